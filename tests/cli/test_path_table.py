@@ -5,7 +5,7 @@ import pytest
 
 from fake_path import fake_path
 from notchflex.cli.tables.path_columns import MEANINGS, parse_columns, usual_groups
-from notchflex.cli.tables.path_rows import MOST_ROWS, reversals_of, rows_note, shown_rows
+from notchflex.cli.tables.path_rows import MAX_ROWS, reversals_of, rows_note, shown_rows
 from notchflex.cli.tables.path_table import print_path
 from notchflex.errors import ErrorCode, InputError
 from notchflex.results.quantities.registry import QUANTITIES
@@ -22,9 +22,9 @@ def commanded(*tension):
 
 
 def test_short_paths_are_shown_whole():
-    path = commanded(*range(MOST_ROWS))
-    assert shown_rows(path) == (list(range(MOST_ROWS)), 1)
-    assert rows_note(MOST_ROWS, MOST_ROWS, 1) == ""
+    path = commanded(*range(MAX_ROWS))
+    assert shown_rows(path) == (list(range(MAX_ROWS)), 1)
+    assert rows_note(MAX_ROWS, MAX_ROWS, 1) == ""
 
 
 @pytest.mark.parametrize(("steps", "stride"), [(61, 2), (121, 5), (500, 10), (6001, 200)])

@@ -56,7 +56,7 @@ def test_a_board_gives_scale_tilt_and_distance(photograph):
     """Known is where the renderer's camera stood: at the first notch, px/mm, deg, 1/mm."""
     seen = sight(photograph, BOARD)
     assert len(seen.corners) == 4
-    known = seen.known(np.array(SCENE.place))
+    known = seen.prior(np.array(SCENE.place))
     assert known.scale == pytest.approx(SCENE.scale, rel=0.003)
     tilt = np.degrees(known.tilt(np.radians(SCENE.direction)))
     assert tilt == pytest.approx(SCENE.tilt, abs=2.0)
@@ -110,7 +110,7 @@ def test_the_drawing_is_the_board_in_its_size(tmp_path, dictionary, capsys):
         image[place] = 255 if white else 0
     seen = sight(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), board)
     assert len(seen.corners) == 6
-    assert seen.known(np.array([340.0, 260.0])).scale == pytest.approx(20.0, rel=0.005)
+    assert seen.prior(np.array([340.0, 260.0])).scale == pytest.approx(20.0, rel=0.005)
     assert board_of(board.text()) == board
 
 

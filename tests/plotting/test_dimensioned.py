@@ -8,7 +8,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import notchflex as nf
-from notchflex.plotting.drawings.dimensioned import MOST, dimensioned_figure, save_dimensioned
+from notchflex.plotting.drawings.dimensioned import MAX_SHAPES, dimensioned_figure, save_dimensioned
 from notchflex.plotting.drawings.notch_views import notch_view
 from notchflex.plotting.shapes.outline import outline
 from notchflex.plotting.shapes.robot_shape import shape_from_angles
@@ -154,7 +154,7 @@ def test_equal_notches_share_a_drawing_and_the_rest_is_named():
     ]
     depths = {f"notch[{number}].depth": 1.20 + 0.02 * number for number in range(1, 9)}
     texts = texts_of(nf.load_robot("two-axis-wrist").with_values(depths))
-    assert sum(text.startswith("notch ") for text in texts) == MOST
+    assert sum(text.startswith("notch ") for text in texts) == MAX_SHAPES
     assert any("Not shown: notches 7, 8." in text for text in texts)
 
 

@@ -23,7 +23,7 @@ from notchflex.plotting import (
     save_animation,
     state_picture,
 )
-from notchflex.plotting.animation import MOST_FRAMES, frames_of
+from notchflex.plotting.animation import MAX_FRAMES, frames_of
 from notchflex.plotting.labels import for_browser as html
 from notchflex.plotting.sheet import Area, Bars, Curve, Panel, grid
 from notchflex.results.quantities.registry import QUANTITIES
@@ -297,7 +297,7 @@ def test_animation_takes_its_time_and_stands_at_both_ends(tmp_path, monkeypatch,
 
 def test_frames_are_spread_over_a_long_path():
     steps = frames_of(fake_path(100, failed=3))
-    assert len(steps) == MOST_FRAMES
+    assert len(steps) == MAX_FRAMES
     assert (steps[0], steps[-1]) == (0, 196)
     with refused("TOO_FEW_DATA"):
         save_animation(fake_path(2, failed=4), "x.gif")

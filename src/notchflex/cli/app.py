@@ -188,8 +188,8 @@ def build() -> App:
         suppress_keyboard_interrupt=False,  # `run` reports it
         print_error=False,
     )
-    here = Path(__file__).parent
-    files = {file.stem: file.relative_to(here) for file in (here / "verbs").rglob("*.py")}
+    folder = Path(__file__).parent
+    files = {file.stem: file.relative_to(folder) for file in (folder / "verbs").rglob("*.py")}
     for order, (verb, (text, examples)) in enumerate(VERBS.items()):
         name = verb.replace("-", "_")
         module = ".".join(files[name].with_suffix("").parts)

@@ -105,7 +105,7 @@ def table(
     """
     from rich.table import Table
 
-    made = Table(
+    result = Table(
         box=None,
         padding=(0, gap, 0, 0),
         header_style="bold",
@@ -117,12 +117,12 @@ def table(
         style = colour if number == 0 else ""
         text = "\n" * (deepest - head.count("\n")) + head.removeprefix(">")
         if head.startswith(">"):
-            made.add_column(text, justify="right", no_wrap=True, style=style)
+            result.add_column(text, justify="right", no_wrap=True, style=style)
         else:
-            made.add_column(text, overflow="fold", style=style)
+            result.add_column(text, overflow="fold", style=style)
     for row in rows:
-        made.add_row(*row)
-    return made
+        result.add_row(*row)
+    return result
 
 
 def shortened(text: str, size: int) -> str:

@@ -136,9 +136,9 @@ class Comparison:
         return branch_words(off, "total_angle", self.measured)
 
     def _rms(self, errors: NDArray[np.float64]) -> NDArray[np.float64]:
-        known = np.isfinite(errors) & self.converged.reshape(-1, *(1,) * (errors.ndim - 1))
-        count = known.sum(axis=0)
-        total = np.sum(np.where(known, errors, 0.0) ** 2, axis=0)
+        is_known = np.isfinite(errors) & self.converged.reshape(-1, *(1,) * (errors.ndim - 1))
+        count = is_known.sum(axis=0)
+        total = np.sum(np.where(is_known, errors, 0.0) ** 2, axis=0)
         return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
     def __repr__(self) -> str:
@@ -234,12 +234,12 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
             f"{robot.number_of_tendons}."
         )
     measured = comparison.measured.load.stroke[:, 0]
-    known = ~np.isnan(measured)
-    stroke = np.where(known, measured, comparison.stroke[:, 0])
+    is_measured = ~np.isnan(measured)
+    stroke = np.where(is_measured, measured, comparison.stroke[:, 0])
     shared = equal_stroke(robot, stroke)
     angles = shared.notch_angle
     # A stroke past the last closing has no equilibrium, but here it is the closed shape.
-    solved = comparison.converged | known
+    solved = comparison.converged | is_measured
     return replace(
         comparison,
         stroke=stroke[:, None],
@@ -255,8 +255,12 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
 
 
 def _angle(measured: Measurements) -> str:
-    seen = measured.observed
-    return "edge_angle" if "edge_angle" in seen and "notch_angle" not in seen else "notch_angle"
+    observed = measured.observed
+    return (
+        "edge_angle"
+        if "edge_angle" in observed and "notch_angle" not in observed
+        else "notch_angle"
+    )
 
 
 def _check(robot: Robot, measurements: Measurements) -> None:
@@ -290,5 +294,5 @@ def _error(name: str, measured: Measurements, model: dict[str, Any]) -> float:
     predicted = Predicted({output: model[output][rows]}, np.ones(len(rows), bool), {})
     off, _ = misfit(name, measured.taken(rows), predicted)
     squares = off.reshape(len(rows), -1, 3 if name in _POINTS else 1) ** 2
-    known = np.isfinite(squares).any(axis=2)
-    return float(np.sqrt(np.nansum(squares) / known.sum()))
+    is_known = np.isfinite(squares).any(axis=2)
+    return float(np.sqrt(np.nansum(squares) / is_known.sum()))

@@ -13,7 +13,7 @@ from notchflex.control.limits import Drive, Limits
 from notchflex.control.observer import Observer
 from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
 from notchflex.control.program.response import Response
-from notchflex.control.search.find import find, meet
+from notchflex.control.search.iterative_search import search_iteratively, solve_directly
 from notchflex.control.search.problem import TargetSearch
 from notchflex.control.search.rate import cross_dead_bands, limit_rate
 from notchflex.control.targets import DIRECTION, LARGEST_TARGET, Targets, target_shapes
@@ -179,9 +179,9 @@ class Controller:
     def _correct(self, measured: np.ndarray) -> None:
         """Take up a part of how far the robot is from the model."""
         deviation = measured - self.values
-        seen = np.isfinite(deviation)
+        is_measured = np.isfinite(deviation)
         change = self._feedback * (deviation - self._deviation)
-        self._deviation = np.where(seen, self._deviation + change, self._deviation)
+        self._deviation = np.where(is_measured, self._deviation + change, self._deviation)
 
     def _observe(self, tension: Any, stroke: Any) -> None:
         """Go on from the state that measured tension and stroke tell."""
@@ -197,33 +197,35 @@ class Controller:
 
     def _seek(self, goal: np.ndarray) -> None:
         problem = limit_rate(self._problem, self._command, self._rate)
-        found = meet(problem, self._before, self._command, goal, self._known)
-        left = problem.search.solves - found.solves
-        if found.failure is not None and left > 0:
+        attempt = solve_directly(problem, self._before, self._command, goal, self._known)
+        left = problem.search.solves - attempt.solves
+        if attempt.failure is not None and left > 0:
             fewer = problem._replace(search=replace(problem.search, solves=left))
             # One tendon goes on from where it came nearest. Several, of which one may have turned
             # round, begin anew; so does one whose dead band is still to be crossed.
-            begin, known = found.drive, found.response
+            begin, response = attempt.drive, attempt.response
             if problem.driven.sum() > 1:
-                begin, known = self._command, self._known
+                begin, response = self._command, self._known
             alone = bool(np.count_nonzero(self._command) < 2)
             stays = begin is self._command and alone
-            other = find(fewer, self._before, begin, goal, known, over_bands=stays)
-            found = other._replace(solves=found.solves + other.solves)
-        found = cross_dead_bands(
-            self._problem, self._rate, self._before, self._command, goal, found, self._known
+            other = search_iteratively(fewer, self._before, begin, goal, response, over_bands=stays)
+            attempt = other._replace(solves=attempt.solves + other.solves)
+        attempt = cross_dead_bands(
+            self._problem, self._rate, self._before, self._command, goal, attempt, self._known
         )
-        failure, good = found.failure, found.response.converged and np.isfinite(found.error)
+        failure, solved = attempt.failure, attempt.response.converged and np.isfinite(attempt.error)
         code = failure.name if failure else ""
-        if good:
+        if solved:
             self._command, self._before, self._known = (
-                found.drive,
-                found.response.state,
-                found.response,
+                attempt.drive,
+                attempt.response.state,
+                attempt.response,
             )
         elif failure is None:
             code = Failure.SEARCH_STOPPED.name
-        self.status = ControlStatus(failure is None, code, found.error, found.solves, not good)
+        self.status = ControlStatus(
+            failure is None, code, attempt.error, attempt.solves, not solved
+        )
 
 
 __all__ = ["ControlStatus", "Controller"]

@@ -11,7 +11,7 @@ from notchflex.results.files.io import whole_document
 from notchflex.results.quantities.registry import QUANTITIES
 
 
-def following_document(found: Following) -> dict[str, Any]:
+def following_document(following: Following) -> dict[str, Any]:
     """Return the document of the path, with a list `targets` of what each target came to.
 
     Keys of a target: `target`, its values by quantity (units as those of the steps), `step` (of
@@ -20,23 +20,23 @@ def following_document(found: Following) -> dict[str, Any]:
     """
     targets = [
         {
-            "target": _in_file_units(found, index),
-            "step": int(found.step[index]),
-            "reached": bool(found.reached[index]),
-            "error": float(found.error[index]),
-            "reason": found.reason[index],
-            "reason_code": found.code[index],
-            "solves": int(found.solves[index]),
+            "target": _in_file_units(following, index),
+            "step": int(following.step[index]),
+            "reached": bool(following.reached[index]),
+            "error": float(following.error[index]),
+            "reason": following.reason[index],
+            "reason_code": following.code[index],
+            "solves": int(following.solves[index]),
         }
-        for index in range(len(found))
+        for index in range(len(following))
     ]
-    return whole_document(found.path) | {"targets": targets}
+    return whole_document(following.path) | {"targets": targets}
 
 
-def _in_file_units(found: Following, index: int) -> dict[str, Any]:
+def _in_file_units(following: Following, index: int) -> dict[str, Any]:
     """The target with the keys and units of the JSON document."""
     values: dict[str, Any] = {}
-    for name, numbers in found.targets.row(index).items():
+    for name, numbers in following.targets.row(index).items():
         key, scale = name, 1.0
         if name != DIRECTION:
             quantity = QUANTITIES[name]
@@ -45,17 +45,17 @@ def _in_file_units(found: Following, index: int) -> dict[str, Any]:
     return values
 
 
-def following_columns(found: Following) -> dict[str, Sequence[Any]]:
+def following_columns(following: Following) -> dict[str, Sequence[Any]]:
     """Return the columns beside those of the path: which target each step is for, and its error.
 
     A step of an overshoot is for no target.
     """
-    steps = len(found.path)
+    steps = len(following.path)
     columns: dict[str, list[Any]] = {
         name: [None] * steps for name in ("target", "target_error", "target_code")
     }
-    for index, step in enumerate(found.step):
+    for index, step in enumerate(following.step):
         columns["target"][step] = index + 1
-        columns["target_error"][step] = float(found.error[index])
-        columns["target_code"][step] = found.code[index]
+        columns["target_error"][step] = float(following.error[index])
+        columns["target_code"][step] = following.code[index]
     return dict(columns)

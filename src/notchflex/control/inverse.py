@@ -133,17 +133,17 @@ def _follow(
         )
     problem, aim = make_problem(robot, targets, options)
     model, rate = problem.model, options.rate
-    before, known = model.first, None
+    before, response = model.first, None
     present = present_drives(problem, before)
     drives: list[np.ndarray] = []
     last: list[int] = []
     attempts: list[Attempt] = []
     for goal in aim.goals:
         near = limit_rate(problem, present, rate)
-        way = approach_target(near, before, present, goal, approach, known)
+        way = approach_target(near, before, present, goal, approach, response)
         attempt, solves = way.last._replace(solves=0), way.solves
         if way.via is None:
-            attempt = cross_dead_bands(problem, rate, before, present, goal, attempt, known)
+            attempt = cross_dead_bands(problem, rate, before, present, goal, attempt, response)
         else:
             drives.append(way.via)
         attempt = attempt._replace(solves=solves + attempt.solves)
@@ -151,8 +151,8 @@ def _follow(
         last.append(len(drives) - 1)
         attempts.append(attempt)
         if attempt.response.converged:
-            present, known = attempt.drive, attempt.response
-            before = known.state
+            present, response = attempt.drive, attempt.response
+            before = response.state
     applied = _load_path(problem, np.array(drives))
     tolerance = problem.search.tolerance
     return Following(

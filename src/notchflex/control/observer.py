@@ -120,11 +120,11 @@ class Observer:
 
     def _compare(self, pulled: np.ndarray, drawn: np.ndarray) -> None:
         for number, model in enumerate(self._models):
-            found = model.solve(self._states[number], pulled)
-            if not found.converged:
+            response = model.solve(self._states[number], pulled)
+            if not response.converged:
                 continue
-            self._states[number] = found.state
-            miss = (found.values[model.slices["stroke"]] - drawn) / self._noise
+            self._states[number] = response.state
+            miss = (response.values[model.slices["stroke"]] - drawn) / self._noise
             miss = miss[np.isfinite(miss) & (pulled > 0.0)]
             self._cost[number] = self._forgets * self._cost[number] + float(miss @ miss)
 

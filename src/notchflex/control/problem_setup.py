@@ -19,7 +19,7 @@ from notchflex.results.state import SavedState, State, check_robot
 from notchflex.robot import Robot
 
 # Drives are sought up to so many times what about closes a notch, where no limit is given.
-_MOST = {"tension": 4.0, "stroke": 2.0}
+_MAX_FACTOR = {"tension": 4.0, "stroke": 2.0}
 # A program is compiled for every set of quantities; those of a group cost little beside each other.
 _ASKED_TOGETHER = (
     ("tip_position", "tip_rotation", "total_angle"),
@@ -98,7 +98,7 @@ def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tup
     unit = float(chain.closing_force)
     if drive == "stroke":
         unit = float(np.asarray(chain.rods.length).sum())
-    most = _MOST[drive] * unit
+    most = _MAX_FACTOR[drive] * unit
     low = np.where(held, fixed, np.maximum(low, -most if drive == "stroke" else 0.0))
     chosen = held | (high <= most)
     high = np.where(held, fixed, np.maximum(np.minimum(high, most), low))

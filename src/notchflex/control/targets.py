@@ -209,10 +209,10 @@ def _numbers(value: Any, name: str) -> np.ndarray:
 def _check_shape(name: str, numbers: np.ndarray, shape: Sequence[int]) -> None:
     if numbers.shape[1:] == tuple(shape) and numbers.ndim == len(shape) + 1 and len(numbers):
         return
-    wanted = "×".join(map(str, shape)) or "one number"
+    expected = "×".join(map(str, shape)) or "one number"
     got = "×".join(map(str, numbers.shape[1:])) or "one number"
     raise InputError.WRONG_SHAPE(
-        f"a target of {name} is {wanted} for this robot, and there must be at least one; "
+        f"a target of {name} is {expected} for this robot, and there must be at least one; "
         f"got {len(numbers) if numbers.ndim else 0} of {got}"
     )
 

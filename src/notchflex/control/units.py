@@ -9,7 +9,7 @@ from notchflex.analysis.kinematics import tip_from_angles
 from notchflex.robot import Robot
 
 # A position is near a robot whose straight length it is a part from the first to the second of.
-_NEAR = (0.2, 2.0)
+_LENGTH_RATIOS = (0.2, 2.0)
 # Sizes of other units, mm.
 _UNITS = {"m": 1000.0, "µm": 0.001}
 
@@ -28,7 +28,7 @@ def unit_hint(robot: Robot, position: Float[np.ndarray, " 3"] | None) -> str:
         return ""
     length = float(np.linalg.norm(tip_from_angles(robot, np.zeros(robot.number_of_notches))[0]))
     size = float(np.sqrt(np.nansum(position**2))) / length
-    low, high = _NEAR
+    low, high = _LENGTH_RATIOS
     for unit, scale in _UNITS.items():
         if low <= size * scale <= high:
             return f"; positions are in mm, and this one would be near the robot in {unit}"

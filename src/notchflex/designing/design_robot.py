@@ -92,20 +92,20 @@ def _tolerances(
     return tolerances
 
 
-def with_yields(made: Design, yields: tuple[YieldOf, ...]) -> Design:
+def with_yields(design: Design, yields: tuple[YieldOf, ...]) -> Design:
     """Add to a design which parts of the robots made within tolerances meet its limits."""
     missed = {one.title for one in yields if not one.met}
-    wishes = tuple(replace(w, met=False) if w.title in missed else w for w in made.wishes)
-    reason = made.reason
+    wishes = tuple(replace(w, met=False) if w.title in missed else w for w in design.wishes)
+    reason = design.reason
     if missed and not reason:
         reason = "the wanted yield cannot be reached; this is the robot that comes nearest"
     return replace(
-        made,
+        design,
         yields=yields,
         wishes=wishes,
         converged=not reason,
         reason=reason,
-        explanation=(*yield_sentences(yields), *made.explanation),
+        explanation=(*yield_sentences(yields), *design.explanation),
     )
 
 
@@ -132,13 +132,13 @@ def made_of(
 ) -> Design:
     """Make the result of the best of some searches."""
     best = searches.best
-    problem, found = best.problem, best.found
-    one = found.evaluation
+    problem, optimum = best.problem, best.found
+    one = optimum.evaluation
     assert one is not None
-    here = problem.evaluate(problem.start)
+    initial = problem.evaluate(problem.start)
     missed = missed_by_wish(problem, one)
     wishes = tuple(
-        _achieved(wish, one.point, here and here.point, missed.get(id(wish)))
+        _achieved(wish, one.point, initial and initial.point, missed.get(id(wish)))
         for wish in problem.wishes
     )
     variables = problem.solver.variables
@@ -150,7 +150,7 @@ def made_of(
         reason = "not all constraints can be met; this is the robot that comes nearest"
     elif far := curves_missed(best):
         reason = far[0].rstrip(".")
-    elif not found.stationary:
+    elif not optimum.stationary:
         reason = "the search ended before it settled; try more starts or iterations"
     solves, gradients = total_counts([*problems, *(one.problem for one in searches.outcomes)])
     return Design(
@@ -176,17 +176,17 @@ def made_of(
 
 def missed_by_wish(problem: DesignProblem, one: DesignEvaluation) -> dict[int, float]:
     """Return the most by which each constraint is missed, in the sizes of its numbers."""
-    found: dict[int, float] = {}
-    for row, missed in zip(problem.rows, np.abs(problem.violation(one)).tolist(), strict=True):
-        found[id(row.wish)] = max(found.get(id(row.wish), 0.0), missed)
-    return found
+    violations: dict[int, float] = {}
+    for row, violation in zip(problem.rows, np.abs(problem.violation(one)).tolist(), strict=True):
+        violations[id(row.wish)] = max(violations.get(id(row.wish), 0.0), violation)
+    return violations
 
 
-def _achieved(wish: Wish, point: Any, before: Any, missed: float | None) -> WishResult:
+def _achieved(wish: Wish, point: Any, before: Any, violation: float | None) -> WishResult:
     """Compare what is achieved with what was asked."""
     met = None
     if isinstance(wish.asked, DesignConstraint):
-        met = missed is not None and missed <= TOLERANCE
+        met = violation is not None and violation <= TOLERANCE
     was = () if before is None else tuple(wish.measure(before.plain).values.tolist())
     return WishResult(
         title=wish.title,

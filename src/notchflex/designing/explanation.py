@@ -9,7 +9,7 @@ import numpy as np
 
 from notchflex._summary import short
 from notchflex.designing.model.wishes import Wish
-from notchflex.designing.search.optimality import Held, multipliers
+from notchflex.designing.search.optimality import ActiveLimit, multipliers
 from notchflex.designing.search.problem import DesignProblem
 from notchflex.designing.search.robust_search import YieldOf
 from notchflex.designing.search.rows import TOLERANCE, Row
@@ -20,7 +20,7 @@ from notchflex.robot import Robot
 from notchflex.robot.value_names import numbers_at
 
 # The most sentences about limits, the dearest first.
-_MOST = 12
+_MAX_SENTENCES = 12
 # A limit is changed by about this part of its size to tell what it costs.
 _PART = 0.05
 _NOTHING = 1e-9
@@ -33,11 +33,13 @@ def curves_missed(outcome: SearchResult) -> tuple[str, ...]:
     sentences: list[str] = []
     for curve in {id(w.curve): w.curve for w in outcome.problem.wishes if w.curve}.values():
         far = one.point.plain.curve(curve).values
-        missed = np.flatnonzero(far > curve.within) + 1
-        if len(missed):
-            shown = ", ".join(map(str, missed[:10].tolist())) + (" ..." if len(missed) > 10 else "")
+        numbers = np.flatnonzero(far > curve.within) + 1
+        if len(numbers):
+            shown = ", ".join(map(str, numbers[:10].tolist())) + (
+                " ..." if len(numbers) > 10 else ""
+            )
             sentences.append(
-                f"curve.{curve.name} is not reached at {len(missed)} of {len(far)} points "
+                f"curve.{curve.name} is not reached at {len(numbers)} of {len(far)} points "
                 f"({shown}), up to {short(float(far.max()))} mm away; asked {curve.within:g} mm."
             )
     return tuple(sentences)
@@ -61,11 +63,11 @@ def yield_sentences(yields: Sequence[YieldOf]) -> tuple[str, ...]:
 
 def _yield_sentence(one: YieldOf) -> str:
     low, high = (_percent(end) for end in one.interval)
-    wanted = "" if one.wanted is None else f", wanted {_percent(one.wanted)} %"
+    target = "" if one.wanted is None else f", wanted {_percent(one.wanted)} %"
     meets = "meet" if one.title == "all limits" else "meet the limit of"
     return (
         f"{_percent(one.achieved)} % of the robots made within the tolerances {meets} {one.title} "
-        f"({low} to {high} %{wanted}); without regard to tolerances {_percent(one.plain)} %."
+        f"({low} to {high} %{target}); without regard to tolerances {_percent(one.plain)} %."
     )
 
 
@@ -84,18 +86,18 @@ def _about_limits(outcome: SearchResult) -> tuple[str, ...]:
     problem = outcome.problem
     if problem.worst(one) > TOLERANCE:
         return (*_missed(outcome), *_at_limits(outcome))
-    found = multipliers(problem, outcome.found.z, one)
-    costs = sorted(found.held, key=lambda held: -abs(_effect(problem, held)[1]))
+    active = multipliers(problem, outcome.found.z, one)
+    costs = sorted(active.held, key=lambda held: -abs(_effect(problem, held)[1]))
     sentences = [_sentence(problem, held) for held in costs]
     kept = [one for one in sentences if one]
-    left = len(kept) - _MOST
+    left = len(kept) - _MAX_SENTENCES
     if not kept:
         kept = ["No limit holds the design: what is asked is met inside all limits."]
     more = [f"{left} more limits are reached."] if left > 0 else []
-    return (*kept[:_MOST], *more)
+    return (*kept[:_MAX_SENTENCES], *more)
 
 
-def _effect(problem: DesignProblem, held: Held) -> tuple[float, float]:
+def _effect(problem: DesignProblem, held: ActiveLimit) -> tuple[float, float]:
     """A round change of a limit, and what it changes of the sum."""
     if held.is_variable:
         size = problem.solver.variables.span[held.row]
@@ -113,12 +115,12 @@ def _round(value: float) -> float:
     return max(one * power for one in (1.0, 2.0, 5.0) if one * power <= value * (1.0 + 1e-9))
 
 
-def _sentence(problem: DesignProblem, held: Held) -> str:
+def _sentence(problem: DesignProblem, held: ActiveLimit) -> str:
     step, effect = _effect(problem, held)
     what = _objective_name(problem)
-    place, unit, change = _place(problem, held, step)
+    limit, unit, change = _place(problem, held, step)
     if what is None or abs(effect) <= _NOTHING * problem.total_size:
-        return f"{place}." if held.side else ""
+        return f"{limit}." if held.side else ""
     name, of_unit, sign = what
     gain = effect if held.side else -abs(effect)
     if held.side == 0:
@@ -127,10 +129,10 @@ def _sentence(problem: DesignProblem, held: Held) -> str:
     elif held.side < 0:
         gain = -effect
     amount = f"{short(abs(gain))} {of_unit}".strip()
-    return f"{place}; {change} would {'save' if sign > 0 else 'gain'} {amount} of {name}."
+    return f"{limit}; {change} would {'save' if sign > 0 else 'gain'} {amount} of {name}."
 
 
-def _place(problem: DesignProblem, held: Held, step: float) -> tuple[str, str, str]:
+def _place(problem: DesignProblem, held: ActiveLimit, step: float) -> tuple[str, str, str]:
     if held.is_variable:
         column = problem.solver.variables.columns[held.row]
         limit = column.upper if held.side > 0 else column.lower
@@ -166,13 +168,13 @@ def _missed(outcome: SearchResult) -> tuple[str, ...]:
     """What cannot be met together, and by how much the nearest robot misses it."""
     one, problem = outcome.found.evaluation, outcome.problem
     assert one is not None
-    missed = np.abs(problem.violation(one))
+    violation = np.abs(problem.violation(one))
     worst: dict[int, tuple[float, int]] = {}
     wishes: dict[int, Wish] = {}
     for number, row in enumerate(problem.rows):
-        if missed[number] > TOLERANCE:
+        if violation[number] > TOLERANCE:
             before = worst.get(id(row.wish), (0.0, number))
-            worst[id(row.wish)] = max(before, (float(missed[number]), number))
+            worst[id(row.wish)] = max(before, (float(violation[number]), number))
             wishes[id(row.wish)] = row.wish
     sentences: list[str] = []
     for _, number in sorted(worst.values(), reverse=True):

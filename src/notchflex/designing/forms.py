@@ -18,7 +18,7 @@ from notchflex.robot import Robot, from_table, to_table
 from notchflex.robot.robot import remember_source, source_of
 from notchflex.robot.value_names import numbers_at
 
-MOST_FORMS = 200
+MAX_FORMS = 200
 
 
 def problems_of(spec: DesignSpec, robot: Robot) -> list[DesignProblem]:
@@ -73,10 +73,10 @@ def _forms(spec: DesignSpec, robot: Robot) -> list[Robot]:
         for stock in spec.stock
     ]
     combinations = list(itertools.product(numbers, itertools.product(*sizes)))
-    if len(combinations) > MOST_FORMS:
+    if len(combinations) > MAX_FORMS:
         raise InputError.OUT_OF_RANGE(
             f"there are {len(combinations)} combinations of sizes and numbers of notches; at most "
-            f"{MOST_FORMS} can be searched."
+            f"{MAX_FORMS} can be searched."
         )
     robots: list[Robot] = []
     problem: InputError | None = None

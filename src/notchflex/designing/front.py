@@ -30,7 +30,7 @@ from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 
-_MOST = 3
+_MAX_OBJECTIVES = 3
 _UNSOLVED = 1e6
 # A point is kept beside another if it differs by this part of the range of an objective.
 _APART = 1e-3
@@ -106,9 +106,9 @@ def design_front(
     """
     need("pymoo", "design", "a front between objectives")
     asked, first = given(spec, robot)
-    if not 2 <= len(asked.objective) <= _MOST or asked.curve:
+    if not 2 <= len(asked.objective) <= _MAX_OBJECTIVES or asked.curve:
         raise InputError.UNSUPPORTED(
-            f"a front needs 2 or {_MOST} objectives, and curves as one of them; got "
+            f"a front needs 2 or {_MAX_OBJECTIVES} objectives, and curves as one of them; got "
             f"{len(asked.objective)}"
         )
     if asked.is_robust:
@@ -159,10 +159,12 @@ def _spread(
 
     size = 4 * points
     count = len(problem.objectives)
-    here = [one for _, one in evaluate_all(problem, smooth(problem, size, seed)) if one is not None]
-    if here:
-        problem.set_sizes(here)
-    known: dict[bytes, DesignEvaluation] = {}
+    evaluations = [
+        one for _, one in evaluate_all(problem, smooth(problem, size, seed)) if one is not None
+    ]
+    if evaluations:
+        problem.set_sizes(evaluations)
+    evaluated: dict[bytes, DesignEvaluation] = {}
 
     class Batched(PymooProblem):  # pyright: ignore[reportUntypedBaseClass]
         """One batch a generation."""
@@ -173,13 +175,13 @@ def _spread(
 
         def _evaluate(self, x: np.ndarray, out: dict[str, Any], *_: Any, **__: Any) -> None:
             objectives = np.full((len(x), count), _UNSOLVED)
-            missed = np.full((len(x), len(problem.rows)), _UNSOLVED)
+            violation = np.full((len(x), len(problem.rows)), _UNSOLVED)
             for row, (z, one) in enumerate(evaluate_all(problem, x)):
                 if one is not None:
-                    known[np.asarray(z).tobytes()] = one
+                    evaluated[np.asarray(z).tobytes()] = one
                     objectives[row] = sums(problem, one)
-                    missed[row] = np.abs(problem.violation(one)) - 1e-3
-            out["F"], out["G"] = objectives, missed
+                    violation[row] = np.abs(problem.violation(one)) - 1e-3
+            out["F"], out["G"] = objectives, violation
 
     half = size // 2
     start: Any = np.concatenate(
@@ -188,7 +190,7 @@ def _spread(
     algorithm: Any = NSGA2(pop_size=size, sampling=start)
     result: Any = minimize(Batched(), algorithm, ("n_gen", generations), seed=seed, verbose=False)
     population = result.pop.get("X")
-    every = [(problem, z, known[z.tobytes()]) for z in population if z.tobytes() in known]
+    every = [(problem, z, evaluated[z.tobytes()]) for z in population if z.tobytes() in evaluated]
     return sorted(every, key=lambda one: problem.worst(one[2]))
 
 
@@ -203,33 +205,33 @@ def _polished(
         for wish, value in zip(wishes[1:], values[1:], strict=True)
     ]
     first = replace_problem(problem, wishes[0], limited)
-    found = search_from(first, z, iterations)
-    if found.evaluation is None or first.worst(found.evaluation) > TOLERANCE:
+    optimum = search_from(first, z, iterations)
+    if optimum.evaluation is None or first.worst(optimum.evaluation) > TOLERANCE:
         return problem, z, one
-    whole = problem.evaluate(found.z)
-    full = None if whole is None else problem.with_slopes(whole, found.z)
-    return (problem, z, one) if full is None else (problem, found.z, full)
+    whole = problem.evaluate(optimum.z)
+    full = None if whole is None else problem.with_slopes(whole, optimum.z)
+    return (problem, z, one) if full is None else (problem, optimum.z, full)
 
 
 def replace_problem(
     problem: DesignProblem, kept: Wish, limited: list[tuple[Wish, float]]
 ) -> DesignProblem:
     """Return a problem of one objective, with limits on the others."""
-    made = DesignProblem(problem.solver, (kept, *problem.constraints), tuple(limited))
+    replaced = DesignProblem(problem.solver, (kept, *problem.constraints), tuple(limited))
     sizes = [problem.sizes, np.array([max(abs(most), 1e-12) for _, most in limited])]
-    vars(made)["sizes"] = np.concatenate(sizes)
-    vars(made)["total_size"] = problem.total_size
-    return made
+    vars(replaced)["sizes"] = np.concatenate(sizes)
+    vars(replaced)["total_size"] = problem.total_size
+    return replaced
 
 
 def _chosen(
-    found: list[tuple[DesignProblem, Vector, DesignEvaluation]], points: int
+    candidates: list[tuple[DesignProblem, Vector, DesignEvaluation]], points: int
 ) -> list[tuple[DesignProblem, Vector, DesignEvaluation]]:
     """Choose points that none of the others beats, spread evenly, by the first objective."""
-    good = [one for one in found if one[0].worst(one[2]) <= max(TOLERANCE, 2e-3)]
-    if not good:
+    feasible = [one for one in candidates if one[0].worst(one[2]) <= max(TOLERANCE, 2e-3)]
+    if not feasible:
         return []
-    values = np.array([sums(problem, one) for problem, _, one in good])
+    values = np.array([sums(problem, one) for problem, _, one in feasible])
     span = np.ptp(values, axis=0)
     scaled = (values - values.min(axis=0)) / np.where(span > 0.0, span, 1.0)
     best = [
@@ -247,7 +249,7 @@ def _chosen(
         targets = np.linspace(0.0, along[-1], points)
         kept = [kept[int(np.argmin(np.abs(along - one)))] for one in targets]
         kept = list(dict.fromkeys(kept))
-    return [good[k] for k in kept]
+    return [feasible[k] for k in kept]
 
 
 def _design(
@@ -257,9 +259,9 @@ def _design(
     one: tuple[DesignProblem, Vector, DesignEvaluation],
 ) -> Design:
     problem, z, evaluation = one
-    from notchflex.designing.search.local import Found
+    from notchflex.designing.search.local import LocalOptimum
 
-    found = Found(z, evaluation, True, 0)
-    outcome = SearchResult(problem, problems.index(problem), z, found)
-    made = made_of(spec, first, problems, Searches([outcome]))
-    return replace(made, explanation=())
+    optimum = LocalOptimum(z, evaluation, True, 0)
+    outcome = SearchResult(problem, problems.index(problem), z, optimum)
+    design = made_of(spec, first, problems, Searches([outcome]))
+    return replace(design, explanation=())

@@ -57,7 +57,7 @@ def cuts_of(robot: Robot) -> RobotCuts:
         (5, 8.0, 10.0)
     """
     at = robot.tube.base_length
-    found: list[PlacedCut] = []
+    cuts: list[PlacedCut] = []
     starts: list[float] = []
     neighbours = (None, *robot.notches, None)
     for number, notch in enumerate(robot.notches, start=1):
@@ -67,7 +67,7 @@ def cuts_of(robot: Robot) -> RobotCuts:
                 f'a notch of kind = "{notch.kind}" does not know its cuts, so there is no drawing, '
                 "pattern or solid of it; give its class a method `cut_layout`."
             )
-        found += [PlacedCut(number, cut.moved(at)) for cut in layout.cuts]
+        cuts += [PlacedCut(number, cut.moved(at)) for cut in layout.cuts]
         starts.append(at)
         at += layout.length
-    return RobotCuts(tuple(found), tuple(starts), at)
+    return RobotCuts(tuple(cuts), tuple(starts), at)

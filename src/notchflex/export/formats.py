@@ -44,8 +44,8 @@ class Format:
     def build(self, subject: Subject, options: Any) -> Document:
         """Make the document; nothing is written."""
         module, _, function = self.builder.partition(":")
-        made: Builder = getattr(import_module(module), function)
-        return made(subject, options)
+        builder: Builder = getattr(import_module(module), function)
+        return builder(subject, options)
 
     def check_packages(self, option: str) -> None:
         """Raise if a package that it needs is not installed."""
@@ -134,9 +134,9 @@ def format_of(file: str) -> str:
     for name, one in FORMATS.items():
         if suffix in one.suffixes:
             return name
-    known = ", ".join(suffix for one in FORMATS.values() for suffix in one.suffixes)
+    suffixes = ", ".join(suffix for one in FORMATS.values() for suffix in one.suffixes)
     got = f"the suffix {suffix}" if suffix else "no suffix"
-    raise InputError.FILE_FORMAT(f"{file}: got {got}; the file must end in one of {known}.")
+    raise InputError.FILE_FORMAT(f"{file}: got {got}; the file must end in one of {suffixes}.")
 
 
 def check_suffix(name: str, file: str, option: str) -> None:

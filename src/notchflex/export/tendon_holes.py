@@ -36,10 +36,10 @@ def tendon_holes(robot: Robot, tendon: int) -> list[Hole]:
     lengths = constant(body_lengths(robot.tube, robot.notches))
     line = passage(robot.notches, lengths, one.direction_deg, robot.tube.outer_radius, one.radius)
     side = np.radians(one.direction_deg)
-    place = one.radius * np.array([np.cos(side), np.sin(side), 0.0])
+    position = one.radius * np.array([np.cos(side), np.sin(side), 0.0])
 
     def hole(body: int, along: float) -> Hole:
-        return Hole(body, place + np.array([0.0, 0.0, along]))
+        return Hole(body, position + np.array([0.0, 0.0, along]))
 
     last = one.end_body or robot.number_of_notches
     holes = [hole(0, 0.0)]

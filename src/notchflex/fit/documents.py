@@ -28,11 +28,11 @@ HEAD = {"program": "notchflex", "version": __version__}
 _UNIT_OF_COST: dict[type, str] = {SumOfRobotErrors: "deg", SumOfDistances: "mm"}
 
 
-def calibration_document(found: Calibration) -> dict[str, Any]:
+def calibration_document(calibration: Calibration) -> dict[str, Any]:
     """Return a fit as a document.
 
     Args:
-        found: The fit.
+        calibration: The fit.
 
     Returns:
         `converged`, `reason`, `objective`, `cost`, `numbers_measured` (`numbers_counted` without
@@ -42,30 +42,30 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         mean squares of every notch, beside the repeats), `searches`, `solves` (number of rows
         solved) and `robots` (their data, and their descriptions with the fitted constants).
     """
-    objective = found.problem.objective
+    objective = calibration.problem.objective
     huber = {"huber": objective.huber} if isinstance(objective, LeastSquares) else {}
     return {
         **HEAD,
-        "converged": found.converged,
-        "reason": found.reason,
+        "converged": calibration.converged,
+        "reason": calibration.reason,
         "objective": {"name": type(objective).__name__, **huber},
-        "cost": found.cost,
+        "cost": calibration.cost,
         "cost_unit": _UNIT_OF_COST.get(type(objective), ""),
-        "numbers_measured": len(found.residuals),
-        "numbers_counted": found.counted,
-        "degrees_of_freedom": found.freedom,
-        "reduced_chi_squared": _finite(found.reduced_chi_squared),
-        "intervals_widened_by": found.widened,
-        "constants": _constants(found),
-        "correlation": [[_finite(one) for one in row] for row in found.correlation],
-        "verdict": list(diagnose(found)),
-        "noise": _noise(found),
-        "errors": _errors(found),
-        "searches": _searches(found),
-        "solves": found.solves,
+        "numbers_measured": len(calibration.residuals),
+        "numbers_counted": calibration.counted,
+        "degrees_of_freedom": calibration.freedom,
+        "reduced_chi_squared": _finite(calibration.reduced_chi_squared),
+        "intervals_widened_by": calibration.widened,
+        "constants": _constants(calibration),
+        "correlation": [[_finite(one) for one in row] for row in calibration.correlation],
+        "verdict": list(diagnose(calibration)),
+        "noise": _noise(calibration),
+        "errors": _errors(calibration),
+        "searches": _searches(calibration),
+        "solves": calibration.solves,
         "robots": {
-            label: {"data": data_of(found, label), "robot": plain(to_table(robot))}
-            for label, robot in found.robots.items()
+            label: {"data": data_of(calibration, label), "robot": plain(to_table(robot))}
+            for label, robot in calibration.robots.items()
         },
     }
 
@@ -104,7 +104,7 @@ def left_out_document(left_out: LeftOut) -> dict[str, Any]:
                     }
                     for name, error in fold.errors.items()
                 ],
-                "before": {name: list(known) for name, known in fold.before.items()},
+                "before": {name: list(sizes) for name, sizes in fold.before.items()},
                 "photograph": _photograph(fold),
             }
             for fold in left_out.folds
@@ -195,31 +195,31 @@ def posterior_document(drawn: Posterior, *, draws: bool = False) -> dict[str, An
     }
 
 
-def data_of(found: Calibration, label: str) -> list[str]:
+def data_of(calibration: Calibration, label: str) -> list[str]:
     """Return the sources of the measurements of a robot."""
-    sources = (one.source for one in found.problem.samples.of_robot(label))
+    sources = (one.source for one in calibration.problem.samples.of_robot(label))
     return list(dict.fromkeys(sources))
 
 
-def _constants(found: Calibration) -> list[dict[str, Any]]:
-    by_pulls = np.sqrt(np.diag(found.by_pulls.covariance))
-    by_rows = np.sqrt(np.diag(found.covariance_by_rows))
+def _constants(calibration: Calibration) -> list[dict[str, Any]]:
+    by_pulls = np.sqrt(np.diag(calibration.by_pulls.covariance))
+    by_rows = np.sqrt(np.diag(calibration.covariance_by_rows))
     rows: list[dict[str, Any]] = []
-    for number, unknown in enumerate(found.problem.unknowns):
-        interval = found.intervals.get(unknown.name)
+    for number, unknown in enumerate(calibration.problem.unknowns):
+        interval = calibration.intervals.get(unknown.name)
         rows.append(
             {
                 "name": unknown.name,
-                "value": found.values[unknown.name],
+                "value": calibration.values[unknown.name],
                 "unit": unknown.unit,
                 "robots": list(dict.fromkeys(one.label for one in unknown.sets)),
                 "interval_95": None if interval is None else [interval.lower, interval.upper],
                 "interval_reason": "" if interval is None else interval.reason,
-                "standard_deviation": _finite(found.deviations[unknown.name]),
+                "standard_deviation": _finite(calibration.deviations[unknown.name]),
                 "standard_deviation_by_pulls": _finite(by_pulls[number]),
                 "standard_deviation_by_rows": _finite(by_rows[number]),
-                "interval_by": "pulls" if found.by_pulls.wider[number] > 1.0 else "rows",
-                "pulls": int(found.by_pulls.pulls[number]),
+                "interval_by": "pulls" if calibration.by_pulls.wider[number] > 1.0 else "rows",
+                "pulls": int(calibration.by_pulls.pulls[number]),
                 "before": unknown.start,
                 "limits": [_finite(unknown.lower), _finite(unknown.upper)],
                 "prior": None if unknown.prior is None else list(unknown.prior),
@@ -228,12 +228,12 @@ def _constants(found: Calibration) -> list[dict[str, Any]]:
     return rows
 
 
-def _noise(found: Calibration) -> list[dict[str, Any]]:
+def _noise(calibration: Calibration) -> list[dict[str, Any]]:
     """Source and root mean square of the noise of every quantity of every file."""
     rows: list[dict[str, Any]] = []
-    for number, sample in enumerate(found.problem.samples.every):
+    for number, sample in enumerate(calibration.problem.samples.every):
         for name in sample.measured.observed:
-            deviation = found.noise.deviation[found.residuals.of(number, name)]
+            deviation = calibration.noise.deviation[calibration.residuals.of(number, name)]
             if not len(deviation):
                 continue
             _, unit, scale = edge(name)
@@ -244,13 +244,13 @@ def _noise(found: Calibration) -> list[dict[str, Any]]:
                     "quantity": name,
                     "unit": unit,
                     "standard_deviation": float(np.sqrt(np.mean(deviation**2))) * scale,
-                    "known_from": found.noise.source[number, name],
+                    "known_from": calibration.noise.source[number, name],
                 }
             )
     return rows
 
 
-def _errors(found: Calibration) -> list[dict[str, Any]]:
+def _errors(calibration: Calibration) -> list[dict[str, Any]]:
     return [
         {
             "robot": one.robot,
@@ -261,18 +261,18 @@ def _errors(found: Calibration) -> list[dict[str, Any]]:
             "repeats": _finite(one.repeats),
             "count": one.count,
         }
-        for one in errors_of_parts(found)
+        for one in errors_of_parts(calibration)
     ]
 
 
-def _searches(found: Calibration) -> list[dict[str, Any]]:
+def _searches(calibration: Calibration) -> list[dict[str, Any]]:
     return [
         {
             **one._asdict(),
-            "values": dict(zip(found.names, one.values.tolist(), strict=True)),
+            "values": dict(zip(calibration.names, one.values.tolist(), strict=True)),
             "cost": None if one.cost is None else one.cost.value,
         }
-        for one in found.searches
+        for one in calibration.searches
     ]
 
 

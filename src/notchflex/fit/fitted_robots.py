@@ -22,7 +22,7 @@ _FILES = 3
 
 
 def write_fitted(
-    found: Calibration, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
+    calibration: Calibration, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
 ) -> tuple[Path, ...]:
     """Write every fitted robot as a robot file, named after its label.
 
@@ -30,7 +30,7 @@ def write_fitted(
     names the data and the 95 % interval. Constants of the measurement (`sensor.`) are not written.
 
     Args:
-        found: The fit.
+        calibration: The fit.
         folder: Folder of the files; made if it is missing. Files of the same names are replaced.
         inputs: Files that must not be replaced.
 
@@ -45,11 +45,11 @@ def write_fitted(
         >>> write_fitted(found, "fitted")  # doctest: +SKIP
         (PosixPath('fitted/my-wrist.toml'),)
     """
-    names = [f"{label}.toml" for label in found.given]
+    names = [f"{label}.toml" for label in calibration.given]
     files = check_folder(str(folder), names, "the folder of fitted robots", inputs=inputs)
-    targets = dict(zip(found.given, files, strict=True))
+    targets = dict(zip(calibration.given, files, strict=True))
     for label, target in targets.items():
-        if target.exists() and _text(target) == source_of(found.given[label]):
+        if target.exists() and _text(target) == source_of(calibration.given[label]):
             raise InputError.CONFLICT(
                 f"{target}: this would replace the file that {label} was read from; choose "
                 "another folder."
@@ -61,10 +61,10 @@ def write_fitted(
             f"the folder {folder} cannot be made: {problem.strerror}."
         ) from None
     for label, target in targets.items():
-        robot = found.robots[label]
+        robot = calibration.robots[label]
         notes = {
-            one.path: _note(found, unknown)
-            for unknown in found.problem.unknowns
+            one.path: _note(calibration, unknown)
+            for unknown in calibration.problem.unknowns
             for one in unknown.sets
             if one.label == label and one.path not in SENSOR
         }
@@ -72,26 +72,26 @@ def write_fitted(
     return files
 
 
-def _note(found: Calibration, unknown: Unknown) -> str:
+def _note(calibration: Calibration, unknown: Unknown) -> str:
     """The comment beside a fitted value: the data, and how far to trust it."""
     labels = dict.fromkeys(one.label for one in unknown.sets)
-    files = [Path(one).name for label in labels for one in data_of(found, label)]
+    files = [Path(one).name for label in labels for one in data_of(calibration, label)]
     files = list(dict.fromkeys(" ".join(one.split()) for one in files))
     if len(files) > _FILES:
         files = [*files[: _FILES - 1], f"{len(files) - _FILES + 1} more files"]
-    trouble = "" if found.converged else "; the search did not settle"
-    value = with_unit(found.values[unknown.name], unknown.unit)
+    trouble = "" if calibration.converged else "; the search did not settle"
+    value = with_unit(calibration.values[unknown.name], unknown.unit)
     rule = "" if unknown.path == unknown.sets[0].path else f"`{unknown.path}` = {value}, "
-    return f"{', '.join(files)}: {rule}{_trust(found, unknown)}{trouble}"
+    return f"{', '.join(files)}: {rule}{_trust(calibration, unknown)}{trouble}"
 
 
-def _trust(found: Calibration, unknown: Unknown) -> str:
-    interval, unit = found.intervals.get(unknown.name), unknown.unit
+def _trust(calibration: Calibration, unknown: Unknown) -> str:
+    interval, unit = calibration.intervals.get(unknown.name), unknown.unit
     if interval is None:
-        size = found.deviations[unknown.name]
+        size = calibration.deviations[unknown.name]
         return f"standard deviation {size:.2g} {unit}".strip() if isfinite(size) else "no interval"
     low, high = interval.lower, interval.upper
-    if found.tells_no_noise:
+    if calibration.tells_no_noise:
         return f"no interval: {interval.reason}"
     if low is None and high is None:
         return "any value fits"
@@ -99,9 +99,9 @@ def _trust(found: Calibration, unknown: Unknown) -> str:
         ends = f"{low:.5g} to {high:.5g}"
     else:
         ends = f"at most {high:.5g}" if low is None else f"at least {low:.5g}"
-    number = found.names.index(unknown.name)
-    pulls = int(found.by_pulls.pulls[number])
-    by_pulls = f", by {pulls} whole pulls" if found.by_pulls.wider[number] > 1.0 else ""
+    number = calibration.names.index(unknown.name)
+    pulls = int(calibration.by_pulls.pulls[number])
+    by_pulls = f", by {pulls} whole pulls" if calibration.by_pulls.wider[number] > 1.0 else ""
     return f"{ends} {unit}".strip() + f" (95 %{by_pulls})"
 
 

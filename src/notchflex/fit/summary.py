@@ -8,21 +8,21 @@ from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.intervals import Interval
 
 
-def summary(found: Calibration) -> str:
+def summary(calibration: Calibration) -> str:
     """Return constants with intervals and units, root-mean-square errors and the diagnosis."""
-    state = "converged" if found.converged else f"not converged: {found.reason}"
-    lines = [f"{', '.join(found.given)}: {found.counted} numbers measured, {state}"]
-    width = max(map(len, found.names))
-    for name, value in found.values.items():
-        unit, interval = found.units[name], found.intervals.get(name)
+    state = "converged" if calibration.converged else f"not converged: {calibration.reason}"
+    lines = [f"{', '.join(calibration.given)}: {calibration.counted} numbers measured, {state}"]
+    width = max(map(len, calibration.names))
+    for name, value in calibration.values.items():
+        unit, interval = calibration.units[name], calibration.intervals.get(name)
         ends = "" if interval is None else f"  95 %: {_ends(interval, unit)}"
         lines.append(f"  {name:<{width}}  {with_unit(value, unit)}{ends}")
     errors = [
         f"{edge(name)[0]} {error * edge(name)[2]:.3g} {edge(name)[1]}"
-        for name, error in found.residuals.root_mean_squares().items()
+        for name, error in calibration.residuals.root_mean_squares().items()
     ]
     lines.append(f"  rms error: {', '.join(errors)}")
-    return "\n".join([*lines, *(diagnose(found) or (NO_PROBLEMS,))])
+    return "\n".join([*lines, *(diagnose(calibration) or (NO_PROBLEMS,))])
 
 
 def _ends(interval: Interval, unit: str) -> str:

@@ -19,7 +19,7 @@ from notchflex.workspaces.actuation import largest_tensions
 
 # So many steps from a slack tendon to the largest tension, where no rate is given.
 _STEPS_TO_LARGEST = 20
-_MOST_STEPS, _MOST_HISTORY = 100_000, 1000
+_MAX_STEPS, _MAX_HISTORY = 100_000, 1000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,7 +64,7 @@ class EpisodeSettings:
                     f"{name} must be positive and finite, {unit}; got {value:g}"
                 )
         object.__setattr__(self, "rate", float(rate))
-        for name, least, most in (("steps", 1, _MOST_STEPS), ("history", 0, _MOST_HISTORY)):
+        for name, least, most in (("steps", 1, _MAX_STEPS), ("history", 0, _MAX_HISTORY)):
             if not least <= check_integer(getattr(self, name), name) <= most:
                 raise InputError.OUT_OF_RANGE(
                     f"{name} must be from {least} to {most}; got {getattr(self, name)}"

@@ -40,11 +40,11 @@ def random_tensions(
         rate: Largest change of a tension in one step, N.
         steps: How many steps.
     """
-    here, parts, count = np.zeros(len(directions)), [], 0
+    begin, parts, count = np.zeros(len(directions)), [], 0
     while count < steps:
-        there = largest * random_pull(random, directions)
-        number = max(1, int(np.ceil(np.abs(there - here).max() / (_PART_OF_RATE * rate))))
+        end = largest * random_pull(random, directions)
+        number = max(1, int(np.ceil(np.abs(end - begin).max() / (_PART_OF_RATE * rate))))
         way = np.arange(1, min(number, steps - count) + 1)[:, None] / number
-        parts.append(here + way * (there - here))
-        here, count = there, count + number
+        parts.append(begin + way * (end - begin))
+        begin, count = end, count + number
     return np.concatenate(parts)

@@ -90,24 +90,24 @@ class EpisodeRows:
         """
         settings = self.settings
         change = settings.change * np.clip(self._checked(actions, len(which)), -1.0, 1.0)
-        wanted = np.clip(self.tension[which] + change, 0.0, settings.largest)
+        tension = np.clip(self.tension[which] + change, 0.0, settings.largest)
         if settings.history:
             older = self._past[which, :-1]
             self._past[which, 0] = self._seen(which)
             self._past[which, 1:] = older
-        states, found, good = self._stepper.step(self._states[which], wanted)
+        states, outputs, converged = self._stepper.step(self._states[which], tension)
         code = [""] * len(which)
-        for row in np.flatnonzero(~good):
-            path = self._stepper.path(self._states[which[row]], wanted[row])
+        for row in np.flatnonzero(~converged):
+            path = self._stepper.path(self._states[which[row]], tension[row])
             code[row] = path.reason_code[0] or "NO_EQUILIBRIUM"
         # Tensions without equilibrium are refused: the robot stays where it is.
-        self.tension[which] = np.where(good[:, None], wanted, self.tension[which])
-        self.tip[which] = np.where(good[:, None], found["tip_position"], self.tip[which])
+        self.tension[which] = np.where(converged[:, None], tension, self.tension[which])
+        self.tip[which] = np.where(converged[:, None], outputs["tip_position"], self.tip[which])
         self._states[which] = states
         distance = self.distance[which]  # before the target moves on
         self._count[which] += 1
-        reached = (distance <= settings.tolerance) & good & (not self._follow)
-        reward = REACHED * reached - distance / settings.length - FAILED * ~good
+        reached = (distance <= settings.tolerance) & converged & (not self._follow)
+        reward = REACHED * reached - distance / settings.length - FAILED * ~converged
         last = (self._count[which] >= settings.steps) & ~reached
         return Outcome(reward, reached, last, code, distance)
 
@@ -126,8 +126,8 @@ class EpisodeRows:
     def observation(self) -> Float[np.ndarray, "n size"]:
         """What is observed of every row, in parts of the largest tension and of the length."""
         rows = np.arange(len(self._count))
-        seen, target = self._seen(rows), self.target / self.settings.length
-        return np.concatenate([seen, self._past.reshape(len(rows), -1), target], axis=1)
+        observed, target = self._seen(rows), self.target / self.settings.length
+        return np.concatenate([observed, self._past.reshape(len(rows), -1), target], axis=1)
 
     def path(self, row: int) -> Any:
         """Return the present state of one row as a path of one load, for pictures."""
@@ -153,8 +153,8 @@ class EpisodeRows:
         states = np.repeat(self._rest, len(random), axis=0)
         tips = np.empty((*pulls.shape[:2], 3))
         for number in range(pulls.shape[1]):
-            states, found, _ = self._stepper.step(states, pulls[:, number])
-            tips[:, number] = found["tip_position"]
+            states, outputs, _ = self._stepper.step(states, pulls[:, number])
+            tips[:, number] = outputs["tip_position"]
         return tips if self._follow else tips[:, -1:]
 
     def _checked(self, actions: Any, rows: int) -> np.ndarray:

@@ -87,8 +87,8 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
                 self._random[row] = seeding.np_random(seeds[row])[0]
         self._begin(which)
         self._ended[which] = False
-        seen = np.isin(np.arange(self.num_envs), which)
-        return self._rows.observation, self._information(seen, self._rows.distance)
+        is_reset = np.isin(np.arange(self.num_envs), which)
+        return self._rows.observation, self._information(is_reset, self._rows.distance)
 
     def step(
         self, actions: np.ndarray
@@ -157,19 +157,19 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
     def _information(
         self,
-        seen: np.ndarray,
+        is_reset: np.ndarray,
         distance: np.ndarray,
         code: list[str] | None = None,
         reached: np.ndarray | None = None,
     ) -> dict[str, Any]:
         """Information in the form of gymnasium: an array, and which of its rows are given."""
         codes = np.full(self.num_envs, None, object)
-        codes[seen] = np.array(code or [""] * self.num_envs, object)[seen]
-        values: dict[str, Any] = {"distance": np.where(seen, distance, 0.0), "code": codes}
+        codes[is_reset] = np.array(code or [""] * self.num_envs, object)[is_reset]
+        values: dict[str, Any] = {"distance": np.where(is_reset, distance, 0.0), "code": codes}
         if not self.follows:
             none = np.zeros(self.num_envs, bool)
             values["is_success"] = none if reached is None else reached.copy()
-        return values | {f"_{name}": seen.copy() for name in values}
+        return values | {f"_{name}": is_reset.copy() for name in values}
 
 
 class FollowVectorEnv(RobotVectorEnv):

@@ -12,24 +12,24 @@ from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotograp
 from notchflex.results.files.json import document_head
 
 
-def measured_document(found: MeasuredPhotographs) -> dict[str, Any]:
+def measured_document(measured: MeasuredPhotographs) -> dict[str, Any]:
     """Return the JSON document: all photographs, the refused with their reasons."""
     photographs = []
-    for number, one in enumerate(found.photographs):
-        loads = {name: texts[number] for name, texts in found.loads.items()}
+    for number, one in enumerate(measured.photographs):
+        loads = {name: texts[number] for name, texts in measured.loads.items()}
         photographs.append({**_entry(one), "loads": loads})
-    return {**document_head(found.robot), "photographs": photographs}
+    return {**document_head(measured.robot), "photographs": photographs}
 
 
-def cut_document(found: MeasuredCut) -> dict[str, Any]:
+def cut_document(cut: MeasuredCut) -> dict[str, Any]:
     """Return the JSON document of notches that were measured: why not, if they were refused."""
     photographs = [
         {"photograph": one.source, "turn_deg": math.degrees(turn), **_view(one)}
-        for one, turn in zip(found.photographs, found.turns, strict=True)
+        for one, turn in zip(cut.photographs, cut.turns, strict=True)
     ]
-    document: dict[str, Any] = {"measured": found.measured, "photographs": photographs}
-    document |= found.columns() if found.measured else {"reason": found.reason}
-    return {**document_head(found.robot), **document}
+    document: dict[str, Any] = {"measured": cut.measured, "photographs": photographs}
+    document |= cut.columns() if cut.measured else {"reason": cut.reason}
+    return {**document_head(cut.robot), **document}
 
 
 def _entry(one: MeasuredPhotograph) -> dict[str, Any]:

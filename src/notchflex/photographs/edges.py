@@ -16,7 +16,7 @@ STEP = 0.5
 _BESIDE = 5.0  # how far out the background is looked at, px
 _BLURRED = 0.35  # contrast outside over that inside: what blur leaves of a sharp edge
 _USUAL = 70.0  # percentile of the rises that is called usual
-_LEAST_ROOM = 5.0  # gaps that are narrower show no background, px
+_MIN_ROOM = 5.0  # gaps that are narrower show no background, px
 
 
 class Edges(NamedTuple):
@@ -48,7 +48,7 @@ def find_edges(contrast: Contrast, outline: Outline, reach: float, middle: Numbe
 
     height, width = contrast.value.shape
     room = np.minimum(outline.room, 1e6)
-    looked = (room > _LEAST_ROOM) & (outline.breadth > 3.0)
+    looked = (room > _MIN_ROOM) & (outline.breadth > 3.0)
     steps = np.arange(-reach - _BESIDE, reach + 2.0 * _BESIDE + STEP, STEP)
     at = outline.point[0] + middle
     inside = (at > 2.0).all(1) & (at[:, 0] < width - 3.0) & (at[:, 1] < height - 3.0)
@@ -65,27 +65,27 @@ def find_edges(contrast: Contrast, outline: Outline, reach: float, middle: Numbe
     rise = smooth[:, :-2] - smooth[:, 2:]  # toward the inside
     level = rise[:, 1:-1]
     peak = (level > rise[:, :-2]) & (level >= rise[:, 2:])
-    place = steps[2:-2]
+    position = steps[2:-2]
     far = round(_BESIDE / STEP)
     outside = np.minimum(np.arange(2, len(steps) - 2) + far, len(steps) - 1)
     within = smooth[:, np.maximum(np.arange(2, len(steps) - 2) - far, 0)]
     clear = smooth[:, outside] < np.maximum(contrast.threshold, _BLURRED * within)
     strong = within - smooth[:, outside] > 0.5 * contrast.threshold
     limit = np.minimum(reach, 0.6 * room)[:, None]
-    allowed = peak & clear & strong & (np.abs(place)[None] <= limit)
-    cost = np.where(allowed, np.abs(place)[None], np.inf)
+    allowed = peak & clear & strong & (np.abs(position)[None] <= limit)
+    cost = np.where(allowed, np.abs(position)[None], np.inf)
     best = cost.argmin(axis=1)
     row = np.arange(len(best))
-    found = np.isfinite(cost[row, best]) & looked
+    is_edge = np.isfinite(cost[row, best]) & looked
     before, here, after = (rise[row, best + shift] for shift in (0, 1, 2))
     bend = before - 2.0 * here + after
     shift = np.where(bend < 0.0, 0.5 * (before - after) / np.where(bend < 0.0, bend, -1.0), 0.0)
-    offset = place[best] + np.clip(shift, -1.0, 1.0) * STEP
-    return Edges(np.where(found, offset, np.nan), looked, _strength(here, found))
+    offset = position[best] + np.clip(shift, -1.0, 1.0) * STEP
+    return Edges(np.where(is_edge, offset, np.nan), looked, _strength(here, is_edge))
 
 
-def _strength(rise: Numbers, found: NDArray[np.bool_]) -> Numbers:
-    if not found.any():
+def _strength(rise: Numbers, is_edge: NDArray[np.bool_]) -> Numbers:
+    if not is_edge.any():
         return np.zeros(len(rise))
-    usual = max(float(np.percentile(rise[found], _USUAL)), 1e-9)
-    return np.where(found, np.clip(rise / usual, 0.0, 1.0), 0.0)
+    usual = max(float(np.percentile(rise[is_edge], _USUAL)), 1e-9)
+    return np.where(is_edge, np.clip(rise / usual, 0.0, 1.0), 0.0)

@@ -16,19 +16,19 @@ from notchflex.photographs.lines import Lines, lines_of, relative
 
 _PRIOR_ROLL, _PRIOR_TILT = math.radians(10.0), math.radians(8.0)
 _PRIOR_KERF, _PRIOR_CUT = 0.01, 0.006  # of the outer diameter: how well notches are made
-_PRIOR_OWN, _MOST_OWN = 0.1, 0.2  # of the outer diameter: how far a notch may be off by itself
+_PRIOR_OWN, _MAX_OWN = 0.1, 0.2  # of the outer diameter: how far a notch may be off by itself
 _PRIOR_ANY = 1.0  # of the outer diameter: roll and depth are told apart by other photographs
-_PRIOR_NEAR, _NEAR = 0.006, 0.006  # inverse distance of the camera, per outer diameter
+_PRIOR_CAMERA, _CAMERA = 0.006, 0.006  # inverse distance of the camera, per outer diameter
 _EDGE = 0.25  # px: noise of an edge in quick rounds
-_LEAST_NOISE = 0.05  # px
-_FAR = 3.0  # px: an edge farther away belongs to something else
+_MIN_NOISE = 0.05  # px
+_MAX_DISTANCE = 3.0  # px: an edge farther away belongs to something else
 _CAP, _ALIKE = 4.0, 4.0  # residuals over their noise; edges that err as one
 _OWN = 0.75  # px: how far a line may be shifted from the others and still lie where it should
 _COMMON = 0.025  # of the width of the tube: how far all lines may be shifted outward or inward
 _LINE = np.array([0.1, 0.06])  # px: usual shift and turn of a line
 _ROBUST = 3.0  # over the noise: edges farther away count less
 _DAMPING, _LITTLE = 1e-3, 1e-7
-_MOST_TURN = 0.35  # rad in one step
+_MAX_TURN = 0.35  # rad in one step
 _EARLY = 5  # rounds in which spreads of lines are not yet found
 _DONE = 2e-3  # of `_scales`: smaller steps end a fit
 
@@ -93,12 +93,12 @@ def refine(
             break
     outline, jacobian = _outline(model, numbers)
     edges = find_edges(contrast, outline, max(reaches[-1], 3.0), middle)
-    good = np.abs(edges.offset) < near
-    score = float(good[edges.looked].sum() / max(1, len(good) // 2, edges.looked.sum()))
+    is_near = np.abs(edges.offset) < near
+    score = float(is_near[edges.looked].sum() / max(1, len(is_near) // 2, edges.looked.sum()))
     return Fit(numbers, outline, edges, jacobian, edges.offset, score)
 
 
-class _Weighed(NamedTuple):
+class _EdgeWeights(NamedTuple):
     """How edges count: weights (1/px^2, (N,)), columns of errors of lines and their spreads."""
 
     weight: Numbers
@@ -106,19 +106,19 @@ class _Weighed(NamedTuple):
     spreads: Numbers
 
 
-def _quick(offset: Numbers, robust: float) -> _Weighed:
+def _quick(offset: Numbers, robust: float) -> _EdgeWeights:
     """Weigh edges by their distance alone."""
-    found = np.isfinite(offset)
-    weight = np.where(found, 1.0 / (1.0 + (np.nan_to_num(offset) / robust) ** 2), 0.0)
-    return _Weighed(weight / _EDGE**2, np.zeros((len(offset), 0)), np.zeros(0))
+    is_edge = np.isfinite(offset)
+    weight = np.where(is_edge, 1.0 / (1.0 + (np.nan_to_num(offset) / robust) ** 2), 0.0)
+    return _EdgeWeights(weight / _EDGE**2, np.zeros((len(offset), 0)), np.zeros(0))
 
 
 def _noise_of(errors: Numbers) -> float:
-    known = np.abs(errors[np.isfinite(errors)])
-    return max(1.4826 * float(np.median(known)), _LEAST_NOISE) if known.size else _LEAST_NOISE
+    finite = np.abs(errors[np.isfinite(errors)])
+    return max(1.4826 * float(np.median(finite)), _MIN_NOISE) if finite.size else _MIN_NOISE
 
 
-def _weighed(lines: Lines, edges: Edges, fitted: int | None) -> _Weighed:
+def _weighed(lines: Lines, edges: Edges, fitted: int | None) -> _EdgeWeights:
     """Weigh edges by their distance from their line, and lines by their distance from others."""
     noise, strength = 0.3, edges.strength
     errors, left = lines.errors(edges.offset, _ROBUST * noise, strength)
@@ -127,11 +127,11 @@ def _weighed(lines: Lines, edges: Edges, fitted: int | None) -> _Weighed:
         errors, left = lines.errors(edges.offset, _ROBUST * noise, strength)
     weight = strength**2 / (1.0 + (np.nan_to_num(left) / (_ROBUST * noise)) ** 2) / noise**2
     weight = np.where(np.isfinite(left), weight, 0.0)
-    return _Weighed(weight, lines.columns(), lines.spreads(errors, fitted))
+    return _EdgeWeights(weight, lines.columns(), lines.spreads(errors, fitted))
 
 
 def _stepped(
-    model: OutlineModel, numbers: Numbers, jacobian: Numbers, offset: Numbers, weighed: _Weighed
+    model: OutlineModel, numbers: Numbers, jacobian: Numbers, offset: Numbers, weighed: _EdgeWeights
 ) -> Numbers:
     """Take one damped Gauss-Newton step within the bounds."""
     count = len(numbers)
@@ -156,12 +156,12 @@ def _stepped(
         free[:count] &= ~beyond  # numbers at a bound stay there, the others are solved again
     moved = step[:count]
     turned = moved[NUMBERS : NUMBERS + model.table.notches]
-    moved = moved * min(1.0, _MOST_TURN / max(float(np.abs(turned).max()), 1e-12))
+    moved = moved * min(1.0, _MAX_TURN / max(float(np.abs(turned).max()), 1e-12))
     return np.clip(numbers + moved, low, high)
 
 
 def _normal(
-    model: OutlineModel, numbers: Numbers, jacobian: Numbers, offset: Numbers, weighed: _Weighed
+    model: OutlineModel, numbers: Numbers, jacobian: Numbers, offset: Numbers, weighed: _EdgeWeights
 ) -> tuple[Numbers, Numbers]:
     """Return the normal matrix and the right side, for the numbers and the errors of lines."""
     rows = np.hstack([jacobian, weighed.columns])
@@ -180,14 +180,14 @@ def priors(model: OutlineModel, numbers: Numbers) -> tuple[Numbers, Numbers]:
     turn = math.pi if math.cos(numbers[4]) < 0.0 else 0.0
     centre[4], spread[4] = turn, _PRIOR_ROLL
     spread[5] = _PRIOR_TILT
-    centre[6], spread[6] = _NEAR / outer, _PRIOR_NEAR / outer
-    known = model.known
-    if known.has_scale:
-        centre[3], spread[3] = math.log(known.scale), known.scale_deviation
-    if math.isfinite(known.slope_deviation):
-        centre[5], spread[5] = known.tilt(float(numbers[2])), known.slope_deviation
-    if known.perspective_deviation < spread[6]:
-        centre[6], spread[6] = known.perspective, known.perspective_deviation
+    centre[6], spread[6] = _CAMERA / outer, _PRIOR_CAMERA / outer
+    prior = model.prior
+    if prior.has_scale:
+        centre[3], spread[3] = math.log(prior.scale), prior.scale_deviation
+    if math.isfinite(prior.slope_deviation):
+        centre[5], spread[5] = prior.tilt(float(numbers[2])), prior.slope_deviation
+    if prior.perspective_deviation < spread[6]:
+        centre[6], spread[6] = prior.perspective, prior.perspective_deviation
     spread[7], spread[8] = _PRIOR_KERF * outer, _PRIOR_CUT * outer
     n = model.table.notches
     if len(numbers) > NUMBERS + n:  # where every notch is measured, its file says little of it
@@ -208,7 +208,7 @@ def _bounds(model: OutlineModel, numbers: Numbers) -> tuple[Numbers, Numbers]:
     low[8], high[8] = -0.08 * outer, 0.08 * outer
     angles = slice(NUMBERS, NUMBERS + model.table.notches)
     low[angles], high[angles] = -0.6, 1.9
-    low[angles.stop :], high[angles.stop :] = -_MOST_OWN * outer, _MOST_OWN * outer
+    low[angles.stop :], high[angles.stop :] = -_MAX_OWN * outer, _MAX_OWN * outer
     return low, high
 
 
@@ -223,8 +223,8 @@ def _outline(model: OutlineModel, numbers: Numbers) -> tuple[Outline, Numbers]:
     """Return the outline and its derivatives along its normals, (N, numbers)."""
     steps = np.concatenate([_STEPS, np.full(len(numbers) - NUMBERS, 1e-4)])
     outline = model.outline(np.vstack([numbers, numbers + np.diag(steps)]))
-    seen = np.einsum("bnk,nk->bn", outline.point, outline.normal)
-    return outline, ((seen[1:] - seen[0]) / steps[:, None]).T
+    projected = np.einsum("bnk,nk->bn", outline.point, outline.normal)
+    return outline, ((projected[1:] - projected[0]) / steps[:, None]).T
 
 
 def covariance(fit: Fit, model: OutlineModel) -> tuple[NDArray[np.float64], float]:
@@ -243,7 +243,7 @@ def covariance(fit: Fit, model: OutlineModel) -> tuple[NDArray[np.float64], floa
 
 def cost(fit: Fit, model: OutlineModel) -> float:
     """Return how badly a fit lies, 0 to 1: edges that are missed count 1."""
-    far = np.nan_to_num(np.abs(_own(fit, model)) / _FAR, nan=1.0)
+    far = np.nan_to_num(np.abs(_own(fit, model)) / _MAX_DISTANCE, nan=1.0)
     return float(np.minimum(far[fit.edges.looked], 1.0).mean()) if fit.edges.looked.any() else 1.0
 
 
@@ -269,7 +269,7 @@ def _own(fit: Fit, model: OutlineModel) -> Numbers:
     lines = lines_of(model)
     errors, _ = lines.errors(fit.residual, 1.0)
     most = _COMMON * 2.0 * model.table.outer * math.exp(fit.numbers[3])
-    known = errors[np.isfinite(errors[:, 0]), 0]
-    common = float(np.clip(np.median(known), -most, most)) if len(known) else 0.0
+    finite = errors[np.isfinite(errors[:, 0]), 0]
+    common = float(np.clip(np.median(finite), -most, most)) if len(finite) else 0.0
     shift = common + np.clip(np.nan_to_num(errors[:, 0] - common), -_OWN, _OWN)
     return fit.residual - shift[lines.which]

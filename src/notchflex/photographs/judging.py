@@ -11,22 +11,24 @@ from notchflex.photographs.chain.chain_table import Numbers
 from notchflex.photographs.locating import Located
 from notchflex.photographs.missing import missing
 
-LEAST_WIDTH = 25.0
+MIN_WIDTH = 25.0
 """Width of the tube below which angles are not measured, px."""
 
-MOST_SPREAD = math.radians(0.5)
+MAX_SPREAD = math.radians(0.5)
 """Standard deviation of one angle beyond which none is reported, rad."""
 
 UNCERTAINTY = math.radians(0.11)
 """Root mean square of the standard deviations beyond which no angles are reported, rad."""
 
-_MOST_NOISE = 1.0
+_MAX_NOISE = 1.0
 _RIVAL = 12.0  # by how much the misfit of another shape must be larger
 _OTHER = math.radians(0.7)  # by how much the angles of another shape differ
 _MADE = 0.04  # of the outer diameter: how far notches may differ from the robot file
 
 
-def doubt(located: Located, deviation: Numbers, noise: float, uncertainty: float = math.inf) -> str:
+def rejection_reason(
+    located: Located, deviation: Numbers, noise: float, uncertainty: float = math.inf
+) -> str:
     """Return why angles are not reported; "" if nothing speaks against them.
 
     Args:
@@ -47,12 +49,12 @@ def doubt(located: Located, deviation: Numbers, noise: float, uncertainty: float
 
 
 def _of_scale(located: Located) -> str:
-    numbers, known = located.fit.numbers, located.model.known
+    numbers, prior = located.fit.numbers, located.model.prior
     width = 2.0 * located.model.table.outer * math.exp(numbers[3])
-    if width < LEAST_WIDTH:
-        return f"the tube is {width:.0f} pixels wide; it needs {LEAST_WIDTH:.0f} or more, go nearer"
-    if known.contradicted(numbers):
-        more = 100.0 * math.expm1(numbers[3] - math.log(known.scale))
+    if width < MIN_WIDTH:
+        return f"the tube is {width:.0f} pixels wide; it needs {MIN_WIDTH:.0f} or more, go nearer"
+    if prior.contradicted(numbers):
+        more = 100.0 * math.expm1(numbers[3] - math.log(prior.scale))
         return (
             f"the outer diameter gives a scale {more:+.1f} % off the one that is given or that the "
             "board gives; check the diameter, and that the board lies in the plane of the robot"
@@ -71,9 +73,9 @@ def _of_view(located: Located) -> str:
 
 
 def _of_spread(located: Located, deviation: Numbers, noise: float) -> str:
-    if noise > _MOST_NOISE:
+    if noise > _MAX_NOISE:
         return f"edges lie {noise:.1f} pixels beside the outline"
-    if not np.isfinite(deviation).all() or deviation.max() > MOST_SPREAD:
+    if not np.isfinite(deviation).all() or deviation.max() > MAX_SPREAD:
         worst = int(np.argmax(np.nan_to_num(deviation, nan=np.inf)))
         return (
             f"the angle of notch {worst + 1} is uncertain by {math.degrees(deviation[worst]):.1f} "

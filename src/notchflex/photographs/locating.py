@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from notchflex.photographs.board.ruler import Look
+from notchflex.photographs.board.ruler import RulerReading
 from notchflex.photographs.chain.axis_points import BASE, axis_points, on_axis_points
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 from notchflex.photographs.chain.outline import OutlineModel
 from notchflex.photographs.contrast import Contrast
 from notchflex.photographs.fitting import Fit, cost, covariance, misfit, refine
-from notchflex.photographs.missing import NEAR, missing
+from notchflex.photographs.missing import MAX_RESIDUAL, missing
 from notchflex.photographs.start import COARSE, reversed_view, starts, with_tilts
 
 _COARSE_WIDTH = 40.0  # of the tube in the first fits, px
@@ -55,14 +55,14 @@ class Located(NamedTuple):
 
 
 def locate(
-    table: ChainTable, contrast: Contrast, look: Look, given: Sequence[Numbers] = ()
+    table: ChainTable, contrast: Contrast, reading: RulerReading, given: Sequence[Numbers] = ()
 ) -> Located | None:
     """Find a robot in a photograph; None if nothing there looks like a tube of its proportions.
 
     Args:
         table: The robot.
         contrast: Contrast of the photograph.
-        look: What is known of its scale and tilt.
+        reading: What is known of its scale and tilt.
         given: Numbers from which fits are started; if there are none, starts are searched.
     """
     height, width = contrast.value.shape
@@ -75,9 +75,9 @@ def locate(
     coarse += on_axis_points(table, axis_points(table, coarse[0])[::-1])[:1]
     wide = 2.0 * table.outer * math.exp(coarse[0][3])
     fine = min(1.0, _FINE_WIDTH / wide)
-    known = look.known(coarse[0][:2] + middle).smaller(fine)
+    view_prior = reading.prior(coarse[0][:2] + middle).smaller(fine)
     contrast, middle = contrast.reduced(fine), (middle + 0.5) * fine - 0.5
-    model = OutlineModel(table, base=BASE * table.outer, known=known)
+    model = OutlineModel(table, base=BASE * table.outer, prior=view_prior)
     fits = _fine(model, contrast, middle, [_scaled(numbers, fine) for numbers in coarse])
     latest = fits
     for _ in range(_MOVES):
@@ -105,7 +105,7 @@ def _turned(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers) 
     """Fit again from views that are turned a little."""
     views = fit.numbers + np.zeros((len(_VIEWS), 1))
     views[:, 4:6] += _VIEWS
-    return [refine(model, contrast, one, _LAST_REACHES, middle, NEAR) for one in views]
+    return [refine(model, contrast, one, _LAST_REACHES, middle, MAX_RESIDUAL) for one in views]
 
 
 def _slipped(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers) -> list[Fit]:
@@ -116,7 +116,7 @@ def _slipped(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers)
     table, scale = model.table, math.exp(fit.numbers[3])
     points, height = axis_points(table, fit.numbers), scale * float(table.height.mean())
     pitch = scale * table.length / table.notches
-    side, found = math.cos(fit.numbers[4]), []
+    side, fits = math.cos(fit.numbers[4]), []
     # The ends of bodies are their starts as seen from the tip, where notches lie on the other side.
     for chain, way, hand in (
         (points, pitch, side),
@@ -125,9 +125,9 @@ def _slipped(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers)
     ):
         both = on_axis_points(table, _moved(chain, way))
         numbers = next(one for one in both if hand * math.cos(one[4]) > 0.0)
-        quick = refine(model, contrast, numbers, _FINE_REACHES, middle, NEAR, quick=True)
-        found.append(refine(model, contrast, quick.numbers, _LAST_REACHES, middle, NEAR))
-    return found
+        quick = refine(model, contrast, numbers, _FINE_REACHES, middle, MAX_RESIDUAL, quick=True)
+        fits.append(refine(model, contrast, quick.numbers, _LAST_REACHES, middle, MAX_RESIDUAL))
+    return fits
 
 
 def _moved(points: Numbers, way: float) -> Numbers:
@@ -145,7 +145,7 @@ def _fine(
     quick = [
         min(
             (
-                refine(model, contrast, start, _FINE_REACHES, middle, NEAR, quick=True)
+                refine(model, contrast, start, _FINE_REACHES, middle, MAX_RESIDUAL, quick=True)
                 for start in with_tilts(numbers, _TILT)
             ),
             key=lambda fit: cost(fit, model),
@@ -157,7 +157,7 @@ def _fine(
     if all(missing(model, fit) for fit in quick):
         near = [fit.numbers for fit in quick]
     return [
-        refine(model, contrast, start, _LAST_REACHES, middle, NEAR)
+        refine(model, contrast, start, _LAST_REACHES, middle, MAX_RESIDUAL)
         for numbers in near
         for start in (numbers, reversed_view(numbers))
     ]
@@ -171,7 +171,7 @@ def _coarse(
     given: Sequence[Numbers],
 ) -> list[Numbers]:
     model = OutlineModel(table, 8, 6, base=BASE * table.outer)
-    found: list[tuple[float, Numbers]] = []
+    candidates: list[tuple[float, Numbers]] = []
     low = contrast.reduced(factor)
     low_middle = (middle + 0.5) * factor - 0.5
     images: dict[float, Contrast] = {}
@@ -183,26 +183,32 @@ def _coarse(
         image = images.setdefault(rough, contrast.reduced(rough))
         numbers = _scaled(start, rough / factor)
         fit = refine(
-            model, image, numbers, _COARSE_REACHES, (middle + 0.5) * rough - 0.5, NEAR, quick=True
+            model,
+            image,
+            numbers,
+            _COARSE_REACHES,
+            (middle + 0.5) * rough - 0.5,
+            MAX_RESIDUAL,
+            quick=True,
         )
-        found.append((cost(fit, model), _scaled(fit.numbers, 1.0 / rough)))
-    found.sort(key=lambda one: one[0])
+        candidates.append((cost(fit, model), _scaled(fit.numbers, 1.0 / rough)))
+    candidates.sort(key=lambda one: one[0])
     kept: list[Numbers] = []
-    for _, numbers in found:
+    for _, numbers in candidates:
         if all(_differ(numbers, other) > _SAME for other in kept):
             kept.append(numbers)
     return kept[:_KEPT]
 
 
 def _scaled(numbers: Numbers, factor: float) -> Numbers:
-    made = numbers.copy()
-    made[:2] *= factor
-    made[3] += math.log(factor)
-    return made
+    scaled = numbers.copy()
+    scaled[:2] *= factor
+    scaled[3] += math.log(factor)
+    return scaled
 
 
 def _differ(one: Numbers, other: Numbers) -> float:
     """Return by how much angles differ, rad: toward the same side of the photograph."""
-    seen = [np.sign(math.cos(numbers[4])) * numbers[NUMBERS:] for numbers in (one, other)]
-    apart = float(np.abs(seen[0] - seen[1]).max())
+    shapes = [np.sign(math.cos(numbers[4])) * numbers[NUMBERS:] for numbers in (one, other)]
+    apart = float(np.abs(shapes[0] - shapes[1]).max())
     return apart if math.cos(one[4]) * math.cos(other[4]) > 0.0 else max(apart, 2.0 * _SAME)

@@ -20,10 +20,10 @@ from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_table
 from notchflex.photographs.contrast import contrast
 from notchflex.photographs.fitting import covariance
-from notchflex.photographs.judging import UNCERTAINTY, doubt
+from notchflex.photographs.judging import UNCERTAINTY, rejection_reason
 from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
-from notchflex.photographs.missing import NEAR
+from notchflex.photographs.missing import MAX_RESIDUAL
 from notchflex.photographs.reading import read_photograph
 from notchflex.photographs.taken.loads import loads_of
 from notchflex.robot import Robot
@@ -136,17 +136,17 @@ def measure_picture(
     picture, factor = smaller(picture)
     middle = (np.array([picture.shape[1], picture.shape[0]]) - 1.0) / 2.0
     given = () if chain is None else on_axis_points(table, (chain + 0.5) * factor - 0.5 - middle)
-    look = ruler.look(picture, factor)
-    if isinstance(look, str):
-        return refused_photograph(name, table, look)
-    located = locate(table, look.hidden(contrast(picture)), look, given)
+    reading = ruler.read(picture, factor)
+    if isinstance(reading, str):
+        return refused_photograph(name, table, reading)
+    located = locate(table, reading.hidden(contrast(picture)), reading, given)
     if located is None:
         return refused_photograph(name, table, NO_TUBE)
     factor *= located.factor
     both, noise = covariance(located.fit, located.model)
     angles = slice(NUMBERS, NUMBERS + table.notches)
     deviation = np.sqrt(np.maximum(np.diag(both)[angles], 0.0))
-    reason = doubt(located, deviation, noise, uncertainty)
+    reason = rejection_reason(located, deviation, noise, uncertainty)
     middle = (np.array([picture.shape[1], picture.shape[0]]) * located.factor - 1.0) / 2.0
     return judged_photograph(name, located, both[angles, angles], (reason, noise, factor), middle)
 
@@ -158,8 +158,8 @@ def smaller(picture: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
     factor = min(1.0, math.sqrt(WORKED_ON / (picture.shape[0] * picture.shape[1])))
     if factor == 1.0:
         return picture, factor
-    made: Any = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-    return made, factor
+    resized: Any = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+    return resized, factor
 
 
 def judged_photograph(
@@ -194,7 +194,7 @@ def judged_photograph(
         "found": fit.score,
         "outline": placed(fit.outline.point[0]),
         "chain": placed(axis_points(table, fit.numbers)),
-        "seen": np.abs(fit.residual) < NEAR,
+        "seen": np.abs(fit.residual) < MAX_RESIDUAL,
     }
     if reason:
         return refused_photograph(name, table, reason, **view)

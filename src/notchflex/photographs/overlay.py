@@ -38,7 +38,7 @@ def overlay_names(sources: Sequence[str]) -> list[str]:
 def write_overlay(
     target: str | Path,
     picture: NDArray[np.uint8],
-    found: MeasuredPhotograph,
+    photograph: MeasuredPhotograph,
     lines: Sequence[str] = (),
 ) -> None:
     """Draw the fitted outline over a photograph with the angles, and write it as PNG.
@@ -49,7 +49,7 @@ def write_overlay(
     Args:
         target: The file.
         picture: The photograph, (height, width, 3).
-        found: What was measured in it.
+        photograph: What was measured in it.
         lines: What is written instead of the angles.
 
     Raises:
@@ -60,14 +60,14 @@ def write_overlay(
     factor = min(1.0, LONGEST / max(picture.shape[:2]))
     small = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     size = max(small.shape[:2]) / 1000.0
-    points = (found.outline + 0.5) * factor - 0.5
-    for point, seen in zip(points, found.seen, strict=True):
+    points = (photograph.outline + 0.5) * factor - 0.5
+    for point, is_seen in zip(points, photograph.seen, strict=True):
         if np.abs(point).max() < 1e4:
             at = (round(16 * float(point[0])), round(16 * float(point[1])))
-            colour = _FOUND if seen else _MISSED
+            colour = _FOUND if is_seen else _MISSED
             cv2.circle(small, at, round(16 * 1.3 * size), colour, -1, cv2.LINE_AA, 4)
-    lines = [f"refused: {found.reason}"] if found.reason else lines or _lines(found)
-    colour = _REFUSED if found.reason else (255, 255, 255)
+    lines = [f"refused: {photograph.reason}"] if photograph.reason else lines or _lines(photograph)
+    colour = _REFUSED if photograph.reason else (255, 255, 255)
     height = round(26 * size)
     band = round((len(lines) + 0.4) * height)  # above the picture, so that it hides nothing
     small = cv2.copyMakeBorder(small, band, 0, 0, 0, cv2.BORDER_CONSTANT, value=(40, 40, 40))
@@ -82,11 +82,11 @@ def write_overlay(
         path.write_bytes(data.tobytes())
 
 
-def cut_lines(found: MeasuredCut) -> list[str]:
+def cut_lines(cut: MeasuredCut) -> list[str]:
     """Return what is written over photographs of a straight robot."""
-    if found.reason:
-        return [f"refused: {found.reason}"]
-    columns = (found.height, found.height_deviation, found.depth, found.depth_deviation)
+    if cut.reason:
+        return [f"refused: {cut.reason}"]
+    columns = (cut.height, cut.height_deviation, cut.depth, cut.depth_deviation)
     return [
         f"notch {number}: height {height:.3f} +- {of_height:.3f}, "
         f"depth {depth:.3f} +- {of_depth:.3f} mm"
@@ -94,8 +94,8 @@ def cut_lines(found: MeasuredCut) -> list[str]:
     ]
 
 
-def _lines(found: MeasuredPhotograph) -> list[str]:
-    angles = zip(found.notch_angle, found.notch_angle_deviation, strict=True)
+def _lines(photograph: MeasuredPhotograph) -> list[str]:
+    angles = zip(photograph.notch_angle, photograph.notch_angle_deviation, strict=True)
     return [
         f"notch {number}: {math.degrees(angle):.2f} +- {math.degrees(spread):.2f} deg"
         for number, (angle, spread) in enumerate(angles, 1)

@@ -23,11 +23,11 @@ _CLOSINGS = (2, 4, 7, 11, 16)
 _BIN = 2.0
 _BREAK = 5  # bins: shorter breaks, by highlights, do not end a stretch
 _SHORTEST = 0.6  # of the length of the robot: its centre line is cut short on the inside of a bend
-_MOST_PARTS = 4
-_LEAST_WIDTH = 3.0
+_MAX_PARTS = 4
+_MIN_WIDTH = 3.0
 _SLIPS = (0.0, -0.4, -0.8, 0.4)
 """How far the robot may lie from where the ribbon ends, pitches toward the base."""
-_WIDTHS = np.geomspace(_LEAST_WIDTH, 0.3 * COARSE, 34)
+_WIDTHS = np.geomspace(_MIN_WIDTH, 0.3 * COARSE, 34)
 
 
 class Ribbon(NamedTuple):
@@ -53,13 +53,13 @@ def starts(table: ChainTable, contrast: Contrast, middle: Numbers) -> list[Numbe
         middle: Middle of that photograph, px.
     """
     ribbons = sorted(_ribbons(table, contrast), key=lambda one: -one.quality)
-    found: list[Numbers] = []
+    views: list[Numbers] = []
     for ribbon in _different(ribbons)[:3]:
         for side, slip in itertools.product((1.0, -1.0), _SLIPS):
             numbers = _numbers(table, ribbon, side, slip, middle)
             if numbers is not None:
-                found.append(numbers)
-    return found
+                views.append(numbers)
+    return views
 
 
 def _ribbons(table: ChainTable, contrast: Contrast) -> Iterator[Ribbon]:
@@ -71,7 +71,7 @@ def _ribbons(table: ChainTable, contrast: Contrast) -> Iterator[Ribbon]:
         closed: Any = cv2.morphologyEx(np.pad(mask, radius + 1), cv2.MORPH_CLOSE, disc)
         closed = closed[radius + 1 : -radius - 1, radius + 1 : -radius - 1]
         count, labels, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
-        by_area = np.argsort(-stats[1:count, cv2.CC_STAT_AREA])[:_MOST_PARTS] + 1
+        by_area = np.argsort(-stats[1:count, cv2.CC_STAT_AREA])[:_MAX_PARTS] + 1
         for label in by_area:
             if stats[label, cv2.CC_STAT_AREA] < 60:
                 continue
@@ -100,8 +100,8 @@ def _levels(part: NDArray[np.bool_]) -> Iterator[tuple[Numbers, Numbers]]:
     lengths: list[Numbers] = []
     for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
         y, x = rows + dy, columns + dx
-        there = (y < part.shape[0]) & (x >= 0) & (x < part.shape[1])
-        other = np.where(there, number[np.minimum(y, part.shape[0] - 1), x % part.shape[1]], -1)
+        is_inside = (y < part.shape[0]) & (x >= 0) & (x < part.shape[1])
+        other = np.where(is_inside, number[np.minimum(y, part.shape[0] - 1), x % part.shape[1]], -1)
         has = other >= 0
         ends.append(np.stack([np.nonzero(has)[0], other[has]]))
         lengths.append(np.full(int(has.sum()), math.hypot(dx, dy)))
@@ -169,14 +169,14 @@ def _numbers(
     behind = np.concatenate([[ends[0] + 0.3 * table.outer], ends[1:] + 0.5 * table.uncut])
     at = np.interp(behind, neutral, heading)
     angles = side * np.diff(at) * table.side
-    place = np.array([np.interp(ends[0], neutral, smooth[1:, axis]) for axis in (0, 1)])
+    position = np.array([np.interp(ends[0], neutral, smooth[1:, axis]) for axis in (0, 1)])
     over = ends[0] - neutral[-1]
     if over > 0.0:
-        place = place - over * scale * np.array([math.cos(at[0]), math.sin(at[0])])
+        position = position - over * scale * np.array([math.cos(at[0]), math.sin(at[0])])
     if over > 0.4 * table.length:
         return None
     roll = math.radians(5.0) if side > 0.0 else math.pi + math.radians(5.0)
-    view = [*(place - middle), at[0], math.log(scale), roll, 0.0, 0.003 / table.outer, 0.0, 0.0]
+    view = [*(position - middle), at[0], math.log(scale), roll, 0.0, 0.003 / table.outer, 0.0, 0.0]
     return np.array([*view, *np.clip(angles, -0.3, 1.6)])
 
 
@@ -200,14 +200,14 @@ def _smoothed(points: Numbers, half: int) -> Numbers:
 
 def with_tilts(numbers: Numbers, size: float) -> list[Numbers]:
     """Return a start with the robot tilted toward the camera, and away from it."""
-    made = [numbers.copy(), numbers.copy()]
-    made[0][5], made[1][5] = size, -size
-    return made
+    tilted = [numbers.copy(), numbers.copy()]
+    tilted[0][5], tilted[1][5] = size, -size
+    return tilted
 
 
 def reversed_view(numbers: Numbers) -> Numbers:
     """Return the view that looks alike from far away: rolled and tilted the other way."""
-    made = numbers.copy()
-    turn = math.pi if math.cos(made[4]) < 0.0 else 0.0
-    made[4], made[5] = 2.0 * turn - made[4], -made[5]
-    return made
+    turned = numbers.copy()
+    turn = math.pi if math.cos(turned[4]) < 0.0 else 0.0
+    turned[4], turned[5] = 2.0 * turn - turned[4], -turned[5]
+    return turned

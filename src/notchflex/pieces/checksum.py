@@ -17,8 +17,8 @@ def _place(data: memoryview) -> int | None:
     start = size - 8 - int.from_bytes(data[-8:-4], "little")
     if size < 12 or not 0 < start < size:
         return None
-    found = bytes(data[start:]).rfind(_BEFORE)
-    return None if found < 0 else start + found + len(_BEFORE)
+    start_of_sum = bytes(data[start:]).rfind(_BEFORE)
+    return None if start_of_sum < 0 else start + start_of_sum + len(_BEFORE)
 
 
 def seal(data: memoryview) -> None:
@@ -27,16 +27,16 @@ def seal(data: memoryview) -> None:
     Args:
         data: The bytes of a file that was written with the metadata {KEY: BLANK}.
     """
-    place = _place(data)
-    assert place is not None
-    data[place : place + 8] = b"%08x" % zlib.crc32(data)
+    offset = _place(data)
+    assert offset is not None
+    data[offset : offset + 8] = b"%08x" % zlib.crc32(data)
 
 
 def is_whole(data: memoryview) -> bool:
     """Tell whether the bytes of a file are those that were sealed; its checksum is blanked."""
-    place = _place(data)
-    if place is None:
+    offset = _place(data)
+    if offset is None:
         return False
-    stored = bytes(data[place : place + 8])
-    data[place : place + 8] = BLANK.encode()
+    stored = bytes(data[offset : offset + 8])
+    data[offset : offset + 8] = BLANK.encode()
     return stored == b"%08x" % zlib.crc32(data)

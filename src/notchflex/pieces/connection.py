@@ -155,17 +155,17 @@ def within(seconds: float, call: Callable[[], T]) -> T:
     Raises:
         TimeoutError: It takes longer.
     """
-    found: Future[T] = Future()
+    future: Future[T] = Future()
 
     def work() -> None:
         try:
-            found.set_result(call())
+            future.set_result(call())
         except Exception as problem:
-            found.set_exception(problem)
+            future.set_exception(problem)
 
     threading.Thread(target=work, daemon=True).start()
     try:
-        return found.result(seconds)
+        return future.result(seconds)
     except TimeoutError as problem:
         raise TimeoutError(str(problem) or f"no answer in {seconds:.0f} s") from None
 

@@ -62,29 +62,29 @@ class Manifest:
         return cls(json.loads(json.dumps(document)))
 
     @classmethod
-    def read(cls, text: str, where: str, wanted: str) -> Self:
+    def read(cls, text: str, where: str, expected: str) -> Self:
         """Read the text of a manifest.
 
         Args:
             text: The text.
             where: What messages call it.
-            wanted: The kind that it must be of.
+            expected: The kind that it must be of.
 
         Raises:
             InputError: It is not a manifest of this kind, or one of another format.
         """
         damaged = InputError.FILE_DAMAGED(
-            f"{where} is not a manifest of a {wanted}, or was changed; remove its folder, or take "
-            "another one."
+            f"{where} is not a manifest of a {expected}, or was changed; remove its "
+            "folder, or take another one."
         )
         try:
             document = json.loads(text)
             kind, form = document["kind"], document["format"]
         except (ValueError, TypeError, KeyError, RecursionError):
             raise damaged from None
-        if kind != wanted or form != FORMAT:
+        if kind != expected or form != FORMAT:
             raise InputError.FILE_FORMAT(
-                f"{where} is of kind {kind} and format {form}; needed are {wanted} and {FORMAT}."
+                f"{where} is of kind {kind} and format {form}; needed are {expected} and {FORMAT}."
             )
         numbers = [document.get(key) for key in ("rows", "piece", "pieces")]
         if not isinstance(document.get("versions"), dict) or not all(
@@ -132,11 +132,12 @@ class Manifest:
             InputError: The folder was begun with another version of a library.
         """
         begun = self.document["versions"]
-        for name, here in versions().items():
-            if begun.get(name) != here:
+        for name, current in versions().items():
+            if begun.get(name) != current:
                 raise InputError.CONFLICT(
-                    f"{where} was begun with {name} {begun.get(name)}, and here is {name} {here}, "
-                    "which may give other digits; go on with the former, or take another folder."
+                    f"{where} was begun with {name} {begun.get(name)}, and here is {name} "
+                    f"{current}, which may give other digits; go on with the former, or take "
+                    "another folder."
                 )
 
     def check_same(self, other: Manifest, where: str) -> None:
@@ -151,27 +152,27 @@ class Manifest:
         """
         other.check_versions(where)
         for key in dict.fromkeys([*self.document, *other.document]):
-            place = _difference(key, self.document.get(key), other.document.get(key))
-            if place:
+            difference = _difference(key, self.document.get(key), other.document.get(key))
+            if difference:
                 raise InputError.CONFLICT(
-                    f"{where} holds another {self.kind}: {place}; take another folder, or "
+                    f"{where} holds another {self.kind}: {difference}; take another folder, or "
                     "remove it."
                 )
 
 
-def _difference(place: str, mine: Any, theirs: Any) -> str:
+def _difference(path: str, mine: Any, theirs: Any) -> str:
     """Return the first difference in words, "" if there is none."""
     if mine == theirs:
         return ""
     if isinstance(mine, dict) and isinstance(theirs, dict):
         keys = dict.fromkeys([*mine, *theirs])
-        found = (_difference(f"{place}.{key}", mine.get(key), theirs.get(key)) for key in keys)
-        return next(one for one in found if one)
+        differences = (_difference(f"{path}.{key}", mine.get(key), theirs.get(key)) for key in keys)
+        return next(one for one in differences if one)
     if isinstance(mine, list) and isinstance(theirs, list) and len(mine) == len(theirs):
         pairs = zip(mine, theirs, strict=True)
-        found = (_difference(f"{place}[{n}]", *pair) for n, pair in enumerate(pairs, start=1))
-        return next(one for one in found if one)
-    return f"`{place}` is {_shown(theirs)} there and {_shown(mine)} here"
+        differences = (_difference(f"{path}[{n}]", *pair) for n, pair in enumerate(pairs, start=1))
+        return next(one for one in differences if one)
+    return f"`{path}` is {_shown(theirs)} there and {_shown(mine)} here"
 
 
 def _shown(value: Any) -> str:

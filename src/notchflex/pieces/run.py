@@ -96,13 +96,13 @@ def run_pieces(
     # Products of matrices by several threads may have other last digits.
     with threadpool_limits(1), locked(folder, pieces.start, pieces.stop):
         tidy(folder, manifest.kind, pieces.start, pieces.stop)
-        found = [done_piece(folder, manifest, piece) for piece in pieces]
-        there = [one for one in found if one is not None]
-        left = [piece for piece, one in zip(pieces, found, strict=True) if one is None]
-        place = os.path.abspath(folder)
+        stored = [done_piece(folder, manifest, piece) for piece in pieces]
+        finished = [one for one in stored if one is not None]
+        left = [piece for piece, one in zip(pieces, stored, strict=True) if one is None]
+        absolute = os.path.abspath(folder)
         try:
-            with _running(task, place, left, workers, scheduler, cores) as running:
-                _watch(running, there, manifest, pieces, progress)
+            with _running(task, absolute, left, workers, scheduler, cores) as running:
+                _watch(running, finished, manifest, pieces, progress)
         except InputError as problem:
             if problem.code is not ErrorCode.FILE_UNWRITABLE:
                 raise
@@ -138,14 +138,14 @@ def _running(
 
 def _watch(
     running: Iterable[Done],
-    there: list[Done],
+    finished: list[Done],
     manifest: Manifest,
     pieces: range,
     progress: Progress | None,
 ) -> None:
     """Count what is done."""
-    before = done = sum(one.rows for one in there)
-    unsolved = sum(one.unsolved for one in there)
+    before = done = sum(one.rows for one in finished)
+    unsolved = sum(one.unsolved for one in finished)
     total = manifest.between(pieces.stop - 1)[1] - manifest.between(pieces.start)[0]
     for one in running:
         done, unsolved = done + one.rows, unsolved + one.unsolved

@@ -54,8 +54,8 @@ def in_threads(
         if cores == 1:
             yield from map(work, pieces)
             return
-        with closing(on_cores(work, pieces, cores)) as found:
-            yield from found
+        with closing(on_cores(work, pieces, cores)) as results:
+            yield from results
     finally:
         give_memory_back()
 

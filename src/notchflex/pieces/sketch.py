@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 HALF = 1024
 """Bins on either side of the middle of the sample."""
 
-_FAR = 64 * HALF
+_MAX_BIN = 64 * HALF
 
 
 @dataclass(frozen=True)
@@ -29,30 +29,32 @@ class Scale:
     @classmethod
     def of(cls, values: Float[np.ndarray, " k"]) -> Scale:
         """Find the scale of a sample; NaN is left out."""
-        good = values[np.isfinite(values)]
-        if not len(good):
+        finite = values[np.isfinite(values)]
+        if not len(finite):
             return cls(0.0, 1.0)
-        low, high = float(good.min()), float(good.max())
+        low, high = float(finite.min()), float(finite.max())
         middle = 0.5 * low + 0.5 * high
         return cls(middle, max(0.5 * high - 0.5 * low, 1e-9 * abs(middle), 1e-12))
 
     def bins(self, values: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
         """Return the bin of every value."""
-        place = (values - self.middle) / self.half
-        beyond = np.abs(place) > 1.0
-        found = np.floor(place * HALF)
+        position = (values - self.middle) / self.half
+        beyond = np.abs(position) > 1.0
+        bins = np.floor(position * HALF)
         if beyond.any():
-            far = place[beyond]
-            found[beyond] = np.floor(np.copysign(HALF * (1.0 + np.log(np.abs(far))), far))
-        return np.clip(found, -_FAR, _FAR).astype(np.int64)
+            far = position[beyond]
+            bins[beyond] = np.floor(np.copysign(HALF * (1.0 + np.log(np.abs(far))), far))
+        return np.clip(bins, -_MAX_BIN, _MAX_BIN).astype(np.int64)
 
     def edge(self, number: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
         """Return values whose bins are given; between whole numbers those in between."""
-        place = np.asarray(number, float) / HALF
-        far = np.abs(place) > 1.0
+        position = np.asarray(number, float) / HALF
+        far = np.abs(position) > 1.0
         with np.errstate(over="ignore"):
-            place = np.where(far, np.copysign(np.exp(np.abs(place) - 1.0), place), place)
-        return self.middle + self.half * place
+            position = np.where(
+                far, np.copysign(np.exp(np.abs(position) - 1.0), position), position
+            )
+        return self.middle + self.half * position
 
 
 @dataclass
@@ -81,9 +83,9 @@ class Sketch:
     def of(cls, values: Float[np.ndarray, " k"], start: int, scale: Scale, extremes: int) -> Sketch:
         """Describe a column of a piece, whose first row has the number `start`; NaN is left out."""
         rows = np.arange(start, start + len(values))
-        good = np.isfinite(values)
-        if not good.all():
-            values, rows = values[good], rows[good]
+        is_finite = np.isfinite(values)
+        if not is_finite.all():
+            values, rows = values[is_finite], rows[is_finite]
         if not len(values):
             return cls()
         bins = scale.bins(values)
@@ -108,8 +110,8 @@ class Sketch:
         last = max(self.first + len(self.counts), other.first + len(other.counts))
         counts = np.zeros(last - first, np.int64)
         for one in (self, other):
-            place = one.first - first
-            counts[place : place + len(one.counts)] += one.counts
+            offset = one.first - first
+            counts[offset : offset + len(one.counts)] += one.counts
         keep = max(extremes, 1)
         largest = sorted(self.largest + other.largest, key=lambda one: (-one[0], one[1]))
         return Sketch(
@@ -126,11 +128,11 @@ class Sketch:
         """Return the value that a part of all values lies below, within its bin; NaN of none."""
         if not self.count:
             return math.nan
-        wanted = part * self.count
+        target = part * self.count
         below = np.concatenate([[0], np.cumsum(self.counts)])
-        place = max(int(np.searchsorted(below, wanted)) - 1, 0)
-        inside = (wanted - below[place]) / max(int(self.counts[place]), 1)
-        value = float(scale.edge(np.array(self.first + place + inside)))
+        bin_number = max(int(np.searchsorted(below, target)) - 1, 0)
+        inside = (target - below[bin_number]) / max(int(self.counts[bin_number]), 1)
+        value = float(scale.edge(np.array(self.first + bin_number + inside)))
         return min(max(value, self.smallest[0][0]), self.largest[0][0])
 
     def histogram(self, bins: int, scale: Scale) -> tuple[list[float], list[int]]:
@@ -139,8 +141,8 @@ class Sketch:
             return [], []
         edges = np.linspace(self.smallest[0][0], self.largest[0][0], bins + 1)
         middles = scale.edge(self.first + 0.5 + np.arange(len(self.counts)))
-        place = np.clip(np.searchsorted(edges, middles, side="right") - 1, 0, bins - 1)
-        return edges.tolist(), np.bincount(place, self.counts, bins).astype(int).tolist()
+        bin_numbers = np.clip(np.searchsorted(edges, middles, side="right") - 1, 0, bins - 1)
+        return edges.tolist(), np.bincount(bin_numbers, self.counts, bins).astype(int).tolist()
 
     def document(self) -> dict[str, Any]:
         """Return plain values, which `read` takes."""

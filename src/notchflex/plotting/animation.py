@@ -24,7 +24,7 @@ from notchflex.results.quantities.registry import QUANTITIES
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
-MOST_FRAMES = 48
+MAX_FRAMES = 48
 """Steps of a long path that are shown."""
 
 DOTS_PER_INCH = 80
@@ -107,9 +107,9 @@ def _durations(count: int) -> tuple[float, int]:
 
 def frames_of(path: EquilibriumPath) -> list[int]:
     """Return an even selection of the converged steps, with the first and the last."""
-    good = np.flatnonzero(np.asarray(path.converged))
-    spread = np.linspace(0, len(good) - 1, min(len(good), MOST_FRAMES)).round().astype(int)
-    return [int(step) for step in good[spread]]
+    converged = np.flatnonzero(np.asarray(path.converged))
+    spread = np.linspace(0, len(converged) - 1, min(len(converged), MAX_FRAMES)).round().astype(int)
+    return [int(step) for step in converged[spread]]
 
 
 def _background(path: EquilibriumPath, title: str | None) -> Picture:

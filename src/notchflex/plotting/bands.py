@@ -69,10 +69,13 @@ def _areas(
     """Yield the area between two ends, (2, S), of every branch."""
     low, high = (converged_only(path, end) for end in ends)
     for part, way in branches(load_parameter(path)):
-        good = np.isfinite(low[part]) & np.isfinite(high[part])
-        along = x[part][good]
+        is_finite = np.isfinite(low[part]) & np.isfinite(high[part])
+        along = x[part][is_finite]
         outline = np.stack(
-            [np.append(along, along[::-1]), np.append(low[part][good], high[part][good][::-1])],
+            [
+                np.append(along, along[::-1]),
+                np.append(low[part][is_finite], high[part][is_finite][::-1]),
+            ],
             axis=1,
         )
         if len(along) > 1:

@@ -17,7 +17,7 @@ from notchflex.results.quantities.registry import QUANTITIES
 if TYPE_CHECKING:
     from notchflex.analysis import Batch
 
-MOST_COLUMNS = 12
+MAX_COLUMNS = 12
 """Entries of a quantity, such as notches, that are drawn; of more, an even selection."""
 
 _LEFT_OUT = ("converged", "reason", "iterations", "tip_position", "stable")
@@ -59,17 +59,17 @@ def batch_picture(
         raise InputError.WRONG_SHAPE(
             f"the batch has {rows} rows, and against has the shape {x.shape}; give one value a row."
         )
-    good = _last(batch, "converged")
-    good = np.ones(rows, bool) if good is None else good.astype(bool)
+    converged = _last(batch, "converged")
+    converged = np.ones(rows, bool) if converged is None else converged.astype(bool)
     panels = [
         panel
         for name in batch
         if name in QUANTITIES and name not in _LEFT_OUT
-        if (panel := _over_rows(batch, name, x, label, good)) is not None
+        if (panel := _over_rows(batch, name, x, label, converged)) is not None
     ]
     tips = _last(batch, "tip_position")
     if tips is not None:
-        panels.append(_tips(tips, good))
+        panels.append(_tips(tips, converged))
     if not panels:
         raise InputError.NO_DATA(
             "the batch holds nothing that can be drawn; ask for outputs such as total_angle, "
@@ -90,17 +90,17 @@ def _last(batch: Batch, name: str) -> NDArray[Any] | None:
 
 
 def _over_rows(
-    batch: Batch, name: str, x: NDArray[np.float64], label: str, good: NDArray[np.bool_]
+    batch: Batch, name: str, x: NDArray[np.float64], label: str, converged: NDArray[np.bool_]
 ) -> Panel | None:
     quantity = QUANTITIES[name]
     values = _last(batch, name)
     if values is None or values.dtype.kind not in "fi" or values.ndim > 2:
         return None
-    table = np.where(good[:, None], values.reshape(len(values), -1) * quantity.scale, np.nan)
+    table = np.where(converged[:, None], values.reshape(len(values), -1) * quantity.scale, np.nan)
     if not np.isfinite(table).any():
         return None
     count = table.shape[1]
-    shown = np.unique(np.linspace(0, count - 1, min(count, MOST_COLUMNS)).round().astype(int))
+    shown = np.unique(np.linspace(0, count - 1, min(count, MAX_COLUMNS)).round().astype(int))
     order = np.argsort(x, kind="stable")
     items: list[Mark] = []
     for column, colour in zip(shown, sequence_colours(len(shown)), strict=True):
@@ -111,9 +111,9 @@ def _over_rows(
     return Panel(items, label, quantity.label, legend=BESIDE if count > 1 else "")
 
 
-def _tips(tips: NDArray[np.float64], good: NDArray[np.bool_]) -> Panel:
-    items: list[Mark] = [dots(tips[good][:, [0, 2]], BLUE, 2.5, hover=True, group="tip")]
-    if not good.all():
+def _tips(tips: NDArray[np.float64], converged: NDArray[np.bool_]) -> Panel:
+    items: list[Mark] = [dots(tips[converged][:, [0, 2]], BLUE, 2.5, hover=True, group="tip")]
+    if not converged.all():
         name = "not converged"
-        items.append(dots(tips[~good][:, [0, 2]], VERMILLION, 2.5, name=name, group=name))
-    return Panel(items, *TIP_LABELS, equal=True, legend="" if good.all() else BESIDE)
+        items.append(dots(tips[~converged][:, [0, 2]], VERMILLION, 2.5, name=name, group=name))
+    return Panel(items, *TIP_LABELS, equal=True, legend="" if converged.all() else BESIDE)

@@ -31,7 +31,7 @@ from notchflex.results.quantities.registry import QUANTITIES
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
-MOST = len(MODEL_COLOURS)
+MAX_ROBOTS = len(MODEL_COLOURS)
 """The number of robots that colours can distinguish."""
 
 _SHAPES = 3
@@ -60,9 +60,9 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
         >>> [cell.panel.title for cell in beside_picture(paths).cells[:2]]
         ['mu 0.13', 'mu 0']
     """
-    if not 2 <= len(paths) <= MOST:
+    if not 2 <= len(paths) <= MAX_ROBOTS:
         raise InputError.OUT_OF_RANGE(
-            f"a picture shows 2 to {MOST} robots beside each other; got {len(paths)}."
+            f"a picture shows 2 to {MAX_ROBOTS} robots beside each other; got {len(paths)}."
         )
     colours = dict(zip(paths, MODEL_COLOURS, strict=False))
     cells: list[Cell] = []
@@ -127,8 +127,8 @@ def _most_bent_states(
         angle = path.notch_angle[step] * quantity.scale
         least = min(least, float(angle.min()))
         points = np.stack([np.arange(1, len(angle) + 1), angle], axis=1)
-        look: dict[str, Any] = {"marker": "o", "size": 2.5, "group": name, "hover": True}
-        angles.append(Curve(points, colours[name], **look))
+        style: dict[str, Any] = {"marker": "o", "size": 2.5, "group": name, "hover": True}
+        angles.append(Curve(points, colours[name], **style))
         pulled = path.tension[step] > SLACK
         if pulled.any():
             tendon = int(np.argmax(pulled))

@@ -96,11 +96,11 @@ def driven_by_stroke(path: EquilibriumPath) -> list[int]:
 
 def steps_by_branch(path: EquilibriumPath) -> dict[str, list[int]]:
     """Return the converged steps of loading and of unloading, each if there are any."""
-    good = np.asarray(path.converged)
+    converged = np.asarray(path.converged)
     steps: dict[str, dict[int, None]] = {}
     for part, way in branches(load_parameter(path)):
-        here = (step for step in range(part.start, part.stop) if good[step])
-        steps.setdefault(way, {}).update(dict.fromkeys(here))
+        own_steps = (step for step in range(part.start, part.stop) if converged[step])
+        steps.setdefault(way, {}).update(dict.fromkeys(own_steps))
     return {way: list(some) for way, some in steps.items() if some}
 
 
@@ -110,17 +110,19 @@ def _prescribed(path: EquilibriumPath, tendon: int) -> NDArray[np.float64]:
 
 def _changing(path: EquilibriumPath) -> list[int]:
     """Return the tendons whose prescribed tension or stroke changes."""
-    good = np.asarray(path.converged)
+    converged = np.asarray(path.converged)
     commanded = np.isfinite([path.commanded_tension, path.commanded_stroke]).any(axis=(0, 1))
     tendons = range(path.tension.shape[1])
-    spread = [np.ptp(_prescribed(path, one)[good]) if good.any() else 0.0 for one in tendons]
+    spread = [
+        np.ptp(_prescribed(path, one)[converged]) if converged.any() else 0.0 for one in tendons
+    ]
     return np.flatnonzero(np.where(commanded, spread, 0.0) > 1e-12).tolist()
 
 
 def _in_proportion(path: EquilibriumPath, first: int, other: int) -> bool:
     """Return whether what drives two tendons changes in proportion."""
-    good = np.asarray(path.converged)
-    pair = [_prescribed(path, one)[good] for one in (first, other)]
+    converged = np.asarray(path.converged)
+    pair = [_prescribed(path, one)[converged] for one in (first, other)]
     change = [values - values[0] for values in pair]
     largest = int(np.argmax(np.abs(change[0])))
     ratio = change[1][largest] / change[0][largest]
@@ -136,7 +138,7 @@ TIP_LABELS = tuple(
     f"{QUANTITIES['tip_position'].title} {axis} [{QUANTITIES['tip_position'].unit}]"
     for axis in "xz"
 )
-MOST_NAMES = 12
+MAX_NAMES = 12
 """If a robot has more notches than this, a legend names some of them."""
 
 
@@ -145,7 +147,7 @@ def branch_lines(
     points: NDArray[np.float64],
     colour: Colour | None = None,
     name: str | None = None,
-    **look: Any,
+    **style: Any,
 ) -> Iterator[Curve]:
     """Yield the branches of a curve (S, 2): loading solid, unloading dashed; converged steps only.
 
@@ -160,7 +162,7 @@ def branch_lines(
         options["marker"] = "o" if part.stop - part.start == 1 else ""
         shown = "" if label in named else label
         shade = COLOUR[way] if colour is None else colour
-        yield Curve(points[part], shade, LINE[way], name=shown, **(options | look))
+        yield Curve(points[part], shade, LINE[way], name=shown, **(options | style))
         named.add(label)
 
 
@@ -184,9 +186,9 @@ def notches_panel(path: EquilibriumPath) -> Panel:
     items = list(_notch_lines(path, x, angles))
     closed = np.asarray(path.closed) & np.asarray(path.converged)[:, None]
     for notch, colour in enumerate(sequence_colours(angles.shape[1])):
-        there = closed[:, notch]
-        if there.any():
-            points = np.stack([x[there], angles[there, notch]], axis=1)
+        is_closed = closed[:, notch]
+        if is_closed.any():
+            points = np.stack([x[is_closed], angles[is_closed, notch]], axis=1)
             items.append(dots(points, colour, group=f"notch {notch + 1}", layer=3))
     if closed.any():
         items.append(dots([], NEUTRAL, name="closed"))
@@ -233,8 +235,8 @@ def _notch_lines(
     """Yield a curve for every notch, in its colour."""
     count = values.shape[1]
     chosen: Any = range(count)
-    if count > MOST_NAMES:  # some, with the first and the last
-        chosen = np.unique(np.linspace(0, count - 1, MOST_NAMES // 2).round().astype(int))
+    if count > MAX_NAMES:  # some, with the first and the last
+        chosen = np.unique(np.linspace(0, count - 1, MAX_NAMES // 2).round().astype(int))
     for notch, colour in enumerate(sequence_colours(count)):
         group = f"notch {notch + 1}"
         name = group if named and notch in chosen else ""
@@ -244,8 +246,8 @@ def _notch_lines(
 
 def failures(path: EquilibriumPath, x: NDArray[np.float64]) -> Iterator[Span]:
     """Mark the steps that did not converge by dotted vertical lines."""
-    places = x[~np.asarray(path.converged)]
-    for order, at in enumerate(places[np.isfinite(places)].tolist()):
+    failed = x[~np.asarray(path.converged)]
+    for order, at in enumerate(failed[np.isfinite(failed)].tolist()):
         yield Span("x", at, at, "#666666", DOTTED, name="" if order else "not converged")
 
 

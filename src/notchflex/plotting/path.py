@@ -41,10 +41,10 @@ if TYPE_CHECKING:
     from notchflex.analysis.uncertainty.bands import Band
     from notchflex.results import EquilibriumPath
 
-MOST_PROFILES = 2
+MAX_PROFILES = 2
 """Tendons whose tension is drawn over the stroke, and from span to span."""
 
-MOST_TENDONS = 8
+MAX_TENDONS = 8
 """Tendons of one state whose tension is drawn."""
 
 _TWO_ROWS = 4
@@ -107,10 +107,10 @@ def _curves(
         shaded(total_panel(path), path, bands, "total_angle"),
         shaded(notches_panel(path), path, bands, "notch_angle"),
     ]
-    panels += [stroke_panel(path, tendon) for tendon in driven_by_stroke(path)[:MOST_PROFILES]]
+    panels += [stroke_panel(path, tendon) for tendon in driven_by_stroke(path)[:MAX_PROFILES]]
     panels.append(shaded(strain_panel(path), path, bands, "peak_strain"))
     if len(ways) > 1 and pulled_tendons(path):
-        panels += [profile_panel(path, tendon) for tendon in pulled_tendons(path)[:MOST_PROFILES]]
+        panels += [profile_panel(path, tendon) for tendon in pulled_tendons(path)[:MAX_PROFILES]]
         if reverses_step_by_step(path):
             panels.append(front_panel(path))
     return panels
@@ -171,7 +171,7 @@ def notch_angles(path: EquilibriumPath, step: int) -> Panel:
 def tension_along(path: EquilibriumPath, step: int) -> Panel:
     """Return the tension of every pulled tendon from span to span in one state."""
     labels = "span of tendon [number], 0 at the base", QUANTITIES["span_tension"].label
-    pulled = [int(i) for i in np.flatnonzero(path.tension[step] > SLACK)][:MOST_TENDONS]
+    pulled = [int(i) for i in np.flatnonzero(path.tension[step] > SLACK)][:MAX_TENDONS]
     if not path.converged[step] or not pulled:
         note = "all tendons are slack" if path.converged[step] else "not converged"
         return Panel([Note(note)], *labels)

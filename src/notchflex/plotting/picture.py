@@ -59,8 +59,8 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     picture(state).save(f"{folder}/wrist.svg")
     """
-    made = _picture(result)
-    return made if title is None else replace(made, title=title)
+    drawn = _picture(result)
+    return drawn if title is None else replace(drawn, title=title)
 
 
 def _picture(result: Any) -> Picture:

@@ -67,8 +67,8 @@ class Curve(Mark):
 
 def dots(points: Any, colour: Colour, size: float = 3.0, **options: Any) -> Curve:
     """Return round markers without a line; `options` are those of `Curve`."""
-    look: dict[str, Any] = {"dash": None, "marker": "o", "size": size}
-    return Curve(points, colour, **(look | options))
+    style: dict[str, Any] = {"dash": None, "marker": "o", "size": size}
+    return Curve(points, colour, **(style | options))
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from notchflex.results.quantities.registry import QUANTITIES, spans_of
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
-MOST_STEPS = 6
+MAX_STEPS = 6
 
 _FEWEST = 3
 """The reversal of friction is drawn if it is partial at this many steps at least."""
@@ -31,12 +31,12 @@ def pulled_tendons(path: EquilibriumPath) -> list[int]:
     return [int(i) for i in np.flatnonzero(tension.max(axis=0) > SLACK)]
 
 
-def span_line(path: EquilibriumPath, step: int, tendon: int, colour: Colour, **look: Any) -> Curve:
+def span_line(path: EquilibriumPath, step: int, tendon: int, colour: Colour, **style: Any) -> Curve:
     """Return the tension of a tendon (from 0) from span to span at one step."""
     tension = path.span_tension[step, tendon, : spans_of(path, tendon)]
     points = np.stack([np.arange(len(tension)), tension], axis=1)
     usual: dict[str, Any] = {"marker": "o", "size": 1.8, "hover": True}
-    return Curve(points, colour, **(usual | look))
+    return Curve(points, colour, **(usual | style))
 
 
 def profile_panel(path: EquilibriumPath, tendon: int) -> Panel:
@@ -124,9 +124,9 @@ def reverses_step_by_step(path: EquilibriumPath) -> bool:
 def _spread(path: EquilibriumPath, steps: list[int], tendon: int) -> list[int]:
     """Return some of the steps with tension, evenly spread over it."""
     steps = [step for step in steps if path.tension[step, tendon] > SLACK]
-    if len(steps) <= MOST_STEPS:
+    if len(steps) <= MAX_STEPS:
         return steps
     tension = path.tension[steps, tendon]
-    wanted = np.linspace(tension.min(), tension.max(), MOST_STEPS)
-    nearest = (steps[int(np.argmin(np.abs(tension - goal)))] for goal in wanted)
+    targets = np.linspace(tension.min(), tension.max(), MAX_STEPS)
+    nearest = (steps[int(np.argmin(np.abs(tension - goal)))] for goal in targets)
     return list(dict.fromkeys(nearest))

@@ -62,18 +62,18 @@ def bounds(
     count = sum(map(len, readings))
     force, low, high = np.zeros((3, count, size))
     ends = Bounds(force, low, high, np.zeros((count, size), bool), np.zeros(count))
-    for number, (found, members) in enumerate(zip(history.best, readings, strict=True)):
-        before = [_Tracker(state, found.force, None), *extremes]
-        for place, one in enumerate(members):
+    for number, (candidate, members) in enumerate(zip(history.best, readings, strict=True)):
+        before = [_Tracker(state, candidate.force, None), *extremes]
+        for column, one in enumerate(members):
             # The first reading comes from the state before; the force of another may change after
             # that, with tendons held: from the mean, or from the ends of the first. None goes on
             # from the one before it, whose noise the contacts would remember.
             trackers = [replace(tracker) for tracker in before]
             _add(ends, history, number, one, trackers, most)
             extremes = trackers[1:]
-            if place == 0:
-                before = [_Tracker(found.state, found.force, None), *extremes]
-        state = found.state
+            if column == 0:
+                before = [_Tracker(candidate.state, candidate.force, None), *extremes]
+        state = candidate.state
         if progress is not None:
             progress(number + 1, len(history.best))
     return ends
@@ -88,7 +88,7 @@ def _add(
     most: float,
 ) -> None:
     """Find the ends of one reading; the trackers go on to it."""
-    model, found, row = history.model, history.best[number], reading.number
+    model, candidate, row = history.model, history.best[number], reading.number
     before, size = trackers[0].state, history.model.size
     forces: list[np.ndarray] = []
     worse: list[float] = []
@@ -101,13 +101,13 @@ def _add(
         problem = ReadingProblem(
             model, reading.step, tracker.state, white, solved.known(tracker.state)
         )
-        at = best_of_all(problem, np.stack([tracker.force, found.force]))
+        at = best_of_all(problem, np.stack([tracker.force, candidate.force]))
         if bad_fit(at):  # no force makes this history fit: it was none, the best goes on
             problem = replace(problem, start=before, known=solved.known(before))
-            at = best(problem, found.force[None])
+            at = best(problem, candidate.force[None])
         if tracker is trackers[0]:
             # What noise does not explain of its distance from the mean is a change of the force.
-            ends.force[row] = found.force + reading.part * (at.force - found.force)
+            ends.force[row] = candidate.force + reading.part * (at.force - candidate.force)
             forces = [ends.force[row]]
         for which, direction in enumerate(one.direction for one in trackers[1:]):
             assert direction is not None

@@ -103,17 +103,17 @@ def with_noise(history: History) -> History:
     A noise is one number that was read in one reading. It changes the force of its own reading and,
     by what the contacts remember, those after it.
     """
-    model, steps, found = history.model, history.steps, history.best
-    history = History(model, steps, found, [], [], [], [], [])
-    if not found:
+    model, steps, candidate = history.model, history.steps, history.best
+    history = History(model, steps, candidate, [], [], [], [], [])
+    if not candidate:
         return history
-    forces = np.array([one.force for one in found])
+    forces = np.array([one.force for one in candidate])
     path = model.follow(forces)
     by_drive, by_force = _slopes_along(model, path)
-    for k, own in enumerate(by_drive[range(len(found)), range(len(found))]):
+    for k, own in enumerate(by_drive[range(len(candidate)), range(len(candidate))]):
         if not np.isfinite(own).all():
-            start = found[k - 1].state if k else None
-            by_drive[k, k] = model.drive_slopes(start, found[k].solved.alone, k).T
+            start = candidate[k - 1].state if k else None
+            by_drive[k, k] = model.drive_slopes(start, candidate[k].solved.alone, k).T
     # What is not known of the memory of so hard a state is left out.
     by_drive, by_force = np.nan_to_num(by_drive), np.nan_to_num(by_force)
     sizes = [len(step.entries) for step in steps]

@@ -41,10 +41,10 @@ def merged(readings: Readings) -> tuple[Readings, Int[np.ndarray, " s"]]:
     count = np.bincount(group)
     means = [_means(table, group) for table in sensors]
     tension, stroke, tip, angles = means
-    made = replace(
+    joined = replace(
         readings, tension=tension, stroke=stroke, tip=tip, angles=angles, count=count.astype(float)
     )
-    return made, group
+    return joined, group
 
 
 def _groups(

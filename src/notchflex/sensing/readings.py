@@ -15,11 +15,11 @@ from notchflex.loads.validation import check_number, check_pulls, short_repr
 from notchflex.results.quantities.registry import AXES
 from notchflex.robot import Robot
 
-MOST_READINGS = 2000
+MAX_READINGS = 2000
 """More readings than this are refused: the time grows with the square of their number."""
 
 # Negative tensions up to so many standard deviations may be noise.
-_MOST_NOISE = 10.0
+_MAX_NOISE = 10.0
 
 
 @dataclass(frozen=True)
@@ -155,24 +155,24 @@ def readings_of(
     rows = max(counts.values(), default=0)
     if rows == 0:
         raise InputError.NO_DATA("there are no readings; give tensions and strokes")
-    if rows > MOST_READINGS:
+    if rows > MAX_READINGS:
         raise InputError.OUT_OF_RANGE(
-            f"a history has at most {MOST_READINGS} readings; got {rows}. Leave out readings "
+            f"a history has at most {MAX_READINGS} readings; got {rows}. Leave out readings "
             "between the points where a tendon reverses"
         )
     whole = {
         name: tables.get(name, np.full((rows, width), np.nan))
         for name, (_, width, _) in columns.items()
     }
-    made = Readings(
+    readings = Readings(
         whole["tensions"], whole["strokes"], whole["tip"], whole["angles"], noise, np.ones(rows)
     )
-    _check_driven(made)
-    return made
+    _check_driven(readings)
+    return readings
 
 
 def _check_driven(readings: Readings) -> None:
-    check_pulls(readings.tension, _MOST_NOISE * readings.noise.tension)
+    check_pulls(readings.tension, _MAX_NOISE * readings.noise.tension)
     neither = np.isnan(readings.tension) & np.isnan(readings.stroke)
     if neither.any():
         row, tendon = np.argwhere(neither)[0]

@@ -12,10 +12,10 @@ from notchflex.sensing.candidates import Candidate, ReadingProblem
 # Lengths that are tried of a step: of what slopes promise, and where that fails of any.
 _WHOLE = np.array([1.0])
 _FULL = np.array([1.0, 0.5, 0.2, 0.05, 0.01])
-_NEAR = np.array([1.02, 1.0, 0.98, 0.9])
+_FIRST_LENGTHS = np.array([1.02, 1.0, 0.98, 0.9])
 _REACH = np.array([2.0, 1.4, 1.0, 0.8, 0.6, 0.4, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001])
 _BETWEEN = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
-_MOST_STEPS, _MOST_REACHES, _MOST_HALVINGS = 20, 16, 6
+_MAX_STEPS, _MAX_REACHES, _MAX_HALVINGS = 20, 16, 6
 # So many forces are solved at once.
 _TOGETHER = 3
 BAD_FIT = 12.0
@@ -49,7 +49,7 @@ def best(
     if not len(problem.step.entries):
         return at
     weak = _WEAK / problem.model.largest
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         if not np.isfinite(at.misfit) or at.misfit < _SMALL_GAIN:
             break
         slopes = problem.slopes(at) if part is None else problem.differences(at, part)
@@ -129,10 +129,10 @@ def extreme(
     """
     largest, origin = problem.model.largest, at.force
     beyond = None
-    for _ in range(_MOST_REACHES):
+    for _ in range(_MAX_REACHES):
         move = _step_along(problem, at, direction, most)
         ahead, gain = at, 0.0
-        for lengths in (_NEAR, _REACH):
+        for lengths in (_FIRST_LENGTHS, _REACH):
             forces = at.force + np.outer(lengths, move)
             ahead, beyond = _farthest(problem, at, forces, direction, most)
             gain = direction @ (ahead.force - at.force)
@@ -143,7 +143,7 @@ def extreme(
             break
         if direction @ at.force >= largest * (1.0 - 1e-12):
             break
-    for _ in range(_MOST_HALVINGS):
+    for _ in range(_MAX_HALVINGS):
         if beyond is None:
             break
         gap = direction @ (beyond - at.force)

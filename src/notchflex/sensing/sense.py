@@ -138,9 +138,9 @@ def _best_place(
     report = _stage(progress, "trying places")
     misfits: dict[int | None, float] = {}
     for number, body in enumerate(bodies, 1):
-        found = estimate(replace(model, unknown=model.unknown.on(body))).best
-        whole = len(found) == len(model.readings)
-        misfits[body] = sum(one.misfit for one in found) if whole else np.inf
+        candidates = estimate(replace(model, unknown=model.unknown.on(body))).best
+        whole = len(candidates) == len(model.readings)
+        misfits[body] = sum(one.misfit for one in candidates) if whole else np.inf
         if report is not None:
             report(number, len(bodies))
     # Of places that fit as well the tip is taken: it is where robots touch.
@@ -151,7 +151,7 @@ def _best_place(
 
 def _result(
     model: SensingModel,
-    found: list[Candidate],
+    candidates: list[Candidate],
     ends: Bounds,
     left_open: list[LeftOpen],
     places: dict[int | None, float],
@@ -172,7 +172,7 @@ def _result(
         high=_filled(ends.high, (count, size)),
         limited=np.concatenate([ends.limited, np.zeros((rest, size), bool)]),
         stuck=stuck,
-        misfit=_filled([one.misfit for one in found], (means,))[group],
+        misfit=_filled([one.misfit for one in candidates], (means,))[group],
         read=entries[group],
         no_force=_filled(ends.no_force, (count,)),
         hidden=tuple(hidden),
@@ -181,8 +181,8 @@ def _result(
         places=places,
         level=LEVEL,
         largest=model.largest,
-        path=model.follow(np.array([one.force for one in found])) if found else None,
-        reason=_reason(model, found, group),
+        path=model.follow(np.array([one.force for one in candidates])) if candidates else None,
+        reason=_reason(model, candidates, group),
     )
 
 
@@ -194,12 +194,14 @@ def _filled(rows: object, shape: tuple[int, ...]) -> np.ndarray:
     return values
 
 
-def _reason(model: SensingModel, found: list[Candidate], group: Int[np.ndarray, " s"]) -> str:
+def _reason(model: SensingModel, candidates: list[Candidate], group: Int[np.ndarray, " s"]) -> str:
     """Return why the history ended before its last reading."""
-    if len(found) == len(model.readings):
+    if len(candidates) == len(model.readings):
         return ""
-    number = len(found)
-    state, force = (found[-1].state, found[-1].force) if found else (None, np.zeros(model.size))
+    number = len(candidates)
+    state, force = (
+        (candidates[-1].state, candidates[-1].force) if candidates else (None, np.zeros(model.size))
+    )
     path = model.solve(state, number, force[None])
     reading = int(np.argmax(group == number)) + 1
     return f"reading {reading} of {len(group)}: {path.reason[0]}"

@@ -54,18 +54,18 @@ def read_sensor_table(
 
 
 def _wanted(table: Table, names: dict[int, str], width: int) -> np.ndarray:
-    there = {place: name for place, name in names.items() if name in table.header}
-    if not there:
+    present = {place: name for place, name in names.items() if name in table.header}
+    if not present:
         raise InputError.TABLE_COLUMNS(
             f"{table.name}: there is no column {next(iter(names.values()))}; {table.columns}."
         )
-    return _columns(table, there, width)
+    return _columns(table, present, width)
 
 
 def _columns(table: Table, columns: dict[int, str], width: int) -> np.ndarray:
     values = np.full((len(table), width), np.nan)
-    for place, name in columns.items():
-        values[:, place] = table.numbers(name, may_miss=True)
+    for column, name in columns.items():
+        values[:, column] = table.numbers(name, may_miss=True)
     return values
 
 

@@ -127,9 +127,9 @@ def column_name(one: Criterion, named: bool) -> str:
         one: The kept number.
         named: Whether there are several loads.
     """
-    places = [
-        AXES[place] if axis == "axis" else str(place + FIRST.get(axis, 1))
-        for axis, place in zip(one.quantity.per, one.index, strict=True)
+    labels = [
+        AXES[number] if axis == "axis" else str(number + FIRST.get(axis, 1))
+        for axis, number in zip(one.quantity.per, one.index, strict=True)
     ]
     unit = one.quantity.unit.replace(" ", "")
     step = [f"step_{one.step + 1}"] if "step " in one.name else []
@@ -137,7 +137,7 @@ def column_name(one: Criterion, named: bool) -> str:
         part
         for part in [
             one.quantity.name,
-            *places,
+            *labels,
             unit,
             *([f"at_{one.load}"] if named else []),
             *step,

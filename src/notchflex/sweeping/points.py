@@ -13,7 +13,7 @@ from notchflex.errors import InputError
 from notchflex.pieces.sobol import SobolPart
 from notchflex.sweeping.plan.parts import Sampling, SweepPlan, SweepVariable
 
-_MOST_LATIN = 20_000_000
+_MAX_LATIN = 20_000_000
 """A Latin hypercube is made whole: so many numbers fit into memory beside all else."""
 
 
@@ -56,10 +56,10 @@ class Points:
         sampling = self.plan.sampling
         if sampling is not None and sampling.method == "latin-hypercube":
             numbers = sampling.points * len(self.plan.sampled)
-            if numbers > _MOST_LATIN:
+            if numbers > _MAX_LATIN:
                 raise InputError.OUT_OF_RANGE(
                     f"a Latin hypercube is made whole, and {sampling.points} points of "
-                    f"{len(self.plan.sampled)} variables are more than {_MOST_LATIN} numbers; take "
+                    f"{len(self.plan.sampled)} variables are more than {_MAX_LATIN} numbers; take "
                     'fewer points, or method = "sobol".'
                 )
 
@@ -78,9 +78,9 @@ class Points:
             start: First row, from 0.
             stop: The row behind the last one.
         """
-        places = np.arange(start, stop)
-        levels = self._levels(places) if self.plan.sampled else None
-        return self._numbers(places // self._each, levels)
+        indices = np.arange(start, stop)
+        levels = self._levels(indices) if self.plan.sampled else None
+        return self._numbers(indices // self._each, levels)
 
     def sample(self, count: int) -> dict[str, Float[np.ndarray, " k"]]:
         """Return the numbers of some rows: the first points, at places all over the grid.
@@ -89,33 +89,33 @@ class Points:
             count: So many rows, or fewer if there are fewer.
         """
         count = min(count, self.plan.rows)
-        places = np.random.default_rng(0).integers(0, self.plan.rows // self._each, count)
+        indices = np.random.default_rng(0).integers(0, self.plan.rows // self._each, count)
         if not self.plan.sampled:
-            return self._numbers(places, None)
+            return self._numbers(indices, None)
         points = np.arange(count) % self._each
-        return self._numbers(places, self._levels(np.arange(min(count, self._each)))[points])
+        return self._numbers(indices, self._levels(np.arange(min(count, self._each)))[points])
 
     def _numbers(
         self, rest: Int[np.ndarray, " k"], levels: Float[np.ndarray, "k d"] | None
     ) -> dict[str, Float[np.ndarray, " k"]]:
         """Return numbers by name at places of the grid and sampled levels."""
-        found: dict[str, np.ndarray] = {}
+        numbers: dict[str, np.ndarray] = {}
         for variable, values in zip(self.plan.grid[::-1], self._axes[::-1], strict=True):
-            found[variable.value] = values[rest % len(values)]
+            numbers[variable.value] = values[rest % len(values)]
             rest = rest // len(values)
         if levels is not None:
             for number, variable in enumerate(self.plan.sampled):
-                found[variable.value] = _at_level(variable, levels[:, number])
-        return {one.value: found[one.value] for one in self.plan.variable}
+                numbers[variable.value] = _at_level(variable, levels[:, number])
+        return {one.value: numbers[one.value] for one in self.plan.variable}
 
-    def _levels(self, places: np.ndarray) -> Float[np.ndarray, "k d"]:
+    def _levels(self, indices: np.ndarray) -> Float[np.ndarray, "k d"]:
         """Return the sampled levels between 0 and 1 of rows in a line."""
         sampling, dimension = self.plan.sampling, len(self.plan.sampled)
         assert sampling is not None
-        points = places % self._each
+        points = indices % self._each
         if sampling.method == "latin-hypercube":
             return _latin(sampling, dimension)[points]
-        if self._each <= len(places):  # all points, more than once
+        if self._each <= len(indices):  # all points, more than once
             return self._sobol.between(0, self._each)[points]
         turns = np.flatnonzero(np.diff(points) < 0) + 1  # where the sequence begins anew
         parts = np.split(points, turns)

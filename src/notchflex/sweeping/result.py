@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 SUMMARY = "summary.json"
-_MOST_XARRAY = 100_000_000
+_MAX_XARRAY = 100_000_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -120,7 +120,7 @@ class Sweep(Displayed):
         need("xarray", "data", "to_xarray")
         import xarray
 
-        if not self.finished or not self.plan.output.rows or self.manifest.rows > _MOST_XARRAY:
+        if not self.finished or not self.plan.output.rows or self.manifest.rows > _MAX_XARRAY:
             raise InputError.UNSUPPORTED(
                 "to_xarray needs all rows of a finished sweep, at most 1e8; use lazy()."
             )
@@ -171,8 +171,8 @@ class Sweep(Displayed):
             parts: Numbers between 0 and 1; those of the plan if None.
         """
         sketch = self.sketches[self._column(column)]
-        wanted = self.plan.output.quantiles if parts is None else parts
-        return [sketch.quantile(part, self.scales[column]) for part in wanted]
+        levels = self.plan.output.quantiles if parts is None else parts
+        return [sketch.quantile(part, self.scales[column]) for part in levels]
 
     def histogram(self, column: str, bins: int | None = None) -> tuple[list[float], list[int]]:
         """Return edges and counts of a histogram of a kept quantity.
@@ -198,11 +198,11 @@ class Sweep(Displayed):
         """Read rows by their numbers, from the pieces that hold them."""
         import polars
 
-        wanted: Int[np.ndarray, " k"] = np.array(sorted(rows), np.int64)
+        selected: Int[np.ndarray, " k"] = np.array(sorted(rows), np.int64)
         frames: list[DataFrame] = []
         size = self.manifest.document["piece"]
-        for piece in np.unique(wanted // size).tolist():
-            inside = polars.col("row").is_in(wanted[wanted // size == piece].tolist())
+        for piece in np.unique(selected // size).tolist():
+            inside = polars.col("row").is_in(selected[selected // size == piece].tolist())
             frames.append(self._numbered(piece).filter(inside).collect())
         return polars.concat(frames) if frames else self.lazy().head(0).collect()
 
@@ -251,10 +251,10 @@ class Sweep(Displayed):
         return Summary(title, rows, ".lazy() is a frame of polars, .to_xarray() a data set")
 
 
-def write_summary(found: Sweep) -> None:
+def write_summary(sweep: Sweep) -> None:
     """Write what is summed up of all rows into the folder, as `summary.json`.
 
     Raises:
         InputError: It cannot be written.
     """
-    write_json(str(found.directory / SUMMARY), found.document())
+    write_json(str(sweep.directory / SUMMARY), sweep.document())

@@ -55,27 +55,27 @@ class SweepWorker:
         """Scales of the statistics of every column."""
         sample = self.model.sample
         step = max(len(next(iter(sample.values()))) // _SCALED, 1)
-        found = self.model.at({name: one[::step] for name, one in sample.items()})
-        return [Scale.of(column) for column in found.values.T]
+        outcomes = self.model.at({name: one[::step] for name, one in sample.items()})
+        return [Scale.of(column) for column in outcomes.values.T]
 
     def piece(self, number: int) -> Piece:
         """Work out one piece."""
         start, stop = self.manifest.between(number)
         numbers = self.points.rows(start, stop)
-        found = self.model.at(numbers)
-        head = self._head(start, found)
-        frame = self._frame(numbers, found)
+        outcomes = self.model.at(numbers)
+        head = self._head(start, outcomes)
+        frame = self._frame(numbers, outcomes)
         if not self.plan.output.rows:
             frame = _chosen(frame, head, start)
         return Piece(frame, head)
 
-    def _head(self, start: int, found: Outcomes) -> dict[str, Any]:
+    def _head(self, start: int, outcomes: Outcomes) -> dict[str, Any]:
         output = self.plan.output
-        failed = np.flatnonzero(found.codes >= FAILED)[: output.failures] + start
+        failed = np.flatnonzero(outcomes.codes >= FAILED)[: output.failures] + start
         names = list(self.model.columns)
-        columns = zip(names, found.values.T, self.scales, strict=True)
+        columns = zip(names, outcomes.values.T, self.scales, strict=True)
         return {
-            "codes": np.bincount(found.codes, minlength=len(CODES)).tolist(),
+            "codes": np.bincount(outcomes.codes, minlength=len(CODES)).tolist(),
             "failures": failed.tolist(),
             "scales": {
                 name: [one.middle, one.half] for name, one in zip(names, self.scales, strict=True)
@@ -87,13 +87,13 @@ class SweepWorker:
             },
         }  # fmt: skip
 
-    def _frame(self, numbers: dict[str, np.ndarray], found: Outcomes) -> Any:
+    def _frame(self, numbers: dict[str, np.ndarray], outcomes: Outcomes) -> Any:
         import polars
 
-        code = polars.Series("code", CODES, polars.Enum(CODES)).gather(found.codes)
-        values = np.ascontiguousarray(found.values.T)
+        code = polars.Series("code", CODES, polars.Enum(CODES)).gather(outcomes.codes)
+        values = np.ascontiguousarray(outcomes.values.T)
         columns = dict(zip(self.model.columns, values, strict=True))
-        some = bool((found.codes >= FAILED).any())
+        some = bool((outcomes.codes >= FAILED).any())
         return polars.DataFrame({**numbers, "code": code, **columns}, nan_to_null=some)
 
 

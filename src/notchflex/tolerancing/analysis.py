@@ -28,8 +28,8 @@ from notchflex.tolerancing.study import Outcomes, Study, study_of
 from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicates
 
 DRAWS = 100_000
-LEAST_DRAWS = 2 * REPLICATES
-MOST_DRAWS, MOST_IN_PIECES = 10_000_000, 10_000_000_000
+MIN_DRAWS = 2 * REPLICATES
+MAX_DRAWS, MAX_IN_PIECES = 10_000_000, 10_000_000_000
 """Draws in memory at most, and in pieces."""
 
 Stage = Callable[[str, int, int], None]
@@ -79,12 +79,12 @@ def tolerance_analysis(
         200
     """
     check_is_robot(robot)
-    if check_integer(draws, "draws") < LEAST_DRAWS:
-        raise InputError.OUT_OF_RANGE(f"draws must be {LEAST_DRAWS} or more; got {draws}")
+    if check_integer(draws, "draws") < MIN_DRAWS:
+        raise InputError.OUT_OF_RANGE(f"draws must be {MIN_DRAWS} or more; got {draws}")
     folder = None if folder is None else PieceFolder.of(folder)
-    if draws > (MOST_DRAWS if folder is None else MOST_IN_PIECES):
+    if draws > (MAX_DRAWS if folder is None else MAX_IN_PIECES):
         more = "; give a folder, which draws in pieces" if folder is None else ""
-        most = MOST_DRAWS if folder is None else MOST_IN_PIECES
+        most = MAX_DRAWS if folder is None else MAX_IN_PIECES
         raise InputError.OUT_OF_RANGE(f"draws must be at most {most:,}{more}; got {draws}")
     asked = _spec(spec, robot)
     chosen, assumed = tolerances_for(robot, asked)

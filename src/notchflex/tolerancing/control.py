@@ -39,7 +39,7 @@ class Control(NamedTuple):
 def control(
     study: Study,
     draws: int,
-    wanted: float | None,
+    target: float | None,
     seed: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> Control:
@@ -48,7 +48,7 @@ def control(
     Args:
         study: What deviates, and the numbers that have limits.
         draws: About how many robots the yield is found of.
-        wanted: The wanted yield, between 0 and 1; None to look for no tolerance.
+        target: The wanted yield, between 0 and 1; None to look for no tolerance.
         seed: Of the points.
         progress: Called with the sources done and all of them.
     """
@@ -60,33 +60,33 @@ def control(
         yields: dict[float, float] = {}
 
         def yield_at(
-            factor: float, index: int = index, known: dict[float, float] = yields
+            factor: float, index: int = index, computed: dict[float, float] = yields
         ) -> float:
-            if factor not in known:
+            if factor not in computed:
                 drawn = study.drawn(levels)
                 source = study.sources[index]
                 for name, value in source.nominal.items():
                     drawn[name] = value + factor * (drawn[name] - value)
-                known[factor] = float(study.solved(drawn, points).accepted.mean())
-            return known[factor]
+                computed[factor] = float(study.solved(drawn, points).accepted.mean())
+            return computed[factor]
 
         exact.append(yield_at(0.0))
-        if wanted is not None:
-            factors.append(_factor(yield_at, wanted))
+        if target is not None:
+            factors.append(_factor(yield_at, target))
         if progress is not None:
             progress(index + 1, len(study.sources))
-    return Control(np.array(exact), None if wanted is None else np.array(factors), points)
+    return Control(np.array(exact), None if target is None else np.array(factors), points)
 
 
-def _factor(yield_at: Callable[[float], float], wanted: float) -> float:
+def _factor(yield_at: Callable[[float], float], target: float) -> float:
     """Find the factor on a tolerance at which the yield falls to what is wanted."""
-    if yield_at(0.0) < wanted:
+    if yield_at(0.0) < target:
         return 0.0
     low, high = 0.0, 1.0
-    while yield_at(high) >= wanted:
+    while yield_at(high) >= target:
         if high >= _WIDEST:
             return np.inf
         low, high = high, 2.0 * high
     # The yield is a staircase: a root of the difference lies on a step.
-    root: Any = brentq(lambda factor: yield_at(factor) - wanted, low, high, xtol=_EXACT * high)
+    root: Any = brentq(lambda factor: yield_at(factor) - target, low, high, xtol=_EXACT * high)
     return float(root)

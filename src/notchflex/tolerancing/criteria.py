@@ -82,11 +82,11 @@ def criteria_of(spec: ToleranceSpec, paths: Mapping[str, EquilibriumPath]) -> li
     Raises:
         InputError: A robot or a load has no such entry or step.
     """
-    found: list[Criterion] = []
+    criteria: list[Criterion] = []
     for limit in spec.limits:
         load = spec.load_of(limit)
-        found += entries_of(limit, load, paths[load], len(paths) > 1)
-    return found
+        criteria += entries_of(limit, load, paths[load], len(paths) > 1)
+    return criteria
 
 
 def entries_of(
@@ -123,8 +123,8 @@ def entries_of(
         default if end is None else float(end)
         for end, default in ((limit.lower, -np.inf), (limit.upper, np.inf))
     )
-    for place in np.ndindex(*map(len, choices)):
-        index = tuple(choice[one] for choice, one in zip(choices, place, strict=True))
+    for position in np.ndindex(*map(len, choices)):
+        index = tuple(choice[one] for choice, one in zip(choices, position, strict=True))
         if not np.isfinite(values[index]):  # beyond the end of a tendon
             continue
         words = " ".join([_entry(limit.quantity, quantity.per, index), ", ".join(at)]).strip()
@@ -159,7 +159,7 @@ def _places(limit: Limited, axis: str, size: int, what: str) -> Sequence[int]:
 
 def _entry(name: str, per: tuple[str, ...], index: tuple[int, ...]) -> str:
     words = [
-        AXES[place] if axis == "axis" else str(place + FIRST.get(axis, 1))
-        for axis, place in zip(per, index, strict=True)
+        AXES[number] if axis == "axis" else str(number + FIRST.get(axis, 1))
+        for axis, number in zip(per, index, strict=True)
     ]
     return f"{name}[{','.join(words)}]" if words else name

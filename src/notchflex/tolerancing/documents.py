@@ -17,43 +17,43 @@ from notchflex.tolerancing.result import ToleranceAnalysis
 PERCENTILES = (2.5, 50.0, 97.5)
 
 
-def tolerance_document(found: ToleranceAnalysis) -> dict[str, Any]:
+def tolerance_document(analysis: ToleranceAnalysis) -> dict[str, Any]:
     """Return a tolerance analysis as a document of plain values, at the edge units.
 
     Args:
-        found: The analysis.
+        analysis: The analysis.
 
     Returns:
         `yield` (with `interval`), `limits`, one for each number that has limits, and `sources`, one
         for each deviation. Angles in deg, lengths in mm, forces in N.
     """
-    low, high = found.interval
+    low, high = analysis.interval
     return {
-        **document_head(found.robot),
-        "draws": found.draws,
-        "seed": found.seed,
-        "tolerances": {one.value: one.written for one in found.tolerances},
-        "assumed": list(found.assumed),
+        **document_head(analysis.robot),
+        "draws": analysis.draws,
+        "seed": analysis.seed,
+        "tolerances": {one.value: one.written for one in analysis.tolerances},
+        "assumed": list(analysis.assumed),
         "yield": {
-            "accepted": found.accepted_fraction,
+            "accepted": analysis.accepted_fraction,
             "interval": [low, high],
-            "wanted": found.wanted_yield,
-            "counts": found.counts,
+            "wanted": analysis.wanted_yield,
+            "counts": analysis.counts,
         },
         "worst_case_sd": WORST_SD,
-        "limits": _limits(found),
-        "sources": _sources(found),
-        "sobol_robots": found.sobol.robots,
-        "sobol_failed": found.sobol.failed,
-        "control_robots": found.control.robots,
+        "limits": _limits(analysis),
+        "sources": _sources(analysis),
+        "sobol_robots": analysis.sobol.robots,
+        "sobol_failed": analysis.sobol.failed,
+        "control_robots": analysis.control.robots,
     }
 
 
-def _limits(found: ToleranceAnalysis) -> list[dict[str, Any]]:
-    parts = [found.percentile(part / 100.0) for part in PERCENTILES]
-    below, above, linear = found.below, found.above, found.linear
+def _limits(analysis: ToleranceAnalysis) -> list[dict[str, Any]]:
+    parts = [analysis.percentile(part / 100.0) for part in PERCENTILES]
+    below, above, linear = analysis.below, analysis.above, analysis.linear
     documents: list[dict[str, Any]] = []
-    for index, one in enumerate(found.criteria):
+    for index, one in enumerate(analysis.criteria):
         scale = one.quantity.scale
         documents.append(
             {
@@ -79,32 +79,32 @@ def _limits(found: ToleranceAnalysis) -> list[dict[str, Any]]:
     return documents
 
 
-def _sources(found: ToleranceAnalysis) -> list[dict[str, Any]]:
+def _sources(analysis: ToleranceAnalysis) -> list[dict[str, Any]]:
     """Return what is found of every deviation; lists are in the order of `limits`."""
-    factor = found.control.factor
+    factor = analysis.control.factor
     documents: list[dict[str, Any]] = []
-    for index, name in enumerate(found.sources):
-        scales = np.array([one.quantity.scale for one in found.criteria])
+    for index, name in enumerate(analysis.sources):
+        scales = np.array([one.quantity.scale for one in analysis.criteria])
         documents.append(
             {
                 "name": name,
-                "one_sd": found.linear.spread[:, index] * scales,
-                "variance_share": found.linear.share[:, index],
-                "sobol_first": found.sobol.first[:-1, index],
-                "sobol_total": found.sobol.total[:-1, index],
-                "sobol_total_of_acceptance": found.sobol.total[-1, index],
-                "yield_if_exact": found.control.exact[index],
+                "one_sd": analysis.linear.spread[:, index] * scales,
+                "variance_share": analysis.linear.share[:, index],
+                "sobol_first": analysis.sobol.first[:-1, index],
+                "sobol_total": analysis.sobol.total[:-1, index],
+                "sobol_total_of_acceptance": analysis.sobol.total[-1, index],
+                "yield_if_exact": analysis.control.exact[index],
                 "allowed_factor": None if factor is None else factor[index],
             }
         )
     return documents
 
 
-def tolerance_columns(found: ToleranceAnalysis) -> dict[str, Sequence[Any]]:
+def tolerance_columns(analysis: ToleranceAnalysis) -> dict[str, Sequence[Any]]:
     """Return the drawn robots as columns: their numbers, those with limits, and what became of it.
 
     Args:
-        found: The analysis.
+        analysis: The analysis.
 
     Returns:
         `robot` from 1, the numbers that deviate by name (mm, N, MPa, deg), the numbers that have
@@ -114,14 +114,14 @@ def tolerance_columns(found: ToleranceAnalysis) -> dict[str, Sequence[Any]]:
     Raises:
         InputError: They were drawn in pieces.
     """
-    if isinstance(found.drawn, DrawnPieces):
+    if isinstance(analysis.drawn, DrawnPieces):
         raise InputError.UNSUPPORTED(
-            f"the drawn robots are rows of the files in {found.drawn.directory}; read those."
+            f"the drawn robots are rows of the files in {analysis.drawn.directory}; read those."
         )
-    outcomes = found.drawn.outcomes
-    columns: dict[str, Sequence[Any]] = {"robot": range(1, found.draws + 1)}
-    columns |= {name: values.tolist() for name, values in found.drawn.numbers.items()}
-    for one, values in zip(found.criteria, outcomes.values.T, strict=True):
+    outcomes = analysis.drawn.outcomes
+    columns: dict[str, Sequence[Any]] = {"robot": range(1, analysis.draws + 1)}
+    columns |= {name: values.tolist() for name, values in analysis.drawn.numbers.items()}
+    for one, values in zip(analysis.criteria, outcomes.values.T, strict=True):
         unit = f" [{one.quantity.unit}]" if one.quantity.unit else ""
         columns[f"{one.name}{unit}"] = (values * one.quantity.scale).tolist()
     columns["outcome"] = [CODES[code] for code in outcomes.codes]

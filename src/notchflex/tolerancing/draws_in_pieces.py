@@ -98,8 +98,8 @@ class ToleranceTask:
     def scales(self) -> list[Scale]:
         """Scales of the statistics of every number."""
         sample = {name: one[:: SAMPLE // _SCALED] for name, one in self.study.sample.items()}
-        found = self.study.solved(sample, len(next(iter(sample.values()))))
-        return [Scale.of(column) for column in found.values.T]
+        outcomes = self.study.solved(sample, len(next(iter(sample.values()))))
+        return [Scale.of(column) for column in outcomes.values.T]
 
     def _sequence(self, number: int) -> SobolPart:
         """Return a replicate, for the calling thread, which goes on with it."""
@@ -115,13 +115,13 @@ class ToleranceTask:
         start, stop = self.manifest.between(number)
         which, first = divmod(start, self.each)
         levels = self._sequence(which).between(first, first + stop - start)
-        found = self.study.at_levels(levels)
-        below, above = beyond(found.values, self.study.criteria)
-        solved = np.asarray(np.isfinite(found.values).all(axis=1))
-        good = np.where(solved[:, None], found.values, np.nan)
-        columns = zip(np.ascontiguousarray(good.T), self.scales, strict=True)
+        outcomes = self.study.at_levels(levels)
+        below, above = beyond(outcomes.values, self.study.criteria)
+        solved = np.asarray(np.isfinite(outcomes.values).all(axis=1))
+        complete = np.where(solved[:, None], outcomes.values, np.nan)
+        columns = zip(np.ascontiguousarray(complete.T), self.scales, strict=True)
         head = {
-            "codes": np.bincount(found.codes, minlength=len(CODES)).tolist(),
+            "codes": np.bincount(outcomes.codes, minlength=len(CODES)).tolist(),
             "replicate": which,
             "below": below.tolist(),
             "above": above.tolist(),
@@ -130,9 +130,9 @@ class ToleranceTask:
                 Sketch.of(values, start, scale, _EXTREMES).document() for values, scale in columns
             ],
         }
-        code = polars.Series("code", CODES, polars.Enum(CODES)).gather(found.codes)
+        code = polars.Series("code", CODES, polars.Enum(CODES)).gather(outcomes.codes)
         frame: dict[str, Any] = {"code": code}
-        for one, values in zip(self.study.criteria, found.values.T, strict=True):
+        for one, values in zip(self.study.criteria, outcomes.values.T, strict=True):
             unit = f" [{one.quantity.unit}]" if one.quantity.unit else ""
             frame[f"{one.name}{unit}"] = np.ascontiguousarray(values) * one.quantity.scale
         return Piece(polars.DataFrame(frame, nan_to_null=True), head)

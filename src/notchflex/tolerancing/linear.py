@@ -78,12 +78,12 @@ def linear_effects(study: Study) -> LinearEffects:
         outputs = tuple(dict.fromkeys(study.criteria[index].quantity.name for index in own))
         tangents = PathTangents(solved, outputs)
         columns = [tangents.along(change) for change in changes]
-        found = {name: np.stack([one[name] for one in columns]) for name in outputs}
+        effects = {name: np.stack([one[name] for one in columns]) for name in outputs}
         for index in own:
             criterion = study.criteria[index]
-            slopes[index] = criterion.of(found[criterion.quantity.name])
-    place = {name: index for index, name in enumerate(names)}
-    own_slopes = [slopes[:, [place[name] for name in one.nominal]] for one in study.sources]
+            slopes[index] = criterion.of(effects[criterion.quantity.name])
+    columns_of = {name: index for index, name in enumerate(names)}
+    own_slopes = [slopes[:, [columns_of[name] for name in one.nominal]] for one in study.sources]
     shift, spread, one_end, other = (
         _moved(study.sources, own_slopes, which) for which in (_mean, _sd, _least, _most)
     )

@@ -26,11 +26,11 @@ _EACH = 1024
 
 _PIECES = 16
 """A study is cut into about so many pieces, unless they would be too small or too large."""
-_LEAST, _MOST = 2**12, 2**18
-_MOST_SLOW = 2**12
+_MIN_ROWS, _MAX_ROWS = 2**12, 2**18
+_MAX_SLOW_ROWS = 2**12
 """Rows of a piece at most where robots are assembled one by one, which takes a thousand times as
 long: a piece that is lost, or waited for, is then no longer either."""
-_MOST_BYTES = 2**27
+_MAX_BYTES = 2**27
 """What the solver returns of one piece at most, so that a worker needs less than 1 GiB."""
 
 
@@ -92,9 +92,9 @@ class PieceStudy(Study):
     def at(self, numbers: Mapping[str, Float[np.ndarray, " k"]]) -> Outcomes:
         """Solve robots: numbers in the units of files, NaN where there is no result."""
         count = len(next(iter(numbers.values())))
-        found = self.solved(numbers, count)
+        outcomes = self.solved(numbers, count)
         scale = np.array([one.quantity.scale for one in self.criteria])
-        return Outcomes(found.values * scale, found.codes)
+        return Outcomes(outcomes.values * scale, outcomes.codes)
 
 
 def piece_rows(rows: int, study: PieceStudy) -> int:
@@ -105,5 +105,5 @@ def piece_rows(rows: int, study: PieceStudy) -> int:
         study: The study.
     """
     size = 2 ** math.ceil(math.log2(max(rows / _PIECES, 1)))
-    most = 2 ** int(math.log2(max(_MOST_BYTES / study.row_bytes, 16)))
-    return min(max(size, _LEAST), _MOST_SLOW if study.one_by_one else _MOST, most)
+    most = 2 ** int(math.log2(max(_MAX_BYTES / study.row_bytes, 16)))
+    return min(max(size, _MIN_ROWS), _MAX_SLOW_ROWS if study.one_by_one else _MAX_ROWS, most)

@@ -69,20 +69,20 @@ def spec_of(table: Mapping[str, Any], robot: Robot) -> ToleranceSpec:
         )
     yields = _table(table, "yield")
     _known(yields, ("wanted",), "yield")
-    wanted = yields.get("wanted")
+    target = yields.get("wanted")
     return ToleranceSpec(
         list(_limits(table)),
         {name: read_load(_table(loads, name, "load."), name, robot) for name in loads},
         cast("Mapping[str, Any] | None", table.get("tolerance")),
-        None if wanted is None else check_number(wanted, "yield.wanted"),
+        None if target is None else check_number(target, "yield.wanted"),
     )
 
 
 def _table(table: Mapping[str, Any], key: str, before: str = "") -> dict[str, Any]:
-    found = table.get(key, {})
-    if not isinstance(found, dict):
+    value = table.get(key, {})
+    if not isinstance(value, dict):
         raise InputError.WRONG_TYPE(f"`{before}{key}` is not a table; write [{before}{key}].")
-    return cast("dict[str, Any]", found)
+    return cast("dict[str, Any]", value)
 
 
 def _known(table: Mapping[str, Any], allowed: tuple[str, ...], where: str) -> None:

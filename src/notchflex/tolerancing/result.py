@@ -103,19 +103,19 @@ class ToleranceAnalysis(Displayed):
 
     def warnings(self) -> list[str]:
         """Return a sentence for each thing that makes the result less than it seems."""
-        found: list[str] = []
+        warnings: list[str] = []
         counts = self.counts
         if counts[CODES[FAILED]]:
-            found.append(
+            warnings.append(
                 f"{counts[CODES[FAILED]]} of {self.draws} drawn robots did not converge; they "
                 "count as rejected, and mean and percentiles leave them out."
             )
         if counts[CODES[INVALID]]:
-            found.append(
+            warnings.append(
                 f"{counts[CODES[INVALID]]} of {self.draws} draws make no valid robot, because the "
                 "tolerances reach beyond what the tube allows; they count as rejected."
             )
-        return found
+        return warnings
 
     def _summary(self) -> Summary:
         low, high = self.interval

@@ -12,7 +12,7 @@ from scipy.stats import qmc, sobol_indices
 
 from notchflex.tolerancing.study import Study
 
-_MOST, _LEAST = 2048, 16
+_MAX_POINTS, _MIN_POINTS = 2048, 16
 """Points of each of the two sets; all indices need d + 2 times as many robots."""
 
 
@@ -44,8 +44,8 @@ def sobol(
         progress: Called with the robots done and all of them.
     """
     sources = len(study.sources)
-    points = 2 ** int(math.log2(max(draws / (sources + 2), _LEAST)))
-    points = min(points, _MOST)
+    points = 2 ** int(math.log2(max(draws / (sources + 2), _MIN_POINTS)))
+    points = min(points, _MAX_POINTS)
     sampler = qmc.Sobol(2 * sources, scramble=True, rng=np.random.default_rng(seed))
     both = sampler.random(points)
     first, second = both[:, :sources], both[:, sources:]
@@ -53,18 +53,18 @@ def sobol(
     for index in range(sources):
         mixed[index, :, index] = second[:, index]
     levels = np.concatenate([first, second, *mixed])
-    found = study.at_levels(levels, progress)
-    values = np.column_stack([found.values, found.accepted.astype(float)])
+    outcomes = study.at_levels(levels, progress)
+    values = np.column_stack([outcomes.values, outcomes.accepted.astype(float)])
     sets = values.reshape(sources + 2, points, -1)
-    good = np.isfinite(sets).all(axis=(0, 2))
+    is_finite = np.isfinite(sets).all(axis=(0, 2))
     failed = int(np.isnan(values).any(axis=1).sum())
     size = sets.shape[2]
-    if not good.any():
+    if not is_finite.any():
         nothing = np.full((size, sources), np.nan)
         return SobolIndices(nothing, nothing, len(levels), failed)
     # A set of robots with one that failed is replaced by the good set before it.
-    last = np.maximum.accumulate(np.where(good, np.arange(points), -1))
-    sets = sets[:, np.where(last >= 0, last, np.argmax(good))]
+    last = np.maximum.accumulate(np.where(is_finite, np.arange(points), -1))
+    sets = sets[:, np.where(last >= 0, last, np.argmax(is_finite))]
     sets = sets - sets[:2].mean(axis=(0, 1))  # smaller errors than about a distant mean
     ordered = np.moveaxis(sets, 1, 2)
     varies = np.ptp(ordered[:2], axis=(0, 2)) > 0.0

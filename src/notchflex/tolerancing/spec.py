@@ -143,10 +143,10 @@ class ToleranceSpec:
                     f"limits must be notchflex.AcceptanceLimit; got {short_repr(limit)}"
                 )
             self.load_of(limit)
-        wanted = self.wanted_yield
-        if wanted is not None and not 0.0 < check_number(wanted, "wanted_yield") < 1.0:
+        target = self.wanted_yield
+        if target is not None and not 0.0 < check_number(target, "wanted_yield") < 1.0:
             raise InputError.OUT_OF_RANGE(
-                f"the wanted yield must lie between 0 and 1, such as 0.95; got {wanted:g}."
+                f"the wanted yield must lie between 0 and 1, such as 0.95; got {target:g}."
             )
 
     def load_of(self, limit: AcceptanceLimit) -> str:

@@ -130,19 +130,21 @@ class Study:
             own = [index for index, one in enumerate(self.criteria) if one.load == name]
             outputs = tuple(dict.fromkeys(self.criteria[index].quantity.name for index in own))
             part = _part_of(progress, number, len(self.loads))
-            found = self.follow(robots, name, load, (*outputs, "converged"), part)
-            good, turn = found["converged"], self.paths[name].base_to_world
+            quantities = self.follow(robots, name, load, (*outputs, "converged"), part)
+            converged, turn = quantities["converged"], self.paths[name].base_to_world
             turned = {
-                name: found[name] if turn is None else REGISTERED[name].turned(found[name], turn)
+                name: quantities[name]
+                if turn is None
+                else REGISTERED[name].turned(quantities[name], turn)
                 for name in outputs
             }
             for index in own:
                 criterion = self.criteria[index]
-                there = good[:, criterion.step]
+                accepted = converged[:, criterion.step]
                 values[rows, index] = np.where(
-                    there, criterion.of(turned[criterion.quantity.name]), np.nan
+                    accepted, criterion.of(turned[criterion.quantity.name]), np.nan
                 )
-            failed = ~good.all(axis=1)
+            failed = ~converged.all(axis=1)
             codes[rows[failed]] = FAILED
         codes[(codes == ACCEPTED) & ~self.within(values).all(axis=1)] = REJECTED
         return Outcomes(values, codes)

@@ -43,25 +43,25 @@ def steer(session: Session, ends: ControlRanges, point: Float[np.ndarray, " 3"])
         ends: Ends of the sliders.
         point: Where the tip is to be, in the world, mm.
     """
-    here, robot = session.controls, session.robot
+    controls, robot = session.controls, session.robot
     away = float(np.linalg.norm(session.solved.tip_position - point))
     if away <= _SEARCH.tolerance:
-        return Steered(here, away, True)
-    drive: Drive = TENSION if TENSION in here.by else STROKE
-    driven = [by == drive for by in here.by]
-    held = [None if free else value for free, value in zip(driven, here.value, strict=True)]
+        return Steered(controls, away, True)
+    drive: Drive = TENSION if TENSION in controls.by else STROKE
+    driven = [by == drive for by in controls.by]
+    held = [None if free else value for free, value in zip(driven, controls.value, strict=True)]
     none = [None] * len(held)
     load = Load(
         tension=none if drive == TENSION else held,
         stroke=held if drive == TENSION else none,
-        tip_force=here.tip_force,
-        tip_mass=here.tip_mass,
+        tip_force=controls.tip_force,
+        tip_mass=controls.tip_mass,
         base_rotation=POINTING[session.pointing],
     )
     low, high = zip(*(ends.ends(tendon, drive) for tendon in range(len(held))), strict=True)
     limits = Limits(tension=(low, high)) if drive == TENSION else Limits(stroke=(low, high))
     state = session.solved.state
-    found = reach(
+    reached = reach(
         robot,
         point,
         state=state,
@@ -71,9 +71,9 @@ def steer(session: Session, ends: ControlRanges, point: Float[np.ndarray, " 3"])
         approach="direct",
         search=_SEARCH,
     )
-    path = found.following.load
+    path = reached.following.load
     values = (path.tension if drive == TENSION else path.stroke)[-1]
-    numbers = here.numbers
+    numbers = controls.numbers
     count = len(held)
     numbers[:count] = np.where(driven, values, numbers[:count])
-    return Steered(here.with_numbers(numbers), found.error, found.reached)
+    return Steered(controls.with_numbers(numbers), reached.error, reached.reached)

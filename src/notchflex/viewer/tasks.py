@@ -194,18 +194,18 @@ class TargetQueue:
         for target in targets:
             self.add(target)
 
-    def restart(self, here: Controls) -> None:
+    def restart(self, controls: Controls) -> None:
         """Continue from another setting to the same targets; those of another kind are dropped."""
         with self._lock:
-            self.here = here
-            turned = [replace(target, pointing=here.pointing) for target in self._targets]
-            self._replace(target for target in turned if target.same_kind(here))
+            self.here = controls
+            turned = [replace(target, pointing=controls.pointing) for target in self._targets]
+            self._replace(target for target in turned if target.same_kind(controls))
 
-    def clear(self, here: Controls | None = None) -> None:
+    def clear(self, controls: Controls | None = None) -> None:
         """Drop all targets; with `here` also set the current setting."""
         with self._lock:
             self._targets.clear()
-            self.here = self.here if here is None else here
+            self.here = self.here if controls is None else controls
 
     def next(self) -> Controls | None:
         """Return the next setting to solve; None if all targets are reached."""

@@ -22,7 +22,7 @@ from notchflex.viewer.steering import steer
 from notchflex.viewer.tasks import TargetQueue, TaskLoop, WatchedFile
 
 # A browser does not show more steps a second than this.
-MOST_STEPS = 60.0
+MAX_STEPS = 60.0
 # Intervals in which charts and numbers are updated, and in which the file is checked [s].
 _TEXT, _LOOK = 0.1, 0.5
 # Distance of the tip from its target that is worth a note, in outer radii.
@@ -96,7 +96,7 @@ class Viewer(TaskLoop):
         if controls is None:
             return
         self.advance(controls)
-        rest = 1.0 / MOST_STEPS - (time.monotonic() - started)
+        rest = 1.0 / MAX_STEPS - (time.monotonic() - started)
         if rest > 0.0:
             time.sleep(rest)
 
@@ -143,11 +143,11 @@ class Viewer(TaskLoop):
         """
         self._playing = False
         self._quiet()
-        found = steer(self.session, self.reach, point)
-        if found.error > _SEEN * self.session.robot.tube.outer_radius:
-            self.note = f"Out of reach: the tip stays {found.error:.2g} mm away."
-        self.targets.clear(found.controls)
-        self.advance(found.controls, goes_on=not last)
+        steered = steer(self.session, self.reach, point)
+        if steered.error > _SEEN * self.session.robot.tube.outer_radius:
+            self.note = f"Out of reach: the tip stays {steered.error:.2g} mm away."
+        self.targets.clear(steered.controls)
+        self.advance(steered.controls, goes_on=not last)
 
     def drive_by(self, tendon: int, by: str) -> None:
         """Prescribe the tension or the stroke of a tendon (from 0) from now on; nothing moves."""
@@ -183,10 +183,10 @@ class Viewer(TaskLoop):
 
     def _restart(self) -> None:
         """Continue from the current state of the session to the targets that are left."""
-        here = self.session.controls
+        controls = self.session.controls
         self.interrupted.clear()
-        self.targets.stride = self.reach.stride(here.by)
-        self.targets.restart(here)
+        self.targets.stride = self.reach.stride(controls.by)
+        self.targets.restart(controls)
         self._draw(update=True)
 
     def point(self, pointing: str) -> None:
@@ -276,8 +276,8 @@ class Viewer(TaskLoop):
     def stretch(self, tendon: int, by: str, end: float) -> None:
         """Change the end of the slider of a tendon (from 0) [N or mm], within limits."""
         first = self._first_reach.ends(tendon, by)[1]
-        here = self.session.controls.command(tendon) == by
-        now = abs(self.targets.end.value[tendon]) if here else 0.0
+        is_commanded = self.session.controls.command(tendon) == by
+        now = abs(self.targets.end.value[tendon]) if is_commanded else 0.0
         low, high = max(now, first / STRETCH), first * STRETCH
         kept = min(max(end, low), high)
         self._quiet()

@@ -27,7 +27,7 @@ _VOXELS = 32
 """Voxels along the longest side of a workspace."""
 
 # Points of the alpha shape at most: one of each voxel, of voxels as fine as that allows.
-_MOST_ALPHA = 30_000
+_MAX_ALPHA = 30_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,7 +112,7 @@ class Workspace(Displayed):
         size = self._voxel_size(2.0)
         while True:  # thinned to one point a voxel
             first = np.unique(np.floor(self._some / size), axis=0, return_index=True)[1]
-            if len(first) <= _MOST_ALPHA:
+            if len(first) <= _MAX_ALPHA:
                 break
             size *= 1.25
         return alpha_size(self._some[first], 2.0 * size if radius is None else radius)

@@ -21,10 +21,10 @@ from notchflex.workspaces.stiffness import with_stiffness
 
 Progress = Callable[[int, int], None]
 
-MOST_STATES, MOST_IN_PIECES = 20_000_000, 20_000_000_000
+MAX_STATES, MAX_IN_PIECES = 20_000_000, 20_000_000_000
 """States in memory at most, and in pieces."""
 
-_MOST_STIFFNESS = 5000
+_MAX_STIFFNESS = 5000
 
 # Rays of a piece: its states and their quantities are in memory at a time.
 _PIECE = 4096
@@ -80,7 +80,7 @@ def workspace(
     checked = limits_of(limits)
     largest = largest_tensions(check_is_robot(robot), tension)
     folder = None if folder is None else PieceFolder.of(folder)
-    most = MOST_STATES if folder is None else MOST_IN_PIECES
+    most = MAX_STATES if folder is None else MAX_IN_PIECES
     _check_numbers(states, pretension, stiffness, seed, float(largest.max()), most)
     if load is not None and not isinstance(load, ExternalLoad):  # pyright: ignore
         raise InputError.WRONG_TYPE(
@@ -89,23 +89,27 @@ def workspace(
     explorer = Explorer(robot, checked, (load or ExternalLoad()).external, cores)
     number = -(-states // (2 * LEVELS))
     if folder is not None:
-        found = explore_in_pieces(explorer, largest, number, pretension, seed, folder, progress)
-        return with_stiffness(found, stiffness) if stiffness and found.loading.any() else found
+        explored = explore_in_pieces(explorer, largest, number, pretension, seed, folder, progress)
+        return (
+            with_stiffness(explored, stiffness)
+            if stiffness and explored.loading.any()
+            else explored
+        )
     every = rays(robot, largest, number, LEVELS, pretension, seed)
     pieces: list[RayPiece] = []
     for start in range(0, number, _PIECE):
         pieces.append(explorer.piece(every[start : start + _PIECE]))
         if progress is not None:
             progress(min(start + _PIECE, number), number)
-    found = joined(explorer, largest, pieces)
-    return with_stiffness(found, stiffness) if stiffness and found.loading.any() else found
+    explored = joined(explorer, largest, pieces)
+    return with_stiffness(explored, stiffness) if stiffness and explored.loading.any() else explored
 
 
 def _check_numbers(
     states: int, pretension: float, stiffness: int, seed: int, largest: float, most: int
 ) -> None:
     if not 2 * LEVELS <= check_integer(states, "states") <= most:
-        more = ", or more in pieces (give a folder)" if most == MOST_STATES else ""
+        more = ", or more in pieces (give a folder)" if most == MAX_STATES else ""
         raise InputError.OUT_OF_RANGE(
             f"states must be from {2 * LEVELS} to {most:,}{more}; got {states}"
         )
@@ -114,9 +118,9 @@ def _check_numbers(
             f"pretension must be 0 N or more and below the largest tension, {largest:g} N; "
             f"got {pretension:g}"
         )
-    if not 0 <= check_integer(stiffness, "stiffness") <= _MOST_STIFFNESS:
+    if not 0 <= check_integer(stiffness, "stiffness") <= _MAX_STIFFNESS:
         raise InputError.OUT_OF_RANGE(
-            f"stiffness is a number of states from 0 to {_MOST_STIFFNESS}; got {stiffness}"
+            f"stiffness is a number of states from 0 to {_MAX_STIFFNESS}; got {stiffness}"
         )
     if check_integer(seed, "seed") < 0:
         raise InputError.OUT_OF_RANGE(f"seed must be 0 or more; got {seed}")

@@ -18,32 +18,32 @@ from notchflex.workspaces.comparing import Overlap
 _PARTS = (0.05, 0.5, 0.95)
 
 
-def workspace_document(found: Workspace) -> dict[str, Any]:
+def workspace_document(explored: Workspace) -> dict[str, Any]:
     """Return what was found as a document of plain values, at the units of files."""
     document: dict[str, Any] = {
-        **document_head(found.robot),
-        "limits": [one.text for one in found.limits],
-        "largest_tension_N": found.largest,
+        **document_head(explored.robot),
+        "limits": [one.text for one in explored.limits],
+        "largest_tension_N": explored.largest,
         "states": {
-            "solved": found.tried,
-            "kept": len(found),
-            "not_converged": found.failed,
-            "beyond_limits": found.beyond,
+            "solved": explored.tried,
+            "kept": len(explored),
+            "not_converged": explored.failed,
+            "beyond_limits": explored.beyond,
         },
     }
-    if not len(found):
+    if not len(explored):
         return document
-    hull, voxels = found.hull, found.voxels()
-    low, high = found.extent
+    hull, voxels = explored.hull, explored.voxels()
+    low, high = explored.extent
     return document | {
         "extent_mm": {axis: [low[i], high[i]] for i, axis in enumerate(AXES)},
         "convex_hull": {"dimension": hull.dimension, "size": hull.size, "unit": hull.unit},
-        "alpha_shape": {"size": found.alpha_size(), "unit": hull.unit},
-        "total_angle_deg": _spread(found.angle * DEGREES),
-        "peak_strain": _spread(found.strain),
-        "tension_N": _spread(found.tension.max(axis=1)),
-        "hysteresis_mm": _spread(found.hysteresis),
-        "softest_stiffness_N_mm": _spread(found.stiffness),
+        "alpha_shape": {"size": explored.alpha_size(), "unit": hull.unit},
+        "total_angle_deg": _spread(explored.angle * DEGREES),
+        "peak_strain": _spread(explored.strain),
+        "tension_N": _spread(explored.tension.max(axis=1)),
+        "hysteresis_mm": _spread(explored.hysteresis),
+        "softest_stiffness_N_mm": _spread(explored.stiffness),
         "voxels": {
             "edge_mm": voxels.size,
             "count": len(voxels),
@@ -54,22 +54,22 @@ def workspace_document(found: Workspace) -> dict[str, Any]:
 
 
 def _spread(values: np.ndarray) -> dict[str, float | None]:
-    good = values[np.isfinite(values)]
-    if not len(good):
+    finite = values[np.isfinite(values)]
+    if not len(finite):
         return {"p5": None, "p50": None, "p95": None, "largest": None}
-    parts = np.quantile(good, _PARTS)
+    parts = np.quantile(finite, _PARTS)
     named: dict[str, float | None] = {
         f"p{100 * part:g}": float(one) for part, one in zip(_PARTS, parts, strict=True)
     }
-    return named | {"largest": float(good.max())}
+    return named | {"largest": float(finite.max())}
 
 
-def overlap_documents(found: Sequence[Overlap]) -> list[dict[str, Any]]:
+def overlap_documents(overlaps: Sequence[Overlap]) -> list[dict[str, Any]]:
     """Return comparisons as plain values."""
-    return [vars(one) for one in found]
+    return [vars(one) for one in overlaps]
 
 
-def save_netcdf(found: Mapping[str, Workspace], target: str) -> None:
+def save_netcdf(workspaces: Mapping[str, Workspace], target: str) -> None:
     """Write the states as NetCDF, each robot a group where there are several; whole or not at all.
 
     Raises:
@@ -78,7 +78,7 @@ def save_netcdf(found: Mapping[str, Workspace], target: str) -> None:
     for module in ("xarray", "h5netcdf", "h5py"):
         need(module, "data", "--nc")
     with replacing(target) as temporary:
-        for number, (label, one) in enumerate(found.items()):
-            group = label.replace("/", "-") if len(found) > 1 else None
+        for number, (label, one) in enumerate(workspaces.items()):
+            group = label.replace("/", "-") if len(workspaces) > 1 else None
             mode = "a" if number else "w"
             one.to_xarray().to_netcdf(temporary, engine="h5netcdf", group=group, mode=mode)

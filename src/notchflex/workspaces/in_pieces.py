@@ -85,8 +85,8 @@ class WorkspaceTask:
     def size(self) -> float:
         """Edge of a voxel, mm, from a few rays."""
         robot, largest = self.explorer.robot, self.largest
-        found = self._solved(rays(robot, largest, _SAMPLE, LEVELS, *self._rest[1:]))
-        side = float(np.ptp(found.tip, axis=0).max()) if len(found) else 1.0
+        explored = self._solved(rays(robot, largest, _SAMPLE, LEVELS, *self._rest[1:]))
+        side = float(np.ptp(explored.tip, axis=0).max()) if len(explored) else 1.0
         return max(side, 1e-6) / _FINE
 
     def _solved(self, tension: Float[np.ndarray, "r s t"]) -> Workspace:
@@ -100,15 +100,15 @@ class WorkspaceTask:
         start, stop = (one // (2 * LEVELS) for one in self.manifest.between(number))
         robot, largest = self.explorer.robot, self.largest
         drawn = ray_sequence(robot, largest, count, seed).between(start, stop)
-        found = self._solved(rays_at(robot, largest, drawn, LEVELS, pretension))
-        columns = _columns(found)
-        corner = _corners(found.tip)
+        explored = self._solved(rays_at(robot, largest, drawn, LEVELS, pretension))
+        columns = _columns(explored)
+        corner = _corners(explored.tip)
         kept = np.union1d(thinned(columns, self.size), np.flatnonzero(corner))
         columns["corner"] = corner
         frame = polars.DataFrame(
             {name: np.ascontiguousarray(one[kept]) for name, one in columns.items()}
         )
-        head = {"codes": [len(found), found.beyond, found.failed, 0]}
+        head = {"codes": [len(explored), explored.beyond, explored.failed, 0]}
         return Piece(frame, head)
 
 
@@ -118,16 +118,16 @@ def workspace_task(content: bytes) -> WorkspaceTask:
     return WorkspaceTask(Explorer(robot, limits, load, 1), *rest)
 
 
-def _columns(found: Workspace) -> dict[str, np.ndarray]:
+def _columns(explored: Workspace) -> dict[str, np.ndarray]:
     """Return the states as columns, in mm, N and rad."""
-    vectors = {"tension": found.tension, "tip": found.tip, "direction": found.direction}
+    vectors = {"tension": explored.tension, "tip": explored.tip, "direction": explored.direction}
     columns = {
         f"{name}_{number + 1}": values[:, number]
         for name, values in vectors.items()
         for number in range(values.shape[1])
     }
     names = ("loading", "strain", "angle", "hysteresis")
-    return columns | {name: getattr(found, name) for name in names}
+    return columns | {name: getattr(explored, name) for name in names}
 
 
 def _vectors(columns: dict[str, np.ndarray], name: str, size: int) -> Float[np.ndarray, "n k"]:

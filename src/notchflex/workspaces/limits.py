@@ -101,10 +101,10 @@ def all_hold(
     limits: Iterable[Limit], outputs: Mapping[str, np.ndarray]
 ) -> Bool[np.ndarray, "rows steps"]:
     """Return which states of paths converged and keep all limits."""
-    good = np.asarray(outputs["converged"], bool)
+    hold = np.asarray(outputs["converged"], bool)
     for limit in limits:
-        good = good & limit.holds(outputs[limit.name])
-    return good
+        hold = hold & limit.holds(outputs[limit.name])
+    return hold
 
 
 def in_python(

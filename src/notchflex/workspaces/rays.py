@@ -59,8 +59,8 @@ class Explorer:
         part = np.linspace(0.0, 1.0, _FIRST_LEVELS + 1)[1:]
         peak = tension[:, tension.shape[1] // 2]
         path = part[None, :, None] * peak[:, None]
-        good = all_hold(self.limits, self._solve(path, [one.name for one in self.limits]))
-        within = np.logical_and.accumulate(good, axis=1).sum(axis=1)
+        hold = all_hold(self.limits, self._solve(path, [one.name for one in self.limits]))
+        within = np.logical_and.accumulate(hold, axis=1).sum(axis=1)
         # Between the last level within and the first beyond: halved a few times, rays as a batch.
         low = np.concatenate([[0.0], part])[within]
         high = np.where(within == len(part), 1.0, np.concatenate([part, [1.0]])[within])

@@ -53,9 +53,9 @@ def hull_of(points: Float[np.ndarray, "n 3"]) -> Hull:
     corners = points[hull.vertices]
     faces = no_faces
     if dimension == 3:
-        place = np.zeros(len(points), int)
-        place[hull.vertices] = np.arange(len(hull.vertices))
-        faces = place[hull.simplices]
+        index = np.zeros(len(points), int)
+        index[hull.vertices] = np.arange(len(hull.vertices))
+        faces = index[hull.simplices]
     return Hull(dimension, float(hull.volume), corners, faces, origin, axes)
 
 
@@ -79,11 +79,11 @@ def alpha_size(points: Float[np.ndarray, "n 3"], radius: float) -> float:
         return 0.0
     edges = simplices[:, 1:] - simplices[:, :1]
     sizes = np.abs(np.linalg.det(edges)) / (2.0 if len(axes) == 2 else 6.0)
-    good = sizes > 1e-12 * sizes.max()
-    half = 0.5 * (edges[good] ** 2).sum(axis=2)
-    centre = np.linalg.solve(edges[good], half[..., None])[..., 0]
+    is_regular = sizes > 1e-12 * sizes.max()
+    half = 0.5 * (edges[is_regular] ** 2).sum(axis=2)
+    centre = np.linalg.solve(edges[is_regular], half[..., None])[..., 0]
     small = np.linalg.norm(centre, axis=1) <= radius
-    return float(sizes[good][small].sum())
+    return float(sizes[is_regular][small].sum())
 
 
 def inside(

@@ -53,22 +53,22 @@ def voxel_map(
         size: Edge of a voxel, mm.
     """
     cells = np.floor(points / size).astype(np.int64)
-    found, of_state, states = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    occupied, of_state, states = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
     of_state = of_state.reshape(-1)
     reached = np.unique(of_state * DIRECTIONS + nearest_directions(directions))
-    dexterity = np.bincount(reached // DIRECTIONS, minlength=len(found)) / DIRECTIONS
+    dexterity = np.bincount(reached // DIRECTIONS, minlength=len(occupied)) / DIRECTIONS
     maps: dict[str, np.ndarray] = {}
     for name, one in values.items():
-        good = np.isfinite(one)
+        is_finite = np.isfinite(one)
         if name == "hysteresis":
-            most = np.full(len(found), -np.inf)
-            np.maximum.at(most, of_state[good], one[good])
+            most = np.full(len(occupied), -np.inf)
+            np.maximum.at(most, of_state[is_finite], one[is_finite])
             maps[name] = np.where(np.isfinite(most), most, np.nan)
         else:
-            count = np.bincount(of_state[good], minlength=len(found))
-            total = np.bincount(of_state[good], one[good], minlength=len(found))
+            count = np.bincount(of_state[is_finite], minlength=len(occupied))
+            total = np.bincount(of_state[is_finite], one[is_finite], minlength=len(occupied))
             maps[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-    return VoxelMap(size, (found + 0.5) * size, states, dexterity, maps, of_state)
+    return VoxelMap(size, (occupied + 0.5) * size, states, dexterity, maps, of_state)
 
 
 def sphere_directions() -> Float[np.ndarray, "directions 3"]:

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from notchflex.fit import Measurements
     from notchflex.robot import Robot
 
-MOST_BESIDE = 4
+MAX_BESIDE = 4
 """Robots beside the first: five can be distinguished by colour."""
 
-_MOST_CHANGES = 4
+_MAX_CHANGES = 4
 """More values of `--set` than this are only counted in a title."""
 
 RobotName = Annotated[
@@ -90,9 +90,9 @@ def changed_title(robot: Robot, settings: Sequence[str]) -> str:
 
     pairs = map(parse_assignment, settings)
     changes = [f"{path} = {value}" for path, value in pairs if path != "name"]
-    more = len(changes) - _MOST_CHANGES
+    more = len(changes) - _MAX_CHANGES
     if more > 0:
-        changes = [*changes[:_MOST_CHANGES], f"{more} more"]
+        changes = [*changes[:_MAX_CHANGES], f"{more} more"]
     return f"{robot.name} with {', '.join(changes)}" if changes else robot.name
 
 
@@ -126,9 +126,9 @@ def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, R
         name: How it was named, which is its label.
         beside: The values of `--beside`: `ROBOT`, `LABEL: ROBOT` or `LABEL: PATH=VALUE, ...`.
     """
-    if len(beside) > MOST_BESIDE:
+    if len(beside) > MAX_BESIDE:
         raise InputError.OUT_OF_RANGE(
-            f"--beside may be given {MOST_BESIDE} times at most; got {len(beside)}."
+            f"--beside may be given {MAX_BESIDE} times at most; got {len(beside)}."
         )
     robots = {robot_label(name): first}
     for text in beside:

@@ -69,9 +69,9 @@ def _print_specimens(left_out: LeftOut) -> None:
     errors: list[list[str]] = []
     for fold in left_out.folds:
         for name, (mean, size) in fold.before.items():
-            found = "-" if fold.specimen is None else f"{fold.specimen.values[name]:.4g}"
+            value = "-" if fold.specimen is None else f"{fold.specimen.values[name]:.4g}"
             gain = "-" if fold.specimen is None else f"{fold.specimen.gain:.2f}"
-            constants.append([fold.label, name, f"{mean:.4g} ± {size:.2g}", found, gain])
+            constants.append([fold.label, name, f"{mean:.4g} ± {size:.2g}", value, gain])
         inside = fold.share_inside()
         for name, error in fold.errors.items() if fold.before else ():
             title, unit, scale = edge(name)
@@ -102,8 +102,8 @@ def print_next(best: NextMeasurement) -> None:
         cells = [_plain(float(values[row]), 4) for _, values in loads]
         rows.append([str(row + 1), *cells, gain + mark.ljust(6)])
     console = terminal.output()
-    wanted = ", ".join(best.wanted) or "all constants together"
-    console.print(f"\nNext measurement of {best.label}, to narrow {wanted}:")
+    names = ", ".join(best.wanted) or "all constants together"
+    console.print(f"\nNext measurement of {best.label}, to narrow {names}:")
     heads = ["candidate", *(head for head, _ in loads), "interval after / before"]
     console.print(terminal.table([f">{head}" for head in heads], rows))
 

@@ -13,7 +13,7 @@ from notchflex.fit.assessment.errors_of_parts import edge
 if TYPE_CHECKING:
     from notchflex.comparison import Comparison
 
-MOST_COLUMNS = 8
+MAX_COLUMNS = 8
 """Numbers side by side in one table; more of them go below."""
 
 
@@ -34,8 +34,8 @@ def print_comparison(comparison: Comparison, others: dict[str, Comparison]) -> N
         console.print("angles between the faces of the notches (edge angles)")
     models = {"model": comparison, **others}
     columns = _columns(models)
-    for first in range(0, len(columns), MOST_COLUMNS):  # a wide robot in parts of 80 columns each
-        some = columns[first : first + MOST_COLUMNS]
+    for first in range(0, len(columns), MAX_COLUMNS):  # a wide robot in parts of 80 columns each
+        some = columns[first : first + MAX_COLUMNS]
         heads = ["root-mean-square error\n", *(f">{head}" for head, _ in some)]
         rows = [
             [terminal.shortened(label, 24), *(cells[n] for _, cells in some)]

@@ -8,33 +8,33 @@ import numpy as np
 
 from notchflex._quantity import DEGREES
 from notchflex.cli import terminal
-from notchflex.cli.tables.path_rows import MOST_ROWS
+from notchflex.cli.tables.path_rows import MAX_ROWS
 
 if TYPE_CHECKING:
     from notchflex.control import Following
 
 
-def print_following(found: Following) -> None:
+def print_following(following: Following) -> None:
     """Print drives, tip and error of every target; of many targets some."""
-    console, tendons = terminal.output(terminal.width()), found.tension.shape[1]
-    met = int(found.reached.sum())
-    console.print(f"{found.robot.name}: {met} of {len(found)} targets met", soft_wrap=True)
+    console, tendons = terminal.output(terminal.width()), following.tension.shape[1]
+    met = int(following.reached.sum())
+    console.print(f"{following.robot.name}: {met} of {len(following)} targets met", soft_wrap=True)
     heads = [">target\n"]
     for what, unit in (("tension", "N"), ("stroke", "mm")):
         heads += [f">{what}{'' if tendons == 1 else f' {i + 1}'}\n{unit}" for i in range(tendons)]
     heads += [">tip x\nmm", ">tip y\nmm", ">tip z\nmm", ">angle\ndeg", ">error\n", "\n"]
-    numbers = np.concatenate([found.tension, found.stroke, found.tip_position], axis=1)
-    angle = found.path.total_angle[found.step] * DEGREES
-    stride = -(-len(found) // MOST_ROWS)
-    shown = sorted({*range(0, len(found), stride), len(found) - 1})
-    vias = np.diff(found.step, prepend=-1) > 1
+    numbers = np.concatenate([following.tension, following.stroke, following.tip_position], axis=1)
+    angle = following.path.total_angle[following.step] * DEGREES
+    stride = -(-len(following) // MAX_ROWS)
+    shown = sorted({*range(0, len(following), stride), len(following) - 1})
+    vias = np.diff(following.step, prepend=-1) > 1
     rows = [
         [
             str(i + 1),
             *(f"{value:.4f}" for value in numbers[i]),
             f"{angle[i]:.2f}",
-            f"{found.error[i]:.1e}",
-            " ".join([*(["overshoot"] if vias[i] else []), found.code[i]]).strip(),
+            f"{following.error[i]:.1e}",
+            " ".join([*(["overshoot"] if vias[i] else []), following.code[i]]).strip(),
         ]
         for i in shown
     ]

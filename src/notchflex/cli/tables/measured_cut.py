@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def write_cut(
-    found: MeasuredCut,
+    cut: MeasuredCut,
     outputs: Outputs,
     output: str | None,
     robot: str | None,
@@ -23,7 +23,7 @@ def write_cut(
     """Write and print the notches as they were cut; return the exit code.
 
     Args:
-        found: What was measured.
+        cut: What was measured.
         outputs: Where results go.
         output: The CSV.
         robot: The robot file with the measured lengths.
@@ -35,32 +35,32 @@ def write_cut(
 
     if overlays:
         overlays[0].parent.mkdir(exist_ok=True)
-    for file, one in zip(overlays, found.photographs, strict=False):
-        write_overlay(file, read_photograph(one.source), one, cut_lines(found))
-    outputs.write_json(lambda: cut_document(found))
-    if found.reason:
-        terminal.warn(f"the cut is refused: {found.reason}.")
+    for file, one in zip(overlays, cut.photographs, strict=False):
+        write_overlay(file, read_photograph(one.source), one, cut_lines(cut))
+    outputs.write_json(lambda: cut_document(cut))
+    if cut.reason:
+        terminal.warn(f"the cut is refused: {cut.reason}.")
         unwritten = [name for name in (output, robot) if name is not None]
         if unwritten:
             terminal.error(f"nothing was measured; not written: {', '.join(unwritten)}.")
         return NOT_CONVERGED
     if output is not None:
-        found.write_csv(output)
+        cut.write_csv(output)
     if robot is not None:
-        found.write_robot(robot)
+        cut.write_robot(robot)
     if outputs.prints_tables and "-" not in (output, robot):
-        _print(found)
-    if len(found.photographs) == 1:
+        _print(cut)
+    if len(cut.photographs) == 1:
         terminal.note("depths need a second photograph, with the robot turned by some 20 deg.")
     return DONE
 
 
-def _print(found: MeasuredCut) -> None:
+def _print(cut: MeasuredCut) -> None:
     console = terminal.output()
-    console.print(f"Notches of {found.robot.name} as cut, with standard deviations")
+    console.print(f"Notches of {cut.robot.name} as cut, with standard deviations")
     heads = [">\nnotch", ">height\nmm", ">±\nmm", ">depth\nmm", ">±\nmm"]
     heads += [">uncut\nmm", ">±\nmm"]
-    first, *others = found.columns().values()
+    first, *others = cut.columns().values()
     rows = [
         [f"{number:.0f}", *(f"{value:.3f}" for value in values)]
         for number, *values in zip(first, *others, strict=True)

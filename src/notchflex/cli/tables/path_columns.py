@@ -96,9 +96,9 @@ def usual_groups(path: EquilibriumPath, rows: Sequence[int]) -> list[ColumnGroup
         commands = [path.commanded_tension[:, tendon], path.commanded_stroke[:, tendon]]
         # A step that was not solved still shows what was commanded.
         for column, command in zip(columns, commands, strict=True):
-            for place, row in enumerate(rows):
+            for index, row in enumerate(rows):
                 if not path.converged[row] and np.isfinite(command[row]):
-                    column.cells[place] = _rounded(float(command[row]), ".3f")
+                    column.cells[index] = _rounded(float(command[row]), ".3f")
         commanded = bool(np.isfinite(commands).any())
         meaning = "" if tendon else _meaning("tension", "T") + "; " + _meaning("stroke", "u")
         groups.append(ColumnGroup(("tension", "stroke"), 1 if commanded else 5, columns, meaning))
@@ -133,14 +133,14 @@ def parse_columns(text: str) -> list[str]:
     """
     allowed = [name for name, quantity in QUANTITIES.items() if "row" not in quantity.per]
     names = [word.strip() for word in text.split(",")]
-    for place, name in enumerate(names):
+    for index, name in enumerate(names):
         if name not in allowed:
             got = repr(name) if name else "an empty name"
             raise InputError.UNKNOWN_NAME(
                 f"--columns {text}: {got} is not the name of a quantity{nearest(name, allowed)}. "
                 f"Allowed: {', '.join(allowed)}."
             )
-        if name in names[:place]:
+        if name in names[:index]:
             raise InputError.CONFLICT(f"--columns {text}: {name} is given twice; give it once.")
     return names
 

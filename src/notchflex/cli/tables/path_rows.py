@@ -12,10 +12,10 @@ from notchflex.errors import InputError
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
-MOST_ROWS = 60
+MAX_ROWS = 60
 """A path with no more steps than this is shown whole."""
 
-_MOST_ALL = 20_000
+_MAX_ALL = 20_000
 
 
 def shown_rows(path: EquilibriumPath, *, every_row: bool = False) -> tuple[list[int], int]:
@@ -35,10 +35,10 @@ def shown_rows(path: EquilibriumPath, *, every_row: bool = False) -> tuple[list[
         InputError: There are too many steps to show all of them.
     """
     steps = len(path)
-    if every_row and steps > _MOST_ALL:
+    if every_row and steps > _MAX_ALL:
         raise InputError.UNSUPPORTED(
             f"--all: a table of {steps:,} rows; write them with --csv FILE instead "
-            f"(--all shows up to {_MOST_ALL:,})."
+            f"(--all shows up to {_MAX_ALL:,})."
         )
     if every_row:
         return list(range(steps)), 1
@@ -46,12 +46,12 @@ def shown_rows(path: EquilibriumPath, *, every_row: bool = False) -> tuple[list[
         size * 10**power
         for power in range(7)  # 1, 2, 5, 10, 20, ...: so that round loads stay round
         for size in (1, 2, 5)
-        if steps <= MOST_ROWS * size * 10**power
+        if steps <= MAX_ROWS * size * 10**power
     )
     rows = set(range(0, steps, stride)) | {0, steps - 1}
     if stride > 1:
         reversals = reversals_of(path)
-        rows |= reversals if len(reversals) <= MOST_ROWS else _extremes(path)
+        rows |= reversals if len(reversals) <= MAX_ROWS else _extremes(path)
         rows |= {int(step) for step in np.flatnonzero(~np.asarray(path.converged))[:1]}
     return sorted(rows), stride
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 ANGLE_AND_TIP = ("total_angle", "tip_position")
 """Quantities whose bands are shown where none are named."""
 
-MOST_LOADS = 3
+MAX_LOADS = 3
 """More different loads than this are only counted."""
 
 
@@ -146,7 +146,7 @@ def load_sentences(external: Sequence[ExternalLoad]) -> list[str]:
     different = list(dict.fromkeys(external))
     if all(one.is_nothing for one in different):
         return []
-    if len(different) > MOST_LOADS:
+    if len(different) > MAX_LOADS:
         return [f"external loads: {len(different)} different ones over the steps"]
     lines: list[str] = []
     for one in different:
@@ -206,9 +206,9 @@ def _print_block(
     console: Console, path: EquilibriumPath, rows: Sequence[int], columns: Sequence[PathColumn]
 ) -> None:
     table = terminal.table([f">{column.head}\n{column.unit}" for column in columns])
-    for place, row in enumerate(rows):
+    for index, row in enumerate(rows):
         style = None if path.converged[row] else "red"
-        table.add_row(*(column.cells[place] for column in columns), style=style)
+        table.add_row(*(column.cells[index] for column in columns), style=style)
     console.print(table)
 
 

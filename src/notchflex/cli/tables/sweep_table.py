@@ -57,39 +57,39 @@ def print_estimate(expected: Estimate) -> None:
 
 
 _USUAL = [0.0, 0.025, 0.25, 0.5, 0.75, 0.975, 1.0]
-_MOST = 9
+_MAX_COLUMNS = 9
 """Quantiles that a table shows at most."""
 
 
-def print_sweep(found: Sweep) -> None:
+def print_sweep(sweep: Sweep) -> None:
     """Print counts, and quantiles of every kept quantity: as many as fit beside its name."""
     console = terminal.output(terminal.width())
-    counts = ", ".join(f"{count} {code}" for code, count in found.counts.items() if count)
-    state = "" if found.finished else f" of {found.manifest.rows}, {len(found.pieces)} of "
-    state += "" if found.finished else f"{found.manifest.pieces} pieces"
-    console.print(f"{found.plan.name}: {found.rows} rows{state}; {counts or 'none'}")
-    if not found.rows:
+    counts = ", ".join(f"{count} {code}" for code, count in sweep.counts.items() if count)
+    state = "" if sweep.finished else f" of {sweep.manifest.rows}, {len(sweep.pieces)} of "
+    state += "" if sweep.finished else f"{sweep.manifest.pieces} pieces"
+    console.print(f"{sweep.plan.name}: {sweep.rows} rows{state}; {counts or 'none'}")
+    if not sweep.rows:
         return
-    console.print(terminal.table(*_fitting(found, console.width), gap=2))
+    console.print(terminal.table(*_fitting(sweep, console.width), gap=2))
 
 
-def _fitting(found: Sweep, width: int) -> tuple[list[str], list[tuple[str, ...]]]:
+def _fitting(sweep: Sweep, width: int) -> tuple[list[str], list[tuple[str, ...]]]:
     """Return heads and cells with as many quantiles as fit into a width, at least the extremes."""
-    parts = sorted({0.0, 1.0, *found.plan.output.quantiles})
+    parts = sorted({0.0, 1.0, *sweep.plan.output.quantiles})
     for shown in (parts, _USUAL, [0.0, 0.025, 0.5, 0.975, 1.0], [0.0, 0.5, 1.0]):
-        made = _quantiles(found, shown)
-        sizes = [max(map(len, column)) for column in zip(made[0], *made[1], strict=True)]
-        if len(shown) <= _MOST and sum(sizes) + 2 * (len(sizes) - 1) <= width:
-            return made
-    return _quantiles(found, [0.0, 1.0])
+        table = _quantiles(sweep, shown)
+        sizes = [max(map(len, column)) for column in zip(table[0], *table[1], strict=True)]
+        if len(shown) <= _MAX_COLUMNS and sum(sizes) + 2 * (len(sizes) - 1) <= width:
+            return table
+    return _quantiles(sweep, [0.0, 1.0])
 
 
-def _quantiles(found: Sweep, shown: list[float]) -> tuple[list[str], list[tuple[str, ...]]]:
+def _quantiles(sweep: Sweep, shown: list[float]) -> tuple[list[str], list[tuple[str, ...]]]:
     """Return heads and cells of a table of quantiles."""
     names = {0.0: ">smallest", 1.0: ">largest", 0.5: ">median"}
     heads = ["quantity", *(names.get(part, f">{100 * part:g} %") for part in shown)]
     rows = [
-        (name, *(f"{value:.5g}" for value in found.quantiles(name, shown)))
-        for name in found.columns
+        (name, *(f"{value:.5g}" for value in sweep.quantiles(name, shown)))
+        for name in sweep.columns
     ]
     return heads, rows

@@ -18,20 +18,20 @@ if TYPE_CHECKING:
     from notchflex.robot.tolerance import Tolerance
 
 
-def closing_lines(robot: Robot, found: ClosingBands) -> list[str]:
+def closing_lines(robot: Robot, bands: ClosingBands) -> list[str]:
     """Return what `show` says: closing, a typical load, 10 µm of depth, and what was assumed."""
-    first, last = int(found.tension.median.argmin()), int(found.tension.median.argmax())
-    words = [_closing(found, one) for one in dict.fromkeys((first, last))]
-    pulled = f" of tendon {found.tendon}" if robot.number_of_tendons > 1 else ""
+    first, last = int(bands.tension.median.argmin()), int(bands.tension.median.argmax())
+    words = [_closing(bands, one) for one in dict.fromkeys((first, last))]
+    pulled = f" of tendon {bands.tendon}" if robot.number_of_tendons > 1 else ""
     text = (
-        f"Accuracy: of {found.bands.draws} draws within the tolerances, 5 to 95 % give: "
-        f"{'; '.join(words)}; total angle at {found.load:.3g} N{pulled}: "
-        f"{_range(found.total_angle, '.1f', DEGREES)} deg."
+        f"Accuracy: of {bands.bands.draws} draws within the tolerances, 5 to 95 % give: "
+        f"{'; '.join(words)}; total angle at {bands.load:.3g} N{pulled}: "
+        f"{_range(bands.total_angle, '.1f', DEGREES)} deg."
     )
-    if math.isfinite(found.by_depth):
-        change = abs(found.by_depth) * DEGREES
+    if math.isfinite(bands.by_depth):
+        change = abs(bands.by_depth) * DEGREES
         text += f" 10 µm of depth in all notches change that angle by {change:.2g} deg."
-    return [*_wrapped(text), *tolerance_lines(found.bands)]
+    return [*_wrapped(text), *tolerance_lines(bands.bands)]
 
 
 def tolerance_lines(bands: Bands) -> list[str]:
@@ -59,14 +59,14 @@ def tolerance_words(
     return lines
 
 
-def _closing(found: ClosingBands, place: int) -> str:
-    tensions = _range(found.tension, ".3g", place=place)
-    angles = _range(found.angle, ".1f", DEGREES, place)
-    return f"notch {found.notches[place]} closes at {tensions} N and {angles} deg"
+def _closing(bands: ClosingBands, step: int) -> str:
+    tensions = _range(bands.tension, ".3g", step=step)
+    angles = _range(bands.angle, ".1f", DEGREES, step)
+    return f"notch {bands.notches[step]} closes at {tensions} N and {angles} deg"
 
 
-def _range(band: Band, form: str, scale: float = 1.0, place: int | None = None) -> str:
-    ends = [band.low, band.high] if place is None else [band.low[place], band.high[place]]
+def _range(band: Band, form: str, scale: float = 1.0, step: int | None = None) -> str:
+    ends = [band.low, band.high] if step is None else [band.low[step], band.high[step]]
     low, high = (float(end) * scale for end in ends)
     if math.isinf(high):
         return f"{low:{form}} or more" if math.isfinite(low) else "no"

@@ -58,10 +58,10 @@ def print_workspace(label: str, document: dict[str, Any]) -> None:
     console.print(terminal.table(heads, rows, gap=2))
 
 
-def print_overlaps(found: Sequence[Overlap]) -> None:
+def print_overlaps(overlaps: Sequence[Overlap]) -> None:
     """Print what workspaces have in common."""
     console = terminal.output()
-    for one in found:
+    for one in overlaps:
         console.print(
             f"{one.first} and {one.second}: of voxels of {one.voxel:.3g} mm {one.both} hold tips "
             f"of both, {one.first_alone} of {one.first} alone, {one.second_alone} of {one.second} "

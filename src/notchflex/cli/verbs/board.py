@@ -40,12 +40,12 @@ def board(
         check_output(output, "-o")
     from notchflex.photographs import board_of
 
-    made = board_of(layout)
-    made.write_svg(output)
+    sheet = board_of(layout)
+    sheet.write_svg(output)
     if output != "-":
-        width, height = made.size
+        width, height = sheet.size
         terminal.note(
             f"{output}: markers on {width:g} x {height:g} mm; print it at 100 % and check a marker "
-            f"with a calliper ({made.marker:g} mm)."
+            f"with a calliper ({sheet.marker:g} mm)."
         )
     return DONE

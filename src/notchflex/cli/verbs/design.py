@@ -67,23 +67,23 @@ def design(
     if front:
         return _front(spec, output, outputs)
     with terminal.bars("ranking robots") as progress:
-        made = designing.design(spec, robust=robust, progress=progress)
+        result = designing.design(spec, robust=robust, progress=progress)
     if output is not None:
-        written = write_design(made, output, inputs=[spec])
+        written = write_design(result, output, inputs=[spec])
         terminal.note(f"written: {', '.join(map(str, written))}.")
-    outputs.write_json(lambda: designing.design_document(made))
+    outputs.write_json(lambda: designing.design_document(result))
 
     def picture() -> object:
         from notchflex._plot import plot as drawn
 
-        return drawn(made)
+        return drawn(result)
 
     outputs.save_picture(picture)  # pyright: ignore[reportArgumentType]
     if outputs.prints_tables:
-        _print(made)
-    if not made.converged:
-        terminal.error(f"{made.reason}.")
-    return DONE if made.converged else NOT_CONVERGED
+        _print(result)
+    if not result.converged:
+        terminal.error(f"{result.reason}.")
+    return DONE if result.converged else NOT_CONVERGED
 
 
 def _front(spec: str, output: str | None, outputs: Outputs) -> int:
@@ -92,31 +92,31 @@ def _front(spec: str, output: str | None, outputs: Outputs) -> int:
     from notchflex._plot import plot as drawn
 
     with terminal.bars("spreading over the front") as progress:
-        found = designing.design_front(spec, progress=progress)
+        front = designing.design_front(spec, progress=progress)
     if output is not None:
-        written = designing.write_front(found, output, inputs=[spec])
+        written = designing.write_front(front, output, inputs=[spec])
         terminal.note(f"written: {', '.join(map(str, written))}.")
     outputs.write_json(
         lambda: {
-            "objectives": list(found.titles),
-            "reason": found.reason,
-            "points": [designing.design_document(point) for point in found.points],
+            "objectives": list(front.titles),
+            "reason": front.reason,
+            "points": [designing.design_document(point) for point in front.points],
         }
     )
-    outputs.save_picture(lambda: drawn(found))  # pyright: ignore[reportArgumentType]
+    outputs.save_picture(lambda: drawn(front))  # pyright: ignore[reportArgumentType]
     if outputs.prints_tables:
-        heads = ["point", *(f">{title}" for title in found.titles)]
+        heads = ["point", *(f">{title}" for title in front.titles)]
         rows = [
             (str(number), *(f"{value:.5g}" for value in values))
-            for number, values in enumerate(found.objectives.tolist(), start=1)
+            for number, values in enumerate(front.objectives.tolist(), start=1)
         ]
         terminal.output().print(terminal.table(heads, rows, gap=2))
-    if found.reason:
-        terminal.error(f"{found.reason}.")
-    return NOT_CONVERGED if found.reason else DONE
+    if front.reason:
+        terminal.error(f"{front.reason}.")
+    return NOT_CONVERGED if front.reason else DONE
 
 
-def _print(made: Design) -> None:
+def _print(design: Design) -> None:
     from notchflex.designing.result import numbers
 
     console = terminal.output()
@@ -130,19 +130,19 @@ def _print(made: Design) -> None:
             numbers(one.before),
             "" if one.met is None else "yes" if one.met else "no",
         )
-        for one in made.wishes
+        for one in design.wishes
     ]
     console.print(terminal.table(heads, rows, gap=2))
     heads = ("\nvariable", ">\nvalue", "\nunit", ">\nbefore", ">\nlimits")
     rows = [
         (v.name, f"{v.value:.5g}", v.unit, f"{v.before:.5g}", f"{v.lower:g} to {v.upper:g}")
-        for v in made.variables
+        for v in design.variables
     ]
     if rows:
         console.print(terminal.table(heads, rows, gap=2))
     console.print()
-    for sentence in made.explanation:
+    for sentence in design.explanation:
         console.print(sentence)
     console.print(
-        f"{made.starts} searches, {made.solves} robots solved, {made.gradients} derivatives."
+        f"{design.starts} searches, {design.solves} robots solved, {design.gradients} derivatives."
     )

@@ -122,15 +122,15 @@ def follow(
         strain=most_strain,
         gap=least_gap,
     )
-    wanted = control.read_targets(targets, chosen)
+    goals = control.read_targets(targets, chosen)
     start = None if from_state is None else State.load(from_state)
-    with terminal.working(f"following {len(wanted)} targets with {chosen.name}"):
+    with terminal.working(f"following {len(goals)} targets with {chosen.name}"):
         terminal.use_compile_cache()
         nothing: Any = [[float("nan")] * chosen.number_of_tendons]
         load = external.on(LoadPath(nothing, nothing))[0] if external else Load()
-        found = control.follow(
+        following = control.follow(
             chosen,
-            wanted,
+            goals,
             state=start,
             load=load,
             drive=drive,
@@ -138,19 +138,19 @@ def follow(
             approach=approach,
             search=control.TargetSearch(tolerance=tolerance),
         )
-        path = found.path
-    _write(found, outputs, changed_title(chosen, settings))
+        path = following.path
+    _write(following, outputs, changed_title(chosen, settings))
     if outputs.prints_tables:
         from notchflex.cli.tables.follow_table import print_following
 
-        print_following(found)
+        print_following(following)
     if not path.converged.all():
         terminal.error(f"not converged: {next(text for text in path.reason if text)}.")
         return NOT_CONVERGED
-    return _report(found)
+    return _report(following)
 
 
-def _write(found: Following, outputs: Outputs, title: str) -> None:
+def _write(following: Following, outputs: Outputs, title: str) -> None:
     from notchflex._replacing import replacing
     from notchflex.control.documents import following_columns, following_document
     from notchflex.results.files.csv import write_path_csv
@@ -158,25 +158,25 @@ def _write(found: Following, outputs: Outputs, title: str) -> None:
     def picture() -> Any:
         from notchflex.plotting import following_picture
 
-        return following_picture(found, title=title)
+        return following_picture(following, title=title)
 
-    outputs.write_json(lambda: following_document(found))
+    outputs.write_json(lambda: following_document(following))
     if target := outputs.targets.get("csv"):
-        write_path_csv(target, found.path, following_columns(found))
+        write_path_csv(target, following.path, following_columns(following))
     outputs.save_picture(picture)
     if target := outputs.targets.get("save_state"):
         with replacing(target) as temporary:
-            found.state.save(temporary)
+            following.state.save(temporary)
 
 
-def _report(found: Following) -> int:
+def _report(following: Following) -> int:
     """Write which targets are not met; return the exit code."""
-    missed = [index for index, reached in enumerate(found.reached) if not reached]
-    if not missed:
+    not_reached = [index for index, reached in enumerate(following.reached) if not reached]
+    if not not_reached:
         return DONE
-    first = missed[0]
+    first = not_reached[0]
     terminal.error(
-        f"{len(missed)} of {len(found)} targets not met, first target {first + 1}: "
-        f"{found.reason[first]}."
+        f"{len(not_reached)} of {len(following)} targets not met, first target {first + 1}: "
+        f"{following.reason[first]}."
     )
     return NOT_CONVERGED

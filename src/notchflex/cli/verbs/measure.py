@@ -180,14 +180,14 @@ def measure(
         if uncertainty is not None:
             limit["uncertainty_deg"] = uncertainty
         given: dict[str, Any] = {"loads": loads, "pattern": pattern, "exif": exif}
-        found = measured(photographs, chosen, progress=progress, **given, **ruler, **limit)
+        result = measured(photographs, chosen, progress=progress, **given, **ruler, **limit)
     done = True
     if correct:
-        found, done = _corrected(found, {**ruler, **limit}, port or PORT, open_browser)
-    _write(found, outputs, output, files)
+        result, done = _corrected(result, {**ruler, **limit}, port or PORT, open_browser)
+    _write(result, outputs, output, files)
     if not done:
         return INTERRUPTED
-    return DONE if not found.refused else NOT_CONVERGED
+    return DONE if not result.refused else NOT_CONVERGED
 
 
 def _check_page(correct: bool, cut: bool, port: int | None, open_browser: bool) -> None:
@@ -202,7 +202,7 @@ def _check_page(correct: bool, cut: bool, port: int | None, open_browser: bool) 
 
 
 def _corrected(
-    found: MeasuredPhotographs, options: dict[str, Any], port: int, open_browser: bool
+    photographs: MeasuredPhotographs, options: dict[str, Any], port: int, open_browser: bool
 ) -> tuple[MeasuredPhotographs, bool]:
     """Serve the page until every photograph was accepted or left out, or until Ctrl-C.
 
@@ -211,7 +211,7 @@ def _corrected(
     """
     from notchflex.viewer.correction.correction import Correction
 
-    page = Correction(found, port=port, **options)
+    page = Correction(photographs, port=port, **options)
     terminal.note(f"correct the fits on {page.address} (Ctrl+C ends, what was accepted is written)")
     if open_browser:
         import webbrowser
@@ -222,8 +222,8 @@ def _corrected(
         raise KeyboardInterrupt
     if not page.done:
         terminal.note(
-            f"ended at photograph {page.number + 1} of {len(found)}; what was accepted before is "
-            "kept."
+            f"ended at photograph {page.number + 1} of {len(photographs)}; "
+            "photographs accepted before are kept."
         )
     return corrected, page.done
 
@@ -238,7 +238,7 @@ def _check_options(cut: bool, turn: tuple[float, ...], robot: str | None, loaded
 
 
 def _write(
-    found: MeasuredPhotographs, outputs: Outputs, output: str | None, files: tuple[Path, ...]
+    photographs: MeasuredPhotographs, outputs: Outputs, output: str | None, files: tuple[Path, ...]
 ) -> None:
     from notchflex.photographs.documents import measured_document
     from notchflex.photographs.overlay import write_overlay
@@ -246,33 +246,33 @@ def _write(
 
     if files:
         files[0].parent.mkdir(exist_ok=True)
-    for file, one in zip(files, found.photographs, strict=False):
+    for file, one in zip(files, photographs.photographs, strict=False):
         write_overlay(file, read_photograph(one.source), one)
-    outputs.write_json(lambda: measured_document(found))
-    if output is not None and found.measured:
-        found.write_csv(output)
+    outputs.write_json(lambda: measured_document(photographs))
+    if output is not None and photographs.measured:
+        photographs.write_csv(output)
     if outputs.prints_tables and output != "-":
-        _print(found)
-    for one in found.refused:
+        _print(photographs)
+    for one in photographs.refused:
         terminal.warn(f"{one.source} is refused: {one.reason}.")
-    if output is not None and not found.measured:
+    if output is not None and not photographs.measured:
         terminal.error(f"no photograph was measured; {output} is not written.")
-    elif output is not None and not found.loads:
+    elif output is not None and not photographs.loads:
         terminal.note("calibrate needs loads too: give --loads, --pattern or --exif.")
 
 
-def _print(found: MeasuredPhotographs) -> None:
+def _print(photographs: MeasuredPhotographs) -> None:
     import numpy as np
 
-    if not found.measured:
+    if not photographs.measured:
         return
     console = terminal.output()
-    console.print(f"Notch angles of {found.robot.name}, with standard deviations")
+    console.print(f"Notch angles of {photographs.robot.name}, with standard deviations")
     heads = ["\nphotograph"]
-    for notch in range(found.robot.number_of_notches):
+    for notch in range(photographs.robot.number_of_notches):
         heads += [f">notch {notch + 1}\ndeg", ">±\ndeg"]
     rows: list[list[str]] = []
-    for one in found.measured:
+    for one in photographs.measured:
         row = [Path(one.source).name]
         for angle, spread in zip(
             np.degrees(one.notch_angle), np.degrees(one.notch_angle_deviation), strict=True

@@ -57,7 +57,7 @@ _SMALL_LEAP = 1e-3
 _ONWARD = 0.5
 # Corrections go on while each leaves this part of the error at most, or the target is this multiple
 # of its tolerance away.
-_LEAST_FALL, _NEAR = 0.5, 100.0
+_MAX_FALL, _NEAR_TARGET = 0.5, 100.0
 # The next correction leaves about the square of the error, over the size of what the drives move:
 # it meets the target where that is this part of the tolerance.
 _CLOSE = 0.1
@@ -85,11 +85,11 @@ def search_drives(
     last, task = layouts.state.unpack(before), layouts.task.unpack(task_vector)
     settings = Settings.of(numbers)
     search = _Search(chain, command, last, task, settings, layouts)
-    found = jax.lax.while_loop(search.goes_on, search.solve, search.begin())
-    at, result = found.at, found.result
-    good = result.converged & believable(SolvedState(chain, at.state).quantity)
-    good = good & tension_is_bounded(chain, command, at.point.base_tension)
-    flags = [good, result.parts == 1, at.met & good, at.error, found.solved]
+    final = jax.lax.while_loop(search.goes_on, search.solve, search.begin())
+    at, result = final.at, final.result
+    accepted = result.converged & believable(SolvedState(chain, at.state).quantity)
+    accepted = accepted & tension_is_bounded(chain, command, at.point.base_tension)
+    flags = [accepted, result.parts == 1, at.met & accepted, at.error, final.solved]
     status = jnp.stack([jnp.asarray(one, float) for one in flags])
     return layouts.state.pack(at.state), at.values, at.slopes, at.sticks, at.drive, status
 
@@ -151,11 +151,11 @@ class _Search:
         towards = self.command._replace(target=state.drive)
         result = solve_load_step(self.chain, towards, self.last, self.settings)
         memory, task = result.between.memory, self.task
-        here = self._evaluate(memory, state.drive, result.solved.point, jnp.zeros((), int))
+        evaluation = self._evaluate(memory, state.drive, result.solved.point, jnp.zeros((), int))
         # Where the load was cut into parts, the history of the last one depends on the drives; and
         # a notch that can snap is solved whole.
         whole = (result.parts == 1) if self.chain.rods.section.ends is None else jnp.array(False)
-        allowed = jnp.where(result.converged & whole & ~here.stuck, task.corrections, 0.0)
+        allowed = jnp.where(result.converged & whole & ~evaluation.stuck, task.corrections, 0.0)
 
         def proceed(at: SearchState) -> Bool[Array, ""]:
             return ~at.met & ~at.close & (at.corrected < allowed) & at.falls
@@ -165,14 +165,14 @@ class _Search:
             tension = self.command.either(point.base_tension, drive)
             point = point._replace(base_tension=tension)
             new = self._evaluate(memory, drive, point, at.corrected + 1)
-            enough = jnp.maximum(_LEAST_FALL * at.error, _NEAR * task.tolerance)
-            return new._replace(falls=new.error <= enough)
+            target_error = jnp.maximum(_MAX_FALL * at.error, _NEAR_TARGET * task.tolerance)
+            return new._replace(falls=new.error <= target_error)
 
-        last = jax.lax.while_loop(proceed, correct, here)
+        last = jax.lax.while_loop(proceed, correct, evaluation)
         # What counts is the load solved from the state before, as a robot is pulled.
         corrected = _within(task, last.drive + last.change)
-        onward = jnp.where((last.corrected > 0) & last.falls, corrected, here.beyond)
-        at = here._replace(state=result.solved, beyond=onward)
+        onward = jnp.where((last.corrected > 0) & last.falls, corrected, evaluation.beyond)
+        at = evaluation._replace(state=result.solved, beyond=onward)
         return SolvedRound(onward, at, result, state.solved + 1)
 
     def _step(self, miss: Array, slopes: Array, drive: Array) -> Array:
@@ -189,9 +189,9 @@ class _Search:
         """Drives after a change; of tendons that stick that beyond their dead bands."""
         packed, command = self.layouts.state.pack(state), self.command
         ratio, bound = (packed[np.array(at)] for at in self.layouts.first_contact)
-        there = command.either(state.stroke, state.point.base_tension)
+        actual = command.either(state.stroke, state.point.base_tension)
         by_stroke = False if command.by_stroke is None else command.by_stroke
-        low, high = dead_band(there, ratio, bound, by_stroke)
+        low, high = dead_band(actual, ratio, bound, by_stroke)
         up, down = jnp.maximum(high - drive, 0.0), jnp.minimum(low - drive, 0.0)
         leap = jnp.where(change > 0.0, up, down)
         several = jnp.sum(self.task.driven) > 1.0
@@ -216,8 +216,8 @@ class _Search:
         )
         drawn = stroke(chain, point.base_tension, at.base)
         state = SolverState(point, history, drawn, applied)
-        found = report_quantities(chain, state, outputs)
-        turned = [REGISTERED[name].turned(found[name], self.task.turn) for name in outputs]
+        quantities = report_quantities(chain, state, outputs)
+        turned = [REGISTERED[name].turned(quantities[name], self.task.turn) for name in outputs]
         return jnp.concatenate([jnp.ravel(one) for one in turned]), (at, state)
 
     def _moves(self, memory: Memory, drive: Array, point: Iterate) -> LinearResponse:

@@ -139,8 +139,8 @@ class DriveModel:
         slid = jacobian
         if sliding is not None and sticks.any():
             slid = np.where(sticks > 0.0, sliding, jacobian)
-        good, whole = bool(status[0]), bool(status[1])
-        return Response(state, values[own], jacobian, good, whole, slid), drive, status
+        converged, whole = bool(status[0]), bool(status[1])
+        return Response(state, values[own], jacobian, converged, whole, slid), drive, status
 
     @cached_property
     def prepared(self) -> PreparedChain:
@@ -156,9 +156,9 @@ class DriveModel:
 
     def drives(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
         """Return tensions (N), of tendons driven by stroke strokes (mm), of a packed state."""
-        places = self._places
+        slices = self._places
         by_stroke = ~np.isnan(self.load.stroke[0])
-        return np.where(by_stroke, state[places.stroke], state[places.tension])
+        return np.where(by_stroke, state[slices.stroke], state[slices.tension])
 
     def dead_band(
         self, state: Float[np.ndarray, " state"]
@@ -167,8 +167,8 @@ class DriveModel:
 
         Exactly so while the other tendons stay as they are. A stroke always moves something.
         """
-        places, by_stroke = self._places, ~np.isnan(self.load.stroke[0])
-        ratio, bound = state[places.first_ratio], state[places.first_bound]
+        slices, by_stroke = self._places, ~np.isnan(self.load.stroke[0])
+        ratio, bound = state[slices.first_ratio], state[slices.first_bound]
         return dead_band(self.drives(state), ratio, bound, by_stroke)
 
     def slip(
@@ -180,7 +180,7 @@ class DriveModel:
 
     def friction(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
         """Return the logarithm of the largest tension ratio over all contacts of every tendon."""
-        return np.array([state[places].sum() for places in self._places.bounds])
+        return np.array([state[slices].sum() for slices in self._places.bounds])
 
     @cached_property
     def _places(self) -> _Places:
@@ -218,14 +218,14 @@ class DriveModel:
         """Shape of each output of the robot itself, and where its numbers are in the padded one."""
         long, begin = self.prepared.long.chain, 0
         sizes = {"tendon": long.tendons, "notch": long.flexures, "body": long.flexures + 1}
-        found: dict[str, tuple[tuple[int, ...], np.ndarray]] = {}
+        selected: dict[str, tuple[tuple[int, ...], np.ndarray]] = {}
         for name in self.outputs:
             shape = [sizes.get(axis, 3) for axis in REGISTERED[name].per]
-            places = begin + np.arange(int(np.prod(shape))).reshape(shape)
-            begin += places.size
-            own = unpad_quantity(self.prepared.chain, name, places.astype(float))
-            found[name] = (own.shape, own.ravel().astype(int))
-        return found
+            entries = begin + np.arange(int(np.prod(shape))).reshape(shape)
+            begin += entries.size
+            own = unpad_quantity(self.prepared.chain, name, entries.astype(float))
+            selected[name] = (own.shape, own.ravel().astype(int))
+        return selected
 
     @cached_property
     def _size(self) -> int:
@@ -237,7 +237,7 @@ class DriveModel:
 
     @cached_property
     def _own(self) -> np.ndarray:
-        return np.concatenate([places for _, places in self._selected.values()])
+        return np.concatenate([entries for _, entries in self._selected.values()])
 
     @cached_property
     def _packed_load(self) -> np.ndarray:

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from notchflex._jax import array_module, jnp
 from notchflex.solver.linear_step.block_elimination import gauss_jordan
 
-LEAST_DRIVES = 1e-10
+MIN_DRIVES = 1e-10
 """Where drives are redundant the smallest meet the target. This weight decides among those that
 meet it equally well, and is too small to act against the target."""
 GROWTH, FIRST_PART = 1.0, 0.05
@@ -56,9 +56,9 @@ def drive_step(
     slopes = slopes * driven[None]
     normal = slopes.T @ slopes
     size = jnp.trace(normal) / jnp.maximum(jnp.sum(driven), 1.0)
-    known = size > 0.0
-    size = jnp.where(known, size, 1.0)
-    small = LEAST_DRIVES * size
+    has_slope = size > 0.0
+    size = jnp.where(has_slope, size, 1.0)
+    small = MIN_DRIVES * size
     eye = jnp.eye(count)
     gradient = slopes.T @ miss + small * drive * driven
     # Far from the target slopes hold roughly: directions that move little are left for later.
@@ -78,7 +78,7 @@ def drive_step(
         inside = jnp.clip(step, low, high)
         free = free * (inside == step)
         step = inside
-    return jnp.where(known, step * driven, 0.0)
+    return jnp.where(has_slope, step * driven, 0.0)
 
 
 def dead_band(

@@ -6,23 +6,24 @@ either branch: by pulling up to it, or by pulling beyond it and letting go.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from notchflex.control.program.response import Response
-from notchflex.control.search.find import find, meet
+from notchflex.control.search.iterative_search import search_iteratively, solve_directly
 from notchflex.control.search.problem import Attempt, Problem
 from notchflex.control.search.search_point import largest_violation, limit_rows
 from notchflex.control.search.smaller import smaller_tensions
-from notchflex.control.search.starts import corners, other_starts, taut_may_do
+from notchflex.control.search.starts import corners, other_starts, taut_tendons_suffice
 from notchflex.errors import Failure
 
 Approach = Literal["direct", "loading", "unloading", "least"]
 
 # An overshoot goes so far beyond what reverses all contacts.
-_BEYOND = 0.05
+_OVERSHOOT = 0.05
 # Limits count as kept within this part of them.
 _KEPT = 1e-6
 # Where the search from the present drives and others fails, it starts again from the best that it
@@ -35,13 +36,16 @@ _LAST_SEARCHES, _NO_NEARER = 3, 1e-6
 _PARTS = 6
 
 
-class Way(NamedTuple):
+_search = partial(search_iteratively, patient=False)
+
+
+class ApproachPath(NamedTuple):
     """How a target is approached.
 
     Attributes:
         via: Drives of the overshoot before the last load; None where there is none.
         last: Where the search ended.
-        solves: How many loads were solved, those of other ways included.
+        solves: How many loads were solved, those of the other paths included.
     """
 
     via: Float[np.ndarray, " t"] | None
@@ -56,7 +60,7 @@ def approach_target(
     goal: Float[np.ndarray, " m"],
     approach: Approach = "direct",
     known: Response | None = None,
-) -> Way:
+) -> ApproachPath:
     """Find drives that meet a target, and the way to them.
 
     Args:
@@ -65,17 +69,17 @@ def approach_target(
         start: Its drives.
         goal: The target; NaN where an entry is free.
         approach: "direct", with the last load rising ("loading") or falling ("unloading"), or
-            whichever way needs the smallest drives ("least").
+            by the path that needs the smallest drives ("least").
         known: Values and slopes of the state before, where they are known.
     """
     direct = find_anyhow(problem, before, start, goal, known)
     direct = smaller_tensions(problem, before, start, goal, direct)
-    ways = [Way(None, direct, direct.solves)]
+    paths = [ApproachPath(None, direct, direct.solves)]
     if approach == "direct" or not direct.response.converged:
-        return ways[0]
+        return paths[0]
     change = _change(problem, start, direct.drive)
     if (approach == "loading" and change > 0.0) or (approach == "unloading" and change < 0.0):
-        return ways[0]
+        return paths[0]
     friction = problem.model.friction(direct.response.state)
     for over in (True, False):
         if (over and approach == "loading") or (not over and approach == "unloading"):
@@ -88,16 +92,16 @@ def approach_target(
         last = smaller_tensions(problem, between.state, via, goal, last)
         right_way = (_change(problem, via, last.drive) < 0.0) is over
         if right_way or last.failure is not None:
-            ways.append(Way(via, last, last.solves + 1))
-    solves = sum(way.solves for way in ways)
-    wanted = ways if approach == "least" else ways[1:] or ways
-    return min(wanted, key=_rank)._replace(solves=solves)
+            paths.append(ApproachPath(via, last, last.solves + 1))
+    solves = sum(path.solves for path in paths)
+    candidates = paths if approach == "least" else paths[1:] or paths
+    return min(candidates, key=_rank)._replace(solves=solves)
 
 
-def _rank(way: Way) -> tuple[bool, bool, float, float]:
-    failed = way.last.failure is not None
-    broken = not _keeps_limits(way.last)
-    return failed, broken, way.last.error if failed else 0.0, way.last.effort
+def _rank(path: ApproachPath) -> tuple[bool, bool, float, float]:
+    failed = path.last.failure is not None
+    broken = not _keeps_limits(path.last)
+    return failed, broken, path.last.error if failed else 0.0, path.last.effort
 
 
 def _change(problem: Problem, start: np.ndarray, end: np.ndarray) -> float:
@@ -114,7 +118,7 @@ def _via(
     # The same shape needs a tension that is about the friction of all contacts (as a logarithm)
     # smaller after unloading than after loading; to turn all contacts round takes twice that.
     other = friction if rises is over else 2.0 * friction
-    factor = np.exp(other) * (1.0 + _BEYOND) if over else np.exp(-other) * (1.0 - _BEYOND)
+    factor = np.exp(other) * (1.0 + _OVERSHOOT) if over else np.exp(-other) * (1.0 - _OVERSHOOT)
     via = np.where(problem.driven, drive * factor, drive)
     return np.clip(via, problem.low, problem.high)
 
@@ -136,24 +140,24 @@ def find_anyhow(
     taut = problem.driven & (start > problem.low)
     own, few = problem._replace(driven=taut), 0 < taut.sum() < problem.driven.sum()
     # Where a tendon turns round, one that is slack may seem to serve instead.
-    tried = few and known is not None and taut_may_do(problem, taut, goal, known)
-    best = first = meet(own if tried else problem, before, start, goal, known)
+    tried = few and known is not None and taut_tendons_suffice(problem, taut, goal, known)
+    best = first = solve_directly(own if tried else problem, before, start, goal, known)
     solves = best.solves
     if best.failure is not None and tried:
-        best = first = meet(problem, before, start, goal, known)
+        best = first = solve_directly(problem, before, start, goal, known)
         solves += best.solves
     if best.failure is not None and few:
-        best = best if tried else meet(own, before, start, goal, known)
+        best = best if tried else solve_directly(own, before, start, goal, known)
         solves += 0 if tried else best.solves
         if best.failure is not None:
-            best = find(own, before, start, goal, known, over_bands=alone, patient=False)
+            best = _search(own, before, start, goal, known, over_bands=alone)
             solves += best.solves
     if best.failure is None:
         return best._replace(solves=solves)
-    best = find(problem, before, start, goal, known, over_bands=alone, patient=False)
+    best = _search(problem, before, start, goal, known, over_bands=alone)
     solves += best.solves
     if best.failure is not None:
-        other = find(problem, before, start, goal, known, over_bands=not alone, patient=False)
+        other = _search(problem, before, start, goal, known, over_bands=not alone)
         solves += other.solves
         best = min(best, other, key=_quality)
     others = [(best.drive, True), *other_starts(problem, before, start)]
@@ -164,7 +168,7 @@ def find_anyhow(
     for other_start, over_bands in others[1:]:
         if best.failure is None:
             return best._replace(solves=solves)
-        other = find(problem, before, other_start, goal, over_bands=over_bands, patient=False)
+        other = _search(problem, before, other_start, goal, over_bands=over_bands)
         solves += other.solves
         best = min(best, other, key=_quality)
     if best.failure is not None:
@@ -173,7 +177,7 @@ def find_anyhow(
         best = min(best, other, key=_quality)
     if best.failure is not None and problem.driven.sum() > 1:
         few = np.where(best.drive < _SMALL * best.drive.max(), problem.low, best.drive)
-        other = find(problem, before, few, goal, patient=False)
+        other = _search(problem, before, few, goal)
         solves += other.solves
         best = min(best, other, key=_quality)
     if best.failure is not None and taut.sum() > 1:
@@ -206,13 +210,13 @@ def _meet_from(
     """
     solves = 0
     for start in starts:
-        other = meet(problem, before, start, goal)
+        other = solve_directly(problem, before, start, goal)
         solves += other.solves
         if other.failure is None:
             return other._replace(solves=solves)
         if (other.drive >= problem.low).all() and (other.drive <= problem.high).all():
             nearest = min(nearest, other, key=_quality)
-    for go_on in (meet, _find_within) if nearest.error < error else ():
+    for go_on in (solve_directly, _find_within) if nearest.error < error else ():
         # It had come near when its rounds were over.
         nearest = go_on(problem, before, nearest.drive, goal)
         solves += nearest.solves
@@ -227,7 +231,7 @@ def _from_corners(
     """Search from just beyond all dead bands, on every side of them; return the best."""
     solves = 0
     for corner in corners(problem, before, start, problem.driven):
-        other = find(problem, before, corner, goal, over_bands=False, patient=False)
+        other = _search(problem, before, corner, goal, over_bands=False)
         solves += other.solves
         best = min(best, other, key=_quality)
         if best.failure is None:
@@ -239,7 +243,7 @@ def _find_within(
     problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray
 ) -> Attempt:
     """Search with dead bands, from drives that are near the target."""
-    return find(problem, before, start, goal, over_bands=False)
+    return search_iteratively(problem, before, start, goal, over_bands=False)
 
 
 def _settled(problem: Problem, before: np.ndarray, best: Attempt, goal: np.ndarray) -> Attempt:
@@ -274,13 +278,13 @@ def _keeps_limits(attempt: Attempt) -> bool:
 
 def _by_parts(problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray) -> Attempt:
     """Move the target from the present values to where it is; the memory stays that of before."""
-    here = problem.model.solve(before, np.clip(start, problem.low, problem.high))
-    values, solves = here.values[problem.entries], 1
+    response = problem.model.solve(before, np.clip(start, problem.low, problem.high))
+    values, solves = response.values[problem.entries], 1
     loose = problem._replace(search=problem.search.loose)
-    attempt = Attempt(start, here, np.inf, 0.0, 1, Failure.SEARCH_STOPPED)
+    attempt = Attempt(start, response, np.inf, 0.0, 1, Failure.SEARCH_STOPPED)
     for part in range(1, _PARTS + 1):
         aim = problem if part == _PARTS else loose
         towards = values + part / _PARTS * (goal - values)
-        attempt = find(aim, before, attempt.drive, towards, patient=False)
+        attempt = _search(aim, before, attempt.drive, towards)
         solves += attempt.solves
     return attempt._replace(solves=solves)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex.control.program.drive_step import FIRST_PART, GROWTH, LEAST_DRIVES
+from notchflex.control.program.drive_step import FIRST_PART, GROWTH, MIN_DRIVES
 from notchflex.control.program.response import Response
 from notchflex.control.search.problem import Attempt, Problem, size_of
 from notchflex.control.search.quadratic import least_step
@@ -18,7 +18,7 @@ from notchflex.control.search.unmet import why_unmet
 # sticks.
 _STUCK = 1e-8
 # Changes by these parts of the drives tell what a tendon does that slides.
-_ASIDE = (1e-6, -1e-6, 0.3, -0.3)
+_SIDE_STEPS = (1e-6, -1e-6, 0.3, -0.3)
 # Where a step moves nothing the next one is so many times longer; where it then moves something it
 # may increase the error so many times.
 _STRIDE, _ACROSS = 4.0, 30.0
@@ -83,9 +83,9 @@ class DampedSearch:
     @property
     def done(self) -> bool:
         """Whether the target is met within the limits."""
-        here = self.point
-        met = here.error <= self.problem.search.tolerance and here.response.converged
-        return met and here.excess <= KEPT
+        point = self.point
+        met = point.error <= self.problem.search.tolerance and point.response.converged
+        return met and point.excess <= KEPT
 
     def step(self, damping: float) -> Float[np.ndarray, " t"]:
         """Return the next step of all drives.
@@ -93,24 +93,24 @@ class DampedSearch:
         Args:
             damping: What the step is weighted with, as a part of the slopes.
         """
-        here, free = self.point, self.free
-        slopes = self.weights[:, None] * here.slopes[self.entries]
+        point, free = self.point, self.free
+        slopes = self.weights[:, None] * point.slopes[self.entries]
         normal = slopes.T @ slopes
         size = float(normal.trace()) / len(free)
-        step = np.zeros(len(here.drive))
+        step = np.zeros(len(point.drive))
         if not size > 0.0:
             return step
-        small = LEAST_DRIVES * size
+        small = MIN_DRIVES * size
         hessian = normal + (damping * size + small) * self._eye
-        gradient = slopes.T @ here.miss + small * here.drive[free]
+        gradient = slopes.T @ point.miss + small * point.drive[free]
         reach = GROWTH * self.scale
-        low = np.maximum((self._low - here.moved)[free], -reach)
-        high = np.minimum((self._high - here.moved)[free], reach)
-        least = least_step(hessian, gradient, low, high, here.limits, here.room)
+        low = np.maximum((self._low - point.moved)[free], -reach)
+        high = np.minimum((self._high - point.moved)[free], reach)
+        least = least_step(hessian, gradient, low, high, point.limits, point.room)
         step[free] = np.minimum(np.maximum(self._stride * least, low), high)
         return step
 
-    def go(self, step: Float[np.ndarray, " t"], least: float) -> float:
+    def try_step(self, step: Float[np.ndarray, " t"], least: float) -> float:
         """Try a step and keep it if it helps.
 
         Args:
@@ -120,30 +120,30 @@ class DampedSearch:
         Returns:
             What it brought of what it promised.
         """
-        here, moved = self.point, self.point.moved + step
+        point, moved = self.point, self.point.moved + step
         response = self._solve(moved)
         if not response.converged:
             return -1.0
-        there = self._at(moved, response, here)
-        promised = here.merit - self._predicted(step[self.free])
-        gain = (here.merit - there.merit) / promised if promised > 0.0 else -1.0
-        on_its_way = bool(there.stuck[step[self.free] != 0.0].any())
-        on_its_way = on_its_way and there.merit <= here.merit * (1.0 + 1e-9)
-        if here.stuck.any() and not there.stuck.any() and there.error <= _ACROSS * here.error:
+        trial = self._at(moved, response, point)
+        promised = point.merit - self._predicted(step[self.free])
+        gain = (point.merit - trial.merit) / promised if promised > 0.0 else -1.0
+        on_its_way = bool(trial.stuck[step[self.free] != 0.0].any())
+        on_its_way = on_its_way and trial.merit <= point.merit * (1.0 + 1e-9)
+        if point.stuck.any() and not trial.stuck.any() and trial.error <= _ACROSS * point.error:
             # Beyond the band, and too far: from there slopes show the way back.
-            self.point, self.scale, self._stride = there, self._scale(moved), 1.0
+            self.point, self.scale, self._stride = trial, self._scale(moved), 1.0
             return max(gain, least)
-        if gain >= least or on_its_way or there.error <= self.problem.search.tolerance:
-            self.point, self.scale = there, self._scale(moved)
+        if gain >= least or on_its_way or trial.error <= self.problem.search.tolerance:
+            self.point, self.scale = trial, self._scale(moved)
             # A notch that is pressed together moves as little as a tendon that sticks.
             self._stride = _STRIDE * self._stride if on_its_way else 1.0
             return max(gain, 1.0 if on_its_way else least)
         self._stride = 1.0
         # A kink lies between: what the step has shown turns the next one along it.
-        self.point = replace(here, slopes=self._secant(moved, response, here))
+        self.point = replace(point, slopes=self._secant(moved, response, point))
         return gain
 
-    def jump(self, step: Float[np.ndarray, " t"]) -> None:
+    def accept_step(self, step: Float[np.ndarray, " t"]) -> None:
         """Take a step, whatever it brings."""
         moved = self.point.moved + step
         response = self._solve(moved)
@@ -152,11 +152,11 @@ class DampedSearch:
 
     def result(self) -> Attempt:
         """Return where the search is, and why it went no further."""
-        here, failure = self.point, None
+        point, failure = self.point, None
         if not self.done:
             aim = self.entries, self.weights, self.scale, self.settled
-            failure = why_unmet(self.problem, here, *aim)
-        return Attempt(here.drive, here.response, here.error, here.excess, self.solves, failure)
+            failure = why_unmet(self.problem, point, *aim)
+        return Attempt(point.drive, point.response, point.error, point.excess, self.solves, failure)
 
     def _outside(self, drive: np.ndarray) -> np.ndarray:
         """What drives move beyond the dead bands."""
@@ -219,19 +219,19 @@ class DampedSearch:
 
     def _slopes_when_sliding(self, slopes: np.ndarray, least: float) -> np.ndarray:
         """Slopes near the present state of a tendon that slides, whichever way it does."""
-        for part in _ASIDE:
+        for part in _SIDE_STEPS:
             aside = part * self.scale * self.problem.driven
-            found = self._solve(np.minimum(np.maximum(aside, self._low), self._high))
-            if not (found.converged and np.isfinite(found.jacobian).all()):
+            response = self._solve(np.minimum(np.maximum(aside, self._low), self._high))
+            if not (response.converged and np.isfinite(response.jacobian).all()):
                 continue
             stuck = (slopes[self.entries] ** 2).sum(axis=0) <= least
-            slopes = np.where(stuck, found.jacobian[:, self.free], slopes)
+            slopes = np.where(stuck, response.jacobian[:, self.free], slopes)
             if ((slopes[self.entries] ** 2).sum(axis=0) > least).all():
                 break
         return slopes
 
     def _predicted(self, step: np.ndarray) -> float:
         """The merit that the slopes promise after a step."""
-        here = self.point
-        miss = here.miss + self.weights * (here.slopes[self.entries] @ step)
-        return float(miss @ miss) + penalty(here.room - here.limits @ step)
+        point = self.point
+        miss = point.miss + self.weights * (point.slopes[self.entries] @ step)
+        return float(miss @ miss) + penalty(point.room - point.limits @ step)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.control.program.response import Response
-from notchflex.control.search.find import find, within_limits
+from notchflex.control.search.iterative_search import search_iteratively, within_limits
 from notchflex.control.search.problem import Attempt, Problem, size_of
 from notchflex.errors import Failure
 
@@ -39,7 +39,7 @@ def cross_dead_bands(
     before: Float[np.ndarray, " state"],
     present: Float[np.ndarray, " t"],
     goal: Float[np.ndarray, " m"],
-    found: Attempt,
+    attempt: Attempt,
     known: Response | None = None,
 ) -> Attempt:
     """Go on through dead bands that are wider than the rate.
@@ -54,36 +54,36 @@ def cross_dead_bands(
         before: The state before, packed.
         present: Its drives.
         goal: The target; NaN where an entry is free.
-        found: What was found within the rate.
+        attempt: What was found within the rate.
         known: Values and slopes of the state before, where they are known.
 
     Returns:
         What was found, where no tendon has a dead band to cross; otherwise the state on the way,
         which fails as `LIMITS_PREVENT`.
     """
-    left = problem.search.solves - found.solves - 1
-    if found.failure is None or not np.isfinite(rate) or left <= 0:
-        return found
+    left = problem.search.solves - attempt.solves - 1
+    if attempt.failure is None or not np.isfinite(rate) or left <= 0:
+        return attempt
     near = limit_rate(problem, present, rate)
     low, high = problem.model.dead_band(before)
     least = _STAYS * max(float(np.abs(present).max()), problem.unit)
-    waits = problem.driven & (np.abs(found.drive - present) <= least)
+    waits = problem.driven & (np.abs(attempt.drive - present) <= least)
     waits &= (near.low > low) | (near.high < high)
     if not waits.any():
-        return found
+        return attempt
     fewer = problem._replace(search=replace(problem.search, solves=left))
-    ahead = find(fewer, before, present, goal, known)
-    found = found._replace(solves=found.solves + ahead.solves)
-    drive = np.where(waits, np.clip(ahead.drive, near.low, near.high), found.drive)
-    better = ahead.response.converged and ahead.error < found.error
+    ahead = search_iteratively(fewer, before, present, goal, known)
+    attempt = attempt._replace(solves=attempt.solves + ahead.solves)
+    drive = np.where(waits, np.clip(ahead.drive, near.low, near.high), attempt.drive)
+    better = ahead.response.converged and ahead.error < attempt.error
     if not better or (np.abs(drive - present) <= least).all():
-        return found
+        return attempt
     response = problem.model.solve(before, drive)
-    found = found._replace(solves=found.solves + 1)
+    attempt = attempt._replace(solves=attempt.solves + 1)
     if not response.converged:
-        return found
+        return attempt
     rows = np.flatnonzero(~np.isnan(goal))
     miss = problem.weights[rows] * (response.values[problem.entries[rows]] - goal[rows])
     error = size_of(miss)
     failure = None if error <= problem.search.tolerance else Failure.LIMITS_PREVENT
-    return within_limits(near, Attempt(drive, response, error, 0.0, found.solves, failure))
+    return within_limits(near, Attempt(drive, response, error, 0.0, attempt.solves, failure))

@@ -12,7 +12,7 @@ from notchflex.control.search.problem import Problem
 
 # Limits count as kept within this part of them; those smaller than the second number (N, mm, or a
 # strain) within parts of it.
-KEPT, _LEAST_LIMIT = 1e-7, 1e-3
+KEPT, _MIN_LIMIT = 1e-7, 1e-3
 # What a violation of limits, as parts of them, counts beside the error.
 _PENALTY = 1e4
 
@@ -72,11 +72,11 @@ def limit_rows(
     for bound in problem.bounds:
         at = problem.model.slices[bound.quantity]
         given = np.isfinite(bound.limit)
-        scale = np.maximum(np.abs(bound.limit[given]), _LEAST_LIMIT)
+        scale = np.maximum(np.abs(bound.limit[given]), _MIN_LIMIT)
         left = bound.side * (bound.limit - values[at])[given] / scale
-        seen = np.isfinite(left)
-        rows.append((bound.side * slopes[at][given] / scale[:, None])[seen])
-        room.append(left[seen])
+        is_limited = np.isfinite(left)
+        rows.append((bound.side * slopes[at][given] / scale[:, None])[is_limited])
+        room.append(left[is_limited])
     return np.concatenate(rows), np.concatenate(room)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.search.find import meet, within_limits
+from notchflex.control.search.iterative_search import solve_directly, within_limits
 from notchflex.control.search.problem import Attempt, Problem, size_of
 from notchflex.control.search.starts import corners
 from notchflex.errors import Failure
@@ -23,7 +23,7 @@ _EXACT = 5e-7
 _FURTHER, _MORE = 0.01, 4.0
 # From below, slopes lead to the end; this part of the way, so as not to pass it.
 _PART_OF_WAY = 0.9999
-_MOST_SOLVES = 30
+_MAX_SOLVES = 30
 # Tendons that were slack and are pulled by this part of the largest tension at most are tried to do
 # without.
 _SMALL = 0.1
@@ -43,7 +43,7 @@ def smaller_tensions(
     before: Float[np.ndarray, " state"],
     start: Float[np.ndarray, " t"],
     goal: Float[np.ndarray, " m"],
-    found: Attempt,
+    attempt: Attempt,
 ) -> Attempt:
     """Return the smallest tensions that meet a target as those that were found do.
 
@@ -52,33 +52,33 @@ def smaller_tensions(
         before: The state before, packed.
         start: Its drives.
         goal: The target; NaN where an entry is free.
-        found: What was found; returned as it is where the target is not met, or where strokes are
+        attempt: What was found; returned as it is where the target is not met, or where strokes are
             driven, which friction leaves no range.
     """
-    if found.failure is not None or not problem.by_tension:
-        return found
-    found = _without_others(problem, before, start, goal, found)
+    if attempt.failure is not None or not problem.by_tension:
+        return attempt
+    attempt = _without_others(problem, before, start, goal, attempt)
     low, _ = problem.model.dead_band(before)
-    for tendon in np.flatnonzero(problem.driven & (found.drive > problem.low)):
-        sticks = problem.model.slip(before, found.response.state)[tendon] <= _NO_SLIP
-        if sticks or _holds(problem, goal, found, int(tendon)):
-            found = _lowered(problem, before, goal, found, int(tendon), float(low[tendon]))
-    return found
+    for tendon in np.flatnonzero(problem.driven & (attempt.drive > problem.low)):
+        sticks = problem.model.slip(before, attempt.response.state)[tendon] <= _NO_SLIP
+        if sticks or _holds(problem, goal, attempt, int(tendon)):
+            attempt = _lowered(problem, before, goal, attempt, int(tendon), float(low[tendon]))
+    return attempt
 
 
 def _without_others(
-    problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray, found: Attempt
+    problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray, attempt: Attempt
 ) -> Attempt:
     """Meet the target by the tendons that were taut, if that takes less."""
     taut = problem.driven & (start > problem.low)
-    slack = problem.driven & ~taut & (found.drive > problem.low)
-    drives = found.drive
+    slack = problem.driven & ~taut & (attempt.drive > problem.low)
+    drives = attempt.drive
     if not slack.any() or not taut.any() or drives[slack].max() > _SMALL * drives.max():
-        return found
-    own, least, solves = problem._replace(driven=taut), found, found.solves
-    rest = np.where(problem.driven & ~taut, problem.low, found.drive)
+        return attempt
+    own, least, solves = problem._replace(driven=taut), attempt, attempt.solves
+    rest = np.where(problem.driven & ~taut, problem.low, attempt.drive)
     for begin in (rest, start, *corners(problem, before, start, taut)):
-        other = meet(own, before, begin, goal)
+        other = solve_directly(own, before, begin, goal)
         solves += other.solves
         if other.failure is None and other.effort < least.effort:
             least = other
@@ -89,23 +89,23 @@ def _lowered(
     problem: Problem,
     before: np.ndarray,
     goal: np.ndarray,
-    found: Attempt,
+    attempt: Attempt,
     tendon: int,
     edge: float,
 ) -> Attempt:
     """Lower one tension as far as the target stays met."""
-    floor, best, solves = float(problem.low[tendon]), found, found.solves
+    floor, best, solves = float(problem.low[tendon]), attempt, attempt.solves
     below, further = None, _FURTHER
     edge *= 1.0 - _PASSED
-    guess = edge if floor < edge < found.drive[tendon] else _just_below(best, tendon)
-    for _ in range(_MOST_SOLVES):
+    guess = edge if floor < edge < attempt.drive[tendon] else _just_below(best, tendon)
+    for _ in range(_MAX_SOLVES):
         guess = max(guess, floor)
-        there = _at(problem, before, goal, best, tendon, guess)
+        trial = _at(problem, before, goal, best, tendon, guess)
         solves += 1
         top = float(best.drive[tendon])
-        if there.failure is None:
+        if trial.failure is None:
             nudged = top - guess <= 2.0 * _EXACT * top
-            best, top = there, guess
+            best, top = trial, guess
             if guess <= floor or (guess == edge and not _holds(problem, goal, best, tendon)):
                 break
             if not nudged:
@@ -116,7 +116,7 @@ def _lowered(
                 guess = 0.5 * (below + top)
         else:
             below = guess
-            onward = below + _PART_OF_WAY * _way_up(problem, goal, there, tendon)
+            onward = below + _PART_OF_WAY * _tension_increase(problem, goal, trial, tendon)
             guess = onward if below < onward < top else 0.5 * (below + top)
         if below is not None and top - below <= _EXACT * top * (1.0 + 1e-6):
             break
@@ -142,18 +142,18 @@ def _at(
     return within_limits(problem, Attempt(drive, response, error, 0.0, 1, failure))
 
 
-def _way_up(problem: Problem, goal: np.ndarray, there: Attempt, tendon: int) -> float:
+def _tension_increase(problem: Problem, goal: np.ndarray, attempt: Attempt, tendon: int) -> float:
     """How much higher the tension must be to meet the target, by the slopes; NaN if unknown."""
-    steep = _steepness(problem, goal, there, tendon)
-    return there.error / steep if steep > 0.0 and there.response.converged else np.nan
+    steep = _steepness(problem, goal, attempt, tendon)
+    return attempt.error / steep if steep > 0.0 and attempt.response.converged else np.nan
 
 
-def _holds(problem: Problem, goal: np.ndarray, there: Attempt, tendon: int) -> bool:
+def _holds(problem: Problem, goal: np.ndarray, attempt: Attempt, tendon: int) -> bool:
     """Whether the slopes by a tension are those of notches that are pressed together."""
-    return _steepness(problem, goal, there, tendon) * problem.unit <= _STUCK
+    return _steepness(problem, goal, attempt, tendon) * problem.unit <= _STUCK
 
 
-def _steepness(problem: Problem, goal: np.ndarray, there: Attempt, tendon: int) -> float:
+def _steepness(problem: Problem, goal: np.ndarray, attempt: Attempt, tendon: int) -> float:
     """Size of the slopes of what is aimed at by a tension, mm, N or rad by their weights, per N."""
-    slopes = problem.weights * there.response.jacobian[problem.entries, tendon]
+    slopes = problem.weights * attempt.response.jacobian[problem.entries, tendon]
     return size_of(slopes[~np.isnan(goal)])

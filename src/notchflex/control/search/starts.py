@@ -20,7 +20,7 @@ _ALONE = 0.15
 # The part of the way to a target that slopes may leave, for drives to be worth trying.
 _MAY_DO = 0.5
 # Of more tendons than these not all combinations of sides are tried.
-_MOST_CORNERS = 3
+_MAX_CORNERS = 3
 
 
 def other_starts(
@@ -51,7 +51,7 @@ def other_starts(
         yield alone, True
 
 
-def taut_may_do(
+def taut_tendons_suffice(
     problem: Problem,
     taut: Bool[np.ndarray, " t"],
     goal: Float[np.ndarray, " m"],
@@ -92,7 +92,7 @@ def corners(
     low, high = problem.model.dead_band(before)
     edges = np.where([[True], [False]], low * (1.0 - _BEYOND_BAND), high * (1.0 + _BEYOND_BAND))
     tendons = np.flatnonzero(moved)
-    many = len(tendons) > _MOST_CORNERS
+    many = len(tendons) > _MAX_CORNERS
     sides = (
         product((0, 1), repeat=len(tendons))
         if not many

@@ -15,7 +15,7 @@ _FLAT = 1e-6
 
 def why_unmet(
     problem: Problem,
-    here: SearchPoint,
+    point: SearchPoint,
     entries: Int[np.ndarray, " m"],
     weights: Float[np.ndarray, " m"],
     scale: float,
@@ -25,21 +25,21 @@ def why_unmet(
 
     Args:
         problem: What is aimed at, and the limits.
-        here: Where the search ended.
+        point: Where the search ended.
         entries: Which numbers of a response are aimed at.
         weights: What an error of each counts.
         scale: Size of the drives.
         settled: Whether no step helped; otherwise the budget was spent.
     """
     free = np.flatnonzero(problem.driven)
-    if not here.response.converged:
+    if not point.response.converged:
         return Failure.SEARCH_STOPPED
-    slopes = weights[:, None] * here.slopes[entries]
-    down = -(slopes.T @ here.miss)
-    flat = _FLAT * float(np.linalg.norm(slopes)) * here.error
+    slopes = weights[:, None] * point.slopes[entries]
+    down = -(slopes.T @ point.miss)
+    flat = _FLAT * float(np.linalg.norm(slopes)) * point.error
     if np.abs(down).max() <= flat:
         return Failure.TARGET_OUT_OF_REACH
-    edge, drive = 1e-9 * scale, here.drive[free]
+    edge, drive = 1e-9 * scale, point.drive[free]
     low, high = problem.low[free], problem.high[free]
     at_low, at_high = (
         (drive <= low + edge) & (down < 0.0),
@@ -47,7 +47,7 @@ def why_unmet(
     )
     # What of the way down is left where limits forbid the rest of it.
     left = np.where(at_low | at_high, 0.0, down)
-    tight = here.limits[here.room <= KEPT]
+    tight = point.limits[point.room <= KEPT]
     if len(tight):
         along = left - tight.T @ np.linalg.lstsq(tight.T, left, rcond=None)[0]
         if np.abs(along).max() <= flat:

@@ -46,10 +46,10 @@ def deviations_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[Deviati
         robot: The robot with the values of the drawing.
         tolerances: The tolerances.
     """
-    found: list[Deviation] = []
+    deviations: list[Deviation] = []
     for source in sources_of(robot, tolerances):
         both = {path: moments(source.tolerance, value) for path, value in source.nominal.items()}
         mean, sd = next(iter(both.values()))
         sds = {path: one for path, (_, one) in both.items()}
-        found.append(Deviation(source.nominal, sds, mean / sd if sd > 0.0 else 0.0))
-    return found
+        deviations.append(Deviation(source.nominal, sds, mean / sd if sd > 0.0 else 0.0))
+    return deviations

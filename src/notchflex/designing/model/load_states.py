@@ -47,13 +47,13 @@ class StatePaths:
     @property
     def step(self) -> dict[str | Probe, int]:
         """The step of every state and probe, from 0; of one in several pieces the first."""
-        found: dict[str | Probe, int] = {}
+        steps: dict[str | Probe, int] = {}
         last = -1
         for piece in self.pieces:
             for one in piece:
                 last += 1 if isinstance(one, Probe) else self.states[one].steps
-                found.setdefault(one, last)
-        return found
+                steps.setdefault(one, last)
+        return steps
 
     @property
     def lengths(self) -> list[int]:

@@ -83,10 +83,10 @@ class Point:
 
         return Reading(table.tension, self.once("closing slopes", slopes))
 
-    def once(self, key: Any, made: Callable[[], Any]) -> Any:
+    def once(self, key: Any, compute: Callable[[], Any]) -> Any:
         """Return what was worked out before under a key, or work it out."""
         if key not in self.kept:
-            self.kept[key] = made()
+            self.kept[key] = compute()
         return self.kept[key]
 
     def of_robot(self, name: str) -> Reading:
@@ -95,12 +95,12 @@ class Point:
 
     def value(self, path: str) -> Reading:
         """Return the values of the robot file."""
-        found = numbers_at(self.robot, path)
-        values = np.array(list(found.values()))
+        numbers = numbers_at(self.robot, path)
+        values = np.array(list(numbers.values()))
         if self.slopes_of is None:
             return Reading(values, None)
-        slopes = np.stack([self.variables.parts_of(one) for one in found])
-        by = [[self._deviates(one, path) for one in self.deviations] for path in found]
+        slopes = np.stack([self.variables.parts_of(one) for one in numbers])
+        by = [[self._deviates(one, path) for one in self.deviations] for path in numbers]
         return Reading(values, np.hstack([slopes, np.reshape(by, (len(values), -1))]))
 
     def _deviates(self, deviation: Deviation, path: str) -> float:
@@ -166,16 +166,16 @@ class Point:
 
     def changes_of_deviations(self, model: ForwardModel, load: LoadPath) -> list[Change]:
         """Directions of one standard deviation of everything that deviates, for a model."""
-        found: list[Change] = []
+        changes: list[Change] = []
         for one in self.deviations:
             if one.law is not None:
                 by = model.change(self.robot, load, one.law)
                 assert by.chain is not None
-                found.append(Change(None, one.sd[one.law] * by.chain))
+                changes.append(Change(None, one.sd[one.law] * by.chain))
             else:
                 move = partial(one.moved, self.robot)
-                found.append(model.change_along(move, 0.0, load, order=2))
-        return found
+                changes.append(model.change_along(move, 0.0, load, order=2))
+        return changes
 
     def change(self, model: ForwardModel, load: LoadPath, number: int) -> Change:
         """Direction of a variable of the robot for a model; nothing for one of the loads."""

@@ -164,9 +164,9 @@ def _rows(asked: Measured, parts: Sequence[str]) -> np.ndarray:
         words = [given] if isinstance(given, str) else [f"{key} {number}" for number in given]
         wrong = [word for word in words if word not in parts]
         if wrong or not words:
-            there = f"{parts[0]} to {parts[-1]}" if len(parts) > 1 else "one number"
+            entries = f"{parts[0]} to {parts[-1]}" if len(parts) > 1 else "one number"
             raise InputError.OUT_OF_RANGE(
-                f"{asked.quantity} has no {wrong[0] if wrong else key}; it has {there}."
+                f"{asked.quantity} has no {wrong[0] if wrong else key}; it has {entries}."
             )
         return np.array([list(parts).index(word) for word in dict.fromkeys(words)])
     return np.arange(len(parts))

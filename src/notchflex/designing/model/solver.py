@@ -102,14 +102,14 @@ class Solver:
                 change = Change(self._load_change(model, path, point.x, column.load), change.chain)
             changes.append(change)
         changes += point.changes_of_deviations(model, path.load)
-        found = model.derivatives(path, changes, self.outputs)
-        wrong = [name for name, one in found.items() if not _known(name, one, path)]
+        derivatives = model.derivatives(path, changes, self.outputs)
+        wrong = [name for name, one in derivatives.items() if not _known(name, one, path)]
         if wrong:
             raise InputError.NOT_CONVERGED(
                 f"a step was so hard that the derivatives of {wrong[0]} are not known; "
                 "give the state more `steps`"
             )
-        return found
+        return derivatives
 
     def _load_change(
         self, model: ForwardModel, path: EquilibriumPath, x: np.ndarray, number: LoadNumber
@@ -121,5 +121,5 @@ class Solver:
 
 def _known(name: str, slopes: np.ndarray, path: EquilibriumPath) -> bool:
     """Whether derivatives are known wherever the quantity itself is a number."""
-    there = np.isfinite(np.asarray(path.quantity(name)))
-    return REGISTERED[name].kind is not float or bool(np.isfinite(slopes[:, there]).all())
+    is_finite = np.isfinite(np.asarray(path.quantity(name)))
+    return REGISTERED[name].kind is not float or bool(np.isfinite(slopes[:, is_finite]).all())

@@ -124,11 +124,11 @@ class Variables:
 
     def values(self, x: Float[np.ndarray, " v"]) -> dict[str, float]:
         """Return the values of the robot file, by path."""
-        found: dict[str, float] = {}
+        values: dict[str, float] = {}
         for one, number in zip(self.columns, x.tolist(), strict=True):
             for path, weight in one.weights.items():
-                found[path] = found.get(path, 0.0) + weight * number
-        return found
+                values[path] = values.get(path, 0.0) + weight * number
+        return values
 
     def robot_at(self, x: Float[np.ndarray, " v"]) -> Robot:
         """Return the robot of a vector.
@@ -158,7 +158,7 @@ def variables_of(
         InputError: A path is not known, given twice or no number, or limits are out of range.
     """
     columns: list[Column] = []
-    seen: dict[str, int] = {}
+    numbers: dict[str, int] = {}
     for number, one in enumerate(variables, start=1):
         shown = f"`variable[{number}]`: "
         try:
@@ -166,11 +166,12 @@ def variables_of(
         except InputError as error:
             raise InputError(f"{shown}{error}", error.code) from None
         for path in dict.fromkeys(path for column in added for path in _every(robot, column)):
-            if path in seen:
+            if path in numbers:
                 raise InputError.CONFLICT(
-                    f"{shown}`{path}` is already chosen by `variable[{seen[path]}]`; leave one out."
+                    f"{shown}`{path}` is already chosen by `variable[{numbers[path]}]`; "
+                    "leave one out."
                 )
-            seen[path] = number
+            numbers[path] = number
         columns += added
     return Variables(robot, states, tuple(columns))
 
@@ -189,7 +190,7 @@ def _columns(
     if variable.value.startswith("state."):
         load = _load_number(robot, variable, states)
         return [Column(variable.value, _UNITS[load.kind], *limits, {}, load)]
-    found = numbers_at(robot, variable.value)
+    numbers = numbers_at(robot, variable.value)
     described = described_at(robot, variable.value)
     for key, limit in zip(("lower", "upper"), limits, strict=True):
         if not described.lower <= limit <= described.upper:
@@ -199,7 +200,7 @@ def _columns(
                 + ". Give it in that unit."
             )
     unit = described.unit
-    for value in found.values():
+    for value in numbers.values():
         if value > _OTHER_UNIT * variable.upper > 0.0 or 0.0 < _OTHER_UNIT * value < variable.lower:
             raise InputError.OUT_OF_RANGE(
                 f"`{variable.value}` is {value:g} {unit}".rstrip()
@@ -208,20 +209,20 @@ def _columns(
             )
     if variable.along == "all":
         return [Column(variable.value, unit, *limits, {variable.value: 1.0})]
-    if not variable.value.startswith("notch") or len(found) < 2:
+    if not variable.value.startswith("notch") or len(numbers) < 2:
         raise InputError.UNSUPPORTED(
             f'along = "{variable.along}" is for values of several notches, such as notch.depth; '
             f"`{variable.value}` is a single number."
         )
     if variable.along == "each":
-        return [Column(path, unit, *limits, {path: 1.0}) for path in found]
-    degree = min(variable.degree or 1, len(found) - 1)
-    at = np.linspace(0.0, 1.0, len(found))
+        return [Column(path, unit, *limits, {path: 1.0}) for path in numbers]
+    degree = min(variable.degree or 1, len(numbers) - 1)
+    at = np.linspace(0.0, 1.0, len(numbers))
     columns: list[Column] = []
     for k in range(degree + 1):
         # Bernstein's polynomials: where their factors are within the limits, so is the sum.
         shape = comb(degree, k) * at**k * (1.0 - at) ** (degree - k)
-        weights = {p: w for p, w in zip(found, shape.tolist(), strict=True) if w}
+        weights = {p: w for p, w in zip(numbers, shape.tolist(), strict=True) if w}
         columns.append(Column(f"{variable.value} ({_place(k, degree)})", unit, *limits, weights))
     return columns
 

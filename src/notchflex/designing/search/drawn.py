@@ -96,8 +96,8 @@ def _of_closings(
         return np.zeros((0, len(wishes)), bool)
 
     def at(tensions: Float[np.ndarray, " n"]) -> Point:
-        known = {CLOSINGS: tensions}
-        return Point(solver.variables, x, robots.robot, solver.paths, {}, kept=known)
+        overrides = {CLOSINGS: tensions}
+        return Point(solver.variables, x, robots.robot, solver.paths, {}, kept=overrides)
 
     return _rows(wishes, map(at, closing_tensions_of(robots)))
 
@@ -130,7 +130,7 @@ def _of_robots(
 
     exact = np.stack([at(one) for one in checks])
     spread = np.maximum(exact.std(axis=0), 1e-9 * np.abs(exact).max(axis=0) + 1e-300)
-    made = fit_polynomial(
+    polynomial = fit_polynomial(
         at,
         0.5 * (low + high) - half,
         0.5 * (low + high) + half,
@@ -140,11 +140,11 @@ def _of_robots(
         wanted=[PolynomialAccuracy(_ERROR, len(table) // 3)],
         checks=checks,
     )
-    if made is None:
+    if polynomial is None:
         values = np.stack([values_of(robots[row]) for row in range(len(robots))])
     else:
-        values = np.tile(made.base, (len(robots), 1))
-        values[:, made.entries] = made.varied(table).T
+        values = np.tile(polynomial.base, (len(robots), 1))
+        values[:, polynomial.entries] = polynomial.varied(table).T
     return _met(wishes, values)
 
 
@@ -164,7 +164,7 @@ def _met(
     for one in wishes:
         rows = rows_of(one)
         own = values[:, start : start + len(rows)]
-        missed = np.abs(violations(rows, own, row_sizes(rows)))
-        met.append(np.all(missed <= TOLERANCE, axis=1))  # not where a value is NaN
+        violation = np.abs(violations(rows, own, row_sizes(rows)))
+        met.append(np.all(violation <= TOLERANCE, axis=1))  # not where a value is NaN
         start += len(rows)
     return np.stack(met, axis=1)

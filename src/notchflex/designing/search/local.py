@@ -15,7 +15,7 @@ from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, 
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.scaled import Scaled
 from notchflex.designing.search.squares import is_sum_of_squares, nearest_squares
-from notchflex.designing.search.trails import Met, Trail
+from notchflex.designing.search.trajectories import DuplicateSearch, SearchTrajectory
 from notchflex.designing.search.trust_region import approach
 
 # SLSQP keeps an estimate of the curvature, which a kink (a notch that closes) spoils: it begins
@@ -25,7 +25,7 @@ _AGAIN, _GAIN = 4, 1e-7
 _STALLED, _PATIENCE = 1e-10, 4
 _PRECISION = 1e-14
 # SLSQP begins where limits are missed by no more than this, in their sizes.
-_FAR = 0.02
+_MAX_VIOLATION = 0.02
 _TRUST = 40
 
 
@@ -33,7 +33,7 @@ class _Stop(Exception):  # noqa: N818 - no error
     """Ends a search that gains nothing more."""
 
 
-class Found(NamedTuple):
+class LocalOptimum(NamedTuple):
     """Where a search ended.
 
     Attributes:
@@ -41,19 +41,19 @@ class Found(NamedTuple):
         evaluation: The robot there, with derivatives; None if the search could not begin.
         stationary: Whether no small change improves it, to first order.
         iterations: Number of iterations.
-        trail: Scaled variables after each step.
+        trajectory: Scaled variables after each step.
     """
 
     z: Vector
     evaluation: DesignEvaluation | None
     stationary: bool
     iterations: int
-    trail: tuple[Vector, ...] = ()
+    trajectory: tuple[Vector, ...] = ()
 
 
 def search_from(
-    problem: DesignProblem, z: Vector, iterations: int, settled: Sequence[Found] = ()
-) -> Found:
+    problem: DesignProblem, z: Vector, iterations: int, settled: Sequence[LocalOptimum] = ()
+) -> LocalOptimum:
     """Search from a start by SLSQP.
 
     Args:
@@ -65,46 +65,48 @@ def search_from(
     Returns:
         The best robot met.
     """
-    trail = Trail([one.trail for one in settled])
+    trajectory = SearchTrajectory([one.trajectory for one in settled])
     try:
-        found = _search(problem, z, iterations, trail)
-    except Met as met:
-        return settled[met.number]._replace(iterations=len(trail.steps))
-    return found._replace(trail=(*trail.steps, found.z))
+        optimum = _search(problem, z, iterations, trajectory)
+    except DuplicateSearch as met:
+        return settled[met.number]._replace(iterations=len(trajectory.steps))
+    return optimum._replace(trajectory=(*trajectory.steps, optimum.z))
 
 
-def _search(problem: DesignProblem, z: Vector, iterations: int, trail: Trail) -> Found:
+def _search(
+    problem: DesignProblem, z: Vector, iterations: int, trajectory: SearchTrajectory
+) -> LocalOptimum:
     first = problem.evaluate(z)
     first = None if first is None else problem.with_slopes(first, z)
     if first is None:
-        return Found(z, None, False, 0)
+        return LocalOptimum(z, None, False, 0)
     stationary = False
     if is_sum_of_squares(problem):
         z, first, settled = nearest_squares(problem, z, first)
-        return Found(z, first, settled or is_stationary(problem, z, first), 0)
-    z, one, done = approach(problem, z, first, iterations, trail)
+        return LocalOptimum(z, first, settled or is_stationary(problem, z, first), 0)
+    z, one, done = approach(problem, z, first, iterations, trajectory)
     best = z, one
-    if problem.worst(one) > _FAR:  # limits that contradict each other here
-        return Found(z, one, False, done)
+    if problem.worst(one) > _MAX_VIOLATION:  # limits that contradict each other here
+        return LocalOptimum(z, one, False, done)
     for _ in range(_AGAIN):
         before = best
-        best, more = _slsqp(problem, *best, iterations - done, trail)
+        best, more = _slsqp(problem, *best, iterations - done, trajectory)
         done += more
         stationary = is_stationary(problem, *best)
         if stationary or done >= iterations or not _gained(problem, before[1], best[1]):
             break
-    return Found(*best, stationary, done)
+    return LocalOptimum(*best, stationary, done)
 
 
-def search_on(problem: DesignProblem, found: Found, iterations: int) -> Found:
+def search_on(problem: DesignProblem, optimum: LocalOptimum, iterations: int) -> LocalOptimum:
     """Go on by trust-constr where SLSQP ended without having settled."""
-    if found.evaluation is None or problem.count == 0:
-        return found
-    best, more = _trust(problem, found.z, found.evaluation, min(_TRUST, iterations))
-    if _gained(problem, found.evaluation, best[1]):
+    if optimum.evaluation is None or problem.count == 0:
+        return optimum
+    best, more = _trust(problem, optimum.z, optimum.evaluation, min(_TRUST, iterations))
+    if _gained(problem, optimum.evaluation, best[1]):
         again = search_from(problem, best[0], iterations)
-        return again._replace(iterations=found.iterations + more + again.iterations)
-    return found._replace(iterations=found.iterations + more)
+        return again._replace(iterations=optimum.iterations + more + again.iterations)
+    return optimum._replace(iterations=optimum.iterations + more)
 
 
 def is_stationary(problem: DesignProblem, z: Vector, one: DesignEvaluation) -> bool:
@@ -119,17 +121,21 @@ def _gained(problem: DesignProblem, before: DesignEvaluation, after: DesignEvalu
 
 
 def _slsqp(
-    problem: DesignProblem, z: Vector, first: DesignEvaluation, iterations: int, trail: Trail
+    problem: DesignProblem,
+    z: Vector,
+    first: DesignEvaluation,
+    iterations: int,
+    trajectory: SearchTrajectory,
 ) -> tuple[tuple[Vector, DesignEvaluation], int]:
     scaled = Scaled(problem, first, z, best=(z, first))
     history: list[tuple[float, float]] = []
 
     def watch(y: np.ndarray) -> None:
-        found = scaled.evaluation(y)
-        if found is None:
+        evaluation = scaled.evaluation(y)
+        if evaluation is None:
             return
-        trail.pass_by(np.clip(y[: problem.count], 0.0, 1.0))
-        history.append((problem.worst(found), scaled.value(y)))
+        trajectory.record(np.clip(y[: problem.count], 0.0, 1.0))
+        history.append((problem.worst(evaluation), scaled.value(y)))
         if len(history) <= _PATIENCE:
             return
         (before, value_before), (now, value) = history[-1 - _PATIENCE], history[-1]

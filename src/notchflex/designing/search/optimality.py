@@ -22,7 +22,7 @@ _FLAT = 1e-4
 
 
 @dataclass(frozen=True)
-class Held:
+class ActiveLimit:
     """A limit that is reached.
 
     Attributes:
@@ -47,7 +47,7 @@ class Multipliers:
         rest: What is left of the gradient of the sum, relative.
     """
 
-    held: tuple[Held, ...]
+    held: tuple[ActiveLimit, ...]
     rest: float
 
     @property
@@ -109,7 +109,7 @@ def multipliers(problem: DesignProblem, z: Vector, one: DesignEvaluation) -> Mul
     factors = solved.x / sizes
     rest = float(np.linalg.norm((matrix @ factors - right)[:count]))
     costs = tuple(
-        Held(row, is_variable, side, _cost(problem, row, is_variable, side, float(factor)))
+        ActiveLimit(row, is_variable, side, _cost(problem, row, is_variable, side, float(factor)))
         for (row, is_variable, side), factor in zip(held, factors, strict=False)
     )
     return Multipliers(costs, rest / gross)

@@ -146,10 +146,10 @@ class DesignProblem:
     def _evaluated(self, z: Vector) -> DesignEvaluation | None:
         try:
             point = self._solved(z)
-            found = self.read(point.plain, z)
+            evaluation = self.read(point.plain, z)
         except InputError as error:
             return self._failed(str(error))
-        return None if found is None else replace(found, point=point)
+        return None if evaluation is None else replace(evaluation, point=point)
 
     def _solved(self, z: Vector) -> Point:
         return self.solver.point(self.x(z))
@@ -172,11 +172,11 @@ class DesignProblem:
         bounded = tuple(self._joined([one.wish.every(point)]) for one in self.bounds)
         has_slopes = point.slopes_of is not None
         rows = self._joined(self._row_readings(point))
-        made = DesignEvaluation(point, self._sum(terms), rows, bounded, total, has_slopes)
-        if made.objective.slopes is not None:
-            size = float(np.linalg.norm(made.objective.slopes * self.solver.variables.span))
+        evaluation = DesignEvaluation(point, self._sum(terms), rows, bounded, total, has_slopes)
+        if evaluation.objective.slopes is not None:
+            size = float(np.linalg.norm(evaluation.objective.slopes * self.solver.variables.span))
             self.steepest = max(self.steepest, size if np.isfinite(size) else 0.0)
-        return made if self._is_finite(made) else None
+        return evaluation if self._is_finite(evaluation) else None
 
     def _terms(self, point: Point, z: Vector) -> tuple[list[Reading], float]:
         """Return what is minimised without what bounds stand for, and the whole sum."""
@@ -201,21 +201,21 @@ class DesignProblem:
 
     def _joined(self, readings: Sequence[Reading]) -> Reading:
         values = np.concatenate([np.zeros(0), *(one.values for one in readings)])
-        known = [one.slopes[:, : self.count] for one in readings if one.slopes is not None]
-        if len(known) < len(readings):
+        slopes = [one.slopes[:, : self.count] for one in readings if one.slopes is not None]
+        if len(slopes) < len(readings):
             return Reading(values, None)
-        return Reading(values, np.concatenate([np.zeros((0, self.count)), *known]))
+        return Reading(values, np.concatenate([np.zeros((0, self.count)), *slopes]))
 
     def _is_finite(self, one: DesignEvaluation) -> bool:
         readings = (one.objective, one.rows, *one.bounded)
-        good = all(
+        is_finite = all(
             np.isfinite(reading.values).all()
             and (reading.slopes is None or np.isfinite(reading.slopes).all())
             for reading in readings
         )
-        if not good:
+        if not is_finite:
             self._failed("a quantity that is asked is not a number, as where a notch never closes")
-        return good
+        return is_finite
 
     @cached_property
     def sizes(self) -> Float[np.ndarray, " k"]:

@@ -65,18 +65,18 @@ class RobustProblem(DesignProblem):
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """Every limit: of one number, or of its quantile."""
-        found: list[Row] = []
+        rows: list[Row] = []
         for number, wish in enumerate(self.constraints):
             plain, hold = rows_of(wish), self.holds.get(number)
             if hold is None:
-                found += plain
+                rows += plain
                 continue
             of = f"for {100.0 * hold.part:g} % of the robots"
             for _, row, side in _sides(plain):
                 label = f"{row.label}, {of}" if row.label else of
                 low, high = (-np.inf, row.upper) if side > 0.0 else (row.lower, np.inf)
-                found.append(Row(wish, label, low, high))
-        return tuple(found)
+                rows.append(Row(wish, label, low, high))
+        return tuple(rows)
 
     def _solved(self, z: Vector) -> Point:
         point = super()._solved(z)
@@ -147,26 +147,26 @@ class RobustProblem(DesignProblem):
 
         def spread() -> list[np.ndarray]:
             mean = np.array([one.mean for one in point.deviations])
-            found: list[np.ndarray] = []
+            spreads: list[np.ndarray] = []
             for wish in self.constraints:
                 slopes = row_reading(wish, point).slopes
                 assert slopes is not None
                 by = slopes[:, self.count :]
-                found.append(np.stack([by @ mean, np.linalg.norm(by, axis=1)]))
-            return found
+                spreads.append(np.stack([by @ mean, np.linalg.norm(by, axis=1)]))
+            return spreads
 
         return point.once("spread", spread)
 
     def _spread_slopes(self, point: Point) -> list[Float[np.ndarray, "2 v k"]]:
-        here = self._spread(point)
+        spread = self._spread(point)
         columns: list[list[np.ndarray]] = []
         for number, column in enumerate(self.solver.variables.columns):
             x = point.x.copy()
             inward = 1.0 if x[number] < 0.5 * (column.lower + column.upper) else -1.0
             step = inward * _STEP * column.span
             x[number] += step
-            there = self._spread(self.solver.point(x))
-            columns.append([(b - a) / step for a, b in zip(here, there, strict=True)])
+            moved = self._spread(self.solver.point(x))
+            columns.append([(b - a) / step for a, b in zip(spread, moved, strict=True)])
         return [np.stack(one, axis=1) for one in zip(*columns, strict=True)]
 
 
@@ -179,8 +179,8 @@ def limited(problem: DesignProblem) -> list[int]:
 def _sides(rows: list[Row]) -> list[tuple[int, Row, float]]:
     """Return every limit with the place of its row: 1 for the greatest value, -1 for the least."""
     return [
-        (place, row, side)
-        for place, row in enumerate(rows)
+        (number, row, side)
+        for number, row in enumerate(rows)
         for side, limit in ((1.0, row.upper), (-1.0, row.lower))
         if np.isfinite(limit)
     ]

@@ -16,7 +16,7 @@ from scipy.special import ndtri
 
 from notchflex.designing.model.deviations import deviations_of
 from notchflex.designing.search.drawn import levels_of, met_by
-from notchflex.designing.search.local import Found, search_from
+from notchflex.designing.search.local import LocalOptimum, search_from
 from notchflex.designing.search.problem import DesignProblem, Progress
 from notchflex.designing.search.robust_problem import Hold, RobustProblem, limited
 from notchflex.designing.search.search import Searches, SearchResult
@@ -58,7 +58,7 @@ class YieldOf:
 
 
 @dataclass(frozen=True)
-class Counted:
+class YieldEstimate:
     """Which of the robots drawn of a design meet which limits.
 
     Attributes:
@@ -69,13 +69,15 @@ class Counted:
 
     def part(self, columns: Sequence[int]) -> tuple[float, tuple[float, float]]:
         """Return which part meets all of some constraints, and its 95 % interval."""
-        good = np.asarray(self.met[:, list(columns)].all(axis=1))
-        each = len(good) // REPLICATES
-        return float(good.mean()), yield_interval(good.reshape(REPLICATES, each).sum(axis=1), each)
+        meets = np.asarray(self.met[:, list(columns)].all(axis=1))
+        each = len(meets) // REPLICATES
+        return float(meets.mean()), yield_interval(
+            meets.reshape(REPLICATES, each).sum(axis=1), each
+        )
 
 
 @dataclass(frozen=True)
-class Wanted:
+class YieldTarget:
     """A part of robots that is wanted of some constraints together, by their columns."""
 
     part: float
@@ -106,11 +108,11 @@ def robust_search(
     options = spec.robust or RobustOptions()
     best = plain.best
     numbers = limited(best.problem)
-    wanted = _wanted(spec, options, best.problem, numbers)
+    targets = _wanted(spec, options, best.problem, numbers)
 
-    def counted(one: SearchResult) -> Counted:
+    def counted(one: SearchResult) -> YieldEstimate:
         levels = levels_of(one.problem, tolerances, options.draws, options.seed)
-        return Counted(met_by(one.problem, one.found.z, tolerances, levels, numbers))
+        return YieldEstimate(met_by(one.problem, one.found.z, tolerances, levels, numbers))
 
     searches = Searches([best], plain.interrupted)
     try:
@@ -119,21 +121,21 @@ def robust_search(
         searches.interrupted = True
         return searches, ()
     starts = sorted(plain.outcomes, key=lambda one: one.merit)[:_STARTS]
-    factors = [float(ndtri(one.part)) for one in wanted]
+    factors = [float(ndtri(one.part)) for one in targets]
     try:
         for done in range(0 if plain.interrupted else _ROUNDS):
             if progress is not None:
                 progress("making it robust", done, _ROUNDS)
-            holds = _holds(wanted, factors, numbers)
-            found = [_robust(one, tolerances, holds, spec.search.iterations) for one in starts]
-            tried = Searches([one for one in found if one is not None])
+            holds = _holds(targets, factors, numbers)
+            results = [_robust(one, tolerances, holds, spec.search.iterations) for one in starts]
+            tried = Searches([one for one in results if one is not None])
             if not tried.outcomes:
                 break
-            here = counted(tried.best)
-            if _is_better(wanted, tried.best, here, searches.best, count):
-                searches, count = tried, here
+            count_now = counted(tried.best)
+            if _is_better(targets, tried.best, count_now, searches.best, count):
+                searches, count = tried, count_now
             starts = [tried.best]
-            if not wanted or not _recalibrate(wanted, factors, here):
+            if not targets or not _recalibrate(targets, factors, count_now):
                 break
     except KeyboardInterrupt:
         searches.interrupted = True
@@ -142,30 +144,30 @@ def robust_search(
 
 def _wanted(
     spec: DesignSpec, options: RobustOptions, problem: DesignProblem, numbers: Sequence[int]
-) -> list[Wanted]:
+) -> list[YieldTarget]:
     """Return what is wanted: of each constraint that says so, and of all together."""
-    found: list[Wanted] = []
+    targets: list[YieldTarget] = []
     for column, number in enumerate(numbers):
         asked = problem.constraints[number].asked
         assert isinstance(asked, DesignConstraint)
         if asked.wanted_yield is not None:
-            found.append(Wanted(asked.wanted_yield, (column,)))
+            targets.append(YieldTarget(asked.wanted_yield, (column,)))
     if options.wanted_yield is not None:
-        found.append(Wanted(options.wanted_yield, tuple(range(len(numbers)))))
-    return found
+        targets.append(YieldTarget(options.wanted_yield, tuple(range(len(numbers)))))
+    return targets
 
 
 def _holds(
-    wanted: Sequence[Wanted], factors: Sequence[float], numbers: Sequence[int]
+    targets: Sequence[YieldTarget], factors: Sequence[float], numbers: Sequence[int]
 ) -> dict[int, Hold]:
     """Return how every constraint is to hold: by the largest factor of those that it needs."""
-    found: dict[int, Hold] = {}
-    for one, factor in zip(wanted, factors, strict=True):
+    holds: dict[int, Hold] = {}
+    for one, factor in zip(targets, factors, strict=True):
         for column in one.columns:
-            before = found.get(numbers[column])
+            before = holds.get(numbers[column])
             if before is None or factor > before.factor:
-                found[numbers[column]] = Hold(one.part, factor)
-    return found
+                holds[numbers[column]] = Hold(one.part, factor)
+    return holds
 
 
 def _robust(
@@ -187,14 +189,20 @@ def _robust(
     problem.set_sizes([first])
     if holds:  # the same sum, whose size several robots have shown
         vars(problem)["total_size"] = start.problem.total_size
-    found: Found = search_from(problem, start.found.z, iterations)
-    return None if found.evaluation is None else SearchResult(problem, start.number, found.z, found)
+    optimum: LocalOptimum = search_from(problem, start.found.z, iterations)
+    return (
+        None
+        if optimum.evaluation is None
+        else SearchResult(problem, start.number, optimum.z, optimum)
+    )
 
 
-def _recalibrate(wanted: Sequence[Wanted], factors: list[float], count: Counted) -> bool:
+def _recalibrate(
+    targets: Sequence[YieldTarget], factors: list[float], count: YieldEstimate
+) -> bool:
     """Move factors by what the counted yields lack; False where all are right."""
     right = True
-    for number, one in enumerate(wanted):
+    for number, one in enumerate(targets):
         low = count.part(one.columns)[1][0]
         if one.part <= low <= one.part + _ABOVE * (1.0 - one.part):
             continue
@@ -208,20 +216,20 @@ def _recalibrate(wanted: Sequence[Wanted], factors: list[float], count: Counted)
 
 
 def _is_better(
-    wanted: Sequence[Wanted],
+    targets: Sequence[YieldTarget],
     one: SearchResult,
-    count: Counted,
+    count: YieldEstimate,
     best: SearchResult,
-    best_count: Counted,
+    best_count: YieldEstimate,
 ) -> bool:
     """Whether a design misses less of what is wanted than the best so far, or costs less."""
-    if not wanted:
+    if not targets:
         every = range(count.met.shape[1])
         return (one.merit[0] == 0.0) >= (best.merit[0] == 0.0) and (
             count.part(every)[0] >= best_count.part(every)[0]
         )
     lack, best_lack = (
-        sum(max(one.part - counts.part(one.columns)[1][0], 0.0) for one in wanted)
+        sum(max(one.part - counts.part(one.columns)[1][0], 0.0) for one in targets)
         for counts in (count, best_count)
     )
     if lack == best_lack == 0.0:
@@ -238,8 +246,8 @@ def _yields(
     problem: DesignProblem,
     options: RobustOptions,
     numbers: Sequence[int],
-    before: Counted,
-    after: Counted,
+    before: YieldEstimate,
+    after: YieldEstimate,
 ) -> tuple[YieldOf, ...]:
     every = tuple(range(len(numbers)))
     rows: list[tuple[str, float | None, tuple[int, ...]]] = [
@@ -250,11 +258,11 @@ def _yields(
         asked = wish.asked
         assert isinstance(asked, DesignConstraint)
         rows.append((wish.title, asked.wanted_yield, (column,)))
-    found: list[YieldOf] = []
-    for title, wanted, columns in rows:
+    yields: list[YieldOf] = []
+    for title, target, columns in rows:
         part, interval = after.part(columns)
-        found.append(YieldOf(title, wanted, part, interval, before.part(columns)[0]))
-    return tuple(found)
+        yields.append(YieldOf(title, target, part, interval, before.part(columns)[0]))
+    return tuple(yields)
 
 
 def check_limits(problems: Sequence[DesignProblem], tolerances: Sequence[Tolerance]) -> None:

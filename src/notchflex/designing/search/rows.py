@@ -99,8 +99,10 @@ def squared(wish: Wish, source: Source) -> Reading:
     if asked.target is None:  # the mean square, which is smooth where it is 0
         every = wish.every(source) if wish.curve is None else source.offsets(wish.curve)
         return every.scaled(float(np.sqrt(asked.weight / len(wish.rows))))
-    made = taken(wish.every(source), wish.take)
-    return Reading(made.values - asked.target, made.slopes).scaled(float(np.sqrt(asked.weight)))
+    reading = taken(wish.every(source), wish.take)
+    return Reading(reading.values - asked.target, reading.slopes).scaled(
+        float(np.sqrt(asked.weight))
+    )
 
 
 def objective_reading(wish: Wish, source: Source) -> Reading:
@@ -131,9 +133,9 @@ def row_sizes(
 ) -> Float[np.ndarray, " k"]:
     """Return the sizes by which violations count: those of the limits, or of what is reached."""
     sizes = [_size(one) for one in rows]
-    found = np.array(sizes, float)
+    scales = np.array(sizes, float)
     other = np.abs(reached) if reached is not None else np.zeros(len(rows))
-    return np.where(found > 0.0, found, np.where(other > 1e-9, other, 1.0))
+    return np.where(scales > 0.0, scales, np.where(other > 1e-9, other, 1.0))
 
 
 def _size(row: Row) -> float:

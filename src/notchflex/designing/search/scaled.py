@@ -76,20 +76,20 @@ class Scaled:
 
     def evaluation(self, y: Vector) -> DesignEvaluation | None:
         """Return the robot at a vector, perhaps without derivatives."""
-        found = self.problem.evaluate(y)
-        if found is not None and self._is_better(found):
-            self.best = y[: self.problem.count].copy(), found
-        return found
+        evaluation = self.problem.evaluate(y)
+        if evaluation is not None and self._is_better(evaluation):
+            self.best = y[: self.problem.count].copy(), evaluation
+        return evaluation
 
     def value(self, y: Vector) -> float:
         """Return the sum; far above all others where there is no robot."""
-        found = self.evaluation(y)
-        return self._good[0] + _PENALTY if found is None else self._value(y, found)
+        evaluation = self.evaluation(y)
+        return self._good[0] + _PENALTY if evaluation is None else self._value(y, evaluation)
 
     def rows(self, y: Vector, kind: str) -> np.ndarray:
         """Return the numbers of the equalities ("eq") or inequalities ("ineq")."""
-        found = self.evaluation(y)
-        return self._good[1][kind] if found is None else self._rows(y, found)[kind]
+        evaluation = self.evaluation(y)
+        return self._good[1][kind] if evaluation is None else self._rows(y, evaluation)[kind]
 
     def gradient(self, y: Vector) -> Vector:
         """Return the derivatives of the sum."""
@@ -102,8 +102,8 @@ class Scaled:
     def _linear(self, y: Vector) -> ScaledDerivatives:
         key = y.tobytes()
         if self.linear is None or self.linear[0] != key:
-            found = self.evaluation(y)
-            full = None if found is None else self.problem.with_slopes(found, y)
+            evaluation = self.evaluation(y)
+            full = None if evaluation is None else self.problem.with_slopes(evaluation, y)
             if full is None:
                 assert self.linear is not None
                 return self.linear[1]
@@ -113,10 +113,10 @@ class Scaled:
             self._good = self._value(y, full), self._rows(y, full)
         return self.linear[1]
 
-    def _is_better(self, found: DesignEvaluation) -> bool:
+    def _is_better(self, candidate: DesignEvaluation) -> bool:
         if self.best is None:
             return True
-        return is_better(self.problem, found, self.best[1])
+        return is_better(self.problem, candidate, self.best[1])
 
     def _slack(self, y: Vector) -> Vector:
         return self.bound_zero + self.bound_size * y[self.problem.count :]
@@ -130,8 +130,10 @@ class Scaled:
         numbers, slack = one.rows.values, self._slack(y)
         least: list[np.ndarray] = []
         for side, limit in ((1.0, low), (-1.0, high)):
-            here = np.isfinite(limit) & ~same
-            least.append(side * (numbers[here] - limit[here]) / self.row_size[here])
+            is_limited = np.isfinite(limit) & ~same
+            least.append(
+                side * (numbers[is_limited] - limit[is_limited]) / self.row_size[is_limited]
+            )
         for k, (bound, reading) in enumerate(zip(self.problem.bounds, one.bounded, strict=True)):
             least.append(bound.sign * (slack[k] - reading.values) / self.bound_size[k])
         equal = (numbers[same] - low[same]) / self.row_size[same]

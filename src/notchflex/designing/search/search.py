@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from notchflex.designing.search.local import Found, search_from, search_on
+from notchflex.designing.search.local import LocalOptimum, search_from, search_on
 from notchflex.designing.search.nearest import nearest
 from notchflex.designing.search.problem import DesignProblem, Progress, Vector
 from notchflex.designing.search.rows import TOLERANCE
@@ -17,9 +17,9 @@ from notchflex.designing.specification.spec import SearchOptions
 from notchflex.errors import InputError
 
 # A robot that misses by less than this part is searched from once more.
-_NEAR = 1e-3
+_MAX_VIOLATION = 1e-3
 # Searches end at the same robot where none of its scaled variables differ by more.
-_SAME = 1e-3
+_MAX_DIFFERENCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class SearchResult:
     problem: DesignProblem
     number: int
     start: Vector
-    found: Found
+    found: LocalOptimum
 
     @property
     def merit(self) -> tuple[float, float]:
@@ -68,14 +68,14 @@ class Searches:
         """Return where the searches of a form ended."""
         return [one for one in self.outcomes if one.number == number]
 
-    def settled(self, number: int) -> list[Found]:
+    def settled(self, number: int) -> list[LocalOptimum]:
         """Return the searches of a form that settled at different robots."""
-        found: list[Found] = []
+        optima: list[LocalOptimum] = []
         for one in self.of(number):
-            same = any(_same(one.found, other) for other in found)
-            if one.found.stationary and one.found.trail and not same:
-                found.append(one.found)
-        return found
+            same = any(_same(one.found, other) for other in optima)
+            if one.found.stationary and one.found.trajectory and not same:
+                optima.append(one.found)
+        return optima
 
     def has_agreed(self, number: int, count: int) -> bool:
         """Return whether nothing is to be gained from further searches of a form.
@@ -93,8 +93,8 @@ class Searches:
         return any(is_followed(one.problem, one.merit[1]) for one in self.of(number))
 
 
-def _same(one: Found, other: Found) -> bool:
-    return bool(np.abs(one.z - other.z).max(initial=0.0) < _SAME)
+def _same(one: LocalOptimum, other: LocalOptimum) -> bool:
+    return bool(np.abs(one.z - other.z).max(initial=0.0) < _MAX_DIFFERENCE)
 
 
 def search(
@@ -120,9 +120,9 @@ def search(
             for done, z in enumerate(starts(problem, several, each, options.seed)):
                 report("searching", number * several + done, several * len(problems))
                 settled = searches.settled(number)
-                found = search_from(problem, z, options.iterations, settled)
-                if found.evaluation is not None:
-                    searches.outcomes.append(SearchResult(problem, number, z, found))
+                optimum = search_from(problem, z, options.iterations, settled)
+                if optimum.evaluation is not None:
+                    searches.outcomes.append(SearchResult(problem, number, z, optimum))
                 if searches.has_agreed(number, max(2, (several + 1) // 2)):
                     break
             if searches.has_followed(number):
@@ -134,8 +134,8 @@ def search(
             report("searching on", 0, 1)
             best = searches.best
             if best.merit[0] == 0.0:
-                found = search_on(best.problem, best.found, options.iterations)
-                searches.outcomes.append(replace(best, found=found))
+                optimum = search_on(best.problem, best.found, options.iterations)
+                searches.outcomes.append(replace(best, found=optimum))
     except KeyboardInterrupt:
         searches.interrupted = True
         if not searches.outcomes:
@@ -152,12 +152,12 @@ def _approach(searches: Searches, options: SearchOptions) -> None:
         evaluation = one.found.evaluation
         assert evaluation is not None
         z, near = nearest(one.problem, one.found.z, evaluation)
-        if one.problem.worst(near) <= _NEAR:
-            found = search_from(one.problem, z, options.iterations)
+        if one.problem.worst(near) <= _MAX_VIOLATION:
+            optimum = search_from(one.problem, z, options.iterations)
         else:
-            found = Found(z, near, False, 0)
-        if found.evaluation is not None:
-            searches.outcomes.append(SearchResult(one.problem, one.number, one.start, found))
+            optimum = LocalOptimum(z, near, False, 0)
+        if optimum.evaluation is not None:
+            searches.outcomes.append(SearchResult(one.problem, one.number, one.start, optimum))
         if searches.best.merit[0] == 0.0:
             return
 

@@ -74,26 +74,26 @@ def starts(problem: DesignProblem, several: int, most: int, seed: int) -> Iterat
         most: Most robots that are drawn.
         seed: Seed of the draws.
     """
-    here = problem.start
-    own = problem.evaluate(here)
-    known = [] if own is None else [StartingPoint(here, own)]
+    initial = problem.start
+    own = problem.evaluate(initial)
+    candidates = [] if own is None else [StartingPoint(initial, own)]
     if several == 1 and own is not None:
         problem.set_sizes([own])
-        yield here
+        yield initial
         return
     few = min(most, max(_FEW, 2 * problem.count))
     half = max(1, most // 2)
     drawn = np.stack([smooth(problem, half, seed), draw(half, problem.count, seed)], axis=1)
     drawn = drawn.reshape(-1, problem.count)  # either kind in turn
     used: list[StartingPoint] = []
-    for part, wanted in ((drawn[:few], min(2, several)), (drawn[few:], several)):
+    for part, count in ((drawn[:few], min(2, several)), (drawn[few:], several)):
         more = [StartingPoint(z, one) for z, one in evaluate_all(problem, part) if one is not None]
-        known += more
-        if known and not used:
-            problem.set_sizes([one.evaluation for one in known])
-        must = known[:1] if own is not None and not used else []
-        order = [one for one in ranked(problem, known) if one not in (*must, *used)]
-        chosen = spread_out(order, wanted, [*must, *used])[len(used) :]
+        candidates += more
+        if candidates and not used:
+            problem.set_sizes([one.evaluation for one in candidates])
+        must = candidates[:1] if own is not None and not used else []
+        order = [one for one in ranked(problem, candidates) if one not in (*must, *used)]
+        chosen = spread_out(order, count, [*must, *used])[len(used) :]
         used += chosen
         yield from (one.z for one in ranked(problem, chosen))
 
@@ -110,22 +110,22 @@ def evaluate_all(
         except InputError as error:
             problem.failures[str(error)] = problem.failures.get(str(error), 0) + 1
             robots.append(None)
-    good = [number for number, robot in enumerate(robots) if robot is not None]
+    valid = [number for number, robot in enumerate(robots) if robot is not None]
     every = [robot for robot in robots if robot is not None]
-    arrays, converged = solved(solver, every, [problem.x(vectors[i]) for i in good])
-    solver.counts["solves"] += len(good)
-    found: list[tuple[Vector, DesignEvaluation | None]] = [(z, None) for z in vectors]
-    for row, number in enumerate(good):
+    arrays, converged = solved(solver, every, [problem.x(vectors[i]) for i in valid])
+    solver.counts["solves"] += len(valid)
+    evaluations: list[tuple[Vector, DesignEvaluation | None]] = [(z, None) for z in vectors]
+    for row, number in enumerate(valid):
         robot = robots[number]
         if robot is None or not converged[row]:
             continue
         own = {name: values[row] for name, values in arrays.items()}
         point = Point(solver.variables, problem.x(vectors[number]), robot, solver.paths, own)
         try:
-            found[number] = vectors[number], problem.read(point, vectors[number])
+            evaluations[number] = vectors[number], problem.read(point, vectors[number])
         except InputError as error:
             problem.failures[str(error)] = problem.failures.get(str(error), 0) + 1
-    return found
+    return evaluations
 
 
 def solved(
@@ -158,28 +158,28 @@ def solved(
     return joined, np.asarray(joined["converged"].all(axis=1))
 
 
-def ranked(problem: DesignProblem, found: Sequence[StartingPoint]) -> list[StartingPoint]:
+def ranked(problem: DesignProblem, candidates: Sequence[StartingPoint]) -> list[StartingPoint]:
     """Sort candidates: first those that miss least and whose sum is least."""
-    if not found:
+    if not candidates:
         return []
-    totals = np.array([one.evaluation.total for one in found])
+    totals = np.array([one.evaluation.total for one in candidates])
     spread = float(np.quantile(totals, 0.75) - np.quantile(totals, 0.25)) or 1.0
-    missed = np.array(
-        [np.minimum(np.abs(problem.violation(one.evaluation)), 1.0).sum() for one in found]
+    violation = np.array(
+        [np.minimum(np.abs(problem.violation(one.evaluation)), 1.0).sum() for one in candidates]
     )
-    merit = (totals - totals.min()) / spread + _WEIGHT * missed
-    return [found[number] for number in np.argsort(merit, kind="stable")]
+    penalised_objective = (totals - totals.min()) / spread + _WEIGHT * violation
+    return [candidates[number] for number in np.argsort(penalised_objective, kind="stable")]
 
 
 def spread_out(
     candidates: Sequence[StartingPoint], count: int, chosen: Sequence[StartingPoint]
 ) -> list[StartingPoint]:
     """Add to chosen candidates the best that are not too near to them and to each other."""
-    found, rest = list(chosen), []
+    selected, rest = list(chosen), []
     for one in candidates:
         apart = _APART * np.sqrt(max(len(one.z), 1))
-        near = any(np.linalg.norm(one.z - other.z) < apart for other in found)
-        (rest if near else found).append(one)
-        if len(found) >= count:
+        near = any(np.linalg.norm(one.z - other.z) < apart for other in selected)
+        (rest if near else selected).append(one)
+        if len(selected) >= count:
             break
-    return [*found, *rest][: max(count, len(chosen))]
+    return [*selected, *rest][: max(count, len(chosen))]

@@ -14,16 +14,16 @@ from scipy.optimize import linprog
 
 from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 from notchflex.designing.search.rows import TOLERANCE
-from notchflex.designing.search.trails import Trail
+from notchflex.designing.search.trajectories import SearchTrajectory
 
 # The box at first, at most and at last, in parts of the ranges of the variables.
-_FIRST, _MOST, _LAST = 0.15, 0.5, 1e-4
+_FIRST_BOX, _MAX_BOX, _MIN_BOX = 0.15, 0.5, 1e-4
 # What all limits missed by their sizes cost, in sizes of the sum; it grows where they stay missed.
 _PRICE, _DEARER, _DEAREST = 10.0, 10.0, 1e5
 # A step is taken if it gains this part of what was promised; the box grows beyond the other part.
-_TAKEN, _GOOD = 0.05, 0.7
+_ACCEPTED_GAIN, _GOOD_GAIN = 0.05, 0.7
 # Little is left to be gained, or nothing is missed by more than this: SLSQP takes over.
-_SETTLED, _NEAR = 1e-5, 1e-3
+_MIN_GAIN, _MAX_VIOLATION = 1e-5, 1e-3
 _STEPS = 30
 
 
@@ -38,8 +38,8 @@ class _Model:
 
     def merit(self, other: DesignEvaluation) -> float:
         """Sum and price of what is missed."""
-        missed = np.abs(self.problem.violation(other)).sum()
-        return other.total / self.size + self.price * float(missed)
+        violation = np.abs(self.problem.violation(other)).sum()
+        return other.total / self.size + self.price * float(violation)
 
     def step(self, z: Vector, box: float) -> tuple[Vector, float]:
         """Return the best step within a box, and the merit that it promises."""
@@ -55,10 +55,14 @@ class _Model:
         matrix: list[np.ndarray] = []
         right: list[np.ndarray] = []
         for side, limit in ((1.0, high), (-1.0, low)):
-            here = np.isfinite(limit)
-            give = -np.eye(m)[here]
-            matrix.append(np.hstack([side * by[here], give, np.zeros((int(here.sum()), k))]))
-            right.append(side * (limit[here] - one.rows.values[here]) / sizes[here])
+            is_limited = np.isfinite(limit)
+            give = -np.eye(m)[is_limited]
+            matrix.append(
+                np.hstack([side * by[is_limited], give, np.zeros((int(is_limited.sum()), k))])
+            )
+            right.append(
+                side * (limit[is_limited] - one.rows.values[is_limited]) / sizes[is_limited]
+            )
         for number, (bound, reading) in enumerate(zip(problem.bounds, one.bounded, strict=True)):
             assert reading.slopes is not None
             rows = np.zeros((len(reading.values), n + m + k))
@@ -73,14 +77,18 @@ class _Model:
         limits = [(max(-box, -a), min(box, 1.0 - a)) for a in z.tolist()]
         limits += [(0.0, np.inf)] * m + [(-np.inf, np.inf)] * k
         every = np.concatenate([np.zeros((0, n + m + k)), *matrix])
-        found = linprog(cost, every, np.concatenate([np.zeros(0), *right]), bounds=limits)
-        if found.x is None:
+        solution = linprog(cost, every, np.concatenate([np.zeros(0), *right]), bounds=limits)
+        if solution.x is None:
             return np.zeros(n), self.merit(one)
-        return found.x[:n], float(found.fun) + float(one.objective.values.sum()) / self.size
+        return solution.x[:n], float(solution.fun) + float(one.objective.values.sum()) / self.size
 
 
 def approach(
-    problem: DesignProblem, z: Vector, first: DesignEvaluation, iterations: int, trail: Trail
+    problem: DesignProblem,
+    z: Vector,
+    first: DesignEvaluation,
+    iterations: int,
+    trajectory: SearchTrajectory,
 ) -> tuple[Vector, DesignEvaluation, int]:
     """Step to where limits hold, or are missed by least.
 
@@ -89,35 +97,35 @@ def approach(
         z: The start, scaled.
         first: The robot there, with derivatives.
         iterations: Most steps.
-        trail: Told of every step; ends the search where another one has been.
+        trajectory: Told of every step; ends the search where another one has been.
 
     Returns:
         Where it ended, the robot there with derivatives, and the number of steps.
     """
-    one, box, price = first, _FIRST, _PRICE
+    one, box, price = first, _FIRST_BOX, _PRICE
     done = 0
     while done < min(iterations, _STEPS) and problem.count:
-        if problem.worst(one) <= _NEAR:
+        if problem.worst(one) <= _MAX_VIOLATION:
             break
         model = _Model(problem, one, price, problem.total_size)
         step, promised = model.step(z, box)
-        here = model.merit(one)
-        gain = here - promised
-        if gain <= _SETTLED * max(1.0, abs(here)) or box < _LAST:
-            if problem.worst(one) <= TOLERANCE or price >= _DEAREST or box < _LAST:
+        merit = model.merit(one)
+        gain = merit - promised
+        if gain <= _MIN_GAIN * max(1.0, abs(merit)) or box < _MIN_BOX:
+            if problem.worst(one) <= TOLERANCE or price >= _DEAREST or box < _MIN_BOX:
                 break
             price *= _DEARER
             continue
         done += 1
         other = problem.evaluate(np.clip(z + step, 0.0, 1.0))
-        part = -1.0 if other is None else (here - model.merit(other)) / gain
+        part = -1.0 if other is None else (merit - model.merit(other)) / gain
         full = None
-        if other is not None and part > _TAKEN:
+        if other is not None and part > _ACCEPTED_GAIN:
             full = problem.with_slopes(other, z + step)
         if full is None:
             box = 0.4 * min(box, float(np.abs(step).max()))
             continue
         z, one = np.clip(z + step, 0.0, 1.0), full
-        trail.pass_by(z)
-        box = min(_MOST, 2.0 * box) if part > _GOOD else box
+        trajectory.record(z)
+        box = min(_MAX_BOX, 2.0 * box) if part > _GOOD_GAIN else box
     return z, one, done

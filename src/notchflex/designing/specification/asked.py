@@ -17,7 +17,7 @@ from notchflex.designing.specification.fields import (
 from notchflex.robot.part import Float, ProblemError, part, quantity
 
 # A coordinate beyond is in another unit, mm.
-_FARTHEST = 1e4
+_MAX_COORDINATE = 1e4
 
 
 @part(kw_only=True, refuse=REFUSE)
@@ -153,8 +153,8 @@ class TargetCurve:
         if (self.points is None) == (self.curvature is None):
             raise ProblemError([("points", "or `curvature` is needed; give one of them.")])
         far = max((abs(x) for one in self.points or () for x in one), default=0.0)
-        if far > _FARTHEST:
-            text = f"has a coordinate of {far:g}; give mm, at most {_FARTHEST:g} mm."
+        if far > _MAX_COORDINATE:
+            text = f"has a coordinate of {far:g}; give mm, at most {_MAX_COORDINATE:g} mm."
             raise ProblemError([("points", text)])
         if self.curvature is not None:
             lengths = [one[0] for one in self.curvature]

@@ -70,8 +70,8 @@ def deck(
     return "\n".join(lines)
 
 
-def _nodes(places: np.ndarray, first: int) -> Iterator[str]:
-    for number, (x, y, z) in enumerate(places.tolist(), start=first):
+def _nodes(positions: np.ndarray, first: int) -> Iterator[str]:
+    for number, (x, y, z) in enumerate(positions.tolist(), start=first):
         yield f"{number},{x:.10g},{y:.10g},{z:.10g}"
 
 

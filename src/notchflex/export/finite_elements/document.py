@@ -79,21 +79,21 @@ def _check_state(path: EquilibriumPath, step: int) -> None:
 
 def _warnings(subject: Subject) -> tuple[str, ...]:
     robot = subject.robot
-    found: list[str] = []
+    warnings: list[str] = []
     if not isinstance(robot.material, Linear):
-        found.append(
+        warnings.append(
             "The deck has the material as plastic with hardening: it is right while the tube is "
             "loaded, not when it unloads."
         )
     if any(isinstance(notch, ArcNotch) and notch.ends == "rigid" for notch in robot.notches):
-        found.append(
+        warnings.append(
             "The chain of this robot has rigid ends beside its notches, and finite elements have "
             'not: set notch.ends = "shell" to compare the two.'
         )
-    found += [f"The elastic ends of the chain: {one}" for one in unchecked_dimensions(robot)]
+    warnings += [f"The elastic ends of the chain: {one}" for one in unchecked_dimensions(robot)]
     if subject.path is not None and any(tendon.path == "wall-arc" for tendon in robot.tendon):
-        found.append(
+        warnings.append(
             "The tendon of the deck runs straight from edge to edge of a notch, not along the arc "
             "of the wall."
         )
-    return tuple(found)
+    return tuple(warnings)

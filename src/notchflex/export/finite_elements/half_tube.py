@@ -33,7 +33,7 @@ def half_tube(robot: Robot, options: DeckOptions) -> TubeMesh:
     angle = np.concatenate(
         [to_edge[:, None, None] * at, at + beyond[:, None, None] * (np.pi - at)]
     ).transpose(1, 0, 2)
-    place = np.stack(
+    position = np.stack(
         [
             -radius[:, None, None] * np.cos(angle),
             radius[:, None, None] * np.sin(angle),
@@ -43,7 +43,7 @@ def half_tube(robot: Robot, options: DeckOptions) -> TubeMesh:
     )
     openings = [GridOpening(2 * options.spine, options.opening, low, high) for low, high in faces]
     x_deg = notches[0].direction_deg
-    return numbered(place, height, openings, is_half=True, x_deg=x_deg)
+    return numbered(position, height, openings, is_half=True, x_deg=x_deg)
 
 
 def _graded(count: int) -> Float[np.ndarray, " k"]:

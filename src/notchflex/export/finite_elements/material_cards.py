@@ -6,7 +6,7 @@ from notchflex.errors import InputError
 from notchflex.robot import Linear, Nitinol, StressStrain, Superelastic
 from notchflex.robot.kinds import Material
 
-_FAR = 0.2  # strain up to which a curve is continued
+_MAX_STRAIN = 0.2  # strain up to which a curve is continued
 
 
 def material_cards(material: Material) -> list[str]:
@@ -18,12 +18,12 @@ def material_cards(material: Material) -> list[str]:
     Raises:
         InputError: The kind has no cards.
     """
-    known = with_cards(material)
-    modulus = known.elastic_modulus
-    elastic = ["*ELASTIC", f"{modulus:.10g},{known.poisson_ratio:.10g}"]
-    if isinstance(known, Linear):
+    supported = with_cards(material)
+    modulus = supported.elastic_modulus
+    elastic = ["*ELASTIC", f"{modulus:.10g},{supported.poisson_ratio:.10g}"]
+    if isinstance(supported, Linear):
         return elastic
-    points = _curve(known, modulus)
+    points = _curve(supported, modulus)
     lines = [f"{stress:.10g},{strain - stress / modulus:.10g}" for strain, stress in points]
     return [*elastic, "*PLASTIC", *lines]
 
@@ -48,8 +48,12 @@ def _curve(
     """Strains and stresses (MPa) from the end of the elastic line on."""
     if isinstance(material, Superelastic):
         first, slope = material.transition_strain, material.superelastic_modulus
-        return [(e, modulus * first + slope * (e - first)) for e in (first, max(_FAR, 2 * first))]
+        return [
+            (e, modulus * first + slope * (e - first)) for e in (first, max(_MAX_STRAIN, 2 * first))
+        ]
     if isinstance(material, Nitinol):
         first, slope = material.plateau_stress / modulus, material.plateau_modulus
-        return [(e, modulus * first + slope * (e - first)) for e in (first, max(_FAR, 2 * first))]
+        return [
+            (e, modulus * first + slope * (e - first)) for e in (first, max(_MAX_STRAIN, 2 * first))
+        ]
     return list(zip(material.strain, material.stress, strict=True))

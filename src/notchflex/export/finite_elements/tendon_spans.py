@@ -15,7 +15,7 @@ from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.robot import Robot
 
 # A tendon may lie so far from the nearest node, as a part of its distance from the tube axis.
-_NEAR = 0.01
+_MAX_NODE_OFFSET = 0.01
 
 
 class TendonSpan(NamedTuple):
@@ -53,13 +53,13 @@ def tendon_spans(
     holes = [starts[hole.body] + hole.place[2] for hole in tendon_holes(robot, tendon)]
     layers = [int(np.argmin(np.abs(mesh.heights - z))) for z in holes]
     nodes = [mesh.nearest(layer, point) for layer in layers]
-    if min(away for _, away in nodes) > _NEAR * one.radius:
+    if min(away for _, away in nodes) > _MAX_NODE_OFFSET * one.radius:
         raise InputError.UNSUPPORTED(
             f"tendon[{tendon + 1}].radius is {one.radius} mm: the mesh has nodes between "
             f"{robot.tube.inner_radius:g} and {robot.tube.outer_radius:g} mm; place it there, or "
             "take more elements through the wall"
         )
-    meets = [away <= _NEAR * one.radius for _, away in nodes]
+    meets = [away <= _MAX_NODE_OFFSET * one.radius for _, away in nodes]
     own = tension if robot.tube.base_length > 0.0 else tension[1:]
     spans: list[TendonSpan] = []
     for (a, b), force in zip(pairwise(range(len(nodes))), own.tolist(), strict=False):

@@ -105,7 +105,7 @@ class TubeMesh:
 
 
 def numbered(
-    place: Float[np.ndarray, "a b c 3"],
+    position: Float[np.ndarray, "a b c 3"],
     heights: Float[np.ndarray, " c"],
     openings: Sequence[GridOpening],
     *,
@@ -115,16 +115,16 @@ def numbered(
     """Drop the cells of the notches and number the nodes that are left.
 
     Args:
-        place: Places on the grid; a whole tube closes from the last angle to the first.
+        position: Places on the grid; a whole tube closes from the last angle to the first.
         heights: Heights of the layers.
         openings: Where the notches are open.
         is_half: Whether half a tube is meshed.
         x_deg: Direction of the x axis on the robot.
     """
     cells = np.stack(
-        np.meshgrid(*(np.arange(size // 2) for size in place.shape[:3]), indexing="ij"), axis=-1
+        np.meshgrid(*(np.arange(size // 2) for size in position.shape[:3]), indexing="ij"), axis=-1
     ).reshape(-1, 3)
-    around = place.shape[1] // 2
+    around = position.shape[1] // 2
     cut = np.zeros(len(cells), bool)
     for one in openings:
         inside = (2 * cells[:, 2] >= one.low) & (2 * cells[:, 2] < one.high)
@@ -133,15 +133,15 @@ def numbered(
     # Half a tube counts its angles from the spine, the other way round.
     grid = 2 * cells[:, None] + (_NODES if is_half else [0, 2, 0] + _NODES * [1, -1, 1])
     if not is_half:
-        grid[..., 1] %= place.shape[1]
-    flat = np.ravel_multi_index(tuple(np.moveaxis(grid, -1, 0)), place.shape[:3])
+        grid[..., 1] %= position.shape[1]
+    flat = np.ravel_multi_index(tuple(np.moveaxis(grid, -1, 0)), position.shape[:3])
     used = np.unique(flat)
-    numbers = np.full(int(np.prod(place.shape[:3])), -1)
+    numbers = np.full(int(np.prod(position.shape[:3])), -1)
     numbers[used] = np.arange(1, len(used) + 1)
     return TubeMesh(
-        nodes=numbers.reshape(place.shape[:3]),
+        nodes=numbers.reshape(position.shape[:3]),
         heights=heights,
-        place=place.reshape(-1, 3)[used],
+        place=position.reshape(-1, 3)[used],
         elements=numbers[flat],
         cell=cells,
         openings=tuple(openings),

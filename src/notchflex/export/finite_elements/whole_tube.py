@@ -59,7 +59,7 @@ def whole_tube(robot: Robot, options: DeckOptions, tendons: Sequence[int]) -> Tu
     shift = np.stack([np.interp(height, edges_at, one) for one in flat.T])
     angle = shift.reshape(*every.shape[1:], len(height))
     angle = angle + (np.arange(2 * around) * np.pi / around)[:, None]
-    place = np.stack(
+    position = np.stack(
         [
             radius[:, None, None] * np.cos(angle),
             radius[:, None, None] * np.sin(angle),
@@ -67,7 +67,7 @@ def whole_tube(robot: Robot, options: DeckOptions, tendons: Sequence[int]) -> Tu
         ],
         axis=-1,
     )
-    return numbered(place, height, openings, is_half=False, x_deg=0.0)
+    return numbered(position, height, openings, is_half=False, x_deg=0.0)
 
 
 def _edges(notch: ArcNotch, edge: float, around: int, options: DeckOptions) -> tuple[int, int]:
@@ -91,7 +91,7 @@ def _knots(
     spine = np.radians(notch.direction_deg) + np.pi
     per = 2.0 * np.pi / around
     first, last = lines
-    found = {first % around: spine - edge - first * per, last % around: spine + edge - last * per}
+    knots = {first % around: spine - edge - first * per, last % around: spine + edge - last * per}
     for side in sides:
         away = (side - spine + np.pi) % (2.0 * np.pi) - np.pi  # from the middle of the spine
         inside = abs(away) < edge[0]
@@ -102,8 +102,8 @@ def _knots(
             number = last + 1 + (number - last - 1) % around
             number = min(number, first + around - 1)
             away %= 2.0 * np.pi
-        found[number % around] = np.full(len(edge), spine + away - number * per)
-    return {one: (by + np.pi) % (2.0 * np.pi) - np.pi for one, by in found.items()}
+        knots[number % around] = np.full(len(edge), spine + away - number * per)
+    return {one: (by + np.pi) % (2.0 * np.pi) - np.pi for one, by in knots.items()}
 
 
 def _lines(

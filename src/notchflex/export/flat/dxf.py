@@ -64,8 +64,8 @@ def _content_of(drawing: PatternDrawing) -> bytes:
     return stream.getvalue().encode(made.output_encoding, errors="dxfreplace")
 
 
-def _layers(made: Drawing) -> None:
+def _layers(drawing: Drawing) -> None:
     for name, text in LAYERS.items():
-        layer = made.layers.add(name, color=_COLOURS[name])
-        if made.dxfversion > "AC1009":  # R12 has no descriptions
+        layer = drawing.layers.add(name, color=_COLOURS[name])
+        if drawing.dxfversion > "AC1009":  # R12 has no descriptions
             layer.description = text

@@ -185,11 +185,11 @@ def _clipped(points: Sequence[Point], level: float, side: float) -> list[Point]:
     """Return the part of a closed outline above a level of y (side 1) or below it (side -1)."""
     kept: list[Point] = []
     for (x, y), (u, v) in zip(points, [*points[1:], points[0]], strict=True):
-        here, there = side * (y - level), side * (v - level)
-        if here >= 0.0:
+        begin, end = side * (y - level), side * (v - level)
+        if begin >= 0.0:
             kept.append((x, y))
-        if here * there < 0.0:
-            part = here / (here - there)
+        if begin * end < 0.0:
+            part = begin / (begin - end)
             kept.append((x + part * (u - x), level))
     has_area = any(side * (y - level) > _EPSILON for _, y in kept)
     return kept if has_area else []

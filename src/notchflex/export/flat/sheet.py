@@ -157,12 +157,12 @@ def _row(pattern: FlatPattern, one: PatternCut) -> list[str]:
 def _table_page(pattern: FlatPattern, rows: Sequence[Sequence[str]]) -> Figure:
     figure, axes = _new_page(f"{plain_name(pattern.robot)}: cuts, nominal on the outer surface")
     axes.set_axis_off()
-    made = axes.table(
+    table = axes.table(
         cellText=[list(row) for row in rows], colLabels=list(_HEADS), loc="upper center"
     )
-    made.auto_set_font_size(False)
-    made.set_fontsize(8.0)
-    for (row, _), cell in made.get_celld().items():
+    table.auto_set_font_size(False)
+    table.set_fontsize(8.0)
+    for (row, _), cell in table.get_celld().items():
         cell.set_height(0.052 if row == 0 else 0.028)
         cell.set_linewidth(0.4)
     foot = "Positions from the base of the robot. "

@@ -43,7 +43,7 @@ def _group(drawing: PatternDrawing, layer: str) -> str:
     colour = _COLOURS[layer]
     inside = [_path(line) for line in drawing.lines if line.layer == layer]
     if layer == "TEXT":
-        look = f'fill="{colour}" font-family="sans-serif"'
+        attributes = f'fill="{colour}" font-family="sans-serif"'
         inside = [
             f'<text x="{one.place[0]!r}" y="{-one.place[1]!r}" font-size="{1.4 * one.height:.6g}"'
             + (' text-anchor="middle" dominant-baseline="central"' if one.centred else "")
@@ -51,10 +51,10 @@ def _group(drawing: PatternDrawing, layer: str) -> str:
             for one in drawing.texts
         ]
     else:
-        look = f'fill="none" stroke="{colour}" stroke-width="{_LINE}"'
+        attributes = f'fill="none" stroke="{colour}" stroke-width="{_LINE}"'
     about = quoteattr(LAYERS[layer])  # pyright: ignore[reportArgumentType]
     lines = "".join(f"  {one}\n" for one in inside)
-    return f'<g id="{layer}" {look} data-content={about}>\n{lines}</g>\n'
+    return f'<g id="{layer}" {attributes} data-content={about}>\n{lines}</g>\n'
 
 
 def _path(line: DrawnLine) -> str:

@@ -171,16 +171,16 @@ def shrunk(corners: Sequence[Point], inside: float, top: float, name: str) -> li
         length = math.dist((x, y), (u, v))
         aside = -inside * (v - y) / length, inside * (u - x) / length
         moved.append(Line((x + aside[0], y + aside[1]), (u + aside[0], v + aside[1])))
-    found = [_at_height(moved[0], top)]
-    found += [_crossing(one, two) for one, two in pairwise(moved)]
-    found.append(_at_height(moved[-1], top))
-    for ((x, y), (u, v)), ((a, b), (c, d)) in zip(pairwise(found), moved, strict=True):
+    points = [_at_height(moved[0], top)]
+    points += [_crossing(one, two) for one, two in pairwise(moved)]
+    points.append(_at_height(moved[-1], top))
+    for ((x, y), (u, v)), ((a, b), (c, d)) in zip(pairwise(points), moved, strict=True):
         if (u - x) * (c - a) + (v - y) * (d - b) <= 0.0:
             raise InputError.OUT_OF_RANGE(
                 f"{name}: a path {inside:.6g} mm inside its edges does not fit into it; give a "
                 "smaller kerf or a larger cut."
             )
-    return found
+    return points
 
 
 def _at_height(line: Line, height: float) -> Point:

@@ -47,8 +47,8 @@ def smallest_web(
     # From the tip on: a cut that starts farther away than the best web so far ends the search.
     order = sorted(range(len(edges)), key=lambda number: -edges[number][:, 0].max())
     shift = np.array([0.0, around])
-    for place, first in enumerate(order):
-        for second in order[place:]:
+    for position, first in enumerate(order):
+        for second in order[position:]:
             edge, other = edges[first], edges[second]
             if edge[:, 0].min() - other[:, 0].max() >= best.width:
                 break

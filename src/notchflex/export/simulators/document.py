@@ -91,7 +91,7 @@ def _sentence(error: SimulatorError) -> str:
     )
 
 
-_MOST = 0.02
+_MAX_ERROR = 0.02
 """Error of the total angle, as a part of its range, beyond which the user is warned."""
 
 
@@ -100,7 +100,7 @@ def _large(errors: list[SimulatorError]) -> tuple[str, ...]:
         f"The MJCF model misses the total angle under tendon {error.tendon} by "
         f"{error.total_angle:.1%} of its range; a smaller largest tension brings it closer."
         for error in errors
-        if not error.total_angle <= _MOST
+        if not error.total_angle <= _MAX_ERROR
     )
 
 

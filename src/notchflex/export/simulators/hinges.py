@@ -16,7 +16,7 @@ from notchflex.export.simulators.samples import PullSamples
 from notchflex.robot import Robot
 
 # Without any turn the place of a hinge is not determined: half way along the flexure.
-_LEAST_TURN = 1e-6
+_MIN_TURN = 1e-6
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def fit_hinges(robot: Robot, pulls: Sequence[PullSamples]) -> HingeChain:
         offset.append(moved[0])
         free.append(start[j].T @ start[j + 1])
         lever.append(0.5 * moved[0])
-        if np.ptp(angle) > _LEAST_TURN:
+        if np.ptp(angle) > _MIN_TURN:
             matrix = (rotations(axis[j], angle) - np.eye(3)).reshape(-1, 3)
             right = (moved - moved[0]).reshape(-1)
             lever[-1] = np.linalg.lstsq(matrix, right, rcond=1e-9)[0]

@@ -16,7 +16,7 @@ from notchflex.export.simulators.samples import PullSamples
 _FIRST_WITH_YIELD = 4
 _LEVELS = 24  # up, and as many down
 _RAMP = 200  # time steps from level to level: faster, and inertia carries hinges too far
-_HOLD, _MOST_HOLDS = 100, 60  # time steps between looks whether all stands still, and how many
+_HOLD, _MAX_HOLDS = 100, 60  # time steps between looks whether all stands still, and how many
 _STILL = 1e-4  # of the largest angle of a hinge so far, in 1 s
 
 
@@ -93,7 +93,7 @@ def run_mujoco(
         for control in np.linspace(before, level, _RAMP):
             data.ctrl[tendon] = control
             mujoco.mj_step(model, data)
-        for _ in range(_MOST_HOLDS):
+        for _ in range(_MAX_HOLDS):
             mujoco.mj_step(model, data, _HOLD)
             largest = max(largest, float(np.abs(data.qpos[at]).max()))
             if np.abs(data.qvel[at]).max() <= _STILL * largest:
@@ -110,26 +110,26 @@ def measure_errors(model: JointModel, text: str) -> list[SimulatorError]:
     for one in model.pulls:
         levels = np.unique(np.linspace(0, len(one.tension) // 2 - 1, _LEVELS).round().astype(int))
         rows = np.concatenate([levels, len(one.tension) - 1 - levels[::-1]])
-        found = run_mujoco(text, one.tendon, one.tension[rows], len(model.springs))
-        errors.append(_compare(model, one, rows, found))
+        pull = run_mujoco(text, one.tendon, one.tension[rows], len(model.springs))
+        errors.append(_compare(model, one, rows, pull))
     return errors
 
 
 def _compare(
-    model: JointModel, one: PullSamples, rows: np.ndarray, found: SimulatedPull
+    model: JointModel, one: PullSamples, rows: np.ndarray, pull: SimulatedPull
 ) -> SimulatorError:
-    total, own = one.angle[rows].sum(axis=1), found.angle.sum(axis=1)
+    total, own = one.angle[rows].sum(axis=1), pull.angle.sum(axis=1)
     moved = np.linalg.norm(one.tip - one.tip[0], axis=1).max()
-    area, own_area = loop_area(found.tension, total), loop_area(found.tension, own)
+    area, own_area = loop_area(pull.tension, total), loop_area(pull.tension, own)
     least = 1e-9 * model.top * np.ptp(total)
     return SimulatorError(
         tendon=one.tendon + 1,
         largest_tension=model.top,
         total_angle=float(np.abs(own - total).max() / np.ptp(total)),
         notch_angle=float(
-            np.abs(found.angle - one.angle[rows]).max() / np.ptp(one.angle, axis=0).max()
+            np.abs(pull.angle - one.angle[rows]).max() / np.ptp(one.angle, axis=0).max()
         ),
-        tip_position=float(np.linalg.norm(found.tip - one.tip[rows], axis=1).max() / moved),
+        tip_position=float(np.linalg.norm(pull.tip - one.tip[rows], axis=1).max() / moved),
         loop_area=float(abs(own_area / area - 1.0)) if abs(area) > least else float("nan"),
     )
 

@@ -16,7 +16,7 @@ from notchflex.robot import Robot
 _STEPS = 121
 _BEYOND_CLOSING = 1.1
 # Far beyond the closing of all notches hardly a sample is left in which anything moves.
-_MOST_BEYOND = 3.0
+_MAX_BEYOND = 3.0
 # A notch that turns by less in one step does not slip there, rad.
 _AT_REST = 1e-7
 
@@ -93,11 +93,11 @@ def pull_samples(robot: Robot, tendon: int, top: float, steps: int = _STEPS) -> 
             f"give a smaller largest tension than {top:.4g} N"
         )
     closed_from = np.flatnonzero(path.closed[:steps].all(axis=1))
-    if len(closed_from) and _MOST_BEYOND * path.tension[closed_from[0], tendon] < top:
+    if len(closed_from) and _MAX_BEYOND * path.tension[closed_from[0], tendon] < top:
         all_closed = float(path.tension[closed_from[0], tendon])
         raise InputError.OUT_OF_RANGE(
             f"every notch of {robot.name} has closed at {all_closed:.4g} N: the largest tension "
-            f"may be at most {_MOST_BEYOND * all_closed:.4g} N; got {top:g} N"
+            f"may be at most {_MAX_BEYOND * all_closed:.4g} N; got {top:g} N"
         )
     angle = path.notch_angle - path.notch_angle[0]
     turned = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) > _AT_REST

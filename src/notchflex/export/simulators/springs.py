@@ -15,21 +15,21 @@ import numpy as np
 from jaxtyping import Float
 
 _POWERS = np.array([1, 2, 3])
-_BEYOND = np.array([1, 2])
+_KNOT_POWERS = np.array([1, 2])
 # Where further springs may begin between the free robot and the largest angle, how many at
 # most, how far apart, and the error of the angle that is good enough, all as parts of the
 # range.
 _PLACES = np.linspace(0.05, 0.95, 28)
-_MOST_KNOTS = 6
+_MAX_KNOTS = 6
 _APART = 0.06
 _WORTH = 0.95  # of the error before; a knot that leaves more is not worth its spring
-_GOOD = 5e-4
+_MAX_MISFIT = 5e-4
 # No sample weighs more than that of a flexure softer than the free one by this factor.
 _SOFTEST = 50.0
 # Friction below this part of the elastic moment is none.
 _ROUNDING = 1e-3
 _FRICTION_POWERS = np.array([2, 3, 4])  # a joint equality has powers up to 4
-_LEAST_TURN = 1e-4  # rad; a flexure that turns less is given its stiffness in the free robot
+_MIN_TURN = 1e-4  # rad; a flexure that turns less is given its stiffness in the free robot
 
 
 @dataclass(frozen=True)
@@ -89,18 +89,18 @@ def fit_spring(
     """
     low, high = float(angle.min(initial=0.0)), float(angle.max(initial=0.0))
     # Rounding is not a motion to a side.
-    low, high = (0.0 if abs(end) < _LEAST_TURN else end for end in (low, high))
-    if high - low < _LEAST_TURN:
+    low, high = (0.0 if abs(end) < _MIN_TURN else end for end in (low, high))
+    if high - low < _MIN_TURN:
         return linear_spring(stiffness)
     slope = (rising * np.sign(angle))[:, None] * _friction(angle)
     weight = _weights(angle, moment, rising, stiffness)
-    goal = _GOOD * (high - low)
-    places = np.concatenate([end * _PLACES for end in (low, high) if abs(end) > _LEAST_TURN])
+    goal = _MAX_MISFIT * (high - low)
+    candidates = np.concatenate([end * _PLACES for end in (low, high) if abs(end) > _MIN_TURN])
     best = _least_squares(angle, moment, slope, weight, np.zeros(0))
-    for _ in range(_MOST_KNOTS):
+    for _ in range(_MAX_KNOTS):
         # A superelastic notch yields somewhere: the knot that helps most is found by trying.
         apart = _APART * (high - low)
-        free = [at for at in places if np.abs(at - best.knots).min(initial=np.inf) > apart]
+        free = [at for at in candidates if np.abs(at - best.knots).min(initial=np.inf) > apart]
         if best.error < goal or not free:
             break
         trials = [
@@ -133,9 +133,9 @@ def _least_squares(
     matrix = np.concatenate([_elastic(angle, knots), slope], axis=1) * weight[:, None]
     scale = np.linalg.norm(matrix, axis=0)
     scale[scale == 0.0] = 1.0
-    found = np.linalg.lstsq(matrix / scale, moment * weight, rcond=1e-10)[0] / scale
-    error = matrix @ found - moment * weight
-    return _Trial(knots, found, float(np.sqrt(np.mean(error**2))))
+    coefficients = np.linalg.lstsq(matrix / scale, moment * weight, rcond=1e-10)[0] / scale
+    error = matrix @ coefficients - moment * weight
+    return _Trial(knots, coefficients, float(np.sqrt(np.mean(error**2))))
 
 
 def _weights(
@@ -164,7 +164,7 @@ def _elastic(
     """Powers of the angle, and of its way beyond every knot."""
     own = angle[:, None] ** _POWERS
     beyond = np.array(np.where(np.sign(knots) * (angle[:, None] - knots) > 0.0, 1.0, 0.0))
-    further = (angle[:, None] - knots)[..., None] ** _BEYOND * beyond[..., None]
+    further = (angle[:, None] - knots)[..., None] ** _KNOT_POWERS * beyond[..., None]
     return np.concatenate([own, further.reshape(len(angle), -1)], axis=1)
 
 

@@ -13,7 +13,7 @@ from notchflex.export.simulators.joint_model import JointModel
 METRE = 1e-3
 """mm to m, N mm to N m, g to kg."""
 
-_LEAST_MASS = 1e-5  # g, where nothing is known of the density
+_MIN_MASS = 1e-5  # g, where nothing is known of the density
 
 
 class Inertia(NamedTuple):
@@ -35,7 +35,7 @@ class Inertia(NamedTuple):
 def inertia(model: JointModel, body: int) -> Inertia:
     """Return mass and moments of inertia of a body, taken as a piece of tube."""
     tube, length = model.robot.tube, METRE * float(model.body_length[body])
-    mass = METRE * max(float(model.body_mass[body]), _LEAST_MASS)
+    mass = METRE * max(float(model.body_mass[body]), _MIN_MASS)
     radii = (METRE * tube.outer_radius) ** 2 + (METRE * tube.inner_radius) ** 2
     along = 0.5 * mass * radii
     # A ring without length has half as much across as along, and simulators refuse less.

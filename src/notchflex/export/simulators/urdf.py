@@ -36,13 +36,13 @@ def urdf(model: JointModel, head: str = "") -> str:
     root.append(comment(head))
     hinges = model.hinges
     # A link's frame is that of the joint before it: in the hinge, turned as the body.
-    place = np.zeros(3)
-    _link(root, model, 0, place)
+    position = np.zeros(3)
+    _link(root, model, 0, position)
     for j, spring in enumerate(model.springs):
         joint = add(root, "joint", name=f"notch_{j + 1}", type="revolute")
         add(joint, "parent", link=f"body_{j}")
         add(joint, "child", link=f"body_{j + 1}")
-        origin = hinges.offset[j] - hinges.lever[j] - place
+        origin = hinges.offset[j] - hinges.lever[j] - position
         turned = roll_pitch_yaw(hinges.free_rotation[j])
         add(joint, "origin", xyz=METRE * origin, rpy=turned)
         own = hinges.free_rotation[j].T
@@ -57,30 +57,30 @@ def urdf(model: JointModel, head: str = "") -> str:
             effort=METRE * float(effort.max()),
             velocity=_FASTEST,
         )
-        place = -own @ hinges.lever[j]
-        _link(root, model, j + 1, place)
+        position = -own @ hinges.lever[j]
+        _link(root, model, j + 1, position)
     add(root, "link", name="tip")
     joint = add(root, "joint", name="tip_fixed", type="fixed")
     add(joint, "parent", link=f"body_{len(model.springs)}")
     add(joint, "child", link="tip")
-    end = np.array([0.0, 0.0, model.body_length[-1]]) - place
+    end = np.array([0.0, 0.0, model.body_length[-1]]) - position
     add(joint, "origin", xyz=METRE * end, rpy=[0, 0, 0])
     return finished(root)
 
 
 def _link(
-    root: ElementTree.Element, model: JointModel, body: int, place: Float[np.ndarray, " 3"]
+    root: ElementTree.Element, model: JointModel, body: int, position: Float[np.ndarray, " 3"]
 ) -> None:
     """Add a link; its frame lies at a place of the body's frame, mm."""
     link = add(root, "link", name=f"body_{body}")
     own, length = inertia(model, body), float(model.body_length[body])
     inertial = add(link, "inertial")
-    add(inertial, "origin", xyz=own.centre - METRE * place, rpy=[0, 0, 0])
+    add(inertial, "origin", xyz=own.centre - METRE * position, rpy=[0, 0, 0])
     add(inertial, "mass", value=own.mass)
     add(inertial, "inertia", ixx=own.across, iyy=own.across, izz=own.along, ixy=0, ixz=0, iyz=0)
     if length > 0.0:
         visual = add(link, "visual")
-        middle = np.array([0.0, 0.0, 0.5 * length]) - place
+        middle = np.array([0.0, 0.0, 0.5 * length]) - position
         add(visual, "origin", xyz=METRE * middle, rpy=[0, 0, 0])
         radius = METRE * model.robot.tube.outer_radius
         add(add(visual, "geometry"), "cylinder", radius=radius, length=METRE * length)

@@ -177,17 +177,17 @@ def _zone(rest: RobotShape, shape: RobotShape, cuts: RobotCuts, notch: int) -> Z
     # A strip across the tube lies between this notch's first cut and the next one along the tube.
     view = math.radians(robot.notches[notch].direction_deg)
     direction = np.array([math.cos(view), math.sin(view), 0.0])
-    places = line.position @ direction
-    if places[0] > places[-1]:  # its proximal end lies on the side of the bend
-        direction, places = -direction, -places
+    heights = line.position @ direction
+    if heights[0] > heights[-1]:  # its proximal end lies on the side of the bend
+        direction, heights = -direction, -heights
     ends = cuts.cuts[first].end, cuts.cuts[first + 1].start
-    return _without_legs(ends, direction, places, turns, moves, robot.tube.outer_radius)
+    return _without_legs(ends, direction, heights, turns, moves, robot.tube.outer_radius)
 
 
 def _without_legs(
     ends: tuple[float, float],
     direction: Points,
-    places: Points,
+    heights: Points,
     turns: Points,
     moves: Points,
     outer: float,
@@ -197,12 +197,12 @@ def _without_legs(
     Elastic ends are sections at one place: those of a strip run along the wall, and are spread over
     it, from the strip to the outer surface; of others the outermost counts.
     """
-    low, high = np.flatnonzero(places == places[0])[-1], np.flatnonzero(places == places[-1])[0]
-    spread = np.array(places)
+    low, high = np.flatnonzero(heights == heights[0])[-1], np.flatnonzero(heights == heights[-1])[0]
+    spread = np.array(heights)
     if low > 0:
-        spread[: low + 1] = np.linspace(min(-outer, places[0]), places[0], low + 1)
-    if high < len(places) - 1:
-        spread[high:] = np.linspace(places[-1], max(outer, places[-1]), len(places) - high)
+        spread[: low + 1] = np.linspace(min(-outer, heights[0]), heights[0], low + 1)
+    if high < len(heights) - 1:
+        spread[high:] = np.linspace(heights[-1], max(outer, heights[-1]), len(heights) - high)
     kept = np.concatenate([[True], np.diff(spread) > 0.0])
     kept[-1] = True
     return Zone(*ends, direction, spread[kept], turns[kept], moves[kept])

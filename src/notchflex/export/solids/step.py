@@ -29,7 +29,7 @@ from notchflex.robot import Robot
 from notchflex.robot.notches.cut import NotchCut
 from notchflex.robot.notches.profile import Line, pieces
 
-_BEYOND = 2.0
+_RADIUS_FACTOR = 2.0
 """How far a cutting solid reaches, in outer radii."""
 _SECTIONS = 9
 """Sections of a bent spine."""
@@ -113,8 +113,8 @@ def _straight(robot: Robot, cuts: RobotCuts, end: TubeEnd, options: SolidOptions
         for tendon in robot.tendon:
             angle = math.radians(tendon.direction_deg)
             x, y = tendon.radius * math.cos(angle), tendon.radius * math.sin(angle)
-            place = cad.Plane((x, y, -options.shank))
-            removed.append(cad.Solid.make_cylinder(0.5 * options.channels, length, place))
+            plane = cad.Plane((x, y, -options.shank))
+            removed.append(cad.Solid.make_cylinder(0.5 * options.channels, length, plane))
     return outer.cut(*removed)
 
 
@@ -126,7 +126,7 @@ def _removed(cut: NotchCut, outer: float) -> Any:
     if cut.radial:
         start, end, half = check_window(cut, outer)
         angles = np.linspace(view - half, view + half, 9)
-        arc = 2.0 * _BEYOND * outer * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        arc = 2.0 * _RADIUS_FACTOR * outer * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         corners = [(0.0, 0.0, start), *((x, y, start) for x, y in arc)]
         face = cad.Face(cad.Wire.make_polygon(corners))
         return cad.Solid.extrude(face, (0.0, 0.0, end - start))
@@ -137,7 +137,7 @@ def _removed(cut: NotchCut, outer: float) -> Any:
         along, height = point
         return tuple(height * across + [0.0, 0.0, along] - depth * out)
 
-    top = _BEYOND * outer
+    top = _RADIUS_FACTOR * outer
     first, last = cut.corners[0], cut.corners[-1]
     edges: list[Any] = []
     for piece in pieces(cut.corners, cut.radii):
@@ -183,10 +183,10 @@ def _bent(
 def _slab(straight: Any, low: float, high: float, outer: float) -> Any:
     """Return the part of the straight solid between two heights."""
     cad = import_module("build123d")
-    disc = cad.Solid.make_cylinder(_BEYOND * outer, high - low, cad.Plane((0.0, 0.0, low)))
-    found = [solid for part in straight.solids() for solid in part.intersect(disc).solids()]
-    check_one_piece(len(found))
-    return found[0]
+    disc = cad.Solid.make_cylinder(_RADIUS_FACTOR * outer, high - low, cad.Plane((0.0, 0.0, low)))
+    parts = [solid for part in straight.solids() for solid in part.intersect(disc).solids()]
+    check_one_piece(len(parts))
+    return parts[0]
 
 
 def _spine(piece: Any, zone: Any, low: float, high: float) -> Any:

@@ -24,8 +24,8 @@ from notchflex.robot.notches.profile import outline
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-FEWEST_SIDES, MOST_SIDES = 48, 2000
-_BEYOND = 2.0
+FEWEST_SIDES, MAX_SIDES = 48, 2000
+_RADIUS_FACTOR = 2.0
 """How far a cutting solid reaches, in outer radii."""
 
 
@@ -36,9 +36,9 @@ def sides_of(robot: Robot, chord: float) -> int:
         InputError: There would be very many.
     """
     step = math.acos(max(1.0 - 2.0 * chord / robot.tube.outer_radius, 0.0))
-    if math.pi > MOST_SIDES * step:
+    if math.pi > MAX_SIDES * step:
         raise InputError.OUT_OF_RANGE(
-            f"chord: with {chord:g} mm the tube would have more than {MOST_SIDES} flat sides; give "
+            f"chord: with {chord:g} mm the tube would have more than {MAX_SIDES} flat sides; give "
             "a larger chord."
         )
     return max(FEWEST_SIDES, 4 * math.ceil(math.pi / step / 4.0))
@@ -69,11 +69,13 @@ def _removed(cut: NotchCut, robot: Robot, sides: int, chord: float) -> Manifold:
         return _sector(cut, outer, sides)
     points = np.array(outline(cut, chord))[:, ::-1]
     # Beyond the surface the cut is as wide as at the surface.
-    low, high = (np.array([[_BEYOND * outer, along]]) for along in (points[0, 1], points[-1, 1]))
+    low, high = (
+        np.array([[_RADIUS_FACTOR * outer, along]]) for along in (points[0, 1], points[-1, 1])
+    )
     return prism(
         np.concatenate([low, points, high])[::-1],
         math.radians(cut.side_deg),
-        2.0 * _BEYOND * outer,
+        2.0 * _RADIUS_FACTOR * outer,
     )
 
 
@@ -85,7 +87,7 @@ def _sector(cut: NotchCut, outer: float, sides: int) -> Manifold:
     middle = math.radians(cut.side_deg)
     # Its corners fall between those of the tube, far outside, so that it cuts at its two walls.
     angles = np.linspace(middle - half, middle + half, max(3, sides // 4))
-    arc = _BEYOND * outer * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    arc = _RADIUS_FACTOR * outer * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     section = CrossSection([np.concatenate([np.zeros((1, 2)), arc])], FillRule.NonZero)
     return Manifold.extrude(section, end - start).translate((0.0, 0.0, start))
 
@@ -100,10 +102,10 @@ def _channels(robot: Robot, end: TubeEnd, options: SolidOptions) -> list[Manifol
     radius = 0.5 * options.channels
     sides = max(24, math.ceil(math.pi / math.acos(max(1.0 - 2.0 * options.chord / radius, 0.0))))
     length = end.at + options.shank
-    found: list[Manifold] = []
+    channels: list[Manifold] = []
     for tendon in robot.tendon:
         angle = math.radians(tendon.direction_deg)
         x, y = tendon.radius * math.cos(angle), tendon.radius * math.sin(angle)
         drill = Manifold.cylinder(length, fair_growth(sides) * radius, circular_segments=sides)
-        found.append(drill.translate((x, y, -options.shank)))
-    return found
+        channels.append(drill.translate((x, y, -options.shank)))
+    return channels

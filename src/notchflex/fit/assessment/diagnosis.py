@@ -24,16 +24,16 @@ NO_PROBLEMS = "No problems found."
 """What is printed if `diagnose` finds nothing."""
 
 
-def diagnose(found: Calibration) -> tuple[str, ...]:
+def diagnose(calibration: Calibration) -> tuple[str, ...]:
     """Say what a user should know before trusting the constants, the gravest first.
 
     Args:
-        found: The fit.
+        calibration: The fit.
 
     Returns:
         Sentences; none if no problem was found.
     """
-    return tuple(_sentences(found))
+    return tuple(_sentences(calibration))
 
 
 def with_unit(value: float, unit: str) -> str:
@@ -41,25 +41,25 @@ def with_unit(value: float, unit: str) -> str:
     return f"{value:.5g} {unit}".strip()
 
 
-def _sentences(found: Calibration) -> Iterator[str]:
-    if not found.converged:
-        yield f"The search did not settle: {found.reason}."
-    yield from _branches(found)
-    yield from _limits(found)
-    yield from _far(found)
-    if not found.tells_no_noise:
-        for name, interval in found.intervals.items():
-            yield from _loose(found, name, interval)
-    yield from _alike(found)
-    yield from _noise(found)
-    if found.is_likelihood and not found.tells_no_noise:
-        yield from _correlated_rows(found)
+def _sentences(calibration: Calibration) -> Iterator[str]:
+    if not calibration.converged:
+        yield f"The search did not settle: {calibration.reason}."
+    yield from _branches(calibration)
+    yield from _limits(calibration)
+    yield from _far(calibration)
+    if not calibration.tells_no_noise:
+        for name, interval in calibration.intervals.items():
+            yield from _loose(calibration, name, interval)
+    yield from _alike(calibration)
+    yield from _noise(calibration)
+    if calibration.is_likelihood and not calibration.tells_no_noise:
+        yield from _correlated_rows(calibration)
 
 
-def _branches(found: Calibration) -> Iterator[str]:
+def _branches(calibration: Calibration) -> Iterator[str]:
     """Tables whose unloading rows the model misses otherwise than their loading rows."""
-    residuals = found.residuals
-    for number, sample in enumerate(found.problem.samples.every):
+    residuals = calibration.residuals
+    for number, sample in enumerate(calibration.problem.samples.every):
         rows = len(sample.measured)
         for name in ("total_angle", "notch_angle"):
             mine = residuals.of(number, name)
@@ -71,8 +71,13 @@ def _branches(found: Calibration) -> Iterator[str]:
                 break
 
 
-def _limits(found: Calibration) -> Iterator[str]:
-    numbers = zip(found.problem.unknowns, found.best.values, found.reached.gradient, strict=True)
+def _limits(calibration: Calibration) -> Iterator[str]:
+    numbers = zip(
+        calibration.problem.unknowns,
+        calibration.best.values,
+        calibration.reached.gradient,
+        strict=True,
+    )
     for unknown, value, slope in numbers:
         for limit, side, push in (
             (unknown.lower, "lower", slope),
@@ -87,9 +92,11 @@ def _limits(found: Calibration) -> Iterator[str]:
                 )
 
 
-def _far(found: Calibration) -> Iterator[str]:
+def _far(calibration: Calibration) -> Iterator[str]:
     """Constants far from the robot file, or from their prior."""
-    for unknown, value in zip(found.problem.unknowns, found.best.values.tolist(), strict=True):
+    for unknown, value in zip(
+        calibration.problem.unknowns, calibration.best.values.tolist(), strict=True
+    ):
         within = unknown.first <= value <= unknown.last
         if not within and unknown.path not in SENSOR:
             was, now = (with_unit(one, unknown.unit) for one in (unknown.start, value))
@@ -107,8 +114,8 @@ def _far(found: Calibration) -> Iterator[str]:
                 )
 
 
-def _loose(found: Calibration, name: str, interval: Interval) -> Iterator[str]:
-    value, unit = found.values[name], found.units[name]
+def _loose(calibration: Calibration, name: str, interval: Interval) -> Iterator[str]:
+    value, unit = calibration.values[name], calibration.units[name]
     lower, upper = interval.lower, interval.upper
     if lower is None and upper is None and interval.reason == NO_SOLUTION:
         yield f"How far {name} may go is not known: {interval.reason}."
@@ -120,7 +127,7 @@ def _loose(found: Calibration, name: str, interval: Interval) -> Iterator[str]:
         limit = f"{word} {with_unit(end, unit)}"
         yield f"The data only tell that {name} is {limit} ({interval.reason})."
     else:
-        unknown = found.problem.unknowns[found.names.index(name)]
+        unknown = calibration.problem.unknowns[calibration.names.index(name)]
         # A constant of either sign may well be 0: it is compared with where it is searched.
         either = unknown.lower < 0.0 < unknown.upper
         size = max(abs(value), 0.5 * unknown.scale if either else 0.0)
@@ -129,8 +136,8 @@ def _loose(found: Calibration, name: str, interval: Interval) -> Iterator[str]:
             yield f"The data hardly tell {name}: {ends}."
 
 
-def _alike(found: Calibration) -> Iterator[str]:
-    correlation, names = found.correlation, found.names
+def _alike(calibration: Calibration) -> Iterator[str]:
+    correlation, names = calibration.correlation, calibration.names
     for i, j in zip(*np.tril_indices(len(names), -1), strict=True):
         value = correlation[i, j]
         if abs(value) > _ALIKE:
@@ -142,23 +149,23 @@ def _alike(found: Calibration) -> Iterator[str]:
             )
 
 
-def _noise(found: Calibration) -> Iterator[str]:
-    if found.misses:
+def _noise(calibration: Calibration) -> Iterator[str]:
+    if calibration.misses:
         yield (
-            f"The model misses the data by {found.widened:.2g} times what they scatter by: "
+            f"The model misses the data by {calibration.widened:.2g} times what they scatter by: "
             "something is not in the model. Intervals are wider by that factor."
         )
-    if not found.is_likelihood:
-        kind = type(found.problem.objective).__name__
+    if not calibration.is_likelihood:
+        kind = type(calibration.problem.objective).__name__
         yield f"{kind} is not a likelihood: it gives no intervals. LeastSquares does."
-    elif found.tells_no_noise:
+    elif calibration.tells_no_noise:
         yield (
             "No more numbers were measured than constants fitted, and nothing tells their noise: "
             "the fit goes through them whatever they are, and how far to trust it is not known. "
             "Measure more, or give standard deviations."
         )
-    elif not found.noise.is_known:
-        sources = found.noise.source.items()
+    elif not calibration.noise.is_known:
+        sources = calibration.noise.source.items()
         names = sorted({name for (_, name), source in sources if source == "fit"})
         yield (
             f"Nothing tells the noise of {' and '.join(names)} (no repeats, no standard "
@@ -166,15 +173,16 @@ def _noise(found: Calibration) -> Iterator[str]:
         )
 
 
-def _correlated_rows(found: Calibration) -> Iterator[str]:
-    wider = found.by_pulls.wider
-    wide = [name for name, one in zip(found.names, wider, strict=True) if one > 1.0]
+def _correlated_rows(calibration: Calibration) -> Iterator[str]:
+    wider = calibration.by_pulls.wider
+    wide = [name for name, one in zip(calibration.names, wider, strict=True) if one > 1.0]
     if wide:
         one = len(wide) == 1
         yield (
             f"Residuals within a pull are correlated: judged by whole pulls "
-            f"({int(found.by_pulls.pulls.max())}), {', '.join(wide)} {'is' if one else 'are'} up "
-            f"to {float(np.max(wider)):.2g} times less certain than independent rows would say. "
+            f"({int(calibration.by_pulls.pulls.max())}), {', '.join(wide)} "
+            f"{'is' if one else 'are'} up to {float(np.max(wider)):.2g} times less certain than "
+            "independent rows would say. "
             f"The {'interval is' if one else 'intervals are'} by pulls. More pulls "
             "would help more than more rows."
         )

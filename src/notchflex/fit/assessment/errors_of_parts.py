@@ -76,22 +76,22 @@ def part_title(quantity: str, part: int) -> str:
     return f"{title}, tendon {part}" if part else title
 
 
-def errors_of_parts(found: Calibration) -> tuple[PartError, ...]:
+def errors_of_parts(calibration: Calibration) -> tuple[PartError, ...]:
     """Return errors of every notch, the total angle, the tip and whatever else was measured.
 
     Args:
-        found: The fit.
+        calibration: The fit.
 
     Returns:
         Robot by robot, in the order of `Measurements.observed`.
     """
-    return tuple(one for label in found.given for one in _of_robot(found, label))
+    return tuple(one for label in calibration.given for one in _of_robot(calibration, label))
 
 
-def _of_robot(found: Calibration, label: str) -> Iterator[PartError]:
-    residuals = found.residuals
-    of_robot = residuals.robot == list(found.given).index(label)
-    measured = found.problem.samples.of_robot(label)
+def _of_robot(calibration: Calibration, label: str) -> Iterator[PartError]:
+    residuals = calibration.residuals
+    of_robot = residuals.robot == list(calibration.given).index(label)
+    measured = calibration.problem.samples.of_robot(label)
     for number, quantity in enumerate(OBSERVED):
         mine = of_robot & (residuals.quantity == number)
         if not mine.any():

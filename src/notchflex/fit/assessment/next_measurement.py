@@ -66,7 +66,7 @@ class NextMeasurement:
 
 
 def next_measurement(
-    found: Calibration,
+    calibration: Calibration,
     candidates: Load | LoadPath | Iterable[Load],
     *,
     robot: str | None = None,
@@ -77,7 +77,7 @@ def next_measurement(
     """Rank loads by how much measuring under them would narrow the intervals.
 
     Args:
-        found: The fit so far.
+        calibration: The fit so far.
         candidates: Loads, each a row from rest.
         robot: Label of the robot that is measured; the first by default.
         narrow: Constants to be narrowed (c-optimal: mean width of their intervals); by default all
@@ -100,18 +100,18 @@ def next_measurement(
         >>> next_measurement(found, pull(0.2, 1.2, steps=6)).best
         5
     """
-    label = robot or next(iter(found.given))
-    _check(found, label, narrow, deviation or {})
-    path = load_path(candidates, found.robots[label].number_of_tendons)
+    label = robot or next(iter(calibration.given))
+    _check(calibration, label, narrow, deviation or {})
+    path = load_path(candidates, calibration.robots[label].number_of_tendons)
     if observed is None:
-        measured = found.problem.samples.of_robot(label)
+        measured = calibration.problem.samples.of_robot(label)
         observed = tuple(dict.fromkeys(name for one in measured for name in one.observed))
-    noise = {name: _noise(found, name, deviation or {}) for name in observed}
-    narrower = np.full((len(path), len(found.names)), np.nan)
+    noise = {name: _noise(calibration, name, deviation or {}) for name in observed}
+    narrower = np.full((len(path), len(calibration.names)), np.nan)
     volume = np.full(len(path), np.nan)
-    before = found.reached.curvature / found.widened**2
+    before = calibration.reached.curvature / calibration.widened**2
     width, size = _widths(before)
-    solved, residuals = _solved(found, label, path, observed)
+    solved, residuals = _solved(calibration, label, path, observed)
     if residuals is None:
         raise InputError.NOT_CONVERGED("none of the candidates has a solution; give smaller loads")
     sizes = np.array([noise[OBSERVED[quantity]] for quantity in residuals.quantity])
@@ -120,23 +120,23 @@ def next_measurement(
         slopes = scaled[residuals.row == row]
         width_after, size_after = _widths(before + slopes.T @ slopes)
         narrower[step], volume[step] = width_after / width, np.exp(size_after - size)
-    wanted, able = tuple(narrow), np.isfinite(volume)
-    return NextMeasurement(label, path, narrower, volume, found.names, wanted, able)
+    names, able = tuple(narrow), np.isfinite(volume)
+    return NextMeasurement(label, path, narrower, volume, calibration.names, names, able)
 
 
 def _check(
-    found: Calibration, label: str, narrow: Sequence[str], deviation: Mapping[str, float]
+    calibration: Calibration, label: str, narrow: Sequence[str], deviation: Mapping[str, float]
 ) -> None:
-    if label not in found.given:
+    if label not in calibration.given:
         raise InputError.UNKNOWN_NAME(
-            f"no robot of this fit is called {label}; there are {', '.join(found.given)}"
+            f"no robot of this fit is called {label}; there are {', '.join(calibration.given)}"
         )
-    missing = [name for name in narrow if name not in found.names]
+    missing = [name for name in narrow if name not in calibration.names]
     if missing:
         raise InputError.UNKNOWN_NAME(
-            f"{missing[0]} was not fitted; narrow some of {', '.join(found.names)}"
+            f"{missing[0]} was not fitted; narrow some of {', '.join(calibration.names)}"
         )
-    if found.tells_no_noise:
+    if calibration.tells_no_noise:
         raise InputError.TOO_FEW_DATA(
             "nothing tells the noise, so that nobody knows what another measurement would add; "
             "measure more, or give standard deviations"
@@ -145,27 +145,27 @@ def _check(
         raise InputError.OUT_OF_RANGE("a deviation of the next measurement must be above 0")
 
 
-def _noise(found: Calibration, name: str, deviation: Mapping[str, float]) -> float:
+def _noise(calibration: Calibration, name: str, deviation: Mapping[str, float]) -> float:
     if name in deviation:
         return float(deviation[name])
     check_quantities([name])
-    mine = found.residuals.quantity == OBSERVED.index(name)
+    mine = calibration.residuals.quantity == OBSERVED.index(name)
     if not mine.any():
         raise InputError.MISSING_VALUE(
             f"{name} was not measured so far; tell its standard deviation"
         )
-    return float(np.sqrt(np.mean(found.noise.deviation[mine] ** 2)))
+    return float(np.sqrt(np.mean(calibration.noise.deviation[mine] ** 2)))
 
 
 def _solved(
-    found: Calibration, label: str, loads: LoadPath, observed: Sequence[str]
+    calibration: Calibration, label: str, loads: LoadPath, observed: Sequence[str]
 ) -> tuple[list[int], Residuals | None]:
     """Candidates that have a solution, and residuals with one row each; None if there are none."""
     axis_at = np.zeros(0)
     if "axis_points" in observed:
-        measured = found.problem.samples.of_robot(label)
+        measured = calibration.problem.samples.of_robot(label)
         axis_at = next((one.axis_at for one in measured if len(one.axis_at)), axis_at)
-    model = solve_each(found.robots[label], loads)
+    model = solve_each(calibration.robots[label], loads)
     steps = np.flatnonzero(model.converged).tolist()
     if not steps:
         return steps, None
@@ -177,8 +177,10 @@ def _solved(
         observed={name: one[steps] for name, one in modelled(model, observed, axis_at).items()},
         axis_at=axis_at,
     )
-    samples = Samples.of({label: found.given[label]}, {label: [rows]}, found.problem.unknowns)
-    return steps, samples.residuals(found.best.values)
+    samples = Samples.of(
+        {label: calibration.given[label]}, {label: [rows]}, calibration.problem.unknowns
+    )
+    return steps, samples.residuals(calibration.best.values)
 
 
 def _widths(information: Float[np.ndarray, "k k"]) -> tuple[Float[np.ndarray, " k"], float]:

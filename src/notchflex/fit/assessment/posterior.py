@@ -19,7 +19,7 @@ from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.intervals import LEVEL
 from notchflex.fit.estimation.problem import Progress
 
-LEAST_DRAWS = 4
+MIN_DRAWS = 4
 """With fewer draws the halves of a chain cannot be compared."""
 
 
@@ -61,7 +61,7 @@ class Posterior:
 
 
 def sample_posterior(
-    found: Calibration,
+    calibration: Calibration,
     *,
     draws: int = 500,
     warm_up: int = 100,
@@ -77,7 +77,7 @@ def sample_posterior(
     adjustment of Shaby 2014).
 
     Args:
-        found: A fit by `LeastSquares`.
+        calibration: A fit by `LeastSquares`.
         draws: Draws of each chain.
         warm_up: Steps before them, which adapt the step size.
         chains: Number of chains, one after the other.
@@ -88,10 +88,10 @@ def sample_posterior(
         InputError: The objective is not a likelihood, the data are too few, a number is too small,
             or numpyro is not installed (extra `bayes`).
     """
-    _check(found)
-    if draws < LEAST_DRAWS or chains < 1 or warm_up < 0:
+    _check(calibration)
+    if draws < MIN_DRAWS or chains < 1 or warm_up < 0:
         raise InputError.OUT_OF_RANGE(
-            f"draws must be {LEAST_DRAWS} or more (the chain's halves are compared), chains 1 or "
+            f"draws must be {MIN_DRAWS} or more (the chain's halves are compared), chains 1 or "
             f"more, warm_up 0 or more; got {draws}, {chains} and {warm_up}"
         )
     need("numpyro", "bayes", "a posterior")
@@ -100,7 +100,10 @@ def sample_posterior(
     # The target has about unit spread in every direction: no mass matrix has to be adapted, and a
     # few steps of this size go from one side to the other.
     kernel = infer.NUTS(
-        potential_fn=_potential(found), step_size=0.7, adapt_mass_matrix=False, max_tree_depth=4
+        potential_fn=_potential(calibration),
+        step_size=0.7,
+        adapt_mass_matrix=False,
+        max_tree_depth=4,
     )
     every: list[np.ndarray] = []
     divergent = 0
@@ -109,63 +112,65 @@ def sample_posterior(
             kernel, num_warmup=warm_up, num_samples=draws, num_chains=1, progress_bar=False
         )
         key = jax.random.PRNGKey(seed + chain)
-        start = 0.5 * jax.random.normal(key, (len(found.names),))
+        start = 0.5 * jax.random.normal(key, (len(calibration.names),))
         sampler.run(key, init_params=start, extra_fields=("diverging",))
-        every.append(_constants(found, np.asarray(sampler.get_samples())))
+        every.append(_constants(calibration, np.asarray(sampler.get_samples())))
         divergent += int(np.sum(sampler.get_extra_fields()["diverging"]))
         if progress is not None:
             progress("drawing", chain + 1, chains)
     drawn = np.stack(every)
-    by_name = list(zip(found.names, np.moveaxis(drawn, -1, 0), strict=True))
+    by_name = list(zip(calibration.names, np.moveaxis(drawn, -1, 0), strict=True))
     effective = {name: float(diagnostics.effective_sample_size(one)) for name, one in by_name}
     unlike = {name: float(diagnostics.split_gelman_rubin(one)) for name, one in by_name}
-    return Posterior(found.names, drawn, effective, unlike, divergent)
+    return Posterior(calibration.names, drawn, effective, unlike, divergent)
 
 
-def _check(found: Calibration) -> None:
-    if not found.is_likelihood:
+def _check(calibration: Calibration) -> None:
+    if not calibration.is_likelihood:
         raise InputError.UNSUPPORTED(
             "a posterior needs LeastSquares(); other objectives are no likelihoods"
         )
-    if found.tells_no_noise:
+    if calibration.tells_no_noise:
         raise InputError.TOO_FEW_DATA(
             "nothing tells the noise: as many constants were fitted as numbers measured; "
             "measure more, or give standard deviations"
         )
-    if not np.isfinite(found.covariance_by_rows).all():
+    if not np.isfinite(calibration.covariance_by_rows).all():
         raise InputError.TOO_FEW_DATA(
             "the data cannot tell some of the constants; fit only the others"
         )
 
 
-def _potential(found: Calibration) -> Callable[[jax.Array], jax.Array]:
+def _potential(calibration: Calibration) -> Callable[[jax.Array], jax.Array]:
     """Minus the logarithm of the posterior, in the units of the fit's own spread."""
-    problem, best = found.problem, found.best.values
-    spread = np.linalg.cholesky(found.covariance_by_rows)
-    shape, temper = jax.ShapeDtypeStruct((1 + len(best),), float), found.widened**2
+    problem, best = calibration.problem, calibration.best.values
+    spread = np.linalg.cholesky(calibration.covariance_by_rows)
+    shape, temper = jax.ShapeDtypeStruct((1 + len(best),), float), calibration.widened**2
 
-    def value_and_gradient(place: np.ndarray) -> np.ndarray:
-        values = best + spread @ np.asarray(place, float)
+    def value_and_gradient(position: np.ndarray) -> np.ndarray:
+        values = best + spread @ np.asarray(position, float)
         inside = (values >= problem.lower).all() and (values <= problem.upper).all()
         cost = problem(values) if inside else None
         if cost is None:
             return np.concatenate([[np.inf], np.zeros(len(values))])
         return np.concatenate([[cost.value], spread.T @ cost.gradient]) / temper
 
-    def forward(place: jax.Array) -> tuple[jax.Array, jax.Array]:
-        both = jax.pure_callback(value_and_gradient, shape, place, vmap_method="sequential")
+    def forward(position: jax.Array) -> tuple[jax.Array, jax.Array]:
+        both = jax.pure_callback(value_and_gradient, shape, position, vmap_method="sequential")
         return both[0], both[1:]
 
     def backward(gradient: jax.Array, cotangent: jax.Array) -> tuple[jax.Array]:
         return (jnp.where(jnp.isfinite(gradient), gradient, 0.0) * cotangent,)
 
-    potential = jax.custom_vjp(lambda place: forward(place)[0])
+    potential = jax.custom_vjp(lambda position: forward(position)[0])
     potential.defvjp(forward, backward)
     return potential
 
 
-def _constants(found: Calibration, places: Float[np.ndarray, "d k"]) -> Float[np.ndarray, "d k"]:
+def _constants(
+    calibration: Calibration, positions: Float[np.ndarray, "d k"]
+) -> Float[np.ndarray, "d k"]:
     """Constants of draws, farther from the fit if whole pulls differ."""
-    spread = np.linalg.cholesky(found.covariance_by_rows)
-    values = found.best.values + found.by_pulls.wider * (places @ spread.T)
-    return np.clip(values, found.problem.lower, found.problem.upper)
+    spread = np.linalg.cholesky(calibration.covariance_by_rows)
+    values = calibration.best.values + calibration.by_pulls.wider * (positions @ spread.T)
+    return np.clip(values, calibration.problem.lower, calibration.problem.upper)

@@ -48,7 +48,7 @@ class Specimen:
 
 
 def update_specimen(
-    found: Calibration,
+    calibration: Calibration,
     robot: Robot,
     measured: Measurements,
     constants: str | Sequence[str | Constant] = "sensor.force_factor",
@@ -60,7 +60,7 @@ def update_specimen(
     about it; the noise is what `found` misses of its measurements.
 
     Args:
-        found: A fit of other robots of the kind, some of whose constants are `each:` robot's.
+        calibration: A fit of other robots of the kind, some of whose constants are `each:` robot's.
         robot: The robot as drawn.
         measured: What was measured of it, one row or more.
         constants: Its own constants, by name without a label.
@@ -90,27 +90,27 @@ def update_specimen(
     names = (constants,) if isinstance(constants, str | Constant) else constants
     given = [one if isinstance(one, Constant) else Constant(one) for one in names]
     own = [
-        replace(one, prior=prior_of(one, found))
-        for one in unknowns({label: robot}, [_with_prior(one, found) for one in given])
+        replace(one, prior=prior_of(one, calibration))
+        for one in unknowns({label: robot}, [_with_prior(one, calibration) for one in given])
     ]
-    return updated(found, label, robot, measured, own)
+    return updated(calibration, label, robot, measured, own)
 
 
-def _with_prior(constant: Constant, found: Calibration) -> Constant:
+def _with_prior(constant: Constant, calibration: Calibration) -> Constant:
     """The constant with the prior that the fit has for it, if it has none itself."""
-    known = (one.prior for one in found.problem.unknowns if one.path == constant.name)
-    return constant if constant.prior else replace(constant, prior=next(known, None))
+    priors = (one.prior for one in calibration.problem.unknowns if one.path == constant.name)
+    return constant if constant.prior else replace(constant, prior=next(priors, None))
 
 
 def updated(
-    found: Calibration,
+    calibration: Calibration,
     label: str,
     robot: Robot,
     measured: Measurements,
     own: Sequence[Unknown],
 ) -> Specimen:
     """Fit constants of a specimen, which have priors, to rows; the shared ones stay as found."""
-    shared = [(one.of(label, robot), value) for one, value in _values(found) if one.shared]
+    shared = [(one.of(label, robot), value) for one, value in _values(calibration) if one.shared]
     # A shared constant sets numbers that those of the specimen leave as they are.
     held = [
         RobotNumber(one.label, one.path, one.base + one.slope * value, 0.0)
@@ -124,8 +124,8 @@ def updated(
             "others have it in common; name constants such as sensor.force_factor"
         )
     constants = (replace(own[0], sets=(*own[0].sets, *held)), *own[1:])
-    rows = replace(measured, deviation=_missed(found, measured))
-    samples = Samples.of({label: robot}, {label: [rows]}, constants, found.settings)
+    rows = replace(measured, deviation=_missed(calibration, measured))
+    samples = Samples.of({label: robot}, {label: [rows]}, constants, calibration.settings)
     again = fitted({label: robot}, FitProblem(samples, LeastSquares()), 1, 0, intervals=False)
     before = {one.name: one.prior for one in own if one.prior is not None}
     prior = np.diag([size**2 for _, size in before.values()])
@@ -142,21 +142,21 @@ def updated(
     return Specimen(again, before, float(after / earlier) if earlier else 1.0)
 
 
-def _missed(found: Calibration, measured: Measurements) -> dict[str, np.ndarray]:
+def _missed(calibration: Calibration, measured: Measurements) -> dict[str, np.ndarray]:
     """What a fit misses of each quantity (root mean square), for rows of another robot."""
-    sizes = found.residuals.root_mean_squares()
+    sizes = calibration.residuals.root_mean_squares()
     return {
-        name: np.full(seen.shape, sizes[name])
-        for name, seen in measured.observed.items()
+        name: np.full(values.shape, sizes[name])
+        for name, values in measured.observed.items()
         if name in sizes
-    } | {name: seen for name, seen in measured.deviation.items() if name not in sizes}
+    } | {name: values for name, values in measured.deviation.items() if name not in sizes}
 
 
-def _values(found: Calibration) -> list[tuple[Unknown, float]]:
-    return list(zip(found.problem.unknowns, found.best.values.tolist(), strict=True))
+def _values(calibration: Calibration) -> list[tuple[Unknown, float]]:
+    return list(zip(calibration.problem.unknowns, calibration.best.values.tolist(), strict=True))
 
 
-def prior_of(unknown: Unknown, found: Calibration) -> tuple[float, float]:
+def prior_of(unknown: Unknown, calibration: Calibration) -> tuple[float, float]:
     """Return mean and standard deviation of a constant of one more specimen.
 
     The prior counts as one specimen: the variance is the mean of its own and of the squared
@@ -166,8 +166,11 @@ def prior_of(unknown: Unknown, found: Calibration) -> tuple[float, float]:
     Raises:
         InputError: There is no prior, and fewer than two fitted specimens.
     """
-    of_specimens = [one.path == unknown.path and one.each for one in found.problem.unknowns]
-    values, variance = found.best.values[of_specimens], np.diag(found.covariance)[of_specimens]
+    of_specimens = [one.path == unknown.path and one.each for one in calibration.problem.unknowns]
+    values, variance = (
+        calibration.best.values[of_specimens],
+        np.diag(calibration.covariance)[of_specimens],
+    )
     if unknown.prior is not None:
         mean, size = unknown.prior
         squares = (values - mean) ** 2 + np.where(np.isfinite(variance), variance, size**2)

@@ -131,17 +131,17 @@ class Calibration:
 
         Of numbers whose noise is known independently of the fit; NaN if there are none.
         """
-        known, left = self._known
+        is_known, left = self._known
         if left <= 0:
             return float("nan")
-        scaled = self.residuals.values[known] / self.noise.deviation[known]
+        scaled = self.residuals.values[is_known] / self.noise.deviation[is_known]
         return float(np.sum(scaled**2)) / left
 
     @property
     def _known(self) -> tuple[Bool[np.ndarray, " r"], int]:
         """Numbers with noise known independently of the fit; how many more than constants."""
-        known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
-        return known, int(known.sum()) - len(self.names)
+        is_known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
+        return is_known, int(is_known.sum()) - len(self.names)
 
     @property
     def misses(self) -> bool:
@@ -239,13 +239,13 @@ class Calibration:
 
         With the model linearised; NaN if it has no end.
         """
-        known = np.isfinite(np.diag(self.covariance))
+        is_known = np.isfinite(np.diag(self.covariance))
         freedom = np.where(self.by_pulls.wider > 1.0, self.by_pulls.pulls - 1, max(self.freedom, 1))
-        times = t.ppf(0.5 + 0.5 * LEVEL, freedom)[known]
-        covariance = self.covariance[np.ix_(known, known)] * np.outer(times, times)
-        variance = np.einsum("ri,ij,rj->r", slopes[:, known], covariance, slopes[:, known])
+        times = t.ppf(0.5 + 0.5 * LEVEL, freedom)[is_known]
+        covariance = self.covariance[np.ix_(is_known, is_known)] * np.outer(times, times)
+        variance = np.einsum("ri,ij,rj->r", slopes[:, is_known], covariance, slopes[:, is_known])
         # An unknown constant only matters to numbers that depend on it.
-        variance[slopes[:, ~known].any(axis=1)] = np.nan
+        variance[slopes[:, ~is_known].any(axis=1)] = np.nan
         return np.sqrt(np.maximum(variance, 0.0))
 
     @property

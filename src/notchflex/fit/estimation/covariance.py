@@ -76,11 +76,11 @@ def by_pulls(
 
 def inverse_of(curvature: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
     """Return the inverse of a curvature; infinite for constants without any."""
-    known = np.diag(curvature) > 0.0
-    inverse = np.diag(np.where(known, 0.0, np.inf))
-    sizes, plain = unit_free(curvature[np.ix_(known, known)])
+    is_known = np.diag(curvature) > 0.0
+    inverse = np.diag(np.where(is_known, 0.0, np.inf))
+    sizes, plain = unit_free(curvature[np.ix_(is_known, is_known)])
     values, vectors = np.linalg.eigh(plain)
     # A curvature of 0 that rounding made small gives a wide interval, not a narrow one.
     part = (vectors / np.maximum(values, 1e-15)) @ vectors.T
-    inverse[np.ix_(known, known)] = part / np.outer(sizes, sizes)
+    inverse[np.ix_(is_known, is_known)] = part / np.outer(sizes, sizes)
     return inverse

@@ -169,10 +169,10 @@ def fitted(
     if np.isinf(costs).all():
         raise _no_start(problem.samples)
     best, reached = _with_noise(problem, searches[int(np.argmin(costs))])
-    found = Calibration(robots, problem, best, reached, searches, {})
-    if intervals and found.is_likelihood:
-        return replace(found, intervals=_intervals(found, progress))
-    return found
+    calibration = Calibration(robots, problem, best, reached, searches, {})
+    if intervals and calibration.is_likelihood:
+        return replace(calibration, intervals=_intervals(calibration, progress))
+    return calibration
 
 
 def _no_start(samples: Samples) -> InputError:
@@ -209,17 +209,17 @@ def _with_noise(problem: FitProblem, best: Minimum) -> tuple[Minimum, Cost]:
     return best, cost
 
 
-def _intervals(found: Calibration, progress: Progress | None) -> dict[str, Interval]:
-    if found.tells_no_noise:
+def _intervals(calibration: Calibration, progress: Progress | None) -> dict[str, Interval]:
+    if calibration.tells_no_noise:
         return {
             name: Interval(None, None, np.array([[value, 0.0]]), "nothing tells the noise")
-            for name, value in found.values.items()
+            for name, value in calibration.values.items()
         }
     intervals: dict[str, Interval] = {}
-    for number, unknown in enumerate(found.problem.unknowns, start=1):
+    for number, unknown in enumerate(calibration.problem.unknowns, start=1):
         name = unknown.name
-        profile = found.profile(name)
-        intervals[name] = profile.interval(rise=found.allowed_rise(name), scale=unknown.scale)
+        profile = calibration.profile(name)
+        intervals[name] = profile.interval(rise=calibration.allowed_rise(name), scale=unknown.scale)
         if progress is not None:
-            progress("intervals", number, len(found.names))
+            progress("intervals", number, len(calibration.names))
     return intervals

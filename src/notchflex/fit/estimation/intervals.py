@@ -18,7 +18,7 @@ LEVEL = 0.95
 # How near the root of the rise must be to its target (of about 2), and how many tries to get there.
 _CLOSE, _TRIES = 0.005, 12
 # So many estimated half-widths away the data still set no end.
-_FAR = 50.0
+_MAX_HALF_WIDTHS = 50.0
 NO_SOLUTION = "the model has no solution that far"
 """Why an end is open that the data may well set."""
 
@@ -104,7 +104,7 @@ class Profile:
     ) -> tuple[float | None, str]:
         """One end of the interval: where the root of the rise, nearly linear, meets its target."""
         estimate = float(self.best[self.number])
-        guess = min(self._half_width(rise), _FAR * scale)
+        guess = min(self._half_width(rise), _MAX_HALF_WIDTHS * scale)
         target = np.sqrt(rise)
         inner, outer = (0.0, 0.0), None
         reach, start = guess, self.best
@@ -130,7 +130,7 @@ class Profile:
             else:
                 inner = (reach, root)
             if outer is None:
-                if reach >= _FAR * max(scale, guess):
+                if reach >= _MAX_HALF_WIDTHS * max(scale, guess):
                     return None, ""
                 reach *= min(max(1.1 * target / max(root, 1e-300), 1.2), 4.0)
             elif np.isinf(outer[1]):

@@ -119,8 +119,8 @@ class _Scaled:
         self.free = np.flatnonzero(lower < upper)
         size = np.where(start == 0.0, 1.0, np.abs(start))
         curvature = np.diag(first.curvature)
-        known = curvature > 0.0
-        scale = np.where(known, 1.0 / np.sqrt(np.where(known, curvature, 1.0)), size)
+        is_known = curvature > 0.0
+        scale = np.where(is_known, 1.0 / np.sqrt(np.where(is_known, curvature, 1.0)), size)
         self.scale = scale[self.free]
         self.least, self.most = (
             (limit - start)[self.free] / self.scale for limit in (lower, upper)
@@ -159,10 +159,10 @@ class _Scaled:
         gradient = self.scale * cost.gradient[self.free]
         curvature = cost.curvature[np.ix_(self.free, self.free)]
         sizes, axes = np.linalg.eigh(curvature * np.outer(self.scale, self.scale))
-        known = sizes > 1e-12 * sizes[-1]
-        root = np.sqrt(np.where(known, sizes, 1.0))
-        along = np.where(known, axes.T @ gradient / root, 0.0)
-        slopes = np.where(known, root, 0.0)[:, None] * axes.T
+        is_known = sizes > 1e-12 * sizes[-1]
+        root = np.sqrt(np.where(is_known, sizes, 1.0))
+        along = np.where(is_known, axes.T @ gradient / root, 0.0)
+        slopes = np.where(is_known, root, 0.0)[:, None] * axes.T
         stiffer = max(np.sqrt(along @ along / max(2.0 * cost.value, 1e-300)), 1.0)
         along, slopes = along / stiffer, slopes * stiffer
         rest = np.sqrt(max(2.0 * cost.value - along @ along, 0.0))

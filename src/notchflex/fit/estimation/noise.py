@@ -16,7 +16,7 @@ from notchflex.fit.model.samples import Samples
 _FIRST: dict[str, float] = {"tip_tension": 0.01, "tip_position": 0.1, "axis_points": 0.1}
 _FIRST_ANGLE = float(np.radians(1.0))
 # Nothing is measured better than this part of that; else an exact fit would have no noise at all.
-_LEAST = 1e-9
+_MIN_NOISE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,6 @@ def noise_left(noise: Noise, residuals: Residuals, constants: int) -> Noise:
     share = max(1.0 - constants / counted, 1.0 / counted)
     for quantity in np.unique(residuals.quantity[noise.estimated]):
         mine = noise.estimated & (residuals.quantity == quantity)
-        least = _LEAST * _FIRST.get(OBSERVED[quantity], _FIRST_ANGLE)
+        least = _MIN_NOISE * _FIRST.get(OBSERVED[quantity], _FIRST_ANGLE)
         deviation[mine] = max(np.sqrt(np.mean(residuals.values[mine] ** 2) / share), least)
     return Noise(deviation, noise.estimated, noise.source)

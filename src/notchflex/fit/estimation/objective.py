@@ -102,10 +102,10 @@ class SumOfRobotErrors:
 
     def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
         """Return the mean over the robots where residuals are as large as the noise, deg."""
-        known, size = np.isfinite(noise), int(residuals.robot.max()) + 1
-        robot = residuals.robot[known]
+        is_known, size = np.isfinite(noise), int(residuals.robot.max()) + 1
+        robot = residuals.robot[is_known]
         count = np.bincount(robot, minlength=size)
-        noise = np.sqrt(np.bincount(robot, noise[known] ** 2, size) / count)
+        noise = np.sqrt(np.bincount(robot, noise[is_known] ** 2, size) / count)
         rows = np.array([residuals.rows[residuals.robot == one][0] for one in range(size)])
         return float(np.degrees(np.mean(noise / np.sqrt(rows * count))))
 

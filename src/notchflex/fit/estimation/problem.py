@@ -120,14 +120,14 @@ def starting_points(problem: FitProblem, starts: int, seed: int) -> Float[np.nda
         starts: Number of starts.
         seed: Seed of the sequence.
     """
-    here = np.array([[one.start for one in problem.unknowns]])
+    start = np.array([[one.start for one in problem.unknowns]])
     if starts <= 1:
-        return here
+        return start
     first = np.array([one.first for one in problem.unknowns])
     last = np.array([one.last for one in problem.unknowns])
     sobol = qmc.Sobol(len(first), rng=np.random.default_rng(seed))
     drawn = sobol.random_base2(int(np.ceil(np.log2((starts - 1) * _DRAWS))))
-    return np.concatenate([here, first + drawn * (last - first)])
+    return np.concatenate([start, first + drawn * (last - first)])
 
 
 def _lowest_nearby(problem: FitProblem, start: Vector, hops: int, seed: int) -> Minimum:
@@ -145,8 +145,8 @@ def _lowest_nearby(problem: FitProblem, start: Vector, hops: int, seed: int) -> 
         stiffness, axes = np.linalg.eigh(curvature)
         along = random.standard_normal(len(stiffness))
         along *= np.sqrt(2.0 * _HOP * abs(best.cost.value)) / np.linalg.norm(along)
-        known = stiffness > 1e-9
-        step = axes[:, known] @ (along[known] / np.sqrt(stiffness[known])) / sizes
+        is_known = stiffness > 1e-9
+        step = axes[:, is_known] @ (along[is_known] / np.sqrt(stiffness[is_known])) / sizes
         other = problem.minimum(best.values + step)
         calls = best.calls + other.calls
         gain = np.inf if other.cost is None else other.cost.value - best.cost.value

@@ -70,16 +70,16 @@ class SearchTask:
         """Search from one starting point."""
         import polars
 
-        found = search_from(self.problem, self.points[number], number, self.starts, self.seed)
+        search = search_from(self.problem, self.points[number], number, self.starts, self.seed)
         names = [one.name for one in self.problem.unknowns]
-        cost = np.nan if found.cost is None else found.cost.value
-        columns: dict[str, Any] = dict(zip(names, found.values[:, None], strict=True))
-        frame = {**columns, "objective": [cost], "converged": [found.converged]}
+        cost = np.nan if search.cost is None else search.cost.value
+        columns: dict[str, Any] = dict(zip(names, search.values[:, None], strict=True))
+        frame = {**columns, "objective": [cost], "converged": [search.converged]}
         head = {
-            "codes": [1, 0, 0, 0] if found.cost is not None else [0, 0, 1, 0],
-            "values": found.values.tolist(),
-            **{name: getattr(found, name) for name in ("converged", "reason")},
-            **{name: int(getattr(found, name)) for name in ("iterations", "calls")},
+            "codes": [1, 0, 0, 0] if search.cost is not None else [0, 0, 1, 0],
+            "values": search.values.tolist(),
+            **{name: getattr(search, name) for name in ("converged", "reason")},
+            **{name: int(getattr(search, name)) for name in ("iterations", "calls")},
         }
         return Piece(polars.DataFrame(frame), head)
 

@@ -77,8 +77,8 @@ def constancy(readings: FrictionReadings) -> Constancy:
         # Turn and load go together: what depends on both shows in one of them.
         used = [0, 1]
     freedom = len(used) - 1
-    y, known = readings.coefficient, known_variance(readings)
-    plain = fit_line(x[:, :1], y, known)
+    y, variance = readings.coefficient, known_variance(readings)
+    plain = fit_line(x[:, :1], y, variance)
     if not freedom:
         words = "All readings have one load and one turn, so that nothing can be told."
     elif len(readings) < len(used) + 2:
@@ -89,7 +89,7 @@ def constancy(readings: FrictionReadings) -> Constancy:
     elif np.isinf(plain.log_likelihood):
         words = "The readings agree to rounding: a constant mu is enough."
     else:
-        other = fit_line(x[:, used], y, known)
+        other = fit_line(x[:, used], y, variance)
         statistic = max(2.0 * (other.log_likelihood - plain.log_likelihood), 0.0)
         p_value = _probability(statistic, freedom, len(y), len(used), other)
         slopes = np.full((2, 2), np.nan)
@@ -112,8 +112,8 @@ def known_variance(readings: FrictionReadings) -> NDArray[np.float64]:
     A reading without any is taken to be as accurate as the others in the mean; 0 if none has any.
     """
     variance = readings.coefficient_deviation**2
-    known = np.isfinite(variance)
-    return np.where(known, variance, np.mean(variance[known]) if known.any() else 0.0)
+    is_known = np.isfinite(variance)
+    return np.where(is_known, variance, np.mean(variance[is_known]) if is_known.any() else 0.0)
 
 
 def _probability(

@@ -112,9 +112,9 @@ class FrictionReadings:
         slopes = slopes_of_coefficient(
             self.coefficient, self.weight_1, self.weight_2, self.turn_1, self.turn_2
         )
-        known = ~np.isnan(self.deviation)
-        part = slopes.T * np.where(known, self.deviation, 0.0)
-        return np.where(known.any(axis=1), np.sqrt(np.sum(part**2, axis=1)), np.nan)
+        is_given = ~np.isnan(self.deviation)
+        part = slopes.T * np.where(is_given, self.deviation, 0.0)
+        return np.where(is_given.any(axis=1), np.sqrt(np.sum(part**2, axis=1)), np.nan)
 
     @property
     def turn(self) -> NDArray[np.float64]:

@@ -114,20 +114,20 @@ def friction_rig(readings: FrictionReadings) -> FrictionRig:
         >>> friction_rig(rig)
         <FrictionRig: mu = 0.06946 (0.06641 to 0.07251), 3 readings of readings>
     """
-    y, known = readings.coefficient, known_variance(readings)
+    y, variance = readings.coefficient, known_variance(readings)
     count, test = len(y), constancy(readings)
-    line = fit_line(np.ones((count, 1)), y, known)
+    line = fit_line(np.ones((count, 1)), y, variance)
     # Readings far off by their turn or load are no outliers if a constant is not enough.
     varies = np.isfinite([0.0, test.by_turn, test.by_load]) & (test.enough is False)
     varies[0] = True
-    off = outliers(design(readings)[:, varies], y, known)
+    off = outliers(design(readings)[:, varies], y, variance)
     left = np.delete(np.arange(count), off)
-    without = fit_line(np.ones((len(left), 1)), y[left], known[left])
-    alone = count == 1 and known[0] == 0.0
+    without = fit_line(np.ones((len(left), 1)), y[left], variance[left])
+    alone = count == 1 and variance[0] == 0.0
     return FrictionRig(
         readings=readings,
         coefficient=float(line.values[0]),
-        interval=mean_interval(y, known),
+        interval=mean_interval(y, variance),
         standard_error=float("nan") if alone else float(np.sqrt(line.covariance[0, 0])),
         spread=float(np.std(y, ddof=1)) if count > 1 else float("nan"),
         scatter=float(np.sqrt(line.rest * count / max(count - 1, 1))),

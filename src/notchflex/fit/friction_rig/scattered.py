@@ -69,17 +69,17 @@ def fit_line(x: Design, y: Vector, known: Vector) -> ScatterFit:
     return ScatterFit(values, covariance, rest, variance, residual, likelihood)
 
 
-def mean_interval(y: Vector, known: Vector, level: float = 0.95) -> tuple[float, float]:
+def mean_interval(y: Vector, variance: Vector, level: float = 0.95) -> tuple[float, float]:
     """Return the profile-likelihood interval of the mean of numbers with known variances.
 
     Its bound makes it exact if no errors are known (Student's interval); it tends to that of
     chi-square with many numbers. NaN for one number of unknown error.
     """
-    best = fit_line(np.ones((len(y), 1)), y, known)
+    best = fit_line(np.ones((len(y), 1)), y, variance)
     mean = float(best.values[0])
     if len(y) == 1:
         quantile = float(norm.ppf(0.5 + 0.5 * level))
-        half = quantile * float(np.sqrt(known[0])) if known[0] > 0.0 else float("nan")
+        half = quantile * float(np.sqrt(variance[0])) if variance[0] > 0.0 else float("nan")
         return mean - half, mean + half
     if np.isinf(best.log_likelihood):
         return mean, mean
@@ -89,7 +89,7 @@ def mean_interval(y: Vector, known: Vector, level: float = 0.95) -> tuple[float,
     no_columns = np.zeros((len(y), 0))
 
     def excess(value: float) -> float:
-        fall = best.log_likelihood - fit_line(no_columns, y - value, known).log_likelihood
+        fall = best.log_likelihood - fit_line(no_columns, y - value, variance).log_likelihood
         return fall - bound
 
     ends: list[float] = []
@@ -102,7 +102,7 @@ def mean_interval(y: Vector, known: Vector, level: float = 0.95) -> tuple[float,
     return ends[0], ends[1]
 
 
-def outliers(x: Design, y: Vector, known: Vector, level: float = 0.05) -> tuple[int, ...]:
+def outliers(x: Design, y: Vector, variance: Vector, level: float = 0.05) -> tuple[int, ...]:
     """Find numbers too far from the model, by the generalised test of Rosner (1983).
 
     The farthest is removed and the others are fitted again, repeatedly, so that several outliers do
@@ -114,7 +114,7 @@ def outliers(x: Design, y: Vector, known: Vector, level: float = 0.05) -> tuple[
     count = 0
     for _ in range(len(y) // 4 if len(y) >= 15 else 1):
         freedom = len(left) - x.shape[1] - 1
-        fitted = fit_line(x[left], y[left], known[left])
+        fitted = fit_line(x[left], y[left], variance[left])
         if freedom < 1 or (fitted.variance == 0.0).any():
             break
         distance = np.abs(fitted.residual) / np.sqrt(fitted.variance)
@@ -138,17 +138,17 @@ def _log_likelihood(
     return -0.5 * np.sum(residual**2 / variance + np.log(2.0 * np.pi * variance), axis=-1)
 
 
-def _rest(x: Design, y: Vector, known: Vector, largest: float) -> float:
+def _rest(x: Design, y: Vector, variance: Vector, largest: float) -> float:
     """Likeliest variance of the rest, 0 if known errors explain everything."""
-    least = 0.0 if (known > 0.0).all() else 1e-12 * largest
+    least = 0.0 if (variance > 0.0).all() else 1e-12 * largest
     # The likelihood may have several peaks in the variance, rarely; a grid finds the highest, and
     # finer ones about it the place to 1e-6 of the variance.
     grid = np.concatenate([[least], largest * np.geomspace(1e-6, 4.0, 25)])
     for _ in range(6):
-        best = int(np.argmax(_log_likelihood(x, y, known + grid[:, None])))
+        best = int(np.argmax(_log_likelihood(x, y, variance + grid[:, None])))
         if best == 0 and grid[0] == least:
             near = np.array([[least], [least + 1e-4 * (grid[1] - least)]])
-            first, second = _log_likelihood(x, y, known + near)
+            first, second = _log_likelihood(x, y, variance + near)
             if first >= second:  # the likelihood falls from the least variance on
                 return least
         low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]

@@ -76,7 +76,7 @@ def read_measurements(
     labels = next((reader.texts(name) for name in columns.PULL if name in table.header), None)
     in_file = reader.from_rest()
     order = _order(table, tension, stroke, labels, in_file if from_rest is None else from_rest)
-    found = Measurements(
+    measurements = Measurements(
         source=table.name,
         load=LoadPath(np.maximum(tension, 0.0), stroke, base_rotation, external),
         pull=order.pull,
@@ -88,7 +88,7 @@ def read_measurements(
         ignored=tuple(name for name in table.header if name not in reader.used),
         order=order.words,
     )
-    return found.as_edge_angles() if measured == "edge" else found
+    return measurements.as_edge_angles() if measured == "edge" else measurements
 
 
 def _order(

@@ -137,12 +137,12 @@ def branches(commands: Sequence[Command], pull: Sequence[str]) -> Int[np.ndarray
     """
     total = np.zeros(len(pull), int)
     for _, values in commands:
-        known = np.isfinite(values)
-        branch = known.astype(int)
+        is_known = np.isfinite(values)
+        branch = is_known.astype(int)
         for fall in _falls(values, pull):
             if fall.kind != "restart":
                 branch[fall.rows] = -1
-        if np.ptp(values[known]) > 0.0:
+        if np.ptp(values[is_known]) > 0.0:
             total += branch
     return np.sign(total)
 
@@ -164,13 +164,13 @@ def turning_points(values: Float[np.ndarray, " n"], least: float) -> list[int]:
 
 def _falls(values: Float[np.ndarray, " p"], pull: Sequence[str]) -> Iterator[Fall]:
     """Yield every fall of a command in the pulls in which it is commanded."""
-    known = np.isfinite(values)
-    span = float(np.ptp(values[known])) if known.any() else 0.0
+    is_known = np.isfinite(values)
+    span = float(np.ptp(values[is_known])) if is_known.any() else 0.0
     if span == 0.0:
         return
     labels = np.array(pull)
     for label in dict.fromkeys(pull):
-        rows = np.flatnonzero(known & (labels == label))
+        rows = np.flatnonzero(is_known & (labels == label))
         for top, start, bottom, kind in _falls_of_pull(values[rows], span):
             yield Fall(int(rows[top]), int(rows[start]), rows[top + 1 : bottom + 1], kind)
 

@@ -156,10 +156,10 @@ class Measurements:
     def __repr__(self) -> str:
         """Return how many rows and pulls there are, and what was measured."""
         way = "each from rest" if self.from_rest else "each pull one path"
-        known = f"; deviations of {', '.join(self.deviation)}" if self.deviation else ""
+        deviations = f"; deviations of {', '.join(self.deviation)}" if self.deviation else ""
         return (
             f"<Measurements of {self.source}: {_count(len(self), 'row')} of "
-            f"{_count(len(self.pulls), 'pull')}, {way}; {', '.join(self.observed)}{known}>"
+            f"{_count(len(self.pulls), 'pull')}, {way}; {', '.join(self.observed)}{deviations}>"
         )
 
     @property

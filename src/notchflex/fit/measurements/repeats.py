@@ -71,19 +71,21 @@ def repeats_of_each(measurements: Measurements, *, step: float | None = None) ->
     for row, history in enumerate(histories):
         groups.setdefault((history, rounded[row].tobytes()), []).append(row)
     same = [rows for rows in groups.values() if _independent(rows, measurements)]
-    enough = 2 * sum(map(len, same)) >= len(measurements)
-    curves = [] if enough else _comparable_curves(measurements, commands, rounded, histories)
+    is_repeated = 2 * sum(map(len, same)) >= len(measurements)
+    curves = [] if is_repeated else _comparable_curves(measurements, commands, rounded, histories)
     deviations: dict[str, Numbers] = {}
     for name, values in measurements.observed.items():
         components = values.reshape(len(values), -1).T
-        variances = [_pooled(one, same) if enough else _between(one, curves) for one in components]
+        variances = [
+            _pooled(one, same) if is_repeated else _between(one, curves) for one in components
+        ]
         deviations[name] = np.sqrt(np.array(variances)).reshape(values.shape[1:])
     return deviations
 
 
 def _root_mean_square(values: Numbers) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
 
 
 def _commands(measurements: Measurements) -> Numbers:
@@ -120,8 +122,8 @@ def _histories(measurements: Measurements, commands: Numbers) -> list[Hashable]:
             values = commands[rows, column]
             points = turning_points(values, TURN * span[column])
             ends = [0, *points, len(values) - 1]
-            for place, row in enumerate(rows):
-                branch = bisect_left(points, place)
+            for position, row in enumerate(rows):
+                branch = bisect_left(points, position)
                 rises = values[ends[branch + 1]] >= values[ends[branch]]
                 turned[row] += [(column, values[point]) for point in points[:branch]]
                 turned[row].append((column, np.inf if rises else -np.inf))
@@ -183,7 +185,7 @@ def _comparable_curves(
         command = int(varying[0])
         rest = np.delete(rounded[rows[0]], command).tobytes()
         order = np.argsort(commands[rows, command], kind="stable")
-        ordered = [rows[place] for place in order]
+        ordered = [rows[number] for number in order]
         curve = commands[ordered, command], ordered
         together.setdefault((history, command, rest), []).append(curve)
     return [curves for curves in together.values() if len(curves) > 1]
@@ -211,6 +213,6 @@ def _between(values: Numbers, comparable: list[list[Curve]]) -> float:
 
 def _means(values: Numbers, load: Numbers, rows: list[int]) -> tuple[Numbers, Numbers]:
     """Loads, each once, and means of what was measured there."""
-    known = ~np.isnan(values[rows])
-    loads, number = np.unique(load[known], return_inverse=True)
-    return loads, np.bincount(number, values[rows][known]) / np.bincount(number)
+    is_known = ~np.isnan(values[rows])
+    loads, number = np.unique(load[is_known], return_inverse=True)
+    return loads, np.bincount(number, values[rows][is_known]) / np.bincount(number)

@@ -182,8 +182,8 @@ def _numbers(label: str, robot: Robot, path: str) -> tuple[RobotNumber, ...]:
 
 def _apart(robot: Robot, path: str) -> dict[str, float]:
     """The numbers that a name means, part by part where they are unlike."""
-    found = numbers_at(robot, path)
-    return found if len(set(found.values())) > 1 else {path: next(iter(found.values()))}
+    numbers = numbers_at(robot, path)
+    return numbers if len(set(numbers.values())) > 1 else {path: next(iter(numbers.values()))}
 
 
 def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant, each: bool) -> Unknown:
@@ -194,14 +194,14 @@ def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant, each: b
     else:
         rule, number, read = _parsed(path)
         # Without a rule robots have one value each, the same in all their parts.
-        here = [
+        values = [
             value
             for label, one, *_ in sets
             for value in (
                 numbers_at(robots[label], one).values() if rule else [number_at(robots[label], one)]
             )
         ]
-        start = math.fsum(here) / len(here)
+        start = math.fsum(values) / len(values)
         robot = next(iter(robots.values()))
         unit, lower, upper = described_at(robot, number)
         first, last = _range(number, unit, start)

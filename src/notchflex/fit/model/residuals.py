@@ -70,31 +70,31 @@ def misfit(
 
     Both are NaN where nothing was measured.
     """
-    seen, output = measured.observed[name], OUTPUTS.get(name, name)
+    observed, output = measured.observed[name], OUTPUTS.get(name, name)
     values = predicted.values[output]
     slopes = predicted.slopes.get(output, np.zeros((0, *values.shape)))
     if name == "tip_rotation":
-        return _turned(seen, values, slopes)
+        return _turned(observed, values, slopes)
     if name == "tip_tension":
         last = np.isfinite(values[0]).sum(axis=-1) - 1
         tendons = np.arange(len(last))
         values, slopes = values[:, tendons, last], slopes[:, :, tendons, last]
     if name == "total_edge_angle":
         values, slopes = values.sum(axis=-1), slopes.sum(axis=-1)
-    values = (values - seen).reshape(len(seen), -1)
+    values = (values - observed).reshape(len(observed), -1)
     return values, slopes.reshape(len(slopes), *values.shape)
 
 
 def _turned(
-    seen: Float[np.ndarray, "p 3"],
+    observed: Float[np.ndarray, "p 3"],
     rotation: Float[np.ndarray, "p 3 3"],
     slopes: Float[np.ndarray, "k p 3 3"],
 ) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "k p 3"]]:
     """Rotation vectors from the measured to the model's orientation, and their derivatives."""
-    turned = Rotation.from_matrix(rotation) * Rotation.from_rotvec(np.nan_to_num(seen)).inv()
+    turned = Rotation.from_matrix(rotation) * Rotation.from_rotvec(np.nan_to_num(observed)).inv()
     vector = turned.as_rotvec()
     spin = slopes @ np.swapaxes(rotation, -1, -2)
     turn = np.stack([spin[..., 2, 1], spin[..., 0, 2], spin[..., 1, 0]], axis=-1)
     by_turn = np.linalg.inv(np.asarray(left_slope(constant(vector))))
-    values = np.where(np.isnan(seen), np.nan, vector)
+    values = np.where(np.isnan(observed), np.nan, vector)
     return values, np.einsum("pij,kpj->kpi", by_turn, turn)

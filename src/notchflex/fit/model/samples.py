@@ -89,12 +89,12 @@ class Samples:
             self.failed += [(sample.measured.source, row) for row in unsolved]
             if self.failed:
                 continue
-            for name, seen in sample.measured.observed.items():
-                known = np.isfinite(seen).reshape(len(seen), -1)
+            for name, observed in sample.measured.observed.items():
+                is_known = np.isfinite(observed).reshape(len(observed), -1)
                 off, by_numbers = misfit(name, sample.measured, predicted)
-                residuals.append(off[known])
+                residuals.append(off[is_known])
                 by_constants = np.zeros((len(residuals[-1]), len(self.unknowns)))
-                by_constants[:, list(sample.columns)] = by_numbers[:, known].T
+                by_constants[:, list(sample.columns)] = by_numbers[:, is_known].T
                 slopes.append(by_constants)
         if self.failed:
             return None
@@ -107,10 +107,10 @@ class Samples:
         parts: list[dict[str, np.ndarray]] = []
         for number, sample in enumerate(self.every):
             total = sum(map(len, self.of_robot(sample.label)))
-            for name, seen in sample.measured.observed.items():
-                known = np.isfinite(seen)
-                row, part = np.nonzero(known.reshape(len(seen), -1))
-                deviation = sample.measured.deviation.get(name, np.full(seen.shape, np.nan))
+            for name, observed in sample.measured.observed.items():
+                is_known = np.isfinite(observed)
+                row, part = np.nonzero(is_known.reshape(len(observed), -1))
+                deviation = sample.measured.deviation.get(name, np.full(observed.shape, np.nan))
                 same = {
                     "sample": number,
                     "robot": labels.index(sample.label),
@@ -121,7 +121,7 @@ class Samples:
                     {key: np.full(len(row), value) for key, value in same.items()}
                     | {"row": row, "part": part, "pull": sample.pulls[row]}
                     | {"point": part // 3 if name in ("tip_position", "axis_points") else part}
-                    | {"given": deviation[known]}
+                    | {"given": deviation[is_known]}
                 )
         layout = {key: np.concatenate([one[key] for one in parts]) for key in parts[0]}
         # Number the points of all measurements without gaps.

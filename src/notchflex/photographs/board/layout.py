@@ -22,7 +22,7 @@ DICTIONARIES = (
 )
 """Names of the sets of markers, as in OpenCV without `DICT_`."""
 
-_MOST = 40
+_MAX_SQUARES = 40
 _WAYS = "such as 4x3,marker=5,gap=1.5 or 4x3,marker=5,gap=1.5,dictionary=apriltag_36h11"
 
 
@@ -57,9 +57,14 @@ class Board:
         """
         for name in ("columns", "rows"):
             count = getattr(self, name)
-            if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= _MOST:
+            if (
+                isinstance(count, bool)
+                or not isinstance(count, int)
+                or not 1 <= count <= _MAX_SQUARES
+            ):
                 raise InputError.OUT_OF_RANGE(
-                    f"{name} of a board must be a whole number from 1 to {_MOST}, not {count!r}"
+                    f"{name} of a board must be a whole number from 1 to {_MAX_SQUARES}, "
+                    f"not {count!r}"
                 )
         for name in ("marker", "gap"):
             length = getattr(self, name)
@@ -106,20 +111,23 @@ class Board:
 
         name = self.dictionary if self.dictionary.startswith("april") else self.dictionary.upper()
         name = name.replace("apriltag", "APRILTAG")
-        made = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{name}"))
-        if len(made.bytesList) < self.columns * self.rows:
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{name}"))
+        if len(dictionary.bytesList) < self.columns * self.rows:
             raise InputError.OUT_OF_RANGE(
-                f"{self.dictionary} has {len(made.bytesList)} markers; a board of {self.columns} "
-                f"x {self.rows} needs {self.columns * self.rows}"
+                f"{self.dictionary} has {len(dictionary.bytesList)} markers; a board of "
+                f"{self.columns} x {self.rows} needs {self.columns * self.rows}"
             )
-        return made
+        return dictionary
 
     def cells(self) -> NDArray[np.bool_]:
         """Return which cells of every marker are white, with its black border, (m, c, c)."""
-        made = self.opencv_dictionary()
-        side = made.markerSize + 2
+        dictionary = self.opencv_dictionary()
+        side = dictionary.markerSize + 2
         numbers = range(self.columns * self.rows)
-        return np.array([made.generateImageMarker(one, side, borderBits=1) for one in numbers]) > 0
+        return (
+            np.array([dictionary.generateImageMarker(one, side, borderBits=1) for one in numbers])
+            > 0
+        )
 
     def svg(self) -> str:
         """Return a drawing in its true size, in mm, with a white border."""
@@ -177,7 +185,7 @@ def board_of(text: str) -> Board:
         key, _, value = part.partition("=")
         given[key.strip()] = value.strip()
     columns, cross, rows = grid.partition("x")
-    known = {"marker", "gap", "dictionary"}
+    keys = {"marker", "gap", "dictionary"}
     if (
         not (cross and columns.isdecimal() and rows.isdecimal())
         or not {
@@ -185,7 +193,7 @@ def board_of(text: str) -> Board:
             "gap",
         }
         <= set(given)
-        <= known
+        <= keys
         or len(given) < len(others)
     ):
         raise InputError.BAD_SYNTAX(

@@ -13,7 +13,7 @@ from notchflex.errors import InputError
 from notchflex.photographs.board.layout import Board
 from notchflex.photographs.board.sighting import Sighting, sight
 from notchflex.photographs.chain.chain_table import Numbers
-from notchflex.photographs.chain.known import NOTHING, Known
+from notchflex.photographs.chain.view_prior import NO_PRIOR, ViewPrior
 from notchflex.photographs.contrast import Contrast
 
 _KNOWN = 0.003
@@ -49,7 +49,7 @@ class Ruler:
         if self.board is not None:
             self.board.opencv_dictionary()
 
-    def look(self, picture: NDArray[np.uint8], factor: float) -> Look | str:
+    def read(self, picture: NDArray[np.uint8], factor: float) -> RulerReading | str:
         """Look for the board in a photograph, (height, width, 3); return why it is not found.
 
         Args:
@@ -57,15 +57,15 @@ class Ruler:
             factor: By how much it was made smaller.
         """
         if self.scale is not None:
-            return Look(Known(self.scale * factor, _KNOWN))
+            return RulerReading(ViewPrior(self.scale * factor, _KNOWN))
         if self.board is None:
-            return Look()
-        seen = sight(picture, self.board)
-        return seen if isinstance(seen, str) else Look(board=seen)
+            return RulerReading()
+        sighting = sight(picture, self.board)
+        return sighting if isinstance(sighting, str) else RulerReading(board=sighting)
 
 
 @dataclass(frozen=True)
-class Look:
+class RulerReading:
     """What a ruler says about one photograph.
 
     Attributes:
@@ -73,12 +73,12 @@ class Look:
         board: The board that is seen.
     """
 
-    everywhere: Known = NOTHING
+    everywhere: ViewPrior = NO_PRIOR
     board: Sighting | None = None
 
-    def known(self, place: Numbers) -> Known:
+    def prior(self, position: Numbers) -> ViewPrior:
         """Return what is known of a robot at a place of the photograph, px."""
-        return self.everywhere if self.board is None else self.board.known(place)
+        return self.everywhere if self.board is None else self.board.prior(position)
 
     def hidden(self, contrast: Contrast) -> Contrast:
         """Return the contrast of the photograph without the board."""

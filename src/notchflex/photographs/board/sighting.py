@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from notchflex.photographs.board.layout import Board
 from notchflex.photographs.chain.chain_table import Numbers
-from notchflex.photographs.chain.known import Known
+from notchflex.photographs.chain.view_prior import ViewPrior
 from notchflex.photographs.contrast import Contrast
 
 NOT_SEEN = "no marker of the board is seen; check its layout, and that all of it is sharp and lit"
@@ -21,10 +21,10 @@ NOT_FLAT = "the markers do not lie as on the board; check its layout, and that i
 
 _LAID_SCALE, _LAID_TILT = 0.003, math.radians(2.0)
 """How well a tube lies in the plane of the board: logarithm of the scale, and rad."""
-_SLOPE, _NEAR, _NEAR_SPREAD, _MOST_NEAR = 0.15, 0.004, 0.006, 0.03
+_SLOPE, _CAMERA, _CAMERA_SPREAD, _MAX_CAMERA = 0.15, 0.004, 0.006, 0.03
 """What slopes (mm/mm) and inverse distances of cameras (1/mm) usually are."""
-_FIRST_NOISE, _LEAST_NOISE = 0.3, 0.1  # px, of corners
-_MOST_OFF = 0.05  # of the side of a marker: how far a corner may lie beside the board
+_FIRST_NOISE, _MIN_NOISE = 0.3, 0.1  # px, of corners
+_MAX_OFF = 0.05  # of the side of a marker: how far a corner may lie beside the board
 _ALIKE = 6.0  # sum of squares by which a mirrored tilt must fit worse
 _STEP = 1e-6
 
@@ -47,16 +47,16 @@ class Sighting:
     corners: Numbers
     middle: Numbers
 
-    def known(self, place: Numbers) -> Known:
+    def prior(self, position: Numbers) -> ViewPrior:
         """Return what the board says of a robot at a place of the photograph, px."""
-        here = self._scale(self.numbers, place)
+        scale = self._scale(self.numbers, position)
         steps = self.numbers + _STEP * np.eye(7)
-        slopes = np.array([self._scale(one, place) - here for one in steps]) / _STEP
+        slopes = np.array([self._scale(one, position) - scale for one in steps]) / _STEP
         scale_deviation = math.sqrt(float(slopes @ self.spread @ slopes))
         deviation = np.sqrt(np.diag(self.spread))
-        away = math.exp(self.numbers[3] - here)
-        return Known(
-            math.exp(here),
+        away = math.exp(self.numbers[3] - scale)
+        return ViewPrior(
+            math.exp(scale),
             math.hypot(scale_deviation, _LAID_SCALE),
             (float(self.numbers[4]), float(self.numbers[5])),
             math.hypot(float(deviation[4:6].max()), _LAID_TILT),
@@ -76,13 +76,13 @@ class Sighting:
         cv2.polylines(value, [outline], True, 0.0, max(3, round(0.25 * size)))
         return replace(contrast, value=value)
 
-    def _scale(self, numbers: Numbers, place: Numbers) -> float:
+    def _scale(self, numbers: Numbers, position: Numbers) -> float:
         """Return the logarithm of the scale where the plane of the board is seen at a place."""
-        seen, scale = place - self.middle, math.exp(numbers[3])
+        offset, scale = position - self.middle, math.exp(numbers[3])
         slope, near = numbers[4:6], numbers[6]
         # The plane there is z = slope xy deep, and seen = (first + scale xy) / (1 + near z).
-        depth = float(slope @ (seen - numbers[:2])) / scale
-        depth /= 1.0 - near * float(slope @ seen) / scale
+        depth = float(slope @ (offset - numbers[:2])) / scale
+        depth /= 1.0 - near * float(slope @ offset) / scale
         return float(numbers[3]) - math.log1p(near * depth)
 
 
@@ -94,12 +94,12 @@ def sight(picture: NDArray[np.uint8], board: Board) -> Sighting | str:
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     detector = cv2.aruco.ArucoDetector(board.opencv_dictionary(), parameters)
     grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
-    found: Any = detector.detectMarkers(grey)
-    names = np.zeros(0, int) if found[1] is None else np.ravel(found[1])
+    markers: Any = detector.detectMarkers(grey)
+    names = np.zeros(0, int) if markers[1] is None else np.ravel(markers[1])
     own = names < board.columns * board.rows
     if not own.any():
         return NOT_SEEN
-    corners = np.array(found[0], float).reshape(-1, 4, 2)[own]
+    corners = np.array(markers[0], float).reshape(-1, 4, 2)[own]
     middle = (np.array([picture.shape[1], picture.shape[0]]) - 1.0) / 2.0
     points = board.corners()[names[own]].reshape(-1, 2)
     fitted = _fitted(points, corners.reshape(-1, 2) - middle)
@@ -108,29 +108,29 @@ def sight(picture: NDArray[np.uint8], board: Board) -> Sighting | str:
     return Sighting(*fitted, corners, middle)
 
 
-def _fitted(points: Numbers, seen: Numbers) -> tuple[Numbers, Numbers] | None:
+def _fitted(points: Numbers, corners: Numbers) -> tuple[Numbers, Numbers] | None:
     """Fit a plane before a camera to corners; return its numbers and their covariance."""
-    flat, complex_seen = points @ [1.0, 1.0j], seen @ [1.0, 1.0j]
+    flat, complex_seen = points @ [1.0, 1.0j], corners @ [1.0, 1.0j]
     first, turn = np.linalg.lstsq(
         np.stack([np.ones_like(flat), flat], axis=1), complex_seen, rcond=None
     )[0]
     start = [first.real, first.imag, math.atan2(turn.imag, turn.real), math.log(abs(turn))]
 
     def residuals(numbers: Numbers) -> Numbers:
-        off = (_projected(numbers, points) - seen).ravel() / _FIRST_NOISE
-        near = (numbers[6] - _NEAR) / _NEAR_SPREAD
+        off = (_projected(numbers, points) - corners).ravel() / _FIRST_NOISE
+        near = (numbers[6] - _CAMERA) / _CAMERA_SPREAD
         return np.concatenate([off, numbers[4:6] / _SLOPE, [near]])
 
-    first_found = _least(residuals, np.array([*start, 0.0, 0.0, _NEAR]))
+    first_found = _least(residuals, np.array([*start, 0.0, 0.0, _CAMERA]))
     # Seen from far away, a plane that is tilted the other way looks alike.
     other = first_found.x * [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0]
     best, mirrored = sorted((first_found, _least(residuals, other)), key=lambda one: one.cost)
-    off = np.linalg.norm(_projected(best.x, points) - seen, axis=1)
+    off = np.linalg.norm(_projected(best.x, points) - corners, axis=1)
     side = float(np.linalg.norm(points[1] - points[0])) * math.exp(best.x[3])
-    if off.max() > _MOST_OFF * side:
+    if off.max() > _MAX_OFF * side:
         return None
-    noise = math.sqrt(float((off**2).sum()) / max(1, 2 * len(seen) - 7))
-    widened = max(noise, _LEAST_NOISE) / _FIRST_NOISE
+    noise = math.sqrt(float((off**2).sum()) / max(1, 2 * len(corners) - 7))
+    widened = max(noise, _MIN_NOISE) / _FIRST_NOISE
     spread = np.linalg.inv(best.jac.T @ best.jac) * max(widened, 1.0) ** 2
     if 2.0 * (mirrored.cost - best.cost) / widened**2 < _ALIKE:
         both = 0.5 * (best.x - mirrored.x)[4:6]
@@ -142,7 +142,7 @@ def _fitted(points: Numbers, seen: Numbers) -> tuple[Numbers, Numbers] | None:
 def _least(residuals: Callable[[Numbers], Numbers], start: Numbers) -> Any:
     bound = np.full(7, np.inf)
     low = np.append(-bound[:6], 0.0)
-    return least_squares(residuals, start, bounds=(low, [*bound[:6], _MOST_NEAR]), x_scale="jac")
+    return least_squares(residuals, start, bounds=(low, [*bound[:6], _MAX_CAMERA]), x_scale="jac")
 
 
 def _projected(numbers: Numbers, points: Numbers) -> Numbers:
@@ -153,6 +153,6 @@ def _projected(numbers: Numbers, points: Numbers) -> Numbers:
     steep = math.sqrt(1.0 + float(slope @ slope))
     # The least rotation that lays the board into the plane z = slope xy.
     along = (flat @ slope) / (steep * (1.0 + steep))
-    place = flat - along[:, None] * slope
-    away = 1.0 + numbers[6] * (place @ slope)
-    return (numbers[:2] + math.exp(numbers[3]) * place) / away[:, None]
+    position = flat - along[:, None] * slope
+    away = 1.0 + numbers[6] * (position @ slope)
+    return (numbers[:2] + math.exp(numbers[3]) * position) / away[:, None]

@@ -15,7 +15,7 @@ BASE = 1.2
 """Length of the straight tube before the first notch that is looked at, outer radii."""
 
 _ROLL = math.radians(5.0)  # of starts: views that are rolled a little are found from there
-_LEAST, _MOST = -0.6, 1.9  # rad: angles of notches
+_MIN_ANGLE, _MAX_ANGLE = -0.6, 1.9  # rad: angles of notches
 
 
 def axis_points(table: ChainTable, numbers: Numbers) -> Numbers:
@@ -63,10 +63,10 @@ def on_axis_points(table: ChainTable, points: Numbers) -> list[Numbers]:
         )
     scale = length / (table.length + BASE * table.outer)
     heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    found: list[tuple[float, Numbers]] = []
+    candidates: list[tuple[float, Numbers]] = []
     for side, roll in ((1.0, _ROLL), (-1.0, math.pi + _ROLL)):
         view = [0.0, 0.0, 0.0, 0.0, roll, 0.0, 0.003 / table.outer, 0.0, 0.0]
-        first = np.clip(side * np.diff(heading) * table.side, _LEAST, _MOST)
+        first = np.clip(side * np.diff(heading) * table.side, _MIN_ANGLE, _MAX_ANGLE)
         start = np.array([*points[1], heading[0], math.log(scale), *first])
         free = [0, 1, 2, 3, *range(NUMBERS, NUMBERS + table.notches)]
         numbers = np.array([*view, *first])
@@ -76,13 +76,13 @@ def on_axis_points(table: ChainTable, points: Numbers) -> list[Numbers]:
             return (axis_points(table, numbers) - points).ravel()
 
         bound = np.full(len(start), np.inf)
-        bound[4:] = _MOST
+        bound[4:] = _MAX_ANGLE
         lower = np.full(len(start), -np.inf)
-        lower[4:] = _LEAST
+        lower[4:] = _MIN_ANGLE
         solved = least_squares(off, start, bounds=(lower, bound), x_scale="jac", max_nfev=60)
         numbers[free] = solved.x
-        found.append((float(solved.cost), numbers))
-    return [numbers for _, numbers in sorted(found, key=lambda one: one[0])]
+        candidates.append((float(solved.cost), numbers))
+    return [numbers for _, numbers in sorted(candidates, key=lambda one: one[0])]
 
 
 def straight_chain(table: ChainTable, width: int, height: int) -> Numbers:

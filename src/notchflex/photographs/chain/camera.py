@@ -59,9 +59,9 @@ class Frame:
     @classmethod
     def of(cls, view: View, start: Numbers, turned: Numbers) -> Frame:
         """Return frames at points of the plane (x, z), (b, N, 2), turned by angles, (b, N)."""
-        made = cls.__new__(cls)
-        made._set(view, start, turned)
-        return made
+        frame = cls.__new__(cls)
+        frame._set(view, start, turned)
+        return frame
 
     def _set(self, view: View, start: Numbers, turned: Numbers) -> None:
         x, z = view.x[:, None], view.z[:, None]
@@ -97,13 +97,13 @@ def _cross(one: Numbers, other: Numbers) -> Numbers:
     """Return the vector products; `np.cross` takes three times as long."""
     ax, ay, az = one[..., 0], one[..., 1], one[..., 2]
     bx, by, bz = other[..., 0], other[..., 1], other[..., 2]
-    made = np.empty(np.broadcast_shapes(one.shape, other.shape))
-    made[..., 0], made[..., 1], made[..., 2] = (
+    product = np.empty(np.broadcast_shapes(one.shape, other.shape))
+    product[..., 0], product[..., 1], product[..., 2] = (
         ay * bz - az * by,
         az * bx - ax * bz,
         ax * by - ay * bx,
     )
-    return made
+    return product
 
 
 def _rotation(direction: Numbers, roll: Numbers, tilt: Numbers) -> Numbers:

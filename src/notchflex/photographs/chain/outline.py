@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from notchflex.photographs.chain.camera import Frame, View, dot
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
-from notchflex.photographs.chain.known import NOTHING, Known
+from notchflex.photographs.chain.view_prior import NO_PRIOR, ViewPrior
 
 SIDE, FACE, SPINE = 0, 1, 2
 """Kinds of outline: the sides of a ring, its ends, the two edges of a spine."""
@@ -55,7 +55,7 @@ class OutlineModel:
         base: Length of the straight tube before the first notch that is looked at, mm.
         corner: Part of an end next to the spine that is not used, outer radii.
         shift: How far blur and shading may shift all edges alike, px (standard deviation).
-        known: What is known of the view.
+        prior: Prior of the view: scale, tilt, distance of the camera.
     """
 
     table: ChainTable
@@ -64,7 +64,7 @@ class OutlineModel:
     base: float = 1.0
     corner: float = 0.12
     shift: float = 0.7
-    known: Known = NOTHING
+    prior: ViewPrior = NO_PRIOR
 
     def __post_init__(self) -> None:
         """Number all points: kind, ring or notch, side or end, place along it."""
@@ -106,47 +106,47 @@ class OutlineModel:
         start, turned = self.table.poses(view.angles)
         point = np.zeros((len(view.angles), len(self.kind), 3))
         tangent = np.zeros_like(point)
-        for part, place in (
+        for part, positions in (
             (self.kind == SIDE, self._sides),
             (self.kind == FACE, self._faces),
             (self.kind == SPINE, self._spines),
         ):
-            point[:, part], tangent[:, part] = place(view, start, turned, part)
-        seen = view.seen(point)
-        along = (view.seen(point[:1] + 1e-4 * tangent[:1]) - seen[:1])[0]
+            point[:, part], tangent[:, part] = positions(view, start, turned, part)
+        projected = view.seen(point)
+        along = (view.seen(point[:1] + 1e-4 * tangent[:1]) - projected[:1])[0]
         length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
         normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / length
-        return Outline(seen, *self._oriented(seen[0], normal, view))
+        return Outline(projected, *self._oriented(projected[0], normal, view))
 
-    def _oriented(self, seen: Numbers, normal: Numbers, view: View) -> tuple[Numbers, ...]:
+    def _oriented(self, projected: Numbers, normal: Numbers, view: View) -> tuple[Numbers, ...]:
         """Turn normals outward; find the room outside and the breadth inside of each point."""
-        inward = seen[self.across] - seen
+        inward = projected[self.across] - projected
         breadth = np.abs((inward * normal).sum(axis=1))
         outward = -np.sign((inward * normal).sum(axis=1))
         normal = normal * np.where(outward == 0.0, 1.0, outward)[:, None]
-        room = np.full(len(seen), np.inf)
+        room = np.full(len(projected), np.inf)
         has = self.facing >= 0
-        gap = ((seen[self.facing[has]] - seen[has]) * normal[has]).sum(axis=1)
+        gap = ((projected[self.facing[has]] - projected[has]) * normal[has]).sum(axis=1)
         room[has] = gap
         return normal, room, breadth
 
     def _other(self, index: _Index) -> NDArray[np.int_]:
         """Return the point across the robot of each point."""
-        found = np.arange(len(self.kind))
+        other = np.arange(len(self.kind))
         for key, number in index.items():
             kind, ring, which, place = key
-            found[number] = index.get((kind, ring, -which, place), number)
+            other[number] = index.get((kind, ring, -which, place), number)
             if kind == FACE and ring == 0:  # its other end is the collet: sides give the inside
-                found[number] = index[(SIDE, 0, -1.0, 0)]
-        return found
+                other[number] = index[(SIDE, 0, -1.0, 0)]
+        return other
 
     def _facing(self, index: _Index) -> NDArray[np.int_]:
         """Return the point across the notch of each point of an end; -1 where there is none."""
-        found = np.full(len(self.kind), -1)
+        facing = np.full(len(self.kind), -1)
         for (kind, ring, which, place), number in index.items():
             if kind == FACE:
-                found[number] = index.get((FACE, ring + int(which), -which, place), -1)
-        return found
+                facing[number] = index.get((FACE, ring + int(which), -which, place), -1)
+        return facing
 
     def _index(self) -> _Index:
         counts: dict[tuple[int, int, float], int] = {}
@@ -219,8 +219,8 @@ class OutlineModel:
         at = place * bend
         reach = (length * place * np.sinc(0.5 * at / np.pi))[..., None]
         heading = angle0 + 0.5 * at
-        here = before + reach * np.stack([np.sin(heading), np.cos(heading)], axis=-1)
-        frame = Frame.of(view, here, angle0 + at)
+        corner = before + reach * np.stack([np.sin(heading), np.cos(heading)], axis=-1)
+        frame = Frame.of(view, corner, angle0 + at)
         centre = frame.origin
         lateral, _ = frame.lateral(centre)
         side = self.table.side[notch]

@@ -18,7 +18,7 @@ from notchflex.photographs.cut.straight import StraightFit, seen_edges
 _ROLL = math.radians(10.0)  # usual roll of a robot that was laid down with care
 _DEPTH = 0.1  # of the outer diameter: how far a depth may be off
 _TURN = math.radians(0.3)  # how well a turn is known
-_LEAST = 1e-4  # mm: no edge is known better
+_MIN_SPREAD = 1e-4  # mm: no edge is known better
 _STARTS = np.radians(np.arange(-24.0, 25.0, 6.0))
 
 
@@ -38,7 +38,8 @@ def depths(
     scales = np.concatenate([np.full(n, _DEPTH * 2.0 * table.outer), [_ROLL]])
     scales = np.concatenate([scales, np.full(len(fits), _TURN)])
     weights = [
-        np.linalg.inv(np.linalg.cholesky(fit.edge_spread + _LEAST**2 * np.eye(n))) for fit in fits
+        np.linalg.inv(np.linalg.cholesky(fit.edge_spread + _MIN_SPREAD**2 * np.eye(n)))
+        for fit in fits
     ]
 
     def residuals(scaled: Numbers) -> Numbers:
@@ -50,12 +51,12 @@ def depths(
         ]
         return np.concatenate([*apart, scaled])
 
-    found = []
+    results = []
     for roll in _STARTS:
         start = np.zeros(len(scales))
         start[n] = roll / _ROLL
-        found.append(least_squares(residuals, start))
-    best = min(found, key=lambda one: one.cost)
+        results.append(least_squares(residuals, start))
+    best = min(results, key=lambda one: one.cost)
     covariance = np.linalg.inv(best.jac.T @ best.jac)
     return (
         (best.x * scales)[:n],

@@ -20,7 +20,7 @@ from notchflex.photographs.measured import MeasuredPhotograph
 from notchflex.photographs.reading import read_photograph
 from notchflex.robot import ArcNotch, Robot
 
-MOST_TURN_DEG = 40.0
+MAX_TURN_DEG = 40.0
 """Most that the robot is turned between photographs, deg: all are taken from the side."""
 
 _APART = 5.0  # standard deviations by which photographs may contradict each other
@@ -90,9 +90,9 @@ def _turns(count: int, turn_deg: float | Sequence[float]) -> Numbers:
             f"{count} photographs need {count - 1} turns, one for each after the first; got "
             f"{given.size}"
         )
-    if not (np.abs(given) <= MOST_TURN_DEG).all():
+    if not (np.abs(given) <= MAX_TURN_DEG).all():
         raise InputError.OUT_OF_RANGE(
-            f"turns must lie between -{MOST_TURN_DEG:g} and {MOST_TURN_DEG:g} deg, not "
+            f"turns must lie between -{MAX_TURN_DEG:g} and {MAX_TURN_DEG:g} deg, not "
             f"{', '.join(f'{turn:g}' for turn in given)}"
         )
     return np.radians(np.concatenate([[0.0], given]))
@@ -106,16 +106,18 @@ def combined(table: ChainTable, fits: Sequence[StraightFit], turns: Numbers) -> 
         fits: What each photograph says.
         turns: By how much the robot was turned for each of them, rad.
     """
-    seen = tuple(fit.photograph for fit in fits)
-    refused = next((one for one in seen if one.reason), None)
+    photographs = tuple(fit.photograph for fit in fits)
+    refused = next((one for one in photographs if one.reason), None)
     if refused is not None:
-        return _cut(table, seen, turns, f"{refused.source}: {refused.reason}")
+        return _cut(table, photographs, turns, f"{refused.source}: {refused.reason}")
     lengths, spread, apart = _mean(fits)
     if apart > _APART:
-        return _cut(table, seen, turns, "the photographs contradict each other in heights")
+        return _cut(table, photographs, turns, "the photographs contradict each other in heights")
     cut, cut_deviation, apart = depths(table, fits, turns)
     if apart > _APART:
-        return _cut(table, seen, turns, "the photographs contradict each other; check the turns")
+        return _cut(
+            table, photographs, turns, "the photographs contradict each other; check the turns"
+        )
     n = table.notches
     depth = np.array([notch.depth for notch in table.robot.notches if isinstance(notch, ArcNotch)])
     beyond = table.depth - table.outer  # depths may count from elsewhere than the outer surface
@@ -128,7 +130,7 @@ def combined(table: ChainTable, fits: Sequence[StraightFit], turns: Numbers) -> 
         "uncut_length_deviation": spread[n:],
         "depth_deviation": slope * cut_deviation,
     }
-    return _cut(table, seen, turns, "", **values)
+    return _cut(table, photographs, turns, "", **values)
 
 
 def _mean(fits: Sequence[StraightFit]) -> tuple[Numbers, Numbers, float]:
@@ -145,7 +147,7 @@ def _mean(fits: Sequence[StraightFit]) -> tuple[Numbers, Numbers, float]:
 
 def _cut(
     table: ChainTable,
-    seen: tuple[MeasuredPhotograph, ...],
+    photographs: tuple[MeasuredPhotograph, ...],
     turns: Numbers,
     reason: str,
     **values: Numbers,
@@ -153,4 +155,4 @@ def _cut(
     nothing = np.full(table.notches, math.nan)
     names = [*LENGTHS, *(f"{name}_deviation" for name in LENGTHS)]
     given = {name: values.get(name, nothing) for name in names}
-    return MeasuredCut(table.robot, seen, turns, reason, **given)
+    return MeasuredCut(table.robot, photographs, turns, reason, **given)

@@ -87,12 +87,12 @@ class MeasuredCut:
             InputError: The photographs were refused, or the file cannot be written.
         """
         robot = self.as_cut()
-        seen = ", ".join(" ".join(Path(one.source).name.split()) for one in self.photographs)
+        sources = ", ".join(" ".join(Path(one.source).name.split()) for one in self.photographs)
         notes: dict[str, str] = {}
         for name in LENGTHS:
             for number, spread in enumerate(getattr(self, f"{name}_deviation"), 1):
                 path = f"notch[{number}].{name}"
-                notes[path] = f"photographs {seen}: standard deviation {spread:.2g} mm"
+                notes[path] = f"photographs {sources}: standard deviation {spread:.2g} mm"
         write_text(Path(target), robot_text(robot, source_of(self.robot), notes))
 
     def _values(self) -> dict[str, float]:

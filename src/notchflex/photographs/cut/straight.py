@@ -16,7 +16,7 @@ from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 from notchflex.photographs.chain.outline import OutlineModel, spine_edge
 from notchflex.photographs.contrast import contrast
 from notchflex.photographs.fitting import Fit, covariance, misfit, refine
-from notchflex.photographs.judging import doubt
+from notchflex.photographs.judging import rejection_reason
 from notchflex.photographs.locating import EDGE_NOISE, locate
 from notchflex.photographs.measure import (
     NO_TUBE,
@@ -25,7 +25,7 @@ from notchflex.photographs.measure import (
     smaller,
 )
 from notchflex.photographs.measured import MeasuredPhotograph
-from notchflex.photographs.missing import NEAR
+from notchflex.photographs.missing import MAX_RESIDUAL
 from notchflex.photographs.start import reversed_view
 
 _WIDTH = 300.0  # of the tube beyond which a photograph is made smaller, px
@@ -33,7 +33,7 @@ _REACH, _LAST = 0.08, 4.0  # of the width of the tube, and px, within which edge
 _ROUNDS = 30
 _CORNER = 0.35  # outer radii: blurred corners beside spines shift ends
 _BENT = "the robot is bent; photograph it straight"
-_MOST_ANGLE = math.radians(12.0)
+_MAX_ANGLE = math.radians(12.0)
 _STEP = 1e-5  # mm, rad
 _SHIFT = 0.2
 """How far blur and shading shift all edges of a photograph alike, px: by that the tube looks wider
@@ -66,14 +66,14 @@ def fit_straight(
     """Fit heights, depths and places of all notches to a photograph, (height, width, 3)."""
     n = table.notches
     picture, factor = smaller(picture)
-    look = ruler.look(picture, factor)
-    if isinstance(look, str):
-        return _refused(refused_photograph(name, table, look), n)
-    whole = look.hidden(contrast(picture))
-    located = locate(table, whole, look)
+    reading = ruler.read(picture, factor)
+    if isinstance(reading, str):
+        return _refused(refused_photograph(name, table, reading), n)
+    whole = reading.hidden(contrast(picture))
+    located = locate(table, whole, reading)
     if located is None:
         return _refused(refused_photograph(name, table, NO_TUBE), n)
-    if np.abs(located.fit.numbers[NUMBERS:]).max() > 1.5 * _MOST_ANGLE:
+    if np.abs(located.fit.numbers[NUMBERS:]).max() > 1.5 * _MAX_ANGLE:
         return _refused(refused_photograph(name, table, _BENT), n)
     numbers = np.concatenate([located.fit.numbers, np.zeros(3 * n + 1)])
     wide = 2.0 * table.outer * math.exp(numbers[3]) / located.factor
@@ -84,21 +84,24 @@ def fit_straight(
     middle = (np.array(image.value.shape[::-1]) - 1.0) / 2.0
     reach = max(_LAST, _REACH * wide * fine)
     reaches = [reach, reach, reach, *(_ROUNDS * [_LAST])]
-    known = located.model.known.smaller(fine / located.factor)
-    model = replace(located.model, corner=_CORNER, shift=_SHIFT, known=known)
+    view_prior = located.model.prior.smaller(fine / located.factor)
+    model = replace(located.model, corner=_CORNER, shift=_SHIFT, prior=view_prior)
     fit = _best(
-        [refine(model, image, start, reaches, middle, NEAR) for start in _tilted(table, numbers)],
+        [
+            refine(model, image, start, reaches, middle, MAX_RESIDUAL)
+            for start in _tilted(table, numbers)
+        ],
         model,
     )
-    found = located._replace(fit=fit, model=model, factor=fine)
+    result = located._replace(fit=fit, model=model, factor=fine)
     both, noise = covariance(fit, model)
     angles = slice(NUMBERS, NUMBERS + n)
     deviation = np.sqrt(np.maximum(np.diag(both)[angles], 0.0))
-    reason = doubt(found, deviation, noise)
-    if not reason and np.abs(fit.numbers[angles]).max() > _MOST_ANGLE:
+    reason = rejection_reason(result, deviation, noise)
+    if not reason and np.abs(fit.numbers[angles]).max() > _MAX_ANGLE:
         reason = _BENT
     judged = (reason, noise, factor * fine)
-    photograph = judged_photograph(name, found, both[angles, angles], judged, middle)
+    photograph = judged_photograph(name, result, both[angles, angles], judged, middle)
     rows, slopes = _lengths(n, len(numbers)), _edge_slopes(table, fit.numbers)
     return StraightFit(
         photograph,
@@ -116,14 +119,14 @@ def _refused(photograph: MeasuredPhotograph, n: int) -> StraightFit:
 
 def _tilted(table: ChainTable, numbers: Numbers) -> list[Numbers]:
     """Return starts whose views differ: edges of a straight robot hardly show them at first."""
-    found: list[Numbers] = []
+    tilted: list[Numbers] = []
     roll, tilt = float(numbers[4]), float(numbers[5])
     mirrored = float(reversed_view(numbers)[4])
     for view in ((roll, tilt), (roll, -tilt), (roll, 0.0), (mirrored, 0.0)):
         start = numbers.copy()
         start[4:7] = *view, 0.003 / table.outer
-        found.append(start)
-    return found
+        tilted.append(start)
+    return tilted
 
 
 def _best(fits: list[Fit], model: OutlineModel) -> Fit:
@@ -166,5 +169,5 @@ def seen_edges(table: ChainTable, cut: Numbers, roll: float) -> Numbers:
 
 def _edge_slopes(table: ChainTable, numbers: Numbers) -> Numbers:
     steps = _STEP * np.eye(len(numbers))
-    here = _edges(table, numbers)
-    return np.stack([_edges(table, numbers + step) - here for step in steps], axis=1) / _STEP
+    edges = _edges(table, numbers)
+    return np.stack([_edges(table, numbers + step) - edges for step in steps], axis=1) / _STEP

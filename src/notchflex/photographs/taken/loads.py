@@ -77,7 +77,7 @@ def _from_names(names: Sequence[str], robot: Robot, pattern: str) -> dict[str, t
     form = re.escape(pattern)
     for name, group in _FIELDS.items():
         form = form.replace(re.escape(f"{{{name}}}"), group)
-    found: list[dict[str, str]] = []
+    readings: list[dict[str, str]] = []
     for name in names:
         path = Path(name)
         match = re.fullmatch(form, path.name) or re.fullmatch(form, path.stem)
@@ -85,10 +85,10 @@ def _from_names(names: Sequence[str], robot: Robot, pattern: str) -> dict[str, t
             raise InputError.BAD_SYNTAX(
                 f"the name of the photograph {path.name} does not fit the pattern {pattern!r}"
             )
-        found.append(match.groupdict())
-    columns = {"tendon_force_N": tuple(one["tension"].replace(",", ".") for one in found)}
-    if "pull" in found[0]:
-        return {"pull": tuple(one["pull"] for one in found), **columns}
+        readings.append(match.groupdict())
+    columns = {"tendon_force_N": tuple(one["tension"].replace(",", ".") for one in readings)}
+    if "pull" in readings[0]:
+        return {"pull": tuple(one["pull"] for one in readings), **columns}
     return columns
 
 
@@ -98,15 +98,15 @@ def _from_exif(names: Sequence[str], robot: Robot) -> dict[str, tuple[str, ...]]
     pulls: list[str] = []
     for name in names:
         texts = exif_texts(photograph_bytes(name))
-        found = [match for text in texts if (match := _TENSION.search(text))]
-        if not found:
+        matches = [match for text in texts if (match := _TENSION.search(text))]
+        if not matches:
             words = f"its texts are {texts!r:.200}" if texts else "it has no text in EXIF"
             raise InputError.MISSING_VALUE(
                 f"{Path(name).name}: UserComment and ImageDescription of EXIF give no tension; "
                 f"{words}, write such as: tension=1.2 N"
             )
-        tensions.append(found[0]["tension"].replace(",", "."))
-        pull = _PULL.search(found[0].string)
+        tensions.append(matches[0]["tension"].replace(",", "."))
+        pull = _PULL.search(matches[0].string)
         pulls.append(pull["pull"] if pull else "")
     columns = {"tendon_force_N": tuple(tensions)}
     if all(pulls):

@@ -32,16 +32,16 @@ _STATES, _VALUES = 3, 12
 _BELOW = 0.38
 
 
-def design_picture(made: Design, *, title: str = "") -> Picture:
+def design_picture(design: Design, *, title: str = "") -> Picture:
     """Describe a design: the robot at up to three states, before and after, and its variables.
 
     Args:
-        made: The design.
+        design: The design.
         title: Heading.
     """
     cells: list[Cell] = []
-    path, before = made.path, made.path_before
-    states = list(made.state_steps.items())[-_STATES:]
+    path, before = design.path, design.path_before
+    states = list(design.state_steps.items())[-_STATES:]
     column = 0
     for label, one, colour in (("before", before, BEFORE), ("designed", path, AFTER)):
         if one is None or not one.converged.any():
@@ -49,16 +49,16 @@ def design_picture(made: Design, *, title: str = "") -> Picture:
         steps = [step for _, step in states if one.converged[step]]
         shades = [colour] * len(steps)
         panel = shape_panel(one, steps, plane_of(one), title=label, colours=shades, legend=BELOW)
-        cells.append(Cell(_with_curves(panel, made, one, label), 0, column, 2))
+        cells.append(Cell(_with_curves(panel, design, one, label), 0, column, 2))
         column += 1
-    several = [one for one in made.wishes if len(one.achieved) > 1]
-    beside = [_variables(made), *(_numbers(one) for one in several[:1])]
+    several = [one for one in design.wishes if len(one.achieved) > 1]
+    beside = [_variables(design), *(_numbers(one) for one in several[:1])]
     cells += stack(beside, column, 1 if several else 2)
-    name = title or f"{made.spec.name}: {made.before.name}"
+    name = title or f"{design.spec.name}: {design.before.name}"
     return Picture(name, 1.2 + 3.6 * (column + 1), 6.8, cells, [])
 
 
-def _with_curves(panel: Panel, made: Design, path: EquilibriumPath, label: str) -> Panel:
+def _with_curves(panel: Panel, design: Design, path: EquilibriumPath, label: str) -> Panel:
     """Add the points of target curves."""
     from dataclasses import replace
 
@@ -66,7 +66,7 @@ def _with_curves(panel: Panel, made: Design, path: EquilibriumPath, label: str) 
 
     marks: list[Mark] = list(panel.items)
     view = plane_of(path)
-    for curve in made.spec.curve:
+    for curve in design.spec.curve:
         points = target_points(curve)
         if view is not None:
             across = points[:, 0] * np.cos(view) + points[:, 1] * np.sin(view)
@@ -75,9 +75,9 @@ def _with_curves(panel: Panel, made: Design, path: EquilibriumPath, label: str) 
     return replace(panel, items=marks)
 
 
-def _variables(made: Design) -> Panel:
+def _variables(design: Design) -> Panel:
     """Where each variable lies between its limits."""
-    chosen = made.variables[:_VALUES]
+    chosen = design.variables[:_VALUES]
     if not chosen:
         return Panel([Note("no variables")], "", "", title="variables")
     after = [(v.value - v.lower) / (v.upper - v.lower) for v in chosen]

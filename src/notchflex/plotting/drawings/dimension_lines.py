@@ -39,8 +39,8 @@ def label(axes: Axes, x: float, y: float, text: str, **options: Any) -> None:
 
 def line(axes: Axes, x: Sequence[float], y: Sequence[float], **options: Any) -> None:
     """Draw a fine line."""
-    look: dict[str, Any] = {"color": FINE, "lw": 0.5, "zorder": 8}
-    axes.plot(x, y, **(look | options))
+    style: dict[str, Any] = {"color": FINE, "lw": 0.5, "zorder": 8}
+    axes.plot(x, y, **(style | options))
 
 
 def centre_line(axes: Axes, x: Sequence[float], y: Sequence[float]) -> None:
@@ -48,10 +48,10 @@ def centre_line(axes: Axes, x: Sequence[float], y: Sequence[float]) -> None:
     line(axes, x, y, dashes=(9, 2, 1.5, 2), zorder=7)
 
 
-def arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], **look: Any) -> None:
+def arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], **style: Any) -> None:
     """Draw an arrow that points at its end."""
     settings = {"arrowstyle": "-|>", "lw": 0.7, "color": FINE, "mutation_scale": 6.0}
-    properties = {"shrinkA": 0.0, "shrinkB": 0.0} | settings | look
+    properties = {"shrinkA": 0.0, "shrinkB": 0.0} | settings | style
     axes.annotate("", end, start, arrowprops=properties, zorder=12)
 
 

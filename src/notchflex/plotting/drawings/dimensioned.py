@@ -17,7 +17,7 @@ from notchflex.plotting.style import VERMILLION, house_style, save
 from notchflex.robot import Robot
 from notchflex.robot.kinds import Notch
 
-MOST = 6
+MAX_SHAPES = 6
 """Maximum number of shapes of notches in a drawing; a sentence names the others."""
 DIAMETER, ROOM = 1.9, 5.0
 """Largest outer diameter and side view on paper [in]."""
@@ -45,10 +45,10 @@ def dimensioned_figure(robot: Robot) -> Figure:
         True
     """
     shapes = _shapes(robot)
-    rows = [(names, robot.notch[place]) for names, place in shapes[:MOST]]
+    rows = [(names, robot.notch[number]) for names, number in shapes[:MAX_SHAPES]]
     views = [
-        notch_view(robot.notch[place], robot, place == 0, (*robot.notch, None)[place + 1])
-        for _, place in shapes[:MOST]
+        notch_view(robot.notch[number], robot, number == 0, (*robot.notch, None)[number + 1])
+        for _, number in shapes[:MAX_SHAPES]
     ]
     with house_style():
         heights = [_row_height(view, robot) for view in views]
@@ -64,11 +64,11 @@ def dimensioned_figure(robot: Robot) -> Figure:
         for (names, notch), view, height in zip(rows, views, heights, strict=True):
             _row(axes, robot, names, notch, view, top)
             top -= height
-        left = f" Not shown: notches {', '.join(s[0] for s in shapes[MOST:])}."
+        left = f" Not shown: notches {', '.join(s[0] for s in shapes[MAX_SHAPES:])}."
         note = "Lengths in mm, under the names of the robot file; to scale except where broken."
         if any(notch.precurvature_deg for notch in robot.notch):
             note += " Drawn without precurvature."
-        note += left if len(shapes) > MOST else ""
+        note += left if len(shapes) > MAX_SHAPES else ""
         axes.text(0.25, 0.16, note, fontsize=7.5, va="center", color=draw.FINE)
     return figure
 
@@ -82,13 +82,13 @@ def _shapes(robot: Robot) -> list[tuple[str, int]]:
     """Return the different notches: their numbers as text, and the index in `robot.notch`."""
     shapes: dict[Notch, tuple[list[str], int]] = {}
     first = 1
-    for place, notch in enumerate(robot.notch):
+    for number, notch in enumerate(robot.notch):
         last = first + notch.repeat - 1
         single = dataclasses.replace(notch, repeat=1, precurvature_deg=0.0)
-        names, _ = shapes.setdefault(single, ([], place))
+        names, _ = shapes.setdefault(single, ([], number))
         names.append(str(first) if first == last else f"{first}–{last}")
         first = last + 1
-    return [(", ".join(names), place) for names, place in shapes.values()]
+    return [(", ".join(names), number) for names, number in shapes.values()]
 
 
 def _scale(view: NotchView, robot: Robot) -> float:

@@ -39,11 +39,11 @@ def section_view(
         half = math.pi - half
     middle = 90.0 if view.toward else 270.0
     turn = math.degrees(half)
-    look = {"facecolor": SECTION, "edgecolor": draw.INK, "lw": 0.8, "zorder": 4}
+    style = {"facecolor": SECTION, "edgecolor": draw.INK, "lw": 0.8, "zorder": 4}
     if view.radial:
-        axes.add_patch(Wedge(centre, outer, middle - turn, middle + turn, width=wall, **look))
+        axes.add_patch(Wedge(centre, outer, middle - turn, middle + turn, width=wall, **style))
     else:
-        left = Wedge(centre, outer, 0, 360, width=wall, **look)
+        left = Wedge(centre, outer, 0, 360, width=wall, **style)
         axes.add_patch(left)
         size = outer + 0.1
         low, high = (y + level, y + size) if view.toward else (y - size, y + level)
@@ -70,8 +70,8 @@ def section_view(
 def _directions(axes: Axes, notch: Notch, centre: Centre, outer: float) -> None:
     """Draw the direction of bending, and the axes x and y of the base."""
     x, y = centre
-    look = {"color": VERMILLION, "lw": 2.0, "mutation_scale": 11.0}
-    draw.arrow(axes, (x, y + outer + 0.1), (x, y + outer + 0.42), **look)
+    style = {"color": VERMILLION, "lw": 2.0, "mutation_scale": 11.0}
+    draw.arrow(axes, (x, y + outer + 0.1), (x, y + outer + 0.42), **style)
     text = f"bends toward\ndirection {notch.direction_deg:g}°"
     draw.label(axes, x + 0.12, y + outer + 0.3, text, ha="left")
     corner = np.array([x + outer + 0.62, y - 0.72 * outer])
@@ -80,8 +80,8 @@ def _directions(axes: Axes, notch: Notch, centre: Centre, outer: float) -> None:
         way = np.array([math.cos(angle), math.sin(angle)])
         end = corner + 0.28 * way
         draw.arrow(axes, (corner[0], corner[1]), (end[0], end[1]), color=draw.INK)
-        place = corner + 0.37 * way
-        draw.label(axes, place[0], place[1], name)
+        position = corner + 0.37 * way
+        draw.label(axes, position[0], position[1], name)
 
 
 def _section_tendons(
@@ -92,17 +92,17 @@ def _section_tendons(
     nearest = max(range(len(turns)), key=lambda number: math.cos(turns[number]))
     for number, (tendon, turn) in enumerate(zip(robot.tendon, turns, strict=True)):
         way = np.array([-math.sin(turn), math.cos(turn)])
-        place = np.asarray(centre) + scale * tendon.radius * way
-        axes.plot(*place, "o", ms=5.0, color=VERMILLION, mec="white", mew=0.6, zorder=14)
+        position = np.asarray(centre) + scale * tendon.radius * way
+        axes.plot(*position, "o", ms=5.0, color=VERMILLION, mec="white", mew=0.6, zorder=14)
         if number != nearest:
             continue
         text = f"tendon\nradius\n{tendon.radius:.4g}"
         if abs(math.sin(turn)) < 1e-6 and math.cos(turn) > 0.0:
             at = centre[0] + outer + 0.28
-            draw.line(axes, [place[0], at + 0.05], [place[1]] * 2)
+            draw.line(axes, [position[0], at + 0.05], [position[1]] * 2)
             draw.line(axes, [centre[0], at + 0.05], [centre[1]] * 2)
-            draw.vertical(axes, centre[1], float(place[1]), at, at - 0.1)
-            draw.label(axes, at + 0.06, 0.5 * (centre[1] + float(place[1])), text, ha="left")
+            draw.vertical(axes, centre[1], float(position[1]), at, at - 0.1)
+            draw.label(axes, at + 0.06, 0.5 * (centre[1] + float(position[1])), text, ha="left")
         else:
-            draw.arrow(axes, centre, (float(place[0]), float(place[1])))
-            draw.label(axes, centre[0] + outer + 0.3, float(place[1]), text, ha="left")
+            draw.arrow(axes, centre, (float(position[0]), float(position[1])))
+            draw.label(axes, centre[0] + outer + 0.3, float(position[1]), text, ha="left")

@@ -124,8 +124,8 @@ def correlation_panel(fit: Calibration) -> Panel:
 
 def _smooth(value: np.ndarray, rise: np.ndarray, best: float) -> np.ndarray:
     """Return a curve through the points, which interpolates their nearly linear signed roots."""
-    known = np.isfinite(rise)
-    value, root = value[known], np.sqrt(rise[known]) * np.sign(value[known] - best)
+    is_known = np.isfinite(rise)
+    value, root = value[is_known], np.sqrt(rise[is_known]) * np.sign(value[is_known] - best)
     x = np.linspace(value[0], value[-1], 200)
     return np.stack([x, np.interp(x, value, root) ** 2], axis=1)
 

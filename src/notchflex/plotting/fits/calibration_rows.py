@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 MEASURED, MODEL, BAND = "measured", "model", "band"
 """Groups of marks in all panels."""
-MOST_NOTCHES = 6
+MAX_NOTCHES = 6
 """Of a robot with more notches some are drawn."""
-MOST_NAMED = 8
+MAX_NAMED = 8
 """Of so many notches a legend has the first and the last colour only."""
 
 _OTHERS = dots([], GREY, 3.5, marker="X", name="residuals of others", group="others")
@@ -38,8 +38,8 @@ def data_panels(fit: Calibration, label: str) -> Iterator[Panel]:
         if quantity == "axis_points":  # thirty points and more: only their residuals
             continue
         components = np.unique(fit.residuals.part[_rows_of(fit, label, quantity)])
-        if len(components) > MOST_NOTCHES:
-            spread = np.linspace(0, len(components) - 1, MOST_NOTCHES).round().astype(int)
+        if len(components) > MAX_NOTCHES:
+            spread = np.linspace(0, len(components) - 1, MAX_NOTCHES).round().astype(int)
             components = components[spread]
         for component in components.tolist():
             yield data_panel(fit, label, quantity, component)
@@ -66,12 +66,12 @@ def data_panel(fit: Calibration, label: str, quantity: str, component: int) -> P
         curve = np.stack([x[rows], model], axis=1)
         items.append(Curve(curve, BLUE, group=MODEL, layer=3, hover=True))
         for pull in dict.fromkeys(residuals.pull[rows].tolist()):
-            there = residuals.pull[rows] == pull
-            points = np.stack([x[rows][there], measured[there] * scale], axis=1)
-            title = f"{MEASURED}, pull {sample.pull[residuals.row[rows][there][0]]}"
-            look: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "hollow": True}
-            look |= {"name": title, "group": MEASURED, "layer": 4, "hover": True}
-            items.append(dots(points, GREY, 3.2, **look))
+            of_pull = residuals.pull[rows] == pull
+            points = np.stack([x[rows][of_pull], measured[of_pull] * scale], axis=1)
+            title = f"{MEASURED}, pull {sample.pull[residuals.row[rows][of_pull][0]]}"
+            style: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "hollow": True}
+            style |= {"name": title, "group": MEASURED, "layer": 4, "hover": True}
+            items.append(dots(points, GREY, 3.2, **style))
     if quantity in ("tip_position", "tip_rotation"):
         title = f"{name}, {'xyz'[component]}"
     else:
@@ -99,9 +99,9 @@ def residual_panel(fit: Calibration, label: str) -> Panel:
     if others.any():
         items.append(replace(_OTHERS, points=points[others], hover=True, layer=1))
     for notch, entry in _notch_entries(fit).items():
-        there = angles & (residuals.part == notch)
-        if there.any():
-            items.append(replace(entry, points=points[there], hover=True, layer=3))
+        of_notch = angles & (residuals.part == notch)
+        if of_notch.any():
+            items.append(replace(entry, points=points[of_notch], hover=True, layer=3))
     title = _titled(fit, label, "model less measured")
     return Panel(items, x_label, "residual / its noise [-]", title=title)
 
@@ -109,7 +109,7 @@ def residual_panel(fit: Calibration, label: str) -> Panel:
 def residual_entries(fit: Calibration) -> list[Curve]:
     """Return the legend entries of the residuals: colours of notches, marks of all others."""
     notches = list(_notch_entries(fit).values())
-    return [*(notches if len(notches) < MOST_NAMED else [notches[0], notches[-1]]), _OTHERS]
+    return [*(notches if len(notches) < MAX_NAMED else [notches[0], notches[-1]]), _OTHERS]
 
 
 def _notch_entries(fit: Calibration) -> dict[int, Curve]:
@@ -168,12 +168,12 @@ def _abscissa(fit: Calibration, label: str) -> tuple[NDArray[np.float64], str]:
             if not np.isfinite(varied).all() or np.ptp(varied) == 0.0:
                 continue
             for number, table in tables.items():
-                there = residuals.sample == number
-                x[there] = table[residuals.row[there], tendon]
+                of_sample = residuals.sample == number
+                x[of_sample] = table[residuals.row[of_sample], tendon]
             quantity = QUANTITIES[name]
             title = quantity.title + (f" {tendon + 1}" if count > 1 else "")
             return x, quantity.label.replace(quantity.title, title, 1)
     for number in samples:
-        there = residuals.sample == number
-        x[there] = residuals.row[there] + 1
+        of_sample = residuals.sample == number
+        x[of_sample] = residuals.row[of_sample] + 1
     return x, "row [number]"

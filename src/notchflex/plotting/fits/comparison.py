@@ -93,8 +93,8 @@ def _angle_panels(comparison: Comparison, models: Mapping[str, Comparison]) -> I
             continue
         items: list[Mark] = []
         for label, entry in _trials(comparison).items():
-            there = (trial == label) & np.isfinite(measured)
-            points = np.stack([x[there], measured[there] * DEGREES], axis=1)
+            of_trial = (trial == label) & np.isfinite(measured)
+            points = np.stack([x[of_trial], measured[of_trial] * DEGREES], axis=1)
             items.append(replace(entry, points=points, size=3.2, name="", hover=True))
         for label, colour, dash in _styles(models):
             angles = _computed(models[label], notch) * DEGREES
@@ -129,19 +129,19 @@ def _abscissa(comparison: Comparison) -> tuple[NDArray[np.float64], str]:
     measured = comparison.measured
     tables = {"tension": measured.measured_tension, "stroke": measured.load.stroke}
     for name, values in tables.items():
-        there = ~np.isnan(values).any(axis=0)
-        if there.any():
-            return values[:, int(np.argmax(there))], QUANTITIES[name].label
+        is_known = ~np.isnan(values).any(axis=0)
+        if is_known.any():
+            return values[:, int(np.argmax(is_known))], QUANTITIES[name].label
     return np.arange(1.0, len(measured) + 1.0), "row of the table"
 
 
 def _lines(comparison: Comparison, x: NDArray[np.float64]) -> list[NDArray[np.intp]]:
     """Return the points of each line of the model: all by load if from rest, else by trial."""
-    good = np.flatnonzero(comparison.converged)
+    converged = np.flatnonzero(comparison.converged)
     if comparison.measured.from_rest:
-        return [good[np.argsort(x[good], kind="stable")]]
+        return [converged[np.argsort(x[converged], kind="stable")]]
     trial = np.array(comparison.measured.pull)
-    return [good[trial[good] == label] for label in comparison.measured.pulls]
+    return [converged[trial[converged] == label] for label in comparison.measured.pulls]
 
 
 def _trials(comparison: Comparison) -> dict[str, Curve]:
@@ -191,8 +191,8 @@ def _representative_points(comparison: Comparison) -> list[int]:
     if not len(candidates):
         return []
     angle = comparison.total_angle[candidates]
-    wanted = np.linspace(angle.min(), angle.max(), SHAPES)
-    nearest = (int(candidates[np.argmin(np.abs(angle - goal))]) for goal in wanted)
+    targets = np.linspace(angle.min(), angle.max(), SHAPES)
+    nearest = (int(candidates[np.argmin(np.abs(angle - goal))]) for goal in targets)
     return list(dict.fromkeys(nearest))
 
 

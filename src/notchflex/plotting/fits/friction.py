@@ -63,11 +63,11 @@ def _items(rig: FrictionRig, x: NDArray[np.float64]) -> list[Mark]:
     points = np.stack([x, readings.coefficient], axis=1)
     deviation = readings.coefficient_deviation
     error = deviation if np.isfinite(deviation).any() else None
-    look: dict[str, Any] = {"hover": True, "error": error}
-    items.append(dots(points, _READING, name="reading", group="reading", **look))
+    style: dict[str, Any] = {"hover": True, "error": error}
+    items.append(dots(points, _READING, name="reading", group="reading", **style))
     if rig.outliers:
-        look = {"hollow": True, "layer": 3, "name": "outlier", "group": "outlier"}
-        items.append(dots(points[list(rig.outliers)], VERMILLION, 8.0, **look))
+        style = {"hollow": True, "layer": 3, "name": "outlier", "group": "outlier"}
+        items.append(dots(points[list(rig.outliers)], VERMILLION, 8.0, **style))
     return items
 
 
@@ -77,8 +77,8 @@ def _other_model(
     """Return the alternative model over one variable, with the other one at its mean."""
     if not np.isfinite(slope):
         return []
-    places = np.linspace(x.min(), x.max(), 100)
-    along = np.log(places) - np.mean(np.log(x)) if logarithmic else places - x.mean()
+    positions = np.linspace(x.min(), x.max(), 100)
+    along = np.log(positions) - np.mean(np.log(x)) if logarithmic else positions - x.mean()
     mean = float(np.mean(rig.readings.coefficient))
-    line = np.stack([places, mean + slope * along], axis=1)
+    line = np.stack([positions, mean + slope * along], axis=1)
     return [Curve(line, ORANGE, name="not constant", group="not constant", layer=3)]

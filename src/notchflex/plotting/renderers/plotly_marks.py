@@ -48,20 +48,20 @@ def traces(item: Mark, panel: Panel, where: Layout, layout: Layout) -> Iterator[
         case Span():
             layout["shapes"].append(_shape(item, where))
             if item.name:  # a shape has no entry in a legend
-                look: Layout = {"name": item.name, "group": item.group or item.name}
-                line = Curve([], item.colour, item.dash, item.width, **look)
-                band = Area([], item.colour, item.colour, item.opacity, 0.0, **look)
+                style: Layout = {"name": item.name, "group": item.group or item.name}
+                line = Curve([], item.colour, item.dash, item.width, **style)
+                band = Area([], item.colour, item.colour, item.opacity, 0.0, **style)
                 yield entry_trace(line if item.low == item.high else band)
         case Bars():
             yield _bars(item, _axis(layout, where, "y"))
         case Correlations():
             yield _correlations(item, where, layout)
         case Note():
-            place: Layout = {"x": 0.5, "y": 0.5}
+            anchor: Layout = {"x": 0.5, "y": 0.5}
             if item.corner:
-                place = {"x": 0.03, "y": 0.95, "xanchor": "left", "yanchor": "top"}
+                anchor = {"x": 0.03, "y": 0.95, "xanchor": "left", "yanchor": "top"}
             layout["annotations"].append(
-                {"text": for_browser(item.text), "font": {"color": css(item.colour)}, **place,
+                {"text": for_browser(item.text), "font": {"color": css(item.colour)}, **anchor,
                  "xref": f"{where['xaxis']} domain", "yref": f"{where['yaxis']} domain",
                  "showarrow": False}
             )  # fmt: skip
@@ -134,11 +134,11 @@ def _mesh(item: Faces) -> Layout:
 def _arrow(item: Arrow) -> Iterator[Layout]:
     start, end = np.asarray(item.start, float), np.asarray(item.end, float)
     step, colour = end - start, css(item.colour)
-    look: Layout = {"hoverinfo": "skip", **_named(item)}
+    style: Layout = {"hoverinfo": "skip", **_named(item)}
     if len(start) == 3:
         ends = zip("xyz", np.stack([start, end]).T, strict=True)
         line = {"color": colour, "width": 3.0 * item.width}
-        yield {"type": "scatter3d", "mode": "lines", "line": line, **dict(ends), **look}
+        yield {"type": "scatter3d", "mode": "lines", "line": line, **dict(ends), **style}
         yield {
             "type": "cone", "anchor": "tip", "sizemode": "raw", "showscale": False,
             "colorscale": [[0, colour], [1, colour]], "hoverinfo": "skip", "showlegend": False,
@@ -153,7 +153,7 @@ def _arrow(item: Arrow) -> Iterator[Layout]:
         "type": "scatter", "mode": "lines+markers", "x": curve[:, 0], "y": curve[:, 1],
         "line": {"color": colour, "width": POINT * item.width},
         "marker": {"symbol": "arrow", "angleref": "previous", "color": colour,
-                   "size": [0.0] * 20 + [11.0]}, **look,
+                   "size": [0.0] * 20 + [11.0]}, **style,
     }  # fmt: skip
 
 

@@ -38,15 +38,15 @@ def figure_of(picture: Sheet) -> Figure:
     with house_style():
         heading = "\n".join(map(for_paper, heading_lines(picture.title, picture.width)))
         figure = new_figure(picture.width, picture.height, heading)
-        places = figure.add_gridspec(*picture.shape)
+        grid = figure.add_gridspec(*picture.shape)
         scales: dict[str, list[Axes]] = {}
         shared: dict[str, Axes] = {}
         for cell in picture.cells:
             panel = cell.panel
-            place = places[cell.row : cell.row + cell.height, cell.column]
+            cells = grid[cell.row : cell.row + cell.height, cell.column]
             options: dict[str, Any] = {"projection": "3d"} if panel.in_space else {}
             options |= {f"share{name}": shared.get(name) for name in panel.shared}
-            axes: Any = figure.add_subplot(place, **options)
+            axes: Any = figure.add_subplot(cells, **options)
             for name in panel.shared:
                 shared.setdefault(name, axes)
             draw_panel(axes, panel)
@@ -131,19 +131,19 @@ def _draw(axes: Any, item: Any) -> None:
         case Arrow():
             _draw_arrow(axes, item)
         case Span():
-            look: dict[str, Any] = {"color": item.colour, "label": for_paper(item.name) or None}
+            style: dict[str, Any] = {"color": item.colour, "label": for_paper(item.name) or None}
             way = "v" if item.axis == "x" else "h"
             if item.low == item.high:
-                look |= {"linestyle": _dashes(item.dash), "linewidth": item.width}
-                getattr(axes, f"ax{way}line")(item.low, **look)
+                style |= {"linestyle": _dashes(item.dash), "linewidth": item.width}
+                getattr(axes, f"ax{way}line")(item.low, **style)
             else:
-                look |= {"alpha": item.opacity, "linewidth": 0.0}
-                getattr(axes, f"ax{way}span")(item.low, item.high, **look)
+                style |= {"alpha": item.opacity, "linewidth": 0.0}
+                getattr(axes, f"ax{way}span")(item.low, item.high, **style)
         case Bars():
-            places = np.arange(len(item.values))
-            bars = axes.barh(places, item.values, color=item.colours, height=0.6)
+            positions = np.arange(len(item.values))
+            bars = axes.barh(positions, item.values, color=item.colours, height=0.6)
             axes.bar_label(bars, fmt="{:.2f}", padding=3, fontsize=8.0)
-            axes.set_yticks(places, [for_paper(name) for name in item.names])
+            axes.set_yticks(positions, [for_paper(name) for name in item.names])
             axes.invert_yaxis()
             axes.grid(visible=False, axis="y")
         case Correlations():
@@ -151,9 +151,9 @@ def _draw(axes: Any, item: Any) -> None:
         case Note():
             at = (0.03, 0.95) if item.corner else (0.5, 0.5)
             aligned = {"va": "top"} if item.corner else {"ha": "center"}
-            look = {"transform": axes.transAxes, "color": item.colour, **aligned}
+            style = {"transform": axes.transAxes, "color": item.colour, **aligned}
             write = axes.text2D if axes.name == "3d" else axes.text
-            write(*at, for_paper(item.text), **look)
+            write(*at, for_paper(item.text), **style)
         case _:
             pass  # faces are drawn together, before
 
@@ -190,13 +190,13 @@ def _line_look(item: Curve) -> dict[str, Any]:
 
 def _draw_arrow(axes: Any, item: Arrow) -> None:
     start, end = np.asarray(item.start, float), np.asarray(item.end, float)
-    look: dict[str, Any] = {"color": item.colour, "linewidth": item.width}
+    style: dict[str, Any] = {"color": item.colour, "linewidth": item.width}
     if len(start) == 3:
-        axes.quiver(*start, *(end - start), label=for_paper(item.name) or None, **look)
+        axes.quiver(*start, *(end - start), label=for_paper(item.name) or None, **style)
         return
     shape: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 9.0}
     shape |= {"connectionstyle": f"arc3,rad={item.bend}", "shrinkA": 0.0, "shrinkB": 0.0}
-    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), zorder=item.layer, **shape, **look))
+    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), zorder=item.layer, **shape, **style))
     axes.update_datalim(np.stack([start, end]) if item.reach is None else item.reach)
     if item.name:
         axes.plot(
@@ -214,11 +214,11 @@ def _draw_correlations(axes: Any, item: Correlations) -> None:
     texts = item.texts
     for (row, column), value in np.ndenumerate(item.values):
         shade = "white" if abs(value) > 0.7 else "black"
-        look: dict[str, Any] = {"fontsize": item.font_size, "color": shade}
-        axes.text(column, row, texts[row][column], ha="center", va="center", **look)
-    places, size = range(len(item.names)), min(7.0, 3.1 * item.font_size)
-    axes.set_xticks(places, [str(number + 1) for number in places], fontsize=size)
-    axes.set_yticks(places, [for_paper(row) for row in item.rows], fontsize=size)
+        style: dict[str, Any] = {"fontsize": item.font_size, "color": shade}
+        axes.text(column, row, texts[row][column], ha="center", va="center", **style)
+    positions, size = range(len(item.names)), min(7.0, 3.1 * item.font_size)
+    axes.set_xticks(positions, [str(number + 1) for number in positions], fontsize=size)
+    axes.set_yticks(positions, [for_paper(row) for row in item.rows], fontsize=size)
     axes.grid(visible=False)
 
 

@@ -47,9 +47,9 @@ def _component(
 ) -> Panel:
     force, spread = sensed.force[:, which], 1.96 * sensed.deviation[:, which]
     spread = np.minimum(spread, sensed.largest)
-    good = np.isfinite(force)
-    whole = _band(x[good], sensed.low[good, which], sensed.high[good, which])
-    noise = _band(x[good], (force - spread)[good], (force + spread)[good])
+    is_known = np.isfinite(force)
+    whole = _band(x[is_known], sensed.low[is_known, which], sensed.high[is_known, which])
+    noise = _band(x[is_known], (force - spread)[is_known], (force + spread)[is_known])
     items: list[Mark] = [
         Area([whole], ORANGE, ORANGE, opacity=0.3, name="noise and stuck friction", group="all"),
         Area([noise], BLUE, BLUE, opacity=0.25, name="noise alone, to first order", group="noise"),
@@ -70,8 +70,8 @@ def _component(
 def _band(
     x: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    there, back = np.stack([x, high], axis=1), np.stack([x, low], axis=1)[::-1]
-    return np.concatenate([there, back])
+    upper, lower = np.stack([x, high], axis=1), np.stack([x, low], axis=1)[::-1]
+    return np.concatenate([upper, lower])
 
 
 def _readings(sensed: SensedForce, x: NDArray[np.float64]) -> list[Panel]:

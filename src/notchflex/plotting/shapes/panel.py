@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 Quads = NDArray[np.float64]
 
-MOST_SHAPES = 5
+MAX_SHAPES = 5
 """More shapes than this hide each other."""
 
 ARROW, SHORTEST = 0.18, 0.25
@@ -48,21 +48,21 @@ _NOTHING = 1e-6
 
 
 def representative_steps(
-    path: EquilibriumPath, most: int = MOST_SHAPES, among: Sequence[int] | None = None
+    path: EquilibriumPath, most: int = MAX_SHAPES, among: Sequence[int] | None = None
 ) -> list[int]:
     """Return an even selection of converged steps (`among` some), straightest to most bent.
 
     Of equal shapes it has the first.
     """
-    good = np.flatnonzero(np.asarray(path.converged) & np.isfinite(path.total_angle))
+    converged = np.flatnonzero(np.asarray(path.converged) & np.isfinite(path.total_angle))
     if among is not None:
-        good = np.array([step for step in among if step in good], int)
-    if not len(good):
+        converged = np.array([step for step in among if step in converged], int)
+    if not len(converged):
         return []
-    bend = np.abs(path.notch_angle[good]).sum(axis=1)
+    bend = np.abs(path.notch_angle[converged]).sum(axis=1)
     chosen: list[int] = []
     for target in np.linspace(bend.min(), bend.max(), most):
-        step = int(good[np.argmin(np.abs(bend - target))])
+        step = int(converged[np.argmin(np.abs(bend - target))])
         near = any(np.ptp([path.total_angle[step], path.total_angle[c]]) < 1e-6 for c in chosen)
         if step not in chosen and not (near and np.ptp(bend) < 1e-6):
             chosen.append(step)
@@ -153,14 +153,14 @@ def _from_the_side(
         yield Area([drawn.held], GREY, GREY, 0.5, layer=1)
     # Pale and nearly opaque, so that lines of shapes behind others can be seen.
     pale = tuple(1.0 - 0.3 * (1.0 - part) for part in rgb(colour))
-    look: dict[str, Any] = {"group": label}
+    style: dict[str, Any] = {"group": label}
     polygons = [*drawn.flexures, *drawn.bodies]
-    yield Area(polygons, pale, colour, name=label, layer=2 + level, **look)
+    yield Area(polygons, pale, colour, name=label, layer=2 + level, **style)
     gap = np.full((1, 2), np.nan)
     bores = np.concatenate([part for line in drawn.bores for part in (line, gap)])
-    yield Curve(bores, colour, FINE, 0.5, layer=3 + level, **look)
+    yield Curve(bores, colour, FINE, 0.5, layer=3 + level, **style)
     for line in drawn.tendons:
-        yield Curve(line, ORANGE, width=1.0, layer=4 + level, **look)
+        yield Curve(line, ORANGE, width=1.0, layer=4 + level, **style)
 
 
 def _in_space(shape: RobotShape, colour: Colour, label: str, first: bool) -> Iterator[Mark]:
@@ -181,16 +181,16 @@ def _load_arrows(
     largest = {kind: max((one.size for one in loads if one.name == kind), default=0.0)
                for kind in ("force", "moment")}  # fmt: skip
     for one in loads:
-        look: dict[str, Any] = {"layer": layer, "name": "" if one.label in named else one.label}
+        style: dict[str, Any] = {"layer": layer, "name": "" if one.label in named else one.label}
         named.add(one.label)
         end = one.point + scaled_arrow(one, largest[one.name], longest)
         if view is None:
-            if one.name == "moment" and look["name"]:
-                look["name"] += ", about its arrow"
+            if one.name == "moment" and style["name"]:
+                style["name"] += ", about its arrow"
             width = 1.8 if one.name == "force" else 0.9
-            yield Arrow(one.point, end, COLOUR[one.kind], width=width, **look)
+            yield Arrow(one.point, end, COLOUR[one.kind], width=width, **style)
         elif one.name == "force":
-            yield Arrow(project(one.point, view), project(end, view), COLOUR[one.kind], **look)
+            yield Arrow(project(one.point, view), project(end, view), COLOUR[one.kind], **style)
         else:
             # Seen with z up and the view to the right, a moment about +normal turns z to the right.
             normal = np.array([-np.sin(view), np.cos(view), 0.0])
@@ -198,8 +198,8 @@ def _load_arrows(
             start = project(one.point, view)
             side = 0.4 * longest * turn * np.array([1.0, 0.0])
             reach = np.array([start - longest, start + longest])
-            look |= {"bend": 0.9, "reach": reach}
-            yield Arrow(start - side, start + side, COLOUR[one.kind], **look)
+            style |= {"bend": 0.9, "reach": reach}
+            yield Arrow(start - side, start + side, COLOUR[one.kind], **style)
 
 
 def body_faces(shape: RobotShape) -> Iterator[Quads]:

@@ -52,9 +52,9 @@ def prism(polygon: Points, view: float, depth: float) -> Manifold:
     """
     from manifold3d import CrossSection, FillRule, Manifold
 
-    made = Manifold.extrude(CrossSection([polygon], FillRule.NonZero), depth)
+    solid = Manifold.extrude(CrossSection([polygon], FillRule.NonZero), depth)
     across = np.array([math.cos(view), math.sin(view), 0.0])
     along = np.array([0.0, 0.0, 1.0])
     axes = np.stack([across, along, np.cross(across, along)], axis=1)
     middle = axes @ np.array([0.0, 0.0, -0.5 * depth])
-    return made.transform(np.concatenate([axes, middle[:, None]], axis=1))
+    return solid.transform(np.concatenate([axes, middle[:, None]], axis=1))

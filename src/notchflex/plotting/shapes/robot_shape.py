@@ -97,9 +97,9 @@ class RobotShape:
             np.asarray(values)[:, column] for values in (group.present, group.visits)
         )
         walls = self.walls(self.robot.tendon[number].direction_deg)
-        place = np.asarray(self.chain.tendon_place)[number]
+        position = np.asarray(self.chain.tendon_place)[number]
         if radius is not None:
-            place = _radial(radius, self.robot.tendon[number].direction_deg)
+            position = _radial(radius, self.robot.tendon[number].direction_deg)
         for body in range(len(self.position)):
             if body and not present[body - 1]:
                 break
@@ -108,7 +108,7 @@ class RobotShape:
                 yield self.flexures[body - 1].fibre(*across), False
             ends = walls[body]
             if ends is not None and (body == 0 or visits[body - 1]):
-                yield self.on_body(body, [place + at * UP for at in ends]), True
+                yield self.on_body(body, [position + at * UP for at in ends]), True
 
     def lips(self, notch: int, radius: float | None = None) -> Points:
         """Return the point midway between the edges of a notch (from 0) that meet when it closes.
@@ -183,18 +183,18 @@ def shape_from_modes(
     nodes = jax.tree.map(np.asarray, _node_poses()(chain.rods, np.asarray(modes)))
     # From the proximal body's frame: start, nodes; from the distal one's: end.
     first = np.concatenate([rods.start_rotation[:, None], nodes.rotation], axis=1)
-    places = np.concatenate([rods.start_offset[:, None], nodes.translation], axis=1)
+    poses = np.concatenate([rods.start_offset[:, None], nodes.translation], axis=1)
     last = np.swapaxes(rods.end_rotation, -1, -2)
     axes = np.concatenate([rotation[:-1, None] @ first, (rotation[1:] @ last)[:, None]], axis=1)
     end = position[1:] - np.einsum("nij,njk,nk->ni", rotation[1:], last, rods.end_offset)
-    along = position[:-1, None] + places @ np.swapaxes(rotation[:-1], -1, -2)
+    along = position[:-1, None] + poses @ np.swapaxes(rotation[:-1], -1, -2)
     line = np.concatenate([along, end[:, None]], axis=1)
     flexures: dict[int, FlexureShape] = {}
     counts = (rods.length > 0.0).sum(axis=1)
     for count in np.unique(counts):  # flexures with the same number of nodes together
         same_count = np.flatnonzero(counts == count)
-        there = np.stack([np.flatnonzero(rods.length[j] > 0.0) for j in same_count])
-        kept = np.concatenate([np.zeros((len(same_count), 1), int), there + 1], axis=1)
+        with_length = np.stack([np.flatnonzero(rods.length[j] > 0.0) for j in same_count])
+        kept = np.concatenate([np.zeros((len(same_count), 1), int), with_length + 1], axis=1)
         kept = np.concatenate([kept, np.full((len(same_count), 1), axes.shape[1] - 1)], axis=1)
         parts = -(-pieces // (int(count) + 1))
         row = same_count[:, None]
@@ -202,7 +202,7 @@ def shape_from_modes(
         at_node = np.arange(points.shape[1]) / parts - 1.0
         section = rods.section
         for j, nodes_there, frames, places_there in zip(
-            same_count, there, turned, points, strict=True
+            same_count, with_length, turned, points, strict=True
         ):
             spine, near, area = (
                 np.interp(at_node, np.arange(count), values[j, nodes_there])

@@ -18,22 +18,22 @@ from notchflex.robot.value_names import described_at
 if TYPE_CHECKING:
     from notchflex.sweeping import Sweep
 
-MOST_POINTS = 2000
+MAX_POINTS = 2000
 """Rows that are drawn; of more, an even selection."""
 
 _BINS = 24
-_LEAST = 20
+_MIN_PER_BIN = 20
 """A bin with fewer rows has no quantiles."""
 
 
-def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
+def sweep_picture(sweep: Sweep, x: str, y: str) -> Picture:
     """Describe one column of a sweep over another.
 
     Rows as points, rejected ones in another colour; where there are many, the median and the band
     that holds 95 % of them, along x. Rows without a result lie on the axis of x.
 
     Args:
-        found: The sweep.
+        sweep: The sweep.
         x: A variable or a kept quantity.
         y: Another one.
 
@@ -42,7 +42,7 @@ def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
     """
     import polars
 
-    frame = found.lazy()
+    frame = sweep.lazy()
     columns = [one for one in frame.collect_schema().names() if one != "code"]
     for name in (x, y):
         if name == "code":
@@ -54,31 +54,31 @@ def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
                 f'the sweep has no column "{name}"{nearest(name, columns)}; there are '
                 f"{', '.join(columns)}."
             )
-    if found.rows > MOST_POINTS and found.plan.output.rows:
+    if sweep.rows > MAX_POINTS and sweep.plan.output.rows:
         # Every k-th row would be a regular part of a grid or of a Sobol sequence.
         scattered = polars.col("row") % 2**31 * 2_654_435_761 % 2**32
-        frame = frame.filter(scattered < 2**32 * MOST_POINTS // found.rows)
+        frame = frame.filter(scattered < 2**32 * MAX_POINTS // sweep.rows)
     table = frame.select("row", "code", polars.col(x).alias("x"), polars.col(y).alias("y"))
     table = table.collect()
     code = table["code"].cast(str).to_numpy()
     both = table.select("x", "y").cast(polars.Float64).to_numpy()
-    good = np.isfinite(both).all(axis=1)
+    is_finite = np.isfinite(both).all(axis=1)
     if not np.isfinite(both[:, 0]).any():
         raise InputError.NO_DATA(f"no row has a number of {x}.")
     items: list[Mark] = []
     for name, colour in (("accepted", BLUE), ("rejected", ORANGE)):
-        chosen = good & (code == name)
+        chosen = is_finite & (code == name)
         if chosen.any():
             items.append(dots(both[chosen], colour, 1.6, name=name, group=name))
-    if good.sum() >= _LEAST * _BINS:
-        items += _band(both[good])
-    lost = ~good & np.isfinite(both[:, 0])
+    if is_finite.sum() >= _MIN_PER_BIN * _BINS:
+        items += _band(both[is_finite])
+    lost = ~is_finite & np.isfinite(both[:, 0])
     if lost.any():
-        floor = both[good, 1].min() if good.any() else 0.0
-        places = np.column_stack([both[lost, 0], np.full(lost.sum(), floor)])
-        items.append(dots(places, VERMILLION, 4.0, name="no result", group="lost", marker="X"))
-    panel = Panel(items, _label(found, x), _label(found, y), legend=BESIDE)
-    title = f"{found.plan.name}: {found.rows} rows"
+        floor = both[is_finite, 1].min() if is_finite.any() else 0.0
+        positions = np.column_stack([both[lost, 0], np.full(lost.sum(), floor)])
+        items.append(dots(positions, VERMILLION, 4.0, name="no result", group="lost", marker="X"))
+    panel = Panel(items, _label(sweep, x), _label(sweep, y), legend=BESIDE)
+    title = f"{sweep.plan.name}: {sweep.rows} rows"
     return Picture(title, 6.4, 4.8, grid([panel], 1))
 
 
@@ -109,13 +109,13 @@ def _band(both: np.ndarray) -> list[Mark]:
     ]
 
 
-def _label(found: Sweep, name: str) -> str:
+def _label(sweep: Sweep, name: str) -> str:
     """Return the label of an axis, with its unit."""
-    variables: list[Any] = [one.value for one in found.plan.variable]
+    variables: list[Any] = [one.value for one in sweep.plan.variable]
     if name in variables:
-        unit = described_at(found.robot, name).unit
+        unit = described_at(sweep.robot, name).unit
         return f"{name} [{unit}]" if unit else name
-    kept = {one.quantity for one in found.plan.keep}
+    kept = {one.quantity for one in sweep.plan.keep}
     fitting = [one for one in kept if f"{name}_".startswith(f"{one}_")]
     if not fitting:
         return name
@@ -125,7 +125,7 @@ def _label(found: Sweep, name: str) -> str:
         word if axis == "axis" else f"{axis} {word}"
         for axis, word in zip(quantity.per, words, strict=False)
     )
-    loads = found.plan.load if len(found.plan.load) > 1 else ()
+    loads = sweep.plan.load if len(sweep.plan.load) > 1 else ()
     at = [f"at {one}" for one in loads if f"_at_{one}" in name]
     step = name.rpartition("_step_")[2] if "_step_" in name else ""
     at += [f"step {step}"] if step.isdecimal() else []

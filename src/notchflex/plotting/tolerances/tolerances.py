@@ -24,11 +24,11 @@ from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VER
 if TYPE_CHECKING:
     from notchflex.tolerancing import ToleranceAnalysis
 
-MOST_LIMITS, MOST_BARS = 4, 12
+MAX_LIMITS, MAX_BARS = 4, 12
 _BINS = 60
 
 
-def tolerance_picture(found: ToleranceAnalysis) -> Picture:
+def tolerance_picture(analysis: ToleranceAnalysis) -> Picture:
     """Describe what tolerances do to a robot.
 
     For every limit, of many those that reject most, the histogram of drawn robots with the limits,
@@ -36,26 +36,26 @@ def tolerance_picture(found: ToleranceAnalysis) -> Picture:
     if one dimension were exact.
 
     Args:
-        found: The analysis.
+        analysis: The analysis.
     """
-    outside = found.below + found.above
-    shown = np.sort(np.argsort(-outside, kind="stable")[:MOST_LIMITS])
-    panels = [_histogram(found, int(index)) for index in shown]
-    order = [int(one) for one in found.order[:MOST_BARS]]
+    outside = analysis.below + analysis.above
+    shown = np.sort(np.argsort(-outside, kind="stable")[:MAX_LIMITS])
+    panels = [_histogram(analysis, int(index)) for index in shown]
+    order = [int(one) for one in analysis.order[:MAX_BARS]]
     worst = int(np.argmax(outside))
-    panels += [_sensitivity(found, worst, order), _yields(found, order)]
+    panels += [_sensitivity(analysis, worst, order), _yields(analysis, order)]
     columns = min(len(panels), 3)
     rows = -(-len(panels) // columns)
-    low, high = (100.0 * end for end in found.interval)
+    low, high = (100.0 * end for end in analysis.interval)
     title = (
-        f"{found.robot.name}: yield {100.0 * found.accepted_fraction:.1f} % "
-        f"({low:.1f} to {high:.1f} %) of {found.draws} robots"
+        f"{analysis.robot.name}: yield {100.0 * analysis.accepted_fraction:.1f} % "
+        f"({low:.1f} to {high:.1f} %) of {analysis.draws} robots"
     )
     cells, size = grid(panels, columns), (0.8 + 4.2 * columns, 1.0 + 3.0 * rows)
-    return Picture(title, *size, cells, _legend(found))
+    return Picture(title, *size, cells, _legend(analysis))
 
 
-def _legend(found: ToleranceAnalysis) -> list[Curve | Area]:
+def _legend(analysis: ToleranceAnalysis) -> list[Curve | Area]:
     """Return what the colours of all panels mean."""
     nothing = np.zeros((0, 2))
     entries: list[Curve | Area] = [
@@ -65,21 +65,21 @@ def _legend(found: ToleranceAnalysis) -> list[Curve | Area]:
         Curve(nothing, GREEN, name="drawing; yield as it is"),
         Curve(nothing, GREY, DASHED, name="worst case"),
     ]
-    if found.wanted_yield is not None:
+    if analysis.wanted_yield is not None:
         entries.append(Curve(nothing, PURPLE, name="wanted yield"))
     return entries
 
 
-def _histogram(found: ToleranceAnalysis, index: int) -> Panel:
-    one = found.criteria[index]
+def _histogram(analysis: ToleranceAnalysis, index: int) -> Panel:
+    one = analysis.criteria[index]
     scale = one.quantity.scale
     unit = f" [{one.quantity.unit}]" if one.quantity.unit else ""
-    edges, count = found.drawn.histogram(index, _BINS)
+    edges, count = analysis.drawn.histogram(index, _BINS)
     edges = edges * scale
     label = f"{one.name.replace('_', ' ')}{unit}"
     if not len(count):
         return Panel([Note("no robot has a result")], label, "robots [%]")
-    tops = 100.0 * count / found.draws
+    tops = 100.0 * count / analysis.draws
     lower, upper = one.lower * scale, one.upper * scale
     inside = (edges[:-1] >= lower) & (edges[1:] <= upper)
     items: list[Mark] = []
@@ -89,9 +89,9 @@ def _histogram(found: ToleranceAnalysis, index: int) -> Panel:
     for end in (lower, upper):
         if np.isfinite(end):
             items.append(Span("x", end, end, VERMILLION, width=1.4, layer=4, name="limit"))
-    nominal = found.linear.nominal[index] * scale
+    nominal = analysis.linear.nominal[index] * scale
     items.append(Span("x", nominal, nominal, GREEN, width=1.4, layer=4, name="drawing"))
-    for end in found.linear.worst_case[index] * scale:
+    for end in analysis.linear.worst_case[index] * scale:
         items.append(
             Span("x", end, end, GREY, dash=DASHED, layer=3, name="worst case", group="worst case")
         )
@@ -109,20 +109,20 @@ def _steps(
     ]
 
 
-def _sensitivity(found: ToleranceAnalysis, index: int, order: list[int]) -> Panel:
-    total = np.nan_to_num(found.sobol.total[index])
-    names = [found.sources[one] for one in order]
+def _sensitivity(analysis: ToleranceAnalysis, index: int, order: list[int]) -> Panel:
+    total = np.nan_to_num(analysis.sobol.total[index])
+    names = [analysis.sources[one] for one in order]
     bars = Bars(list(total[order]), names, [SKY] * len(order))
-    label = f"part of the variance of {found.criteria[index].name.replace('_', ' ')} [-]"
+    label = f"part of the variance of {analysis.criteria[index].name.replace('_', ' ')} [-]"
     return Panel([bars], label, "", x_range=(0.0, None), title="total Sobol index")
 
 
-def _yields(found: ToleranceAnalysis, order: list[int]) -> Panel:
-    names = [found.sources[one] for one in order]
-    now = 100.0 * found.accepted_fraction
-    bars = Bars([100.0 * found.control.exact[one] for one in order], names, [SKY] * len(order))
+def _yields(analysis: ToleranceAnalysis, order: list[int]) -> Panel:
+    names = [analysis.sources[one] for one in order]
+    now = 100.0 * analysis.accepted_fraction
+    bars = Bars([100.0 * analysis.control.exact[one] for one in order], names, [SKY] * len(order))
     items: list[Mark] = [bars, Span("x", now, now, GREEN, width=1.4, layer=4, name="as it is")]
-    if found.wanted_yield is not None:
-        wanted = 100.0 * found.wanted_yield
-        items.append(Span("x", wanted, wanted, PURPLE, width=1.4, layer=4, name="wanted"))
+    if analysis.wanted_yield is not None:
+        target = 100.0 * analysis.wanted_yield
+        items.append(Span("x", target, target, PURPLE, width=1.4, layer=4, name="wanted"))
     return Panel(items, "yield [%]", "", title="yield if one dimension were exact")

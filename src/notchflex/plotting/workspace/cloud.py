@@ -17,14 +17,14 @@ from notchflex.workspaces.voxels import sphere_directions
 if TYPE_CHECKING:
     from notchflex.workspaces import Workspace
 
-MOST_POINTS = 4000
+MAX_POINTS = 4000
 """Tips that are drawn of one workspace; of more, one for each voxel or an even selection."""
 
 _CLASSES = 6
 _LABELS = ("x [mm]", "y [mm]", "z [mm]")
 
 
-def workspace_picture(found: Workspace) -> Picture:
+def workspace_picture(workspace: Workspace) -> Picture:
     """Describe a workspace.
 
     The convex hull and the tips in space, and below the voxels seen from the side (x or y, the
@@ -32,7 +32,7 @@ def workspace_picture(found: Workspace) -> Picture:
     was computed, stiffness.
 
     Args:
-        found: The workspace.
+        workspace: The workspace.
 
     Raises:
         InputError: No state is left.
@@ -43,9 +43,9 @@ def workspace_picture(found: Workspace) -> Picture:
         >>> picture.cells[1].panel.title
         'largest tension [N]'
     """
-    voxels = found.voxels()
-    across = 0 if np.ptp(found.extent[:, 0]) >= np.ptp(found.extent[:, 1]) else 1
-    hull = found.hull
+    voxels = workspace.voxels()
+    across = 0 if np.ptp(workspace.extent[:, 0]) >= np.ptp(workspace.extent[:, 1]) else 1
+    hull = workspace.hull
     title = f"convex hull {hull.size:.3g} {hull.unit}"
     flat = hull.dimension < 3
     maps = {
@@ -54,52 +54,52 @@ def workspace_picture(found: Workspace) -> Picture:
         "largest error by hysteresis [mm]": voxels.values["hysteresis"],
         "dexterity [% of directions]": 100.0 * voxels.dexterity,
     }
-    if np.isfinite(found.stiffness).any():
+    if np.isfinite(workspace.stiffness).any():
         maps["softest stiffness of the tip [N/mm]"] = voxels.values["stiffness"]
-    first = _plane(found, across, title) if flat else _space(found, title)
+    first = _plane(workspace, across, title) if flat else _space(workspace, title)
     panels = [first]
     points = voxels.centre[:, [across, 2]]
     panels += [_map(points, values, name, across) for name, values in maps.items()]
     width = 4.4
-    return Picture(f"Workspace of {found.robot.name}", 3 * width, 7.4, grid(panels, 3))
+    return Picture(f"Workspace of {workspace.robot.name}", 3 * width, 7.4, grid(panels, 3))
 
 
-def workspaces_picture(found: Mapping[str, Workspace]) -> Picture:
+def workspaces_picture(workspaces: Mapping[str, Workspace]) -> Picture:
     """Describe several workspaces in the same axes, seen from the front and from the side.
 
     Args:
-        found: Workspaces by label.
+        workspaces: Workspaces by label.
     """
     colours = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
     panels: list[Panel] = []
-    flat = all(np.ptp(one.extent[:, 1]) < 1e-9 for one in found.values())
+    flat = all(np.ptp(one.extent[:, 1]) < 1e-9 for one in workspaces.values())
     for across in (0,) if flat else (0, 1):
         items: list[Mark] = []
-        for (label, one), colour in zip(found.items(), colours, strict=False):
+        for (label, one), colour in zip(workspaces.items(), colours, strict=False):
             points = _thinned(one)[:, [across, 2]]
             name = f"{label}: convex hull {one.hull.size:.3g} {one.hull.unit}"
             items.append(dots(points, colour, 2.0, name=name, group=label))
         legend = BELOW if across or flat else ""
         panels.append(Panel(items, _LABELS[across], _LABELS[2], equal=True, legend=legend))
-    *others, last = found
+    *others, last = workspaces
     title = f"Workspaces of {', '.join(others)} and {last}"
     return Picture(title, 5.2 * len(panels), 5.2, grid(panels, 2))
 
 
-def _thinned(found: Workspace) -> NDArray[np.float64]:
+def _thinned(workspace: Workspace) -> NDArray[np.float64]:
     """Return tips to draw: an even selection."""
-    step = -(-len(found) // MOST_POINTS)
-    return found.tip[::step]
+    step = -(-len(workspace) // MAX_POINTS)
+    return workspace.tip[::step]
 
 
-def _space(found: Workspace, title: str) -> Panel:
-    tips, rising = _thinned(found), found.loading[:: -(-len(found) // MOST_POINTS)]
+def _space(workspace: Workspace, title: str) -> Panel:
+    tips, rising = _thinned(workspace), workspace.loading[:: -(-len(workspace) // MAX_POINTS)]
     items: list[Mark] = [
         dots(tips[rising], BLUE, 1.5, name="loading", group="loading"),
         dots(tips[~rising], ORANGE, 1.5, name="unloading", group="unloading"),
     ]
     # The farthest corners alone: all of them are too many lines.
-    corners = found.hull.corners
+    corners = workspace.hull.corners
     some = corners[np.unique((corners @ sphere_directions().T).argmax(axis=0))]
     few = hull_of(some)
     gap = np.full((len(few.faces), 1, 3), np.nan)
@@ -108,15 +108,15 @@ def _space(found: Workspace, title: str) -> Panel:
     return Panel(items, *_LABELS, title=title, legend=BESIDE, equal=True)
 
 
-def _plane(found: Workspace, across: int, title: str) -> Panel:
-    tips, rising = _thinned(found), found.loading[:: -(-len(found) // MOST_POINTS)]
+def _plane(workspace: Workspace, across: int, title: str) -> Panel:
+    tips, rising = _thinned(workspace), workspace.loading[:: -(-len(workspace) // MAX_POINTS)]
     columns = [across, 2]
     items: list[Mark] = [
         dots(tips[rising][:, columns], BLUE, 1.5, name="loading", group="loading"),
         dots(tips[~rising][:, columns], ORANGE, 1.5, name="unloading", group="unloading"),
     ]
-    if found.hull.dimension == 2:
-        ring = np.concatenate([found.hull.corners, found.hull.corners[:1]])[:, columns]
+    if workspace.hull.dimension == 2:
+        ring = np.concatenate([workspace.hull.corners, workspace.hull.corners[:1]])[:, columns]
         items.append(Curve(ring, SKY, width=1.0, name="convex hull", group="hull"))
     labels = (_LABELS[across], _LABELS[2])
     return Panel(items, *labels, title=title, legend=BESIDE, equal=True)
@@ -124,18 +124,18 @@ def _plane(found: Workspace, across: int, title: str) -> Panel:
 
 def _map(points: NDArray[np.float64], values: NDArray[np.float64], name: str, across: int) -> Panel:
     """Return voxels by value, in a few classes of equal width."""
-    good = np.isfinite(values)
+    is_finite = np.isfinite(values)
     items: list[Mark] = []
-    if good.any():
-        low, high = float(values[good].min()), float(values[good].max())
+    if is_finite.any():
+        low, high = float(values[is_finite].min()), float(values[is_finite].max())
         ends = np.linspace(low, high, _CLASSES + 1)
         number = np.clip(np.searchsorted(ends, values, side="right") - 1, 0, _CLASSES - 1)
         colours = sequence_colours(_CLASSES)
         for one in range(_CLASSES):
-            mine = points[good & (number == one)]
+            mine = points[is_finite & (number == one)]
             if len(mine):
                 label = f"{ends[one]:.3g} to {ends[one + 1]:.3g}"
-                look: dict[str, Any] = {"name": label, "group": f"{name} {one}"}
-                items.append(dots(mine, colours[one], 2.5, layer=2 + one, **look))
+                style: dict[str, Any] = {"name": label, "group": f"{name} {one}"}
+                items.append(dots(mine, colours[one], 2.5, layer=2 + one, **style))
     labels = (_LABELS[across], _LABELS[2])
     return Panel(items, *labels, title=name, legend=BESIDE, equal=True)

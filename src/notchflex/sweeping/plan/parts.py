@@ -9,11 +9,11 @@ from notchflex.errors import InputError
 from notchflex.robot.part import Float, Int, ProblemError, part
 
 _REFUSE = InputError.INVALID_SPECIFICATION
-_MOST_VALUES = 10_000_000
-MOST_ROWS = 10**12
+_MAX_VALUES = 10_000_000
+MAX_ROWS = 10**12
 """Rows of a sweep at most: a month of 32 cores, and four million files."""
-_MOST_PIECES = 4_000_000
-_MOST_POINTS = 10**11
+_MAX_PIECES = 4_000_000
+_MAX_POINTS = 10**11
 """Points at most: the way to the last one of a Sobol sequence takes minutes."""
 
 
@@ -36,12 +36,12 @@ class SweepVariable:
     value: Annotated[str, Field(min_length=1, description="path of the robot file")]
     values: Annotated[
         tuple[Float, ...] | None,
-        Field(min_length=1, max_length=_MOST_VALUES, description="list of values"),
+        Field(min_length=1, max_length=_MAX_VALUES, description="list of values"),
     ] = None
     lower: Annotated[Float | None, Field(description="least value")] = None
     upper: Annotated[Float | None, Field(description="greatest value")] = None
     count: Annotated[
-        Int | None, Field(ge=2, le=_MOST_VALUES, description="number of values of a grid")
+        Int | None, Field(ge=2, le=_MAX_VALUES, description="number of values of a grid")
     ] = None
     spacing: Annotated[
         Literal["linear", "log"], Field(description='"linear", or "log" for equal ratios')
@@ -89,7 +89,7 @@ class Sampling:
     method: Annotated[
         Literal["sobol", "latin-hypercube"], Field(description='"sobol" or "latin-hypercube"')
     ] = "sobol"
-    points: Annotated[Int, Field(ge=1, le=_MOST_POINTS, description="number of points")]
+    points: Annotated[Int, Field(ge=1, le=_MAX_POINTS, description="number of points")]
     seed: Annotated[Int, Field(ge=0, le=2**63 - 1, description="seed of the points")] = 0
 
 
@@ -231,9 +231,9 @@ class SweepPlan:
         twice = [name for name in names if names.count(name) > 1]
         if twice:
             raise ProblemError([("variable", f"has `{twice[0]}` twice; vary it once.")])
-        if self.rows > MOST_ROWS:
+        if self.rows > MAX_ROWS:
             raise ProblemError([("variable", f"makes {self.rows:.3g} rows; give at most 1e12.")])
-        if self.piece is not None and self.rows / self.piece > _MOST_PIECES:
+        if self.piece is not None and self.rows / self.piece > _MAX_PIECES:
             text = f"is {self.piece}, which makes {self.rows / self.piece:.3g} files; give "
-            raise ProblemError([("piece", f"{text}{-(-self.rows // _MOST_PIECES)} or more.")])
+            raise ProblemError([("piece", f"{text}{-(-self.rows // _MAX_PIECES)} or more.")])
         return self

@@ -58,7 +58,7 @@ class Correction:
 
     def __init__(
         self,
-        found: MeasuredPhotographs,
+        measured: MeasuredPhotographs,
         *,
         scale: float | None = None,
         board: Board | None = None,
@@ -68,17 +68,17 @@ class Correction:
     ) -> None:
         check_installed()
         check_host(host, port)
-        self.found, self.number = found, 0
+        self.found, self.number = measured, 0
         self._ruler = Ruler(scale, board)
         self._uncertainty = checked_uncertainty(uncertainty_deg)
-        self.results = list(found.photographs)
-        self._table = chain_table(found.robot)
+        self.results = list(measured.photographs)
+        self._table = chain_table(measured.robot)
         self._tasks = Tasks()
         self._dragged, self.message = False, ""
         self.server = serve(host, port)
         gui = self.server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
-        gui.set_panel_label(found.robot.name)
+        gui.set_panel_label(measured.robot.name)
         self._notice, self._text = gui.add_html(""), gui.add_html("")
         self._refit = gui.add_button("Refit")
         self._accept = gui.add_button("Accept")

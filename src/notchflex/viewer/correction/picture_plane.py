@@ -60,27 +60,27 @@ class PicturePlane:
         self.chain = chain
 
     def _handle(self, number: int, dragged: Callable[[], None]) -> Any:
-        made = self._scene.add_transform_controls(
+        handle = self._scene.add_transform_controls(
             f"{_ROOT}/point_{number}", scale=_ARROW, active_axes=(True, True, False),
             disable_rotations=True, depth_test=False,
         )  # fmt: skip
 
-        @made.on_update
+        @handle.on_update
         async def _(_event: Any) -> None:
             dragged()
 
-        return made
+        return handle
 
     @property
     def chain(self) -> Numbers:
         """Points of the chain as they were dragged, px, (n + 2, 2)."""
-        places = np.array([one.position[:2] for one in self._handles], float)
-        return places / self._pixel + self._middle
+        positions = np.array([one.position[:2] for one in self._handles], float)
+        return positions / self._pixel + self._middle
 
     @chain.setter
     def chain(self, points: Numbers) -> None:
-        for node, place in zip(self._handles, self._placed(points), strict=True):
-            node.position = place
+        for node, position in zip(self._handles, self._placed(points), strict=True):
+            node.position = position
         self.draw_chain()
 
     def draw_chain(self) -> None:
@@ -91,13 +91,14 @@ class PicturePlane:
             f"{_ROOT}/chain", pairs, _CHAIN, thickness=_LINE, thickness_units="screen"
         )
 
-    def draw_outline(self, found: MeasuredPhotograph) -> None:
+    def draw_outline(self, photograph: MeasuredPhotograph) -> None:
         """Draw a fitted outline: green points lie on an edge, orange ones on none."""
-        within = np.abs(found.outline - self._middle).max(axis=1, initial=0.0) < 1e4
-        colours = np.where(found.seen[within][:, None], _FOUND, _MISSED).astype(np.uint8)
+        within = np.abs(photograph.outline - self._middle).max(axis=1, initial=0.0) < 1e4
+        colours = np.where(photograph.seen[within][:, None], _FOUND, _MISSED).astype(np.uint8)
         self._scene.add_point_cloud(
-            f"{_ROOT}/outline", self._placed(found.outline[within]).astype(np.float32), colours,
-            point_size=_POINT, point_shape="circle", precision="float32", point_shading="flat",
+            f"{_ROOT}/outline", self._placed(photograph.outline[within]).astype(np.float32),
+            colours, point_size=_POINT, point_shape="circle", precision="float32",
+            point_shading="flat",
         )  # fmt: skip
 
     def eye(self, aspect: float) -> CameraPose:

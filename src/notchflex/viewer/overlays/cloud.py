@@ -50,18 +50,18 @@ class ReachableCloud:
 
     def update(self, robot: Robot, controls: Controls, ends: ControlRanges, shown: bool) -> None:
         """Show or hide the points; compute them where they are not known."""
-        wanted = (robot, controls.tip_force, controls.tip_mass, controls.pointing, ends.tension)
+        key = (robot, controls.tip_force, controls.tip_mass, controls.pointing, ends.tension)
         if not shown:
             if self._node is not None:
                 self._node.visible = False
-        elif wanted == self._wanted:
+        elif key == self._wanted:
             if self._node is not None and not self._node.visible:
                 self._node.visible = True
         else:
             self.remove()
-            self._wanted = wanted
+            self._wanted = key
             self._background.request(
-                lambda: explored(robot, controls, ends), lambda found: self._show(wanted, found)
+                lambda: explored(robot, controls, ends), lambda found: self._show(key, found)
             )
 
     def remove(self) -> None:
@@ -76,13 +76,13 @@ class ReachableCloud:
         node: Any = self._node
         return np.zeros((0, 3)) if node is None or not node.visible else np.asarray(node.points)
 
-    def _show(self, wanted: Any, found: Workspace) -> None:
-        if wanted != self._wanted:
+    def _show(self, key: Any, workspace: Workspace) -> None:
+        if key != self._wanted:
             return  # of a robot or of loads that are no more
-        colours = np.where(found.loading[:, None], rgb(BLUE), rgb(ORANGE)).astype(np.uint8)
+        colours = np.where(workspace.loading[:, None], rgb(BLUE), rgb(ORANGE)).astype(np.uint8)
         self._node = self._server.scene.add_point_cloud(
             NAME,
-            found.tip.astype(np.float32),
+            workspace.tip.astype(np.float32),
             colours,
             point_size=_POINT * self._length,
             point_shape="circle",
@@ -101,7 +101,7 @@ def explored(robot: Robot, controls: Controls, ends: ControlRanges) -> Workspace
         tip_mass=controls.tip_mass,
         base_rotation=POINTING[controls.pointing],
     )
-    found = workspace(robot, tension=np.array(ends.tension), states=STATES, load=load)
-    if not len(found):
+    cloud = workspace(robot, tension=np.array(ends.tension), states=STATES, load=load)
+    if not len(cloud):
         raise InputError.NO_DATA("no state of the reachable cloud converged under these loads")
-    return found
+    return cloud

@@ -20,7 +20,7 @@ from notchflex.viewer.session import LoopHistory, Session
 if TYPE_CHECKING:
     import viser
 
-MOST_READINGS = 12
+MAX_READINGS = 12
 # Of good sensors: most of the interval is what friction leaves open.
 NOISE = SensorNoise(tension=0.001, stroke=0.001)
 _NONE = 1e-9
@@ -76,22 +76,22 @@ class SensedArrow:
             shown: Whether it is to be seen.
             still: Whether the robot stands still.
         """
-        wanted = session.history, len(session.history), session.pointing
+        key = session.history, len(session.history), session.pointing
         same = self._wanted is not None and (
-            self._wanted[0] is wanted[0] and self._wanted[1:] == wanted[1:]
+            self._wanted[0] is key[0] and self._wanted[1:] == key[1:]
         )
         if not shown or not same:
             self._hide()
         if not shown:
             self._wanted = None
         elif still and not same:
-            self._wanted = wanted
+            self._wanted = key
             robot, tip = session.robot, np.asarray(session.state.tip_position)
             readings = read(session.history)
             if len(readings[0]) and readings[0].any():
                 self._background.request(
                     lambda: sensed(robot, session.pointing, *readings),
-                    lambda found: self._show(wanted, tip, found),
+                    lambda found: self._show(key, tip, found),
                 )
 
     @property
@@ -111,22 +111,22 @@ class SensedArrow:
             if node.visible:
                 node.visible = False
 
-    def _show(self, wanted: Any, tip: Float[np.ndarray, " 3"], found: SensedForce) -> None:
-        if self._wanted is not wanted:
+    def _show(self, key: Any, tip: Float[np.ndarray, " 3"], force: SensedForce) -> None:
+        if self._wanted is not key:
             return  # the robot has moved on
-        self.found = found
-        self._label.text, self._label.visible = text(found), True
+        self.found = force
+        self._label.text, self._label.visible = text(force), True
         # Below the tip, beside the arrows of the loads and of the handle.
         below = np.array([0.0, 0.0, -self._radius])
         start, bar, self._label.position = (tip + far * below for far in _BELOW)
-        if not found.converged[-1]:
+        if not force.converged[-1]:
             return
-        ends = np.abs([found.low[-1], found.high[-1], found.force[-1]])
+        ends = np.abs([force.low[-1], force.high[-1], force.force[-1]])
         scale = self._longest / max(float(ends.max()), _NONE)
-        end = start + scale * found.vector[-1]
+        end = start + scale * force.vector[-1]
         self._arrow.points = np.stack([start, end])[None].astype(np.float32)
-        self._arrow.visible = bool(np.abs(found.vector[-1]).max() > _NONE)
-        self._interval.points = intervals(found, bar, scale).astype(np.float32)
+        self._arrow.visible = bool(np.abs(force.vector[-1]).max() > _NONE)
+        self._interval.points = intervals(force, bar, scale).astype(np.float32)
         self._interval.visible = True
 
 
@@ -148,7 +148,7 @@ def read(history: LoopHistory) -> tuple[Float[np.ndarray, "r t"], Float[np.ndarr
     if len(tension) < 2:
         return tension[:0], stroke[:0]
     # Between turns tendons and force change in proportion, as `sense` takes them to.
-    rows = turning_points(np.concatenate([tension, stroke], axis=1))[-MOST_READINGS:]
+    rows = turning_points(np.concatenate([tension, stroke], axis=1))[-MAX_READINGS:]
     return tension[rows], stroke[rows]
 
 
@@ -163,8 +163,8 @@ def sensed(
     Raises:
         InputError: Readings that tell nothing of a force.
     """
-    known = Load(base_rotation=POINTING[pointing])
-    return sense(robot, tension, stroke, noise=NOISE, known=known)
+    given = Load(base_rotation=POINTING[pointing])
+    return sense(robot, tension, stroke, noise=NOISE, known=given)
 
 
 def text(found: SensedForce) -> str:

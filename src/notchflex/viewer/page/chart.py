@@ -21,7 +21,7 @@ from notchflex.viewer.session import Session
 
 WIDTH, HEIGHT = 290, 190
 LEFT, RIGHT, TOP, BOTTOM = 46, 12, 8, 36
-MOST_POINTS = 1500
+MAX_POINTS = 1500
 """Lines with more points are thinned, except for their ends."""
 
 INK, GRID, BEFORE = "#444444", "#dddddd", "#b5b5b5"
@@ -109,8 +109,8 @@ def chart(panel: Panel, name: str) -> str:
         parts.append(f'<text x="{LEFT - 5}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>')
     for line in lines:
         rows = line.rows
-        if len(rows) > MOST_POINTS:
-            rows = rows[np.linspace(0, len(rows) - 1, MOST_POINTS).round().astype(int)]
+        if len(rows) > MAX_POINTS:
+            rows = rows[np.linspace(0, len(rows) - 1, MAX_POINTS).round().astype(int)]
         parts.append(_drawn(line, pixels(rows)))
     parts.append(
         f'<text x="{0.5 * (LEFT + end)}" y="{HEIGHT - 8}" text-anchor="middle" font-size="12">'

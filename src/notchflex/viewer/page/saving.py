@@ -113,15 +113,15 @@ def _write(axes: Axes, session: Session) -> None:
     loads = [one.label for one in applied_loads(session.solved, 0, shape_at(session.solved, 0))]
     lines = [f"{row.label}: {row.value}" for row in rows(session)]
     lines.append(f"loads at the tip: {', '.join(loads) or 'none'}")
-    look: dict[str, Any] = {"fontsize": 9, "parse_math": False, "transform": axes.transAxes}
-    axes.text(0.0, 1.0, "\n".join(lines), va="top", **look)
+    style: dict[str, Any] = {"fontsize": 9, "parse_math": False, "transform": axes.transAxes}
+    axes.text(0.0, 1.0, "\n".join(lines), va="top", **style)
     ball = {"linestyle": "none", "marker": "o", "markersize": 7}
     handles: list[Line2D] = []
     for colour, mark, text in entries(session.robot):
         shape: dict[str, Any] = ball if mark == BALL else {}
         handles.append(Line2D([], [], color=colour, label=text, **shape))
-    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, -0.02), "ncols": 2}
-    axes.legend(handles=handles, fontsize=8, handlelength=1.2, **place)
+    position: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, -0.02), "ncols": 2}
+    axes.legend(handles=handles, fontsize=8, handlelength=1.2, **position)
     allowed = session.robot.material.allowed_strain
     if allowed is None:
         return

@@ -42,9 +42,9 @@ def framed(
     """
     forward, right, up = _axes(toward)
     axes = np.stack([right, up, forward])
-    seen = points @ axes.T
-    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-    x, y, depth = (seen - middle).T
+    projected = points @ axes.T
+    middle = 0.5 * (projected.min(axis=0) + projected.max(axis=0))
+    x, y, depth = (projected - middle).T
     slope = np.tan(0.5 * fov)
     # Near points must lie inside the edges of the picture too.
     away = room * np.maximum(np.abs(x) / (slope * aspect), np.abs(y) / slope) - depth

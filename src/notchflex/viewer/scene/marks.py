@@ -53,8 +53,8 @@ def strain_colour(part: float | None) -> Colour:
         return METAL
     if is_beyond(part):
         return BEYOND
-    place = round(min(abs(part), 1.0) * STEPS) / STEPS * (len(_SCALE) - 1)
-    red, green, blue = (np.interp(place, np.arange(len(_SCALE)), part) for part in _SCALE.T)
+    position = round(min(abs(part), 1.0) * STEPS) / STEPS * (len(_SCALE) - 1)
+    red, green, blue = (np.interp(position, np.arange(len(_SCALE)), part) for part in _SCALE.T)
     return round(float(red)), round(float(green)), round(float(blue))
 
 

@@ -63,9 +63,9 @@ class Scene:
             self._bodies.append(node)
         self._skins: list[FlexureSurface] = skins(rest)
         self._skins_of: dict[str, list[FlexureSurface]] = {}
-        look: dict[str, Any] = {"color": METAL, "flat_shading": True}
+        style: dict[str, Any] = {"color": METAL, "flat_shading": True}
         self._flexures = [
-            scene.add_mesh_simple(f"{ROOT}/flexure_{number + 1}", skin.at(one), skin.faces, **look)
+            scene.add_mesh_simple(f"{ROOT}/flexure_{number + 1}", skin.at(one), skin.faces, **style)
             for number, (skin, one) in enumerate(zip(self._skins, rest.flexures, strict=True))
         ]
         self._see_through = False
@@ -102,8 +102,10 @@ class Scene:
         scene.add_light_hemisphere(
             "/lights/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=2.2
         )
-        for number, (place, bright) in enumerate(_LIGHTS):
-            scene.add_light_directional(f"/lights/lamp_{number}", intensity=bright, position=place)
+        for number, (position, bright) in enumerate(_LIGHTS):
+            scene.add_light_directional(
+                f"/lights/lamp_{number}", intensity=bright, position=position
+            )
 
     def update(self, path: EquilibriumPath, controls: Controls) -> None:
         """Move everything to the state of a path of one step."""
@@ -146,8 +148,8 @@ class Scene:
 
     def _move(self, shape: RobotShape) -> None:
         turned = quaternions(shape.rotation)
-        for node, place, turn in zip(self._bodies, shape.position, turned, strict=True):
-            node.position, node.wxyz = place, turn
+        for node, position, turn in zip(self._bodies, shape.position, turned, strict=True):
+            node.position, node.wxyz = position, turn
         if self._see_through != self.shown.see_through:
             self._see_through = self.shown.see_through
             for node in self._bodies:

@@ -28,7 +28,7 @@ ROUND = 96  # flat sides of the tube
 PIECES = 12  # straight pieces of a bent flexure, at least
 _SPINE = 12  # flat pieces of a spine, as seen along the tube
 _ACROSS = 3  # corners of a strip across its thickness
-_BEYOND = 1.0  # extra length of the tube at both ends of a body [mm]
+_END_MARGIN = 1.0  # extra length of the tube at both ends of a body [mm]
 
 
 def body_solids(rest: RobotShape) -> list[tuple[Points, Triangles]]:
@@ -64,7 +64,7 @@ def _across(view: float) -> Points:
 
 def _tube(rest: RobotShape, along: Points) -> Manifold:
     """Return the wall of the tube, longer than the body."""
-    ends = float(along.min()) - _BEYOND, float(along.max()) + _BEYOND
+    ends = float(along.min()) - _END_MARGIN, float(along.max()) + _END_MARGIN
     return tube_wall(rest.robot.tube, ends, ROUND)
 
 
@@ -137,9 +137,9 @@ def _strip(rest: RobotShape, notch: int) -> FlexureSurface:
     """Return a strip across the tube, as wide as the wall of the tube."""
     one, tube = rest.flexures[notch], rest.robot.tube
     direction = _across(np.radians(rest.robot.notches[notch].direction_deg))
-    place = np.linspace(0.0, 1.0, _ACROSS)[:, None] * (one.spine + one.near) - one.spine
+    position = np.linspace(0.0, 1.0, _ACROSS)[:, None] * (one.spine + one.near) - one.spine
     outside, inside = [], []
-    for row in place:
+    for row in position:
         local = (one.fibre(row) - rest.position[notch]) @ rest.rotation[notch] @ direction
         beside = np.minimum(np.abs(local), tube.outer_radius)
         outside.append(np.sqrt(tube.outer_radius**2 - beside**2))
@@ -147,7 +147,7 @@ def _strip(rest: RobotShape, notch: int) -> FlexureSurface:
     count = len(one.area)
     walls = np.stack([np.stack(outside), np.stack(inside)])  # (layers, across, sections)
     # The other wall is the mirror image, with reversed triangles.
-    across = np.concatenate([np.tile(place, (2, 1))] * 2)
+    across = np.concatenate([np.tile(position, (2, 1))] * 2)
     out = np.concatenate([walls.reshape(-1, count), -walls.reshape(-1, count)])
     box = _box(count, _ACROSS)
     corners = 2 * _ACROSS
@@ -162,8 +162,8 @@ def _box(sections: int, row: int) -> Triangles:
     following = np.roll(ring, -1)
     faces: list[Triangles] = []
     for at in range(sections - 1):
-        here, there = at * 2 * row, (at + 1) * 2 * row
-        a, b, c, d = ring + here, following + here, following + there, ring + there
+        lower, upper = at * 2 * row, (at + 1) * 2 * row
+        a, b, c, d = ring + lower, following + lower, following + upper, ring + upper
         faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
     first = np.arange(row - 1)
     a, b, c, d = first, first + 1, first + 1 + row, first + row

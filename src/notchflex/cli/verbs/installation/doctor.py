@@ -203,8 +203,8 @@ def _print(report: dict[str, Any]) -> None:
 
 
 def _extra_words(extra: dict[str, Any]) -> str:
-    here = [f"{name} {version}" for name, version in extra["packages"].items() if version]
+    versions = [f"{name} {version}" for name, version in extra["packages"].items() if version]
     gone = [name for name, version in extra["packages"].items() if not version]
     if not gone:
-        return ", ".join(here)
+        return ", ".join(versions)
     return f"{', '.join(gone)} missing: {extra['install']}"

@@ -9,7 +9,7 @@ from notchflex.photographs.chain.chain_table import Numbers
 
 
 @dataclass(frozen=True)
-class Known:
+class ViewPrior:
     """What a board or a ruler says about the view at one place of a photograph.
 
     Attributes:
@@ -39,7 +39,7 @@ class Known:
         """Return the tilt of a tube that lies in the plane, by its direction, rad."""
         return math.atan(self.slope[0] * math.cos(direction) + self.slope[1] * math.sin(direction))
 
-    def smaller(self, factor: float) -> Known:
+    def smaller(self, factor: float) -> ViewPrior:
         """Return the same for a photograph that was made smaller by a factor."""
         return replace(self, scale=self.scale * factor)
 
@@ -51,5 +51,5 @@ class Known:
         )
 
 
-NOTHING = Known()
+NO_PRIOR = ViewPrior()
 _APART = 3.0  # standard deviations

@@ -15,10 +15,10 @@ from jaxtyping import Float
 Vector = Float[np.ndarray, " v"]
 
 # Searches are at the same robot where none of the scaled variables differ by more.
-_NEAR = 0.01
+_MAX_DIFFERENCE = 0.01
 
 
-class Met(Exception):  # noqa: N818 - no error
+class DuplicateSearch(Exception):  # noqa: N818 - no error
     """Ends a search that has come to where another one has been.
 
     Attributes:
@@ -32,7 +32,7 @@ class Met(Exception):  # noqa: N818 - no error
 
 
 @dataclass(eq=False)
-class Trail:
+class SearchTrajectory:
     """The way of a search.
 
     Attributes:
@@ -43,13 +43,13 @@ class Trail:
     others: Sequence[Sequence[Vector]] = ()
     steps: list[Vector] = field(default_factory=list[Vector])
 
-    def pass_by(self, z: Vector) -> None:
+    def record(self, z: Vector) -> None:
         """Keep a step.
 
         Raises:
-            Met: Another search has been here.
+            DuplicateSearch: Another search has been here.
         """
         self.steps.append(z)
         for number, other in enumerate(self.others):
-            if any(np.abs(z - there).max(initial=0.0) <= _NEAR for there in other):
-                raise Met(number)
+            if any(np.abs(z - point).max(initial=0.0) <= _MAX_DIFFERENCE for point in other):
+                raise DuplicateSearch(number)

@@ -18,13 +18,13 @@ from notchflex.errors import Failure
 
 # Damping: where a step fails, its factor after one that did, the gain above which it is lifted, and
 # the largest with which a step is worth trying.
-_FIRST, _FACTOR, _GOOD_GAIN, _MOST_DAMPING = 1e-3, 8.0, 0.5, 1e12
+_FIRST, _FACTOR, _GOOD_GAIN, _MAX_DAMPING = 1e-3, 8.0, 0.5, 1e12
 # The part of the promised improvement that a step must bring.
-_LEAST_GAIN = 1e-3
+_MIN_GAIN = 1e-3
 # Tendons whose slopes (mm, N or rad per N or mm) are below this stick. They slide at drives that
 # differ by these parts.
 _STUCK = 1e-9
-_ASIDE = (1e-6, -1e-6)
+_SIDE_STEPS = (1e-6, -1e-6)
 # Loads that the program may solve for a target.
 _ROUNDS = 6
 # A step that changes drives by less than this part of them is none.
@@ -33,10 +33,10 @@ _NO_STEP = 1e-11
 _IMPATIENT, _PATIENT = (8, 0.98), (16, 1.0 - 1e-8)
 # Drives that are redundant are made smaller in so many rounds of so many corrections, while a round
 # changes them and their size by more than these parts.
-_MOST_RELAXATIONS, _CORRECTIONS, _SMALL_RELAXATION, _SMALL_GAIN = 6, 5, 1e-3, 1e-4
+_MAX_RELAXATIONS, _CORRECTIONS, _SMALL_RELAXATION, _SMALL_GAIN = 6, 5, 1e-3, 1e-4
 
 
-def find(
+def search_iteratively(
     problem: Problem,
     before: Float[np.ndarray, " state"],
     start: Float[np.ndarray, " t"],
@@ -74,20 +74,20 @@ def find(
                 break
             checked, merit = search.solves, search.point.merit
         step = search.step(damping)
-        if np.abs(step).max() <= _NO_STEP * search.scale or damping > _MOST_DAMPING:
+        if np.abs(step).max() <= _NO_STEP * search.scale or damping > _MAX_DAMPING:
             search.settled = True
             break
-        gain = search.go(step, _LEAST_GAIN)
+        gain = search.try_step(step, _MIN_GAIN)
         if gain >= _GOOD_GAIN:
             damping = 0.0 if damping <= _FIRST else damping / _FACTOR
-        elif gain < _LEAST_GAIN:
+        elif gain < _MIN_GAIN:
             damping = max(_FIRST, damping * _FACTOR)
     if search.done and len(search.free) > len(rows):
         _relax(search, budget)
     return search.result()
 
 
-def meet(
+def solve_directly(
     problem: Problem,
     before: Float[np.ndarray, " state"],
     start: Float[np.ndarray, " t"],
@@ -109,18 +109,18 @@ def meet(
     """
     model, search = problem.model, problem.search
     rows = np.flatnonzero(goal == goal)
-    entries, weights, wanted = problem.entries[rows], problem.weights[rows], goal[rows]
+    entries, weights, target = problem.entries[rows], problem.weights[rows], goal[rows]
     solves = 0
     if known is None:
         known, solves = _present(problem, before, start)
-    error = size_of(weights * (known.values[entries] - wanted))
+    error = size_of(weights * (known.values[entries] - target))
     redundant = len(start) > len(rows) and int(problem.driven.sum()) > len(rows)
     if not known.converged or not np.isfinite(known.jacobian[entries]).all():
         return Attempt(start, known, error, 0.0, solves, Failure.SEARCH_STOPPED)
     if error <= search.tolerance and not redundant:
         return within_limits(problem, Attempt(start, known, error, 0.0, solves, None))
     aim = DriveAim(
-        entries, wanted, weights, problem.low, problem.high, problem.driven,
+        entries, target, weights, problem.low, problem.high, problem.driven,
         search.tolerance, problem.unit, min(_ROUNDS, search.solves),
     )  # fmt: skip
     response, drive, nearest, met, more = model.search(before, start, known, aim)
@@ -136,7 +136,7 @@ def _present(problem: Problem, before: np.ndarray, start: np.ndarray) -> tuple[R
     model, driven = problem.model, problem.driven
     known, solves = model.solve(before, start), 1
     sliding = known.sliding
-    for part in _ASIDE:
+    for part in _SIDE_STEPS:
         stuck = driven & (np.abs(sliding[problem.entries]).max(axis=0) <= _STUCK)
         if not stuck.any():
             break
@@ -165,16 +165,16 @@ def within_limits(problem: Problem, attempt: Attempt) -> Attempt:
 
 def _relax(search: DampedSearch, budget: int) -> None:
     """Go on to the smallest drives that meet the target."""
-    for _ in range(_MOST_RELAXATIONS):
+    for _ in range(_MAX_RELAXATIONS):
         step = search.step(0.0)
         if search.solves >= budget or np.abs(step).max() <= _SMALL_RELAXATION * search.scale:
             return
         kept, effort = search.point, size_of(search.point.drive)
-        search.jump(step)
+        search.accept_step(step)
         for _ in range(_CORRECTIONS):
             if search.done or search.solves >= budget:
                 break
-            search.go(search.step(0.0), _LEAST_GAIN)
+            search.try_step(search.step(0.0), _MIN_GAIN)
         if not search.done or size_of(search.point.drive) > (1.0 - _SMALL_GAIN) * effort:
             search.point = kept
             return
