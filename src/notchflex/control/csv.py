@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from difflib import get_close_matches
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from notchflex.loads.validation import short_repr
 from notchflex.results.files.csv_reading import read_table
 from notchflex.results.quantities.registry import AXES, QUANTITIES
 from notchflex.robot import Robot
+from notchflex.robot.error_messages import nearest
 
 # Columns of a simulation that say what was commanded are no targets, but may stand in the file.
 _COMMANDS = ("tension", "stroke")
@@ -48,10 +48,10 @@ def read_targets(source: str | os.PathLike[str], robot: Robot) -> Targets:
     columns = dict(_columns(robot))
     unknown = [name for name in table.header if name not in columns]
     if unknown:
-        near = get_close_matches(unknown[0], columns, 2, 0.6)
-        meant = f"did you mean {' or '.join(near)}" if near else f"there are {_shown(columns)}"
+        near = nearest(unknown[0], columns, 2)
         raise InputError.TABLE_COLUMNS(
-            f"{table.name}: {short_repr(unknown[0])} is not a column of targets; {meant}"
+            f"{table.name}: {short_repr(unknown[0])} is not a column of targets"
+            f"{near or f'; there are {_shown(columns)}'}"
         )
     shapes = target_shapes(robot)
     values: dict[str, np.ndarray] = {}

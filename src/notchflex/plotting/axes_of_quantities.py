@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +29,7 @@ from notchflex.plotting.style import house_style, sequence_colours
 from notchflex.results.files.csv import entries_of, is_listed
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
+from notchflex.robot.error_messages import nearest
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
@@ -135,9 +135,8 @@ def series_of(path: EquilibriumPath, name: str) -> Series:
             f"{name} can't be drawn as lines; draw a quantity such as total_angle"
         )
     choice = [*(one.name for one in known), *headers, STEP]
-    near = get_close_matches(str(name), choice, 3, 0.5)
-    meant = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(choice)}"
-    raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r} to draw; {meant}")
+    meant = nearest(str(name), choice, 3) or f"; there are {', '.join(choice)}"
+    raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r} to draw{meant}")
 
 
 def entry_label(quantity: Quantity, name: str) -> str:

@@ -49,10 +49,10 @@ def unknown_key(name: str, key: str, allowed: Iterable[str]) -> str:
     return f"`{name}` is not a known key{nearest(key, allowed)}. Allowed: {', '.join(allowed)}."
 
 
-def nearest(word: str, allowed: Iterable[str]) -> str:
-    """Ask "did you mean", or say nothing where no allowed word is near."""
-    close = difflib.get_close_matches(word.lower(), list(allowed), n=1, cutoff=0.6)
-    return f" (did you mean `{close[0]}`?)" if close else ""
+def nearest(word: str, allowed: Iterable[str], most: int = 1) -> str:
+    """Ask "did you mean", or say nothing where no allowed word is near; `most` are named."""
+    close = difflib.get_close_matches(word.lower(), list(allowed), n=most, cutoff=0.6)
+    return f" (did you mean {' or '.join(f'`{one}`' for one in close)}?)" if close else ""
 
 
 def _sentences_of(record: dict[str, Any], cls: type, repeats: Sequence[int]) -> list[str]:

@@ -6,11 +6,14 @@ Whatever reads or checks arguments raises `InputError` for what cannot be used.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from cyclopts import Parameter, Token
 
+from notchflex._load_words import number
 from notchflex.errors import InputError
+
+Values = TypeVar("Values")
 
 
 def converted(
@@ -49,6 +52,41 @@ def converted(
         negative=(),
         **options,
     )
+
+
+def named(form: str, read: Callable[[str], Values], text: str) -> tuple[str, Values]:
+    """Read `NAME=VALUES`.
+
+    Args:
+        form: What is allowed, for the message.
+        read: Reads the values.
+        text: What was typed.
+    """
+    name, equals, values = (word.strip() for word in text.partition("="))
+    if not (name and equals and values):
+        raise InputError.BAD_SYNTAX(f"give {form}.")
+    return name, read(values)
+
+
+def low_high(
+    form: str, text: str, *, alone_is_high: bool = False
+) -> tuple[float | None, float | None]:
+    """Read `LOW:HIGH`, one of which may be left out.
+
+    Args:
+        form: What is allowed, for the message.
+        text: What was typed.
+        alone_is_high: Whether a number without a colon is the upper limit.
+    """
+    low, colon, high = text.partition(":")
+    if not colon and alone_is_high:
+        low, high = "", low
+    elif not colon:
+        raise InputError.BAD_SYNTAX(f"give {form}.")
+    if not (low.strip() or high.strip()):
+        raise InputError.BAD_SYNTAX(f"a number is missing; give {form}.")
+    lower, upper = (number(word, form) if word.strip() else None for word in (low, high))
+    return lower, upper
 
 
 def flag(text: str, **options: Any) -> Parameter:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 from cyclopts import Group, Parameter
 
 from notchflex._extras import need
 from notchflex._load_words import TendonCommand, number, whole
-from notchflex.cli.arguments.conversion import converted
+from notchflex.cli.arguments.conversion import converted, low_high, named
 from notchflex.cli.arguments.loads import tendon_command
 from notchflex.errors import InputError
 
@@ -22,7 +22,6 @@ from notchflex.cli.arguments.data_sources import DataSources
 
 BEYOND = Group("Beyond the fit", sort_key=8)
 Names = Annotated[tuple[str, ...], Parameter(metavar="NAME...", negative=(), show_default=False)]
-Numbers = TypeVar("Numbers")
 
 
 class ParameterSpec(NamedTuple):
@@ -36,21 +35,6 @@ class ParameterSpec(NamedTuple):
 
 _BOUNDS = "NAME=LOW:HIGH, such as friction.coefficient=0:0.5; one of the two may be left out"
 _PRIOR = "NAME=MEAN+-SD, such as material.elastic_modulus=10000+-500"
-
-
-def _of_constant(form: str, read: Callable[[str], Numbers], text: str) -> tuple[str, Numbers]:
-    name, equals, values = (word.strip() for word in text.partition("="))
-    if not (name and equals and values):
-        raise InputError.BAD_SYNTAX(f"give {form}.")
-    return name, read(values)
-
-
-def _read_limits(values: str) -> tuple[float | None, float | None]:
-    low, colon, high = values.partition(":")
-    if not colon or not (low.strip() or high.strip()):
-        raise InputError.BAD_SYNTAX(f"give {_BOUNDS}.")
-    lower, upper = (number(word, _BOUNDS) if word.strip() else None for word in (low, high))
-    return lower, upper
 
 
 def _read_prior(values: str) -> tuple[float, float]:
@@ -77,12 +61,14 @@ class FitOptions:
     ]
     bounds: Annotated[
         tuple[tuple[str, tuple[float | None, float | None]], ...],
-        converted(partial(_of_constant, _BOUNDS, _read_limits), "NAME=LOW:HIGH", several=True),
+        converted(
+            partial(named, _BOUNDS, partial(low_high, _BOUNDS)), "NAME=LOW:HIGH", several=True
+        ),
         Parameter(name="--bounds", help="Limits of a constant, `NAME=LOW:HIGH`, in its unit."),
     ] = ()
     prior: Annotated[
         tuple[tuple[str, tuple[float, float]], ...],
-        converted(partial(_of_constant, _PRIOR, _read_prior), "NAME=MEAN+-SD", several=True),
+        converted(partial(named, _PRIOR, _read_prior), "NAME=MEAN+-SD", several=True),
         Parameter(name="--prior", help="Prior of a constant, `NAME=MEAN+-SD`, in its unit."),
     ] = ()
     objective: Annotated[

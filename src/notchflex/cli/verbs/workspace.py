@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from notchflex._load_words import number, whole
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, texts
+from notchflex.cli.arguments.conversion import converted, low_high, named, texts
 from notchflex.cli.arguments.loads import ExternalLoads
 from notchflex.cli.arguments.pieces import InPieces
 from notchflex.cli.arguments.robots import (
@@ -31,19 +31,6 @@ if TYPE_CHECKING:
 _LIMIT = "NAME=LARGEST or NAME=SMALLEST:LARGEST, such as strain=0.04 or gap=0.05:"
 
 
-def _limit(text: str) -> tuple[str, tuple[float | None, float | None]]:
-    """Read one limit: its name and its bounds, in the units of files."""
-    name, equals, bounds = text.partition("=")
-    if not equals or not name.strip():
-        raise InputError.BAD_SYNTAX(f"give {_LIMIT}.")
-    low, colon, high = bounds.partition(":")
-    words = [low, high] if colon else ["", low]
-    if not any(word.strip() for word in words):
-        raise InputError.BAD_SYNTAX(f"a number is missing; give {_LIMIT}.")
-    ends = [number(word, _LIMIT) if word.strip() else None for word in words]
-    return name.strip(), (ends[0], ends[1])
-
-
 def _tensions(text: str) -> list[float]:
     form = "tensions of 0 N or more, one or one per tendon joined by commas"
     return [number(word, form, least=0.0) for word in text.split(",")]
@@ -55,7 +42,12 @@ def workspace(
     *,
     limit: Annotated[
         tuple[tuple[str, tuple[float | None, float | None]], ...],
-        converted(_limit, "NAME=VALUE", several=True, name="--limit"),
+        converted(
+            partial(named, _LIMIT, partial(low_high, _LIMIT, alone_is_high=True)),
+            "NAME=VALUE",
+            several=True,
+            name="--limit",
+        ),
         Parameter(
             help="Keep a quantity within a limit: `strain=0.04` (the largest peak strain), "
             "`angle=90` [deg], `gap=0.05:` (no notch closes further) or any quantity of a result. "
