@@ -29,7 +29,7 @@ _MADE = 0.04  # of the outer diameter: how far notches may differ from the robot
 def rejection_reason(
     located: Located, deviation: Numbers, noise: float, uncertainty: float = math.inf
 ) -> str:
-    """Return why angles are not reported; "" if nothing speaks against them.
+    """Return why the fit is rejected, or an empty string.
 
     Args:
         located: The best fit.

@@ -1,4 +1,4 @@
-"""Draws within tolerances in pieces: more than fits into memory, by many processes, gone on with.
+"""Draws within tolerances in pieces: more than fits into memory, by many processes, resumable.
 
 A piece is a part of one replicate of scrambled Sobol points.
 """

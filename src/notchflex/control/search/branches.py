@@ -1,7 +1,7 @@
-"""The way to a target: at once, or over a state from which friction helps.
+"""The load path to a target: direct, or through an overshoot that reverses friction.
 
 At one tension a robot is bent more after unloading than after loading. A target can often be met on
-either branch: by pulling up to it, or by pulling beyond it and letting go.
+either branch: by loading up to it, or by overshooting it and unloading.
 """
 
 from __future__ import annotations

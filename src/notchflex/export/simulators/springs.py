@@ -53,11 +53,12 @@ class HingeSpring:
     friction: Float[np.ndarray, " 3"]
 
     def moment(self, angle: Float[np.ndarray, " s"]) -> Float[np.ndarray, " s"]:
-        """Elastic moment at some angles."""
+        """Return the elastic moment at hinge angles, N·mm."""
         return _elastic(angle, self.knots) @ np.append(self.stiffness, self.further)
 
     def friction_moment(self, angle: Float[np.ndarray, " s"]) -> Float[np.ndarray, " s"]:
-        """Friction moment at some angles, positive to both sides where it is any."""
+        """Return the friction moment at hinge angles, N·mm; it opposes the motion, so it has the sign
+        of the angle during loading."""
         return np.sign(angle) * (_friction(angle) @ self.friction)
 
     @property

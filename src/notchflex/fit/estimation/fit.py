@@ -61,7 +61,7 @@ def calibrate(
         settings: Settings of the solver.
         progress: Called with the name of the task, how much of it is done, and how much there is.
         folder: Search from every start as a piece that this folder keeps: by many processes
-            (`PieceFolder`), gone on with by the same call. The result is the same.
+            (`PieceFolder`), resumed by the same call. The result is the same.
 
     Returns:
         The fitted robots, and how far to trust their constants.

@@ -81,7 +81,7 @@ class FrictionRig:
                 if self.scatter < 0.5 * typical
                 else f"which leave a scatter of {self.scatter:.2g} unexplained"
             )
-            said.append(f"Their standard deviations stand for {typical:.2g}, {more}.")
+            said.append(f"Their standard deviations correspond to {typical:.2g} in mu, {more}.")
         said += [
             f"{self.readings.at(reading)}: mu = {self.readings.coefficient[reading]:.4g} lies too "
             "far from the others to be chance; look at this reading again."
