@@ -118,7 +118,7 @@ def test_data_that_cannot_tell_a_constant_say_so():
     assert friction.lower is None
     assert modulus.lower is modulus.upper is None
     said = " ".join(diagnose(found))
-    assert "cannot tell material.superelastic_modulus" in said
+    assert "do not determine material.superelastic_modulus" in said
     assert "friction.coefficient is at most" in said
 
 

@@ -122,7 +122,7 @@ VERBS = {
         "    notchflex sweep swept --plot notch.depth,total_angle_deg -o swept.png",
     ),
     "design": (
-        "Choose dimensions so that a robot does what is asked.",
+        "Choose dimensions so that a robot meets a specification.",
         "notchflex new wish --design\n"
         "    notchflex design wish.toml -o designed\n"
         "    notchflex design wish.toml -o robust --robust\n"

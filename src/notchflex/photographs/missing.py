@@ -1,4 +1,4 @@
-"""Whether every part of a robot is seen in a photograph where a fit has it."""
+"""Check that every part of a fitted robot is visible in the photograph."""
 
 from __future__ import annotations
 

@@ -57,8 +57,7 @@ class HingeSpring:
         return _elastic(angle, self.knots) @ np.append(self.stiffness, self.further)
 
     def friction_moment(self, angle: Float[np.ndarray, " s"]) -> Float[np.ndarray, " s"]:
-        """Return the friction moment at hinge angles, N·mm; it opposes the motion, so it has the sign
-        of the angle during loading."""
+        """Return the friction moment during loading at hinge angles, N·mm, with their sign."""
         return np.sign(angle) * (_friction(angle) @ self.friction)
 
     @property

@@ -1,4 +1,4 @@
-"""What a fit can and cannot determine, in plain words."""
+"""Diagnosis of a fit in sentences: what the data determine and what they do not."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from notchflex.fit.model.branch_residuals import branch_words
 from notchflex.fit.model.rows import SENSOR
 
 # A half-width of more than this part of the value is loose; constants more correlated than that
-# cannot be told apart.
+# cannot be distinguished.
 _LOOSE, _ALIKE = 0.5, 0.95
 # So many standard deviations from its prior a constant contradicts it.
 _UNLIKE_PRIOR = 3.0
@@ -21,19 +21,19 @@ _UNLIKE_PRIOR = 3.0
 _AT_LIMIT = 1e-6
 
 NO_PROBLEMS = "No problems found."
-"""What is printed if `diagnose` finds nothing."""
+"""Sentence that is printed if `diagnose` finds nothing."""
 
 
-def diagnose(calibration: Calibration) -> tuple[str, ...]:
+def diagnose(found: Calibration) -> tuple[str, ...]:
     """Say what a user should know before trusting the constants, the gravest first.
 
     Args:
-        calibration: The fit.
+        found: The fit.
 
     Returns:
         Sentences; none if no problem was found.
     """
-    return tuple(_sentences(calibration))
+    return tuple(_sentences(found))
 
 
 def with_unit(value: float, unit: str) -> str:
@@ -57,7 +57,7 @@ def _sentences(calibration: Calibration) -> Iterator[str]:
 
 
 def _branches(calibration: Calibration) -> Iterator[str]:
-    """Tables whose unloading rows the model misses otherwise than their loading rows."""
+    """Tables whose unloading rows deviate from the model by another amount than loading rows."""
     residuals = calibration.residuals
     for number, sample in enumerate(calibration.problem.samples.every):
         rows = len(sample.measured)
@@ -120,7 +120,9 @@ def _loose(calibration: Calibration, name: str, interval: Interval) -> Iterator[
     if lower is None and upper is None and interval.reason == NO_SOLUTION:
         yield f"How far {name} may go is not known: {interval.reason}."
     elif lower is None and upper is None:
-        yield f"The data do not determine {name}: any value fits as well. Its estimate means nothing."
+        yield (
+            f"The data do not determine {name}: any value fits as well. Its estimate means nothing."
+        )
     elif upper is None or lower is None:
         word, end = ("at most", upper) if lower is None else ("at least", lower)
         assert end is not None

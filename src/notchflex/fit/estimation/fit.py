@@ -212,7 +212,7 @@ def _with_noise(problem: FitProblem, best: Minimum) -> tuple[Minimum, Cost]:
 def _intervals(calibration: Calibration, progress: Progress | None) -> dict[str, Interval]:
     if calibration.tells_no_noise:
         return {
-            name: Interval(None, None, np.array([[value, 0.0]]), "nothing tells the noise")
+            name: Interval(None, None, np.array([[value, 0.0]]), "the noise is unknown")
             for name, value in calibration.values.items()
         }
     intervals: dict[str, Interval] = {}

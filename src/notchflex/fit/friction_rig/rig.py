@@ -117,7 +117,7 @@ def friction_rig(readings: FrictionReadings) -> FrictionRig:
     y, variance = readings.coefficient, known_variance(readings)
     count, test = len(y), constancy(readings)
     line = fit_line(np.ones((count, 1)), y, variance)
-    # Readings far off by their turn or load are no outliers if a constant is not enough.
+    # Readings far off by their turn or load are not outliers if a constant is not enough.
     varies = np.isfinite([0.0, test.by_turn, test.by_load]) & (test.enough is False)
     varies[0] = True
     off = outliers(design(readings)[:, varies], y, variance)

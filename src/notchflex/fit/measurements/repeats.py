@@ -1,4 +1,4 @@
-"""How well measurements repeat: the standard deviation between pulls at the same loads."""
+"""Repeatability of measurements: the standard deviation between pulls at the same loads."""
 
 from __future__ import annotations
 
