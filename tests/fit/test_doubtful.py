@@ -52,7 +52,7 @@ def test_a_fit_through_every_number_does_not_tell_how_far_to_trust_it(tmp_path):
     assert "No more numbers were measured than constants fitted" in said_of(found)
     assert found.allows(MODULUS, 1.01 * found.values[MODULUS])
     (file,) = write_fitted(found, tmp_path / "fitted")
-    assert "nothing tells the noise" in file.read_text(encoding="utf-8")
+    assert "the noise is unknown" in file.read_text(encoding="utf-8")
     for ask in (sample_posterior, lambda fit: next_measurement(fit, nf.pull(0.2, 1.0, steps=2))):
         with refused("TOO_FEW_DATA", "noise"):
             ask(found)
@@ -96,7 +96,7 @@ def test_a_robot_of_which_nothing_is_fitted_counts_but_moves_nothing():
 def test_what_nothing_depends_on_was_not_pushed_to_its_limit():
     found = calibrate(WRIST, measured(), "sensor.stroke_slack", starts=1)
     assert found.values["sensor.stroke_slack"] == 0.0
-    assert "cannot tell sensor.stroke_slack" in said_of(found)
+    assert "do not determine sensor.stroke_slack" in said_of(found)
     assert "limit" not in said_of(found)
     beyond = Constant(FRICTION, lower=0.3, upper=0.5)
     pushed = calibrate(WRIST, measured(), beyond, starts=1, intervals=False)

@@ -277,7 +277,7 @@ def test_base_and_tip_that_look_alike_are_told_apart_or_refused():
     picture = cv2.cvtColor(render(ROBOT, angles, scene), cv2.COLOR_GRAY2BGR)
     found = measure_picture(picture, chain_table(ROBOT), "wrist")
     if found.reason:
-        assert "two shapes fit nearly alike" in found.reason
+        assert "two shapes fit almost equally well" in found.reason
     else:
         np.testing.assert_allclose(found.notch_angle, angles, atol=np.radians(0.5))
 

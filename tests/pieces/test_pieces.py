@@ -1,4 +1,4 @@
-"""Draws, states and searches in pieces: as without, by one process or several, gone on with."""
+"""Draws, states and searches in pieces: as without, by one process or several, resumed."""
 
 from __future__ import annotations
 

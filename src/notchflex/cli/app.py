@@ -122,7 +122,7 @@ VERBS = {
         "    notchflex sweep swept --plot notch.depth,total_angle_deg -o swept.png",
     ),
     "design": (
-        "Choose dimensions so that a robot does what is asked.",
+        "Choose dimensions so that a robot meets a specification.",
         "notchflex new wish --design\n"
         "    notchflex design wish.toml -o designed\n"
         "    notchflex design wish.toml -o robust --robust\n"
@@ -142,7 +142,7 @@ VERBS = {
         "    notchflex sense pacheco2021-a read.csv --components xz --with tip --tip-noise 0.05",
     ),
     "workspace": (
-        "Explore where the tip of a robot can go, while its tendons are pulled and let go.",
+        "Explore where the tip of a robot can go, during loading and unloading.",
         "notchflex workspace two-axis-wrist --states 20000 --plot workspace.png\n"
         "    notchflex workspace pacheco2021-a --limit strain=0.04 --states 4000 --json -\n"
         "    notchflex workspace pacheco2021-a --states 4000 --beside pacheco2021-b",

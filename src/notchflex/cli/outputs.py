@@ -1,4 +1,4 @@
-"""Where a verb writes its results: options, checks before anything is computed, and writing."""
+"""Output files of a verb: options, checks before anything is computed, and writing."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def comparison_document(comparison: Comparison) -> dict[str, Any]:
     Returns:
         `rmse_deg.notches`, `rmse_deg.total`, `tip_rmse_mm`, `points`, `negative_forces`,
         `from_rest` with `order` (how the order of the rows was understood), `diagnosis`, the
-        columns that were ignored, and every row, measured beside modelled. None stands for what
+        columns that were ignored, and every row, measured beside modelled. None marks what
         was not measured.
     """
     measured = comparison.measured

@@ -25,7 +25,7 @@ from notchflex.robot import Robot
 
 
 class ControlStatus(NamedTuple):
-    """How the last step of a controller went.
+    """Status of the last step of a controller.
 
     Attributes:
         reached: Whether the model meets the target.
@@ -50,7 +50,7 @@ class Controller:
     """Drives for one target after the other, for use in a loop.
 
     A step never raises and never takes more than its number of solves. Feedforward is the exact
-    inverse with friction history. Two kinds of measurements correct it: what is aimed at itself,
+    inverse with friction history. Two kinds of measurements correct it: the target quantity itself,
     such as the position of the tip, and tension with stroke, which correct the friction history
     and the coefficient of friction.
 
@@ -125,7 +125,7 @@ class Controller:
         """Return drives for a target.
 
         Args:
-            target: Values of the quantity that is aimed at, by name if there are several (mm, N,
+            target: Values of the target quantity, by name if there are several (mm, N,
                 rad); NaN where an entry is free.
             measured: The same as measured now; NaN where it was not. Nothing where None.
             tension: Measured tension of every tendon, N; for the observer.
@@ -145,7 +145,7 @@ class Controller:
                 self._correct(self._flat(measured))
             self._seek(goal - self._deviation)
         except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError):
-            # A loop must go on whatever it is given: the robot stays where it is.
+            # A control loop must continue after invalid input: the command stays unchanged.
             self.status = ControlStatus(False, "INVALID_INPUT", float("nan"), 0, True)
         return self._command.copy()
 
@@ -156,7 +156,7 @@ class Controller:
 
     @property
     def values(self) -> Float[np.ndarray, " m"]:
-        """What the model has at the last command, of what is aimed at, flattened."""
+        """Model values of the target quantities at the last command, flattened."""
         if self._known is None:
             self._known = self._problem.model.solve(self._before, self._command)
         return self._known.values[self._problem.entries]
@@ -184,7 +184,7 @@ class Controller:
         self._deviation = np.where(is_measured, self._deviation + change, self._deviation)
 
     def _observe(self, tension: Any, stroke: Any) -> None:
-        """Go on from the state that measured tension and stroke tell."""
+        """Continue from the state estimated from measured tension and stroke."""
         assert self.observer is not None
         model, state = self.observer.observe(tension, stroke)
         if not self.observer.accepted:

@@ -1,4 +1,4 @@
-"""What following targets returns, as a JSON document and as columns of a CSV table."""
+"""The result of following targets, as a JSON document and as columns of a CSV table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from notchflex.results.quantities.registry import QUANTITIES
 
 
 def following_document(following: Following) -> dict[str, Any]:
-    """Return the document of the path, with a list `targets` of what each target came to.
+    """Return the document of the path, with a list `targets` of the result for each target.
 
     Keys of a target: `target`, its values by quantity (units as those of the steps), `step` (of
     the path, from 0), `reached`, `error` (mm, N and rad by their weights), `reason`,

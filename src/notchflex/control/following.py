@@ -1,4 +1,4 @@
-"""What following targets returns: drives, states, and how near each target was met."""
+"""The result of following targets: drives, states, and the error of each target."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Following(Displayed):
 
     @property
     def solves(self) -> Int[np.ndarray, " k"]:
-        """How many loads were solved for each target."""
+        """Number of loads solved for each target."""
         return np.array([one.solves for one in self.attempts])
 
     @property
@@ -155,7 +155,7 @@ class Reach(Displayed):
 
     @property
     def loads(self) -> list[Load]:
-        """What to command: the load at the target, before it that of an overshoot if any."""
+        """Commands: the load at the target, after that of an overshoot if any."""
         every, step = self.following, self.following.step
         first = 0 if self.target == 0 else int(step[self.target - 1]) + 1
         return [every.load[i] for i in range(first, int(step[self.target]) + 1)]

@@ -130,7 +130,7 @@ class Observer:
 
     @property
     def weights(self) -> Float[np.ndarray, " models"]:
-        """How likely each model is, in all 1."""
+        """Probability of each model; the sum is 1."""
         likely = np.exp(-0.5 * (self._cost - self._cost.min()))
         return likely / likely.sum()
 

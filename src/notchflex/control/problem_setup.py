@@ -1,4 +1,4 @@
-"""What a search needs of robot, limits and targets, made from what a user gives."""
+"""Setup of a search: robot, limits and targets from the arguments of a user."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _ASKED_TOGETHER = (
 
 
 class ProblemOptions(NamedTuple):
-    """What `reach`, `follow` and `Controller` take alike.
+    """Arguments common to `reach`, `follow` and `Controller`.
 
     Attributes:
         state: The present state; rest where None.

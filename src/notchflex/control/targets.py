@@ -30,7 +30,7 @@ _FORMS = "x, y, z of the tip in mm, or names of quantities with their values"
 
 @dataclass(frozen=True)
 class Targets:
-    """What quantities are to become, target by target.
+    """Target values of quantities, target by target.
 
     Attributes:
         values: By name of a quantity, its values, targets as leading axis; NaN where an entry is
@@ -58,7 +58,7 @@ class Aim(NamedTuple):
     """Targets as numbers of a response.
 
     Attributes:
-        entries: Which numbers of `Response.values` are aimed at, (m,).
+        entries: Entries of `Response.values` that have a target, (m,).
         goals: What they are to become, (k, m); NaN where free.
         weights: What an error of one unit counts, (m,).
     """

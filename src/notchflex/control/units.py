@@ -19,7 +19,7 @@ def unit_hint(robot: Robot, position: Float[np.ndarray, " 3"] | None) -> str:
 
     Args:
         robot: The robot.
-        position: Where its tip shall be, mm, NaN where free; None where no position is aimed at.
+        position: Where its tip shall be, mm, NaN where free; None if no position is targeted.
 
     Returns:
         Words to add to a reason; empty where no other unit explains the position.

@@ -1,4 +1,4 @@
-"""Design: from what is asked of a robot to its dimensions."""
+"""Design: dimensions of a robot from a specification."""
 
 from notchflex.designing.design_robot import design as design
 from notchflex.designing.documents import design_document as design_document

@@ -1,4 +1,4 @@
-"""`nf.design`: from what is asked to a robot."""
+"""`nf.design`: a robot from a specification."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def design(
     robust: bool = False,
     progress: Progress | None = None,
 ) -> Design:
-    """Choose numbers of a robot so that it does what is asked.
+    """Choose numbers of a robot so that it meets a specification.
 
     Args:
         spec: A design file, its table, or a `DesignSpec`.

@@ -8,7 +8,7 @@ from notchflex.designing.result import Design
 from notchflex.results.files.json import document_head
 
 
-def design_document(design: Design) -> dict[str, Any]:
+def design_document(made: Design) -> dict[str, Any]:
     """Return a design as a document.
 
     Returns:
@@ -17,11 +17,11 @@ def design_document(design: Design) -> dict[str, Any]:
         and `starts`, and of a robust design `yields`. Angles in deg, lengths in mm, forces in N.
     """
     return {
-        **document_head(design.robot),
-        "design": design.spec.name,
-        "converged": design.converged,
-        "met": design.met,
-        "reason": design.reason,
+        **document_head(made.robot),
+        "design": made.spec.name,
+        "converged": made.converged,
+        "met": made.met,
+        "reason": made.reason,
         "wishes": [
             {
                 "quantity": one.title,
@@ -32,14 +32,14 @@ def design_document(design: Design) -> dict[str, Any]:
                 "met": one.met,
                 "parts": list(one.parts),
             }
-            for one in design.wishes
+            for one in made.wishes
         ],
-        "variables": [vars(one) for one in design.variables],
-        "explanation": list(design.explanation),
-        "solves": design.solves,
-        "gradients": design.gradients,
-        "starts": design.starts,
-        **({"yields": [vars(one) for one in design.yields]} if design.yields else {}),
+        "variables": [vars(one) for one in made.variables],
+        "explanation": list(made.explanation),
+        "solves": made.solves,
+        "gradients": made.gradients,
+        "starts": made.starts,
+        **({"yields": [vars(one) for one in made.yields]} if made.yields else {}),
     }
 
 

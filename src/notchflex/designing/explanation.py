@@ -21,7 +21,7 @@ from notchflex.robot.value_names import numbers_at
 
 # The most sentences about limits, the dearest first.
 _MAX_SENTENCES = 12
-# A limit is changed by about this part of its size to tell what it costs.
+# Change of a limit, relative to its size, for which its cost is stated.
 _PART = 0.05
 _NOTHING = 1e-9
 
@@ -92,7 +92,7 @@ def _about_limits(outcome: SearchResult) -> tuple[str, ...]:
     kept = [one for one in sentences if one]
     left = len(kept) - _MAX_SENTENCES
     if not kept:
-        kept = ["No limit holds the design: what is asked is met inside all limits."]
+        kept = ["No limit is active: the design meets the specification inside all limits."]
     more = [f"{left} more limits are reached."] if left > 0 else []
     return (*kept[:_MAX_SENTENCES], *more)
 
@@ -165,7 +165,7 @@ def _objective_name(problem: DesignProblem) -> tuple[str, str, float] | None:
 
 
 def _missed(outcome: SearchResult) -> tuple[str, ...]:
-    """What cannot be met together, and by how much the nearest robot misses it."""
+    """Conflicting constraints, and the violation of each at the nearest robot."""
     one, problem = outcome.found.evaluation, outcome.problem
     assert one is not None
     violation = np.abs(problem.violation(one))

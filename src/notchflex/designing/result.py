@@ -1,4 +1,4 @@
-"""What a design returns."""
+"""The result of a design."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MINIMISE, MAXIMISE = "as small as possible", "as great as possible"
 
 @dataclass(frozen=True)
 class WishResult:
-    """What was asked, and what is achieved.
+    """One objective or constraint, with the achieved value.
 
     Attributes:
         title: The quantity, with its state.

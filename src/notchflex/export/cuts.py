@@ -64,8 +64,8 @@ def cuts_of(robot: Robot) -> RobotCuts:
         layout = notch.cut_layout(robot.tube, neighbours[number - 1], neighbours[number + 1])
         if layout is None:
             raise InputError.UNSUPPORTED(
-                f'a notch of kind = "{notch.kind}" does not know its cuts, so there is no drawing, '
-                "pattern or solid of it; give its class a method `cut_layout`."
+                f'a notch of kind = "{notch.kind}" has no definition of its cuts, so there is no '
+                "drawing, pattern or solid of it; give its class a method `cut_layout`."
             )
         cuts += [PlacedCut(number, cut.moved(at)) for cut in layout.cuts]
         starts.append(at)

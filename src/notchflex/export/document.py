@@ -1,4 +1,4 @@
-"""What every writer of a file makes: a document that is complete before anything is written."""
+"""The result of every exporter: a document that is complete before anything is written."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Subject:
-    """What is exported: a robot, and for a robot under load the step of a path."""
+    """Subject of an export: a robot, and for a robot under load the step of a path."""
 
     robot: Robot
     path: EquilibriumPath | None = None

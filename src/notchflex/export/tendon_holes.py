@@ -1,4 +1,4 @@
-"""Where tendons pass the edges of the bodies."""
+"""Points where tendons pass the edges of the bodies."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from notchflex.robot import Robot
 
 
 class TubeEnd(NamedTuple):
-    """Where the tube ends.
+    """Ends of the tube.
 
     Attributes:
         at: Distance of its end from the base [mm].

@@ -1,6 +1,6 @@
 """Fits as JSON documents, for `notchflex.results.files.json.write_json`, and as text.
 
-Constants are in the units of the robot file. None stands for a missing number, also for an open end
+Constants are in the units of the robot file. None marks a missing number, also an open end
 of an interval.
 """
 
@@ -28,11 +28,11 @@ HEAD = {"program": "notchflex", "version": __version__}
 _UNIT_OF_COST: dict[type, str] = {SumOfRobotErrors: "deg", SumOfDistances: "mm"}
 
 
-def calibration_document(calibration: Calibration) -> dict[str, Any]:
+def calibration_document(found: Calibration) -> dict[str, Any]:
     """Return a fit as a document.
 
     Args:
-        calibration: The fit.
+        found: The fit.
 
     Returns:
         `converged`, `reason`, `objective`, `cost`, `numbers_measured` (`numbers_counted` without
@@ -42,30 +42,30 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         mean squares of every notch, beside the repeats), `searches`, `solves` (number of rows
         solved) and `robots` (their data, and their descriptions with the fitted constants).
     """
-    objective = calibration.problem.objective
+    objective = found.problem.objective
     huber = {"huber": objective.huber} if isinstance(objective, LeastSquares) else {}
     return {
         **HEAD,
-        "converged": calibration.converged,
-        "reason": calibration.reason,
+        "converged": found.converged,
+        "reason": found.reason,
         "objective": {"name": type(objective).__name__, **huber},
-        "cost": calibration.cost,
+        "cost": found.cost,
         "cost_unit": _UNIT_OF_COST.get(type(objective), ""),
-        "numbers_measured": len(calibration.residuals),
-        "numbers_counted": calibration.counted,
-        "degrees_of_freedom": calibration.freedom,
-        "reduced_chi_squared": _finite(calibration.reduced_chi_squared),
-        "intervals_widened_by": calibration.widened,
-        "constants": _constants(calibration),
-        "correlation": [[_finite(one) for one in row] for row in calibration.correlation],
-        "verdict": list(diagnose(calibration)),
-        "noise": _noise(calibration),
-        "errors": _errors(calibration),
-        "searches": _searches(calibration),
-        "solves": calibration.solves,
+        "numbers_measured": len(found.residuals),
+        "numbers_counted": found.counted,
+        "degrees_of_freedom": found.freedom,
+        "reduced_chi_squared": _finite(found.reduced_chi_squared),
+        "intervals_widened_by": found.widened,
+        "constants": _constants(found),
+        "correlation": [[_finite(one) for one in row] for row in found.correlation],
+        "verdict": list(diagnose(found)),
+        "noise": _noise(found),
+        "errors": _errors(found),
+        "searches": _searches(found),
+        "solves": found.solves,
         "robots": {
-            label: {"data": data_of(calibration, label), "robot": plain(to_table(robot))}
-            for label, robot in calibration.robots.items()
+            label: {"data": data_of(found, label), "robot": plain(to_table(robot))}
+            for label, robot in found.robots.items()
         },
     }
 

@@ -22,7 +22,7 @@ _FILES = 3
 
 
 def write_fitted(
-    calibration: Calibration, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
+    found: Calibration, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
 ) -> tuple[Path, ...]:
     """Write every fitted robot as a robot file, named after its label.
 
@@ -30,7 +30,7 @@ def write_fitted(
     names the data and the 95 % interval. Constants of the measurement (`sensor.`) are not written.
 
     Args:
-        calibration: The fit.
+        found: The fit.
         folder: Folder of the files; made if it is missing. Files of the same names are replaced.
         inputs: Files that must not be replaced.
 
@@ -45,11 +45,11 @@ def write_fitted(
         >>> write_fitted(found, "fitted")  # doctest: +SKIP
         (PosixPath('fitted/my-wrist.toml'),)
     """
-    names = [f"{label}.toml" for label in calibration.given]
+    names = [f"{label}.toml" for label in found.given]
     files = check_folder(str(folder), names, "the folder of fitted robots", inputs=inputs)
-    targets = dict(zip(calibration.given, files, strict=True))
+    targets = dict(zip(found.given, files, strict=True))
     for label, target in targets.items():
-        if target.exists() and _text(target) == source_of(calibration.given[label]):
+        if target.exists() and _text(target) == source_of(found.given[label]):
             raise InputError.CONFLICT(
                 f"{target}: this would replace the file that {label} was read from; choose "
                 "another folder."
@@ -61,10 +61,10 @@ def write_fitted(
             f"the folder {folder} cannot be made: {problem.strerror}."
         ) from None
     for label, target in targets.items():
-        robot = calibration.robots[label]
+        robot = found.robots[label]
         notes = {
-            one.path: _note(calibration, unknown)
-            for unknown in calibration.problem.unknowns
+            one.path: _note(found, unknown)
+            for unknown in found.problem.unknowns
             for one in unknown.sets
             if one.label == label and one.path not in SENSOR
         }

@@ -79,7 +79,7 @@ class RobotEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
         Returns:
             Observation, reward, whether the target is reached, whether the last step is done, and
-            information: `distance` from the target that was aimed at (mm), `code` of a failure.
+            information: `distance` from the target of the step (mm), `code` of a failure.
 
         Raises:
             InputError: An action of another shape, or not finite.

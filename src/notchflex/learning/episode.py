@@ -1,4 +1,4 @@
-"""What an episode is: the robot, how fast its tendons may be pulled, what is observed."""
+"""Settings of an episode: the robot, the rate of its tendons, the observation."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class EpisodeSettings:
 
     @cached_property
     def straight_tip(self) -> Float[np.ndarray, " 3"]:
-        """Where the tip of the straight robot is, mm."""
+        """Tip position of the straight robot, mm."""
         return np.asarray(tip_from_angles(self.model, np.zeros(self.model.number_of_notches))[0])
 
     @cached_property

@@ -15,13 +15,13 @@ from notchflex.learning.random_paths import random_pull, random_tensions
 from notchflex.loads.validation import short_repr
 
 FAILED = 1.0
-"""What a tension without equilibrium costs."""
+"""Cost of a tension without equilibrium."""
 REACHED = 1.0
-"""What reaching a target is worth."""
+"""Reward for reaching a target."""
 
 
 class Outcome(NamedTuple):
-    """What a step brought, by row.
+    """Outcome of a step, by row.
 
     Attributes:
         reward: Its reward.
@@ -113,7 +113,7 @@ class EpisodeRows:
 
     @property
     def target(self) -> Float[np.ndarray, "n 3"]:
-        """Where the tip is to be after the next step, mm; after the last one where it was to be."""
+        """Target of the tip after the next step, mm; after the last step the last target."""
         last = self._targets.shape[1] - 1
         return self._targets[np.arange(len(self._count)), np.minimum(self._count, last)]
 
@@ -124,7 +124,7 @@ class EpisodeRows:
 
     @property
     def observation(self) -> Float[np.ndarray, "n size"]:
-        """What is observed of every row, in parts of the largest tension and of the length."""
+        """Observation of every row, in parts of the largest tension and of the length."""
         rows = np.arange(len(self._count))
         observed, target = self._seen(rows), self.target / self.settings.length
         return np.concatenate([observed, self._past.reshape(len(rows), -1), target], axis=1)

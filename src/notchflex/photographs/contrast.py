@@ -1,4 +1,4 @@
-"""What differs from the background: a smooth background, and the contrast against it."""
+"""A smooth background of a photograph, and the contrast against it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ROUNDS = 12
 
 @dataclass(frozen=True)
 class Contrast:
-    """How far a photograph differs from its background.
+    """Difference of a photograph from its background.
 
     Attributes:
         value: Distance of every pixel from the background over all colours, grey levels.

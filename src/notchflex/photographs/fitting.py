@@ -16,8 +16,8 @@ from notchflex.photographs.lines import Lines, lines_of, relative
 
 _PRIOR_ROLL, _PRIOR_TILT = math.radians(10.0), math.radians(8.0)
 _PRIOR_KERF, _PRIOR_CUT = 0.01, 0.006  # of the outer diameter: how well notches are made
-_PRIOR_OWN, _MAX_OWN = 0.1, 0.2  # of the outer diameter: how far a notch may be off by itself
-_PRIOR_ANY = 1.0  # of the outer diameter: roll and depth are told apart by other photographs
+_PRIOR_OWN, _MAX_OWN = 0.1, 0.2  # of the outer diameter: deviation of a single notch
+_PRIOR_ANY = 1.0  # of the outer diameter: other photographs separate roll from depth
 _PRIOR_CAMERA, _CAMERA = 0.006, 0.006  # inverse distance of the camera, per outer diameter
 _EDGE = 0.25  # px: noise of an edge in quick rounds
 _MIN_NOISE = 0.05  # px
@@ -99,7 +99,7 @@ def refine(
 
 
 class _EdgeWeights(NamedTuple):
-    """How edges count: weights (1/px^2, (N,)), columns of errors of lines and their spreads."""
+    """Weights of edges: weights (1/px^2, (N,)), columns of errors of lines and their spreads."""
 
     weight: Numbers
     columns: Numbers
@@ -174,7 +174,7 @@ def _normal(
 
 
 def priors(model: OutlineModel, numbers: Numbers) -> tuple[Numbers, Numbers]:
-    """Return centres and spreads of what is known before."""
+    """Return means and standard deviations of the priors."""
     outer = 2.0 * model.table.outer
     centre, spread = np.zeros(len(numbers)), np.full(len(numbers), np.inf)
     turn = math.pi if math.cos(numbers[4]) < 0.0 else 0.0
@@ -230,7 +230,7 @@ def _outline(model: OutlineModel, numbers: Numbers) -> tuple[Outline, Numbers]:
 def covariance(fit: Fit, model: OutlineModel) -> tuple[NDArray[np.float64], float]:
     """Return the covariance of all numbers, and the robust spread of the residuals, px.
 
-    Errors of lines are among the unknowns (`lines.py`): edges beside each other err alike.
+    Errors of lines are among the unknowns (`lines.py`), because neighbouring edges are correlated.
     """
     weighed = _weighed(lines_of(model), fit.edges, len(fit.numbers))
     normal, _ = _normal(model, fit.numbers, fit.jacobian, fit.residual, weighed)
@@ -250,9 +250,9 @@ def cost(fit: Fit, model: OutlineModel) -> float:
 def misfit(fit: Fit, model: OutlineModel, noise: float) -> float:
     """Return how unlikely residuals are: a sum of squares in which those far away are capped.
 
-    Neighbouring edges err alike, so that only some of them count; missed edges count most. Lines
-    that are shifted or turned relative to the others count too: seen from the wrong side, a robot
-    fits edge by edge, but only with lines that are shifted, or with notches of another depth.
+    Errors of neighbouring edges are correlated, so that only some of them count; missed edges count
+    most. Lines that are shifted or turned relative to the others count too: seen from the wrong
+    side, a robot fits edge by edge, but only with shifted lines, or with notches of another depth.
     """
     lines = lines_of(model)
     errors, left = lines.errors(fit.residual, 1.0)

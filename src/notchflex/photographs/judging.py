@@ -1,4 +1,4 @@
-"""Whether a fit can be trusted: the reason why not, in one sentence."""
+"""Acceptance of a fit: the reason for a rejection, in one sentence."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MADE = 0.04  # of the outer diameter: how far notches may differ from the robot
 def rejection_reason(
     located: Located, deviation: Numbers, noise: float, uncertainty: float = math.inf
 ) -> str:
-    """Return why angles are not reported; "" if nothing speaks against them.
+    """Return why the fit is rejected, or an empty string.
 
     Args:
         located: The best fit.
@@ -84,7 +84,7 @@ def _of_spread(located: Located, deviation: Numbers, noise: float) -> str:
     for worse, differs in located.rival:
         if worse < _RIVAL and differs > _OTHER:
             return (
-                "two shapes fit nearly alike; their angles differ by up to "
+                "two shapes fit almost equally well; their angles differ by up to "
                 f"{math.degrees(differs):.1f} deg"
             )
     return ""

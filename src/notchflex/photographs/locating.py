@@ -71,7 +71,7 @@ def locate(
     coarse = [*given, *_coarse(table, contrast, factor, middle, given)]
     if not coarse:
         return None
-    # Where both ends look alike, a chain from tip to base fits nearly as well.
+    # Where both ends look the same, a chain from tip to base fits nearly as well.
     coarse += on_axis_points(table, axis_points(table, coarse[0])[::-1])[:1]
     wide = 2.0 * table.outer * math.exp(coarse[0][3])
     fine = min(1.0, _FINE_WIDTH / wide)
@@ -131,7 +131,7 @@ def _slipped(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers)
 
 
 def _moved(points: Numbers, way: float) -> Numbers:
-    """Return points farther along their line, which goes on straight at both ends, px."""
+    """Return points farther along their line, which continues straight at both ends, px."""
     ends = [2.0 * points[:1] - points[1:2], 2.0 * points[-1:] - points[-2:-1]]
     line = np.vstack([ends[0], points, ends[1]])
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])

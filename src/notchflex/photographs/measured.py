@@ -1,4 +1,4 @@
-"""What was measured in photographs."""
+"""The measured photographs."""
 
 from __future__ import annotations
 

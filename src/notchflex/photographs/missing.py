@@ -1,4 +1,4 @@
-"""Whether every part of a robot is seen in a photograph where a fit has it."""
+"""Check that every part of a fitted robot is visible in the photograph."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MIN_FACES, _MIN_SPINES, _MIN_INNER = 0.35, 0.5, 0.3
 
 
 def missing(model: OutlineModel, fit: Fit) -> str:
-    """Return which part of the outline is not seen; "" if enough of every part is."""
+    """Return why the fit is rejected for a part that is not seen, or an empty string."""
     n = model.table.notches
     is_near = np.abs(fit.residual) < MAX_RESIDUAL
     looked = fit.edges.looked

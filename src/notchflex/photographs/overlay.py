@@ -20,7 +20,7 @@ _FOUND, _MISSED, _REFUSED = (60, 200, 60), (40, 140, 255), (120, 160, 255)
 
 
 def overlay_names(sources: Sequence[str]) -> list[str]:
-    """Return a name for the overlay of each photograph, no two alike.
+    """Return a unique name for the overlay of each photograph.
 
     Example:
         >>> overlay_names(["a/x.jpg", "b/x.jpg", "y.png"])

@@ -1,4 +1,4 @@
-"""Where a robot may lie in a photograph: starts of the fit, from a centre line."""
+"""Starting points of the fit of a photograph, from a centre line."""
 
 from __future__ import annotations
 
@@ -206,7 +206,7 @@ def with_tilts(numbers: Numbers, size: float) -> list[Numbers]:
 
 
 def reversed_view(numbers: Numbers) -> Numbers:
-    """Return the view that looks alike from far away: rolled and tilted the other way."""
+    """Return the view that looks the same from far away: opposite roll and tilt."""
     turned = numbers.copy()
     turn = math.pi if math.cos(turned[4]) < 0.0 else 0.0
     turned[4], turned[5] = 2.0 * turn - turned[4], -turned[5]

@@ -1,1 +1,1 @@
-"""Long computations in pieces, one file each, by threads or by workers of dask; gone on with."""
+"""Long computations in pieces, one file each, by threads or dask; resumed after an interruption."""

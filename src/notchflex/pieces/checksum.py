@@ -1,4 +1,4 @@
-"""A checksum in the footer of a Parquet file, of all its bytes: tells a file that was damaged.
+"""A checksum in the footer of a Parquet file, of all its bytes: detects a damaged file.
 
 Its place is found by the Thrift encoding of the footer: key, a field of text (0x18), its length.
 """

@@ -146,7 +146,7 @@ def _close(client: Any) -> None:
 def within(seconds: float, call: Callable[[], T]) -> T:
     """Return the result of a call, or go on without it.
 
-    A call of dask whose scheduler dies may wait for ever, whatever limit it was given.
+    A call of dask whose scheduler dies may wait for ever, in spite of its time limit.
 
     Args:
         seconds: Longest time to wait.

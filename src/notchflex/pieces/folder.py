@@ -19,7 +19,7 @@ from notchflex.results.files.writing import check_folder, read_text, write_text
 PIECES, LOCK = "pieces", ".lock"
 
 _OF_MANIFEST = 2**40
-"""The byte of the lock that stands for the manifest, behind those of all pieces."""
+"""The byte of the lock that locks the manifest, behind those of all pieces."""
 
 
 class _Held:

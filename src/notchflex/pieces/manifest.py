@@ -30,7 +30,7 @@ def versions() -> dict[str, str]:
 
 @dataclass(frozen=True, eq=False)
 class Manifest:
-    """What a folder of pieces holds.
+    """Manifest of a folder of pieces.
 
     Attributes:
         document: As it is in its file, of plain values: `kind` (as in "sweep.json"), `versions`,
@@ -102,12 +102,12 @@ class Manifest:
 
     @cached_property
     def digest(self) -> str:
-        """What every piece is marked with."""
+        """Mark of every piece."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     @property
     def kind(self) -> str:
-        """What is computed, such as "sweep"."""
+        """Kind of computation, such as "sweep"."""
         return self.document["kind"]
 
     @property

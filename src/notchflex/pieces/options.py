@@ -1,4 +1,4 @@
-"""Where pieces are kept, and who works on them."""
+"""Folder and workers of a computation in pieces."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from notchflex.pieces.run import Progress, check_workers, open_folder, run_piece
 class PieceFolder:
     """A folder that keeps the finished pieces of a long computation, and who works on them.
 
-    The same call again goes on where it was stopped.
+    The same call resumes an interrupted computation.
 
     Args:
         directory: The folder; it is made if it is missing.

@@ -22,7 +22,7 @@ KEY = "notchflex-sweep"
 
 
 class Piece(NamedTuple):
-    """What was worked out.
+    """Computed content of a piece.
 
     Attributes:
         frame: Its rows.
@@ -34,7 +34,7 @@ class Piece(NamedTuple):
 
 
 class Done(NamedTuple):
-    """What became of a piece.
+    """Outcome of a piece.
 
     Attributes:
         piece: Its number, from 0.
@@ -50,7 +50,7 @@ class Done(NamedTuple):
 
 
 class Recipe(NamedTuple):
-    """How another process makes a task.
+    """Recipe by which another process makes a task.
 
     Attributes:
         make: A function of a module.
@@ -71,7 +71,7 @@ class PieceTask(Protocol):
 
     @property
     def recipe(self) -> Recipe:
-        """How another process makes the same task."""
+        """Recipe by which another process makes the same task."""
         ...
 
     def prepare(self) -> None:

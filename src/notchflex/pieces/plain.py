@@ -1,4 +1,4 @@
-"""Objects as plain values, by which a manifest tells whether two computations are the same."""
+"""Objects as plain values: a manifest compares two computations by them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who works on pieces: threads of this process, or workers of dask; the pieces do not tell."""
+"""Execution of pieces by threads of this process or workers of dask, with equal results."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _MAX_BIN = 64 * HALF
 
 @dataclass(frozen=True)
 class Scale:
-    """Where a sample has its values: a finite middle, and half their range, above 0."""
+    """Range of the values of a sample: a finite middle, and half the range, above 0."""
 
     middle: float
     half: float

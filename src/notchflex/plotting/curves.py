@@ -73,7 +73,7 @@ def branches(x: NDArray[np.float64]) -> Iterator[tuple[slice, str]]:
         [(0, 3, 'loading'), (2, 4, 'unloading')]
     """
     change = np.diff(x)
-    # Rounding errors of a constant value are no reversal.
+    # Rounding errors of a constant value are not a reversal.
     change[np.abs(change) <= 1e-9 * np.nanmax(np.abs(x), initial=0.0)] = 0.0
     start, direction = 0, 0.0
     for index, sign in enumerate(np.sign(change)):
@@ -132,7 +132,7 @@ def _in_proportion(path: EquilibriumPath, first: int, other: int) -> bool:
 COLOUR = {LOADING: BLUE, UNLOADING: VERMILLION}
 LINE = {LOADING: SOLID, UNLOADING: DASHED}
 NEUTRAL = "#4c4c4c"
-"""Colour of legend entries that stand for marks of several colours."""
+"""Colour of legend entries for marks of several colours."""
 NOTCH_LABEL = "notch [number], 1 at the base"
 TIP_LABELS = tuple(
     f"{QUANTITIES['tip_position'].title} {axis} [{QUANTITIES['tip_position'].unit}]"

@@ -30,7 +30,7 @@ INSIDE, BESIDE, BELOW = "inside", "beside", "below"
 
 @dataclass(frozen=True, kw_only=True)
 class Mark:
-    """What every mark of a panel has: legend entry, group and drawing order (higher in front).
+    """Fields of every mark: legend entry, group and drawing order (higher in front).
 
     A browser shows and hides the marks of one group together.
     """

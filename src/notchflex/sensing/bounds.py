@@ -134,7 +134,7 @@ class _Tracker:
 
 
 class _SolvedFrom:
-    """What was solved in one reading, by the state that it began at: histories may share one."""
+    """Results in one reading, by their initial state: histories may share one."""
 
     def __init__(self) -> None:
         """Begin with nothing."""

@@ -13,7 +13,7 @@ from notchflex.sensing.model import SensingModel, Step
 from notchflex.solver.programs.run import SolverRun
 from notchflex.solver.solver_state import SolverState
 
-# Part of the range over which differences stand for slopes.
+# Part of the range over which differences approximate slopes.
 _NARROW = 1e-5
 
 
@@ -37,7 +37,7 @@ class Solved:
 
     @property
     def run(self) -> SolverRun:
-        """How the forces were solved."""
+        """Counts of the solves for the forces."""
         run = self.path.run
         assert isinstance(run, SolverRun)
         return run
@@ -86,7 +86,7 @@ Known = dict[bytes, Solved]
 
 @dataclass(frozen=True, eq=False)
 class ReadingProblem:
-    """What a force must meet in one reading, from the state after the reading before.
+    """Problem of one reading: the force from the state after the reading before.
 
     Attributes:
         model: The robot.

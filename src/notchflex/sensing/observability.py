@@ -22,7 +22,7 @@ _PART = 0.05
 
 @dataclass(frozen=True, eq=False)
 class LeftOpen:
-    """What one reading leaves open.
+    """Unobservable directions of one reading.
 
     Attributes:
         covariance: Of the force by noise, to first order, N². Along a direction that hardly changes

@@ -1,4 +1,4 @@
-"""What one reading says by itself that was averaged with others.
+"""The evidence of one reading that was averaged with others.
 
 The model follows the means, for its contacts must not follow the noise. That noise explains how far
 readings are apart does not show that the force was the same in all of them. So the force and the

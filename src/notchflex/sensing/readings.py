@@ -59,7 +59,7 @@ class SensorNoise:
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """What the sensors read along a history of s readings; NaN where nothing was measured.
+    """Readings of the sensors along a history of s readings; NaN where nothing was measured.
 
     Attributes:
         tension: Tensions at the base, N, (s, t).
@@ -97,7 +97,7 @@ class Readings:
 
     @property
     def read(self) -> dict[str, Float[np.ndarray, "s m"]]:
-        """What the model must meet, by quantity.
+        """Measured values that the model must reproduce, by quantity.
 
         The stroke of a slack tendon says nothing: it is left out where the tension cannot be told
         from 0.
@@ -107,7 +107,7 @@ class Readings:
 
     @property
     def compared(self) -> dict[str, Float[np.ndarray, "s m"]]:
-        """What sensors read that the model computes, by quantity."""
+        """Sensor values that the model computes, by quantity."""
         return {"stroke": self.stroke, "tip_position": self.tip, "notch_angle": self.angles}
 
     @property

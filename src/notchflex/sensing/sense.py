@@ -52,7 +52,7 @@ def sense(
 
     The history begins at rest, with slack tendons and without the force. From reading to reading
     tendons and force change in proportion. The force may come, change and go at any reading: that
-    of every reading is found for itself, from the state that the readings before left. Consecutive
+    of every reading is estimated separately, from the state after the readings before. Consecutive
     readings that noise explains are averaged before the model follows them; the force of each stays
     its own, and so does its interval.
 

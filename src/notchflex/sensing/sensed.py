@@ -1,4 +1,4 @@
-"""What was sensed: forces along a history, their intervals, contact, and what cannot be known."""
+"""The sensed forces along a history: intervals, contact, and unobservable directions."""
 
 from __future__ import annotations
 
@@ -102,7 +102,8 @@ class SensedForce(Displayed):
     def contact_probability(self) -> Float[np.ndarray, " s"]:
         """Probability of readings that differ as much from those without force by noise, (s,).
 
-        The least favourable history decides: where the tendon sticks, small forces are no contact.
+        The least favourable history decides: while the tendon sticks, small forces are not
+        reported as contact.
         """
         freedom = [len(self.components) - len(rows) for rows in self.hidden]
         return np.array(
@@ -154,7 +155,7 @@ class SensedForce(Displayed):
         return [one for one, misfit in self.places.items() if one != self.place and misfit <= most]
 
     def raise_if_failed(self) -> SensedForce:
-        """Itself, if a force was found for every reading.
+        """Return the result itself if a force was found for every reading.
 
         Raises:
             ConvergenceError: One was not; the message says which and why.

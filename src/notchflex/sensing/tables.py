@@ -16,7 +16,7 @@ from notchflex.robot import Robot
 from notchflex.sensing.sensed import SensedForce
 
 BESIDE = ("tip", "angles")
-"""What may be read beside tensions and strokes."""
+"""Optional readings beside tensions and strokes."""
 
 
 def read_sensor_table(

@@ -1,4 +1,4 @@
-"""Sweeps: many robots under the same loads, in pieces that are kept as files and gone on with."""
+"""Sweeps: many robots under the same loads, in stored pieces, resumed after an interruption."""
 
 from notchflex.sweeping.plan import SweepPlan, read_plan
 from notchflex.sweeping.reading import read_sweep

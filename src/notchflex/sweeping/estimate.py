@@ -1,4 +1,4 @@
-"""What a sweep will take, before it starts: rows, time and bytes, from rows that are timed."""
+"""Estimate of a sweep before it starts: rows, time and bytes, from a timed sample."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LONG = 1.0
 
 
 class Estimate(NamedTuple):
-    """What a sweep will take.
+    """Estimated size and time of a sweep.
 
     Attributes:
         rows: Its rows.
@@ -52,7 +52,7 @@ class Estimate(NamedTuple):
 
 
 def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = None) -> Estimate:
-    """Solve the first piece of a sweep, and tell what all of it will take; nothing is written.
+    """Solve the first piece of a sweep, and estimate its whole time and size; nothing is written.
 
     Args:
         plan: The plan, or the file that holds it.

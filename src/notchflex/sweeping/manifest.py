@@ -14,7 +14,7 @@ KIND = "sweep"
 
 
 class SweepManifest(Manifest):
-    """What a sweep is."""
+    """Manifest of a sweep."""
 
     @classmethod
     def of(cls, plan: SweepPlan, robot: Robot, model: SweepModel) -> SweepManifest:

@@ -34,7 +34,7 @@ def sweep(
 ) -> Sweep:
     """Solve many robots that differ by a few numbers, and keep the results as files.
 
-    A sweep is cut into pieces, and each piece is one file. A sweep that was stopped goes on where
+    A sweep is cut into pieces, and each piece is one file. A sweep that was stopped resumes where
     it was. The files do not depend on who works on the pieces, and in which order.
 
     Args:

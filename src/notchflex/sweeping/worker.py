@@ -35,7 +35,7 @@ class SweepWorker:
 
     @property
     def recipe(self) -> Recipe:
-        """How another process makes the same worker: from the text of the manifest."""
+        """Recipe by which another process makes the same worker: the text of the manifest."""
         return Recipe(sweep_worker, self.manifest.text)
 
     def prepare(self) -> None:

@@ -61,7 +61,7 @@ def tolerance_analysis(
         cores: As for `simulate_batch`.
         progress: Called with what is computed, how much of it is done, and how much there is.
         folder: Draw in pieces, which this folder keeps: for more draws than fit into memory, by
-            many processes (`PieceFolder`), gone on with by the same call.
+            many processes (`PieceFolder`), resumed by the same call.
 
     Returns:
         Worst case and root sum of squares, yield, Sobol indices, and what each tolerance does.

@@ -16,11 +16,11 @@ _POINTS = 2048
 _WIDEST = 2.0
 """A tolerance is widened so many times at most."""
 _EXACT = 0.02
-"""How exactly the factor on a tolerance is found."""
+"""Relative accuracy of the factor on a tolerance."""
 
 
 class Control(NamedTuple):
-    """What one tolerance alone does to the yield, the others as they are.
+    """Effect of one tolerance on the yield, the others unchanged.
 
     Attributes:
         exact: Yield if the source had no deviation at all, (d,).
@@ -79,7 +79,7 @@ def control(
 
 
 def _factor(yield_at: Callable[[float], float], target: float) -> float:
-    """Find the factor on a tolerance at which the yield falls to what is wanted."""
+    """Find the factor on a tolerance at which the yield falls to its target."""
     if yield_at(0.0) < target:
         return 0.0
     low, high = 0.0, 1.0

@@ -110,7 +110,7 @@ def entries_of(
         )
     if not holds(path, quantity):
         raise InputError.UNSUPPORTED(
-            f"there is no {limit.quantity} of this robot; choose another quantity."
+            f"this robot has no {limit.quantity}; choose another quantity."
         )
     values = np.asarray(path.quantity(limit.quantity))[step - 1]
     choices = [

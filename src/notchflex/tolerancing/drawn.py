@@ -32,12 +32,12 @@ class DrawnRobots:
 
     @property
     def codes(self) -> Int[np.ndarray, " codes"]:
-        """How many robots have each of `CODES`."""
+        """Number of robots by each of `CODES`."""
         return np.bincount(self.outcomes.codes, minlength=len(CODES))
 
     @property
     def accepted(self) -> Int[np.ndarray, " replicates"]:
-        """How many robots of each replicate are accepted."""
+        """Number of accepted robots in each replicate."""
         return self.outcomes.accepted.reshape(REPLICATES, -1).sum(axis=1)
 
     def beyond(self, criteria: Sequence[Criterion]) -> tuple[np.ndarray, np.ndarray]:
@@ -63,7 +63,7 @@ class DrawnRobots:
 
 @dataclass(frozen=True, eq=False)
 class DrawnPieces:
-    """What is summed up of robots that were drawn in pieces.
+    """Summary of robots that were drawn in pieces.
 
     Attributes:
         directory: The folder of the pieces.

@@ -1,4 +1,4 @@
-"""Draws within tolerances in pieces: more than fits into memory, by many processes, gone on with.
+"""Draws within tolerances in pieces: more than fits into memory, by many processes, resumable.
 
 A piece is a part of one replicate of scrambled Sobol points.
 """
@@ -86,7 +86,7 @@ class ToleranceTask:
 
     @property
     def recipe(self) -> Recipe:
-        """How another process makes the same task."""
+        """Recipe by which another process makes the same task."""
         return Recipe(tolerance_task, pickle.dumps((self._content, self._draws, self.seed)))
 
     def prepare(self) -> None:
@@ -102,7 +102,7 @@ class ToleranceTask:
         return [Scale.of(column) for column in outcomes.values.T]
 
     def _sequence(self, number: int) -> SobolPart:
-        """Return a replicate, for the calling thread, which goes on with it."""
+        """Return a replicate, for the calling thread."""
         if getattr(self._own, "number", None) != number:
             self._own.number = number
             self._own.part = replicate(len(self.study.sources), self.each, self.seed, number)

@@ -16,14 +16,14 @@ from notchflex.solver.newton import DEFAULT
 from notchflex.tolerancing.study import Study
 
 WORST_SD = 3.0
-"""Where a normal distribution is not cut off, the worst case takes so many standard deviations."""
+"""Number of standard deviations in the worst case of an untruncated normal distribution."""
 
 
 _Deviation = Callable[[Tolerance, float], float]
 
 
 class LinearEffects(NamedTuple):
-    """What small tolerances do to the numbers that have limits, each source by itself.
+    """Effect of small tolerances on the numbers that have limits, for each source.
 
     Attributes:
         nominal: The numbers of the drawing, (k,).

@@ -22,7 +22,7 @@ SAMPLE = 4096
 """Rows that polynomials of chains are made and checked with, from all over the study."""
 
 _EACH = 1024
-"""Robots that are assembled each by itself are so many at a time: a chain takes much memory."""
+"""Largest number of separately assembled robots at a time: a chain takes much memory."""
 
 _PIECES = 16
 """A study is cut into about so many pieces, unless they would be too small or too large."""
@@ -48,7 +48,7 @@ class PieceStudy(Study):
 
     @cached_property
     def chains(self) -> dict[str, VariedChains | None]:
-        """Chains of varied robots under every load; None where each is assembled by itself."""
+        """Chains of varied robots under every load; None where each is assembled separately."""
         robots = VariedRobots(self.exact, self.sample, self.ranges)
         if not robots.valid().all():
             return dict.fromkeys(self.loads)

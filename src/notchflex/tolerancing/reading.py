@@ -53,7 +53,7 @@ def read_tolerance_spec(file: str | os.PathLike[str], robot: Robot) -> Tolerance
 
 
 def spec_of(table: Mapping[str, Any], robot: Robot) -> ToleranceSpec:
-    """Make what is asked of the table of a file.
+    """Make a specification from the table of a file.
 
     Args:
         table: As read from TOML.

@@ -23,7 +23,7 @@ from notchflex.tolerancing.yields import REPLICATES, yield_interval
 
 @dataclass(frozen=True, repr=False)
 class ToleranceAnalysis(Displayed):
-    """What tolerances do to a robot that must meet limits; k numbers with limits, d sources.
+    """Effect of tolerances on a robot with limits; k numbers with limits, d sources.
 
     Attributes:
         robot: The robot of the drawing.
@@ -31,7 +31,7 @@ class ToleranceAnalysis(Displayed):
         criteria: The numbers that have limits.
         tolerances: What deviates.
         assumed: Names of the values whose tolerance the robot does not give.
-        sources: Names of what deviates by itself, such as `notch[3].depth`.
+        sources: Names of independent deviations, such as `notch[3].depth`.
         linear: Worst case and root sum of squares, by gradients.
         drawn: The robots that were drawn, or what is summed up of those in pieces.
         sobol: Sobol indices.
@@ -55,7 +55,7 @@ class ToleranceAnalysis(Displayed):
 
     @property
     def draws(self) -> int:
-        """How many robots were drawn."""
+        """Number of drawn robots."""
         return int(self.drawn.codes.sum())
 
     @property
@@ -70,7 +70,7 @@ class ToleranceAnalysis(Displayed):
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many robots were accepted, rejected, did not converge, and are no valid robots."""
+        """Number of robots accepted, rejected, not converged, and invalid."""
         return dict(zip(CODES, self.drawn.codes.tolist(), strict=True))
 
     @property
@@ -95,7 +95,7 @@ class ToleranceAnalysis(Displayed):
     def order(self) -> Int[np.ndarray, " d"]:
         """Places of the sources, that first whose control brings the most yield.
 
-        Where the yield does not tell, that which makes most of the variance of a number.
+        If the yield does not decide, the one with the largest share of the variance of a number.
         """
         gained = np.round(self.control.exact - self.accepted_fraction, 3)
         share = self.linear.share.max(axis=0, initial=0.0)

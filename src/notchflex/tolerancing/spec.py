@@ -1,4 +1,4 @@
-"""What is asked of a robot that is made within tolerances: loads, acceptance limits, yield."""
+"""Specification of robots within tolerances: loads, acceptance limits, yield."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class AcceptanceLimit:
         upper: Largest value; None for no limit.
         load: Name of the load; None for the only one.
         step: Step of the load, from 1; None for the last.
-        notch: Which notch, from 1; None for every one, each by itself.
+        notch: Which notch, from 1; None for every notch separately.
         tendon: Which tendon, from 1; None for every one.
         body: Which body, 0 for the base; None for every one.
         span: Which span of a tendon, from 1; None for every one.

@@ -32,7 +32,7 @@ standard deviations."""
 
 
 class Outcomes(NamedTuple):
-    """What became of robots.
+    """Outcomes of robots.
 
     Attributes:
         values: The numbers that have limits, (robots, criteria); NaN where there is no result.
@@ -77,7 +77,7 @@ class Study:
 
     @cached_property
     def sources(self) -> list[ToleranceSource]:
-        """What deviates, each on its own."""
+        """Independent sources of deviations."""
         return [one for one in sources_of(self.exact, self.tolerances) if np.ptp(_ends(one)) > 0.0]
 
     @cached_property

@@ -2,7 +2,7 @@ r"""The part of robots that is accepted, by randomised quasi-Monte Carlo, with a
 
 Scrambled Sobol points fill the tolerances more evenly than independent draws, so that a binomial
 interval of all points would be too wide. They are drawn as independent replicates: each is
-scrambled anew, and the scatter of their yields $\hat p_r$ tells the variance of the mean. That is
+scrambled anew, and the scatter of their yields $\hat p_r$ gives the variance of the mean. That is
 worth $n_e = \hat p(1 - \hat p)/\operatorname{var}(\bar p)$ independent draws, which Wilson's
 interval takes with the quantile of Student's t for the number of replicates.
 """

@@ -1,4 +1,4 @@
-"""Where the page is served, and to whom: other pages in the same browser are refused.
+"""Address and access of the page: other pages in the same browser are refused.
 
 A page of another site can send requests to 127.0.0.1, and after DNS rebinding even under its own
 name. Browsers send the page in `Origin` and the name that it used in `Host`, and a page can

@@ -1,4 +1,4 @@
-"""What the solver thread has to do: tasks in order, and targets of the robot.
+"""Tasks of the solver thread in order, and targets of the robot.
 
 A field on the page sends a number after every key: 1 before 1.5. Friction is history-dependent, so
 a typed number waits for a pause, and a newer one from the same field replaces it. Any other task
@@ -202,7 +202,7 @@ class TargetQueue:
             self._replace(target for target in turned if target.same_kind(controls))
 
     def clear(self, controls: Controls | None = None) -> None:
-        """Drop all targets; with `here` also set the current setting."""
+        """Drop all targets; with `controls` also set the current setting."""
         with self._lock:
             self._targets.clear()
             self.here = self.here if controls is None else controls

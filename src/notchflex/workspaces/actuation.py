@@ -1,6 +1,6 @@
-"""How the tendons are pulled to explore a workspace: rays of tension, up and down again.
+"""Actuation for a workspace: rays of tension, loading and unloading.
 
-A ray is a ratio of tensions that is pulled from 0 to a peak and let go again, so that every tension
+A ray is a ratio of tensions that rises from 0 to a peak and falls again, so that every tension
 is there while loading and while unloading. Of the tendons that end at one body two neighbours are
 pulled at a time: what more would add is pressed together, not moved.
 """

@@ -16,7 +16,7 @@ from notchflex.workspaces.voxels import voxel_map
 
 @dataclass(frozen=True)
 class Overlap:
-    """What two workspaces have in common.
+    """Overlap of two workspaces.
 
     Attributes:
         first: Label of the first.

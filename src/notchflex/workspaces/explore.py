@@ -44,7 +44,7 @@ def workspace(
     progress: Progress | None = None,
     folder: PieceFolder | str | os.PathLike[str] | None = None,
 ) -> Workspace:
-    """Explore where the tip of a robot can go, while its tendons are pulled and let go.
+    """Explore where the tip of a robot can go, during loading and unloading.
 
     Args:
         robot: The robot.
@@ -61,7 +61,7 @@ def workspace(
         cores: How many cores to use; all where not given.
         progress: Called with the rays done and the rays of the whole.
         folder: Explore in pieces, which this folder keeps: for more states than fit into memory, by
-            many processes (`PieceFolder`), gone on with by the same call. Of states whose tips lie
+            many processes (`PieceFolder`), resumed by the same call. Of states whose tips lie
             in the same small voxel and point the same way, one is kept.
 
     Returns:

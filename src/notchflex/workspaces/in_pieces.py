@@ -72,7 +72,7 @@ class WorkspaceTask:
 
     @property
     def recipe(self) -> Recipe:
-        """How another process makes the same task."""
+        """Recipe by which another process makes the same task."""
         one = self.explorer
         content = (one.robot, one.limits, one.load, self.largest, *self._rest)
         return Recipe(workspace_task, pickle.dumps(content))

@@ -33,7 +33,7 @@ class Limit:
     high: float
 
     def holds(self, values: Float[np.ndarray, "*k entries"]) -> Bool[np.ndarray, " *k"]:
-        """Return whether all entries are within; NaN stands for an entry that is not there."""
+        """Return whether all entries are within; NaN marks a missing entry."""
         outside = (values < self.low) | (values > self.high)
         return np.asarray(~outside.reshape(*values.shape[:2], -1).any(axis=-1))
 

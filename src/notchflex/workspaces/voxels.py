@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 DIRECTIONS = 96
-"""Directions that the dexterity tells apart, evenly on the sphere."""
+"""Number of directions that the dexterity distinguishes, evenly on the sphere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ def voxel_map(
 
 
 def sphere_directions() -> Float[np.ndarray, "directions 3"]:
-    """Return the directions that the dexterity tells apart, as unit vectors."""
+    """Return the directions that the dexterity distinguishes, as unit vectors."""
     # notation: a Fibonacci sphere, points at equal steps of height turned by the golden angle
     number = np.arange(DIRECTIONS)
     z = 1.0 - (2.0 * number + 1.0) / DIRECTIONS

@@ -49,8 +49,8 @@ Sources = Annotated[
     converted(_read_source, "[LABEL=]ROBOT=DATA.csv"),
     Parameter(
         help=f"{PAIR}: a robot (ready, or a file) and its measurements (the columns of "
-        "`notchflex.read_measurements`). The same robot again adds more data; a label tells "
-        "two robots of one file apart."
+        "`notchflex.read_measurements`). The same robot again adds more data; a label "
+        "distinguishes two robots of one file."
     ),
 ]
 

@@ -39,14 +39,14 @@ Scheduler = Annotated[
 @Parameter(name="*", group=PIECES)
 @dataclass(frozen=True)
 class InPieces:
-    """Where finished pieces are kept, and who works on them."""
+    """Folder and workers of a computation in pieces."""
 
     folder: Annotated[
         str | None,
         Parameter(
             metavar="DIR",
             help="Work in pieces, and keep those that are finished in this folder (extra `data`): "
-            "the same call goes on where it was stopped.",
+            "the same call resumes where it was stopped.",
         ),
     ] = None
     workers: Workers = None

@@ -1,4 +1,4 @@
-"""What `notchflex measure --cut` writes and prints."""
+"""Output of `notchflex measure --cut`."""
 
 from __future__ import annotations
 

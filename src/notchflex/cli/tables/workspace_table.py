@@ -1,4 +1,4 @@
-"""What `workspace` prints: sizes, extents and spreads."""
+"""Output of `workspace`: sizes, extents and spreads."""
 
 from __future__ import annotations
 

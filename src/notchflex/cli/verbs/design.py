@@ -45,7 +45,7 @@ def design(
     plot: PlotFile = None,
     quiet: Quiet = False,
 ) -> int:
-    """Choose dimensions so that a robot does what is asked.
+    """Choose dimensions so that a robot meets a specification.
 
     The design file names variables, loads, objectives and constraints. Prints what was asked beside
     what is achieved, which limits hold the design and what each costs. Ctrl-C keeps the best robot

@@ -51,8 +51,8 @@ def measure(
     pattern: Annotated[
         str | None,
         Parameter(
-            help="What the names of the files look like: `{tension}` stands for the pull in N, "
-            "`{pull}` for a label of the pull."
+            help="Pattern of the file names: `{tension}` is the tension in N, `{pull}` the label "
+            "of the pull."
         ),
     ] = None,
     exif: Annotated[

@@ -1,6 +1,6 @@
 """One compiled program that solves a load, differentiates it, and moves its drives to a target.
 
-A solved load tells by one linear step how its equilibrium changes with the drives. So Newton's
+One linear step at a solved load gives the change of its equilibrium with the drives. So Newton's
 method need not solve a load for every drive that is tried: the drives and the equilibrium are
 corrected together, with the friction history of the same state before, until balance and target
 are nearly met. A correction costs as much as a few iterations of a solve. Then the load is solved
@@ -205,7 +205,7 @@ class _Search:
         return _within(self.task, drive + jnp.where(small, 0.0, change + leap))
 
     def _values(self, memory: Memory, point: Iterate) -> tuple[Array, tuple[Evaluation, Any]]:
-        """What is asked of a point, in the world; its balance, and the state with its history."""
+        """Quantities of a point in the world, its residual, and the state with its history."""
         chain, applied, outputs = self.chain, self.command.applied, self.layouts.outputs
         at = evaluate(chain, point.unknowns, memory, point.base_tension, applied)
         history = Memory(

@@ -38,7 +38,7 @@ _CORRECTIONS = 8.0
 
 
 class _Places(NamedTuple):
-    """Where a packed state holds what control needs of it.
+    """Positions in a packed state that control needs.
 
     Attributes:
         tension: Base tension of every tendon, (t,).
@@ -204,7 +204,7 @@ class DriveModel:
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        """Where the entries of each output are in `Response.values`."""
+        """Positions of the entries of each output in `Response.values`."""
         ends = np.cumsum([0, *(int(np.prod(shape)) for shape in self.shapes.values())])
         return {n: slice(*ends[i : i + 2]) for i, n in enumerate(self.shapes)}
 
@@ -229,7 +229,7 @@ class DriveModel:
 
     @cached_property
     def _size(self) -> int:
-        """How many numbers the outputs of the padded robot have."""
+        """Number of values of the outputs of the padded robot."""
         long = self.prepared.long.chain
         sizes = {"tendon": long.tendons, "notch": long.flexures, "body": long.flexures + 1}
         per = (REGISTERED[name].per for name in self.outputs)
@@ -261,7 +261,7 @@ class DriveModel:
 
     @cached_property
     def _fields(self) -> dict[str, slice]:
-        """Where the fields of a task are in the packed vector."""
+        """Positions of the fields of a task in the packed vector."""
         numbers = zip(Task._fields, self._layouts.task.indices, strict=True)
         return {name: slice(int(at.min()), int(at.max()) + 1) for name, at in numbers}
 

@@ -1,4 +1,4 @@
-"""What a solved load tells of the drives, and what a search for a target is given."""
+"""Values and slopes of a solved load by the drives, and the input of a search for a target."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class Response(NamedTuple):
 
 
 class DriveAim(NamedTuple):
-    """A target of drives, and their limits; m numbers aimed at, t tendons.
+    """A target of drives, and their limits; m target values, t tendons.
 
     Attributes:
-        entries: Which numbers of a response are aimed at, (m,).
+        entries: Entries of a response that have a target, (m,).
         goal: What they are to become, (m,).
         weights: What an error of each counts, (m,).
         low: Lowest drives, (t,).

@@ -1,4 +1,4 @@
-"""Where the compiled search is: the state of its loops."""
+"""The state of the loops of the compiled search."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from notchflex.solver.solver_state import SolverState
 
 
 class SearchState(NamedTuple):
-    """Where the corrections of a solved load are.
+    """State of the corrections of a solved load.
 
     Attributes:
         drive: The drives, (t,).

@@ -1,4 +1,4 @@
-"""What the compiled search is given: a target, limits and layouts, packed as vectors."""
+"""Input of the compiled search: a target, limits and layouts, packed as vectors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from notchflex.solver.programs.static_structure import StaticStructure
 
 
 class Task(NamedTuple):
-    """What the program is to do; n numbers of a response, t tendons.
+    """Task of the program; n numbers of a response, t tendons.
 
     Attributes:
         goal: What the numbers are to become, (n,).
@@ -64,7 +64,7 @@ def blank_task(numbers: int, tendons: int, turn: np.ndarray) -> Task:
 
 
 class SearchLayouts(NamedTuple):
-    """How the program takes chain, load, state and task as vectors, and what it reports.
+    """Layouts of chain, load, state and task as vectors, and the reported quantities.
 
     Attributes:
         chain: Structure and layout of the chain.

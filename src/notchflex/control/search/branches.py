@@ -1,7 +1,7 @@
-"""The way to a target: at once, or over a state from which friction helps.
+"""The load path to a target: direct, or through an overshoot that reverses friction.
 
 At one tension a robot is bent more after unloading than after loading. A target can often be met on
-either branch: by pulling up to it, or by pulling beyond it and letting go.
+either branch: by loading up to it, or by overshooting it and unloading.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _search = partial(search_iteratively, patient=False)
 
 
 class ApproachPath(NamedTuple):
-    """How a target is approached.
+    """Load path to a target.
 
     Attributes:
         via: Drives of the overshoot before the last load; None where there is none.
@@ -64,7 +64,7 @@ def approach_target(
     """Find drives that meet a target, and the way to them.
 
     Args:
-        problem: What is aimed at, and the limits.
+        problem: Target quantities and limits.
         before: The state before, packed.
         start: Its drives.
         goal: The target; NaN where an entry is free.
@@ -105,7 +105,7 @@ def _rank(path: ApproachPath) -> tuple[bool, bool, float, float]:
 
 
 def _change(problem: Problem, start: np.ndarray, end: np.ndarray) -> float:
-    """How far the drives rise, all together."""
+    """Sum of the changes of the drives."""
     return float(np.sum((end - start)[problem.driven]))
 
 
@@ -198,10 +198,10 @@ def _meet_from(
     nearest: Attempt,
     error: float,
 ) -> Attempt:
-    """Meet a target from one of some drives, or go on from the nearest that this came to.
+    """Solve from several starting drives, or continue from the nearest result.
 
     Args:
-        problem: What is aimed at, and the limits.
+        problem: Target quantities and limits.
         before: The state before, packed.
         starts: The drives.
         goal: The target.

@@ -17,7 +17,7 @@ from notchflex.control.search.unmet import why_unmet
 # A column of the slopes that is this part of the target over the drives is that of a tendon that
 # sticks.
 _STUCK = 1e-8
-# Changes by these parts of the drives tell what a tendon does that slides.
+# Drive changes, as parts of the drives, that make a tendon slide and show its slopes.
 _SIDE_STEPS = (1e-6, -1e-6, 0.3, -0.3)
 # Where a step moves nothing the next one is so many times longer; where it then moves something it
 # may increase the error so many times.
@@ -34,9 +34,9 @@ class DampedSearch:
     what the drives move beyond.
 
     Args:
-        problem: What is aimed at, and the limits.
+        problem: Target quantities and limits.
         before: The state before, packed.
-        entries: Which numbers of a response are aimed at.
+        entries: Entries of a response that have a target.
         weights: What an error of each counts.
         goal: What they are to become.
         over_bands: Whether dead bands are left out.
@@ -111,14 +111,14 @@ class DampedSearch:
         return step
 
     def try_step(self, step: Float[np.ndarray, " t"], least: float) -> float:
-        """Try a step and keep it if it helps.
+        """Try a step and accept it if the merit decreases enough.
 
         Args:
             step: The step.
-            least: The part of what it promises that it must bring.
+            least: Smallest accepted ratio of actual to predicted reduction of the merit.
 
         Returns:
-            What it brought of what it promised.
+            Ratio of actual to predicted reduction.
         """
         point, moved = self.point, self.point.moved + step
         response = self._solve(moved)
@@ -144,7 +144,7 @@ class DampedSearch:
         return gain
 
     def accept_step(self, step: Float[np.ndarray, " t"]) -> None:
-        """Take a step, whatever it brings."""
+        """Accept a step without a test of the merit."""
         moved = self.point.moved + step
         response = self._solve(moved)
         if response.converged:
@@ -159,7 +159,7 @@ class DampedSearch:
         return Attempt(point.drive, point.response, point.error, point.excess, self.solves, failure)
 
     def _outside(self, drive: np.ndarray) -> np.ndarray:
-        """What drives move beyond the dead bands."""
+        """Drive changes beyond the dead bands."""
         low, high = self._band
         return np.maximum(drive - high, 0.0) + np.minimum(drive - low, 0.0)
 

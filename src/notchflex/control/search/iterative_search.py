@@ -49,13 +49,13 @@ def search_iteratively(
     """Search drives that meet a target.
 
     Args:
-        problem: What is aimed at, and the limits.
+        problem: Target quantities and limits.
         before: The state before, packed.
         start: Drives to start from.
         goal: The target; NaN where an entry is free.
         known: Values and slopes at `start`, where they are known.
         over_bands: Whether dead bands of the drives are left out.
-        patient: Whether it goes on where it hardly comes nearer, until the budget is spent.
+        patient: Whether it continues with little progress, until the budget is spent.
 
     Returns:
         The best that was found within the budget.
@@ -94,10 +94,10 @@ def solve_directly(
     goal: Float[np.ndarray, " m"],
     known: Response | None = None,
 ) -> Attempt:
-    """Meet a target from the present drives by one program, as mostly succeeds.
+    """Search drives from the present ones by one compiled program; this suffices in most cases.
 
     Args:
-        problem: What is aimed at, and the limits.
+        problem: Target quantities and limits.
         before: The state before, packed.
         start: Its drives.
         goal: The target; NaN where an entry is free.

@@ -1,4 +1,4 @@
-"""What a search for a target is given, and what it returns."""
+"""Input and result of a search for a target."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ class TargetSearch:
 
 
 class Problem(NamedTuple):
-    """What a search is for: one target, and what may not be exceeded.
+    """Problem of a search: one target, and its limits.
 
     Attributes:
         model: The robot.
-        entries: Which numbers of a response are aimed at.
+        entries: Entries of a response that have a target.
         weights: What an error of one unit counts.
         driven: Which tendons are driven; the others keep what the load commands.
         low: Lowest drive of every tendon, N or mm.
@@ -83,7 +83,7 @@ class Problem(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """Where a search ended.
+    """Result of one search.
 
     Attributes:
         drive: Drives of all tendons, N or mm.

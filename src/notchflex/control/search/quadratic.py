@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
-# Limits that cannot all be met weigh so much more than the target.
+# Weight of limits that cannot all be met, relative to the target.
 _VIOLATION = 1e6
 
 

@@ -20,7 +20,7 @@ def limit_rate(problem: Problem, present: Float[np.ndarray, " t"], rate: float) 
     """Return the problem with drives no farther from the present ones than the rate.
 
     Args:
-        problem: What is aimed at, and the limits.
+        problem: Target quantities and limits.
         present: The present drives, N or mm.
         rate: Largest change, N or mm; infinite where there is none.
     """
@@ -49,7 +49,7 @@ def cross_dead_bands(
     band go towards what that needs, as far as the rate lets them.
 
     Args:
-        problem: What is aimed at, and the limits, without the rate.
+        problem: Target quantities and limits, without the rate.
         rate: Largest change of a drive, N or mm.
         before: The state before, packed.
         present: Its drives.

@@ -50,7 +50,7 @@ class SearchPoint:
 
     @property
     def merit(self) -> float:
-        """What a step must lessen: the squared error, and that of broken limits."""
+        """Merit function: the squared error, plus a penalty for violated limits."""
         if not self.response.converged:
             return np.inf
         return self.error**2 + penalty(self.room)

@@ -48,7 +48,7 @@ def smaller_tensions(
     """Return the smallest tensions that meet a target as those that were found do.
 
     Args:
-        problem: What is aimed at, and the limits.
+        problem: Target quantities and limits.
         before: The state before, packed.
         start: Its drives.
         goal: The target; NaN where an entry is free.
@@ -154,6 +154,6 @@ def _holds(problem: Problem, goal: np.ndarray, attempt: Attempt, tendon: int) ->
 
 
 def _steepness(problem: Problem, goal: np.ndarray, attempt: Attempt, tendon: int) -> float:
-    """Size of the slopes of what is aimed at by a tension, mm, N or rad by their weights, per N."""
+    """Size of the slopes of the target quantities by a tension, mm, N or rad by weights, per N."""
     slopes = problem.weights * attempt.response.jacobian[problem.entries, tendon]
     return size_of(slopes[~np.isnan(goal)])

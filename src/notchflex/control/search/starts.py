@@ -31,7 +31,7 @@ def other_starts(
     Drives just beyond the dead band of each tendon, parts of all, and each tendon pulled alone.
 
     Args:
-        problem: What is aimed at, and the limits.
+        problem: Target quantities and limits.
         before: The state before, packed.
         start: Its drives.
     """
@@ -60,7 +60,7 @@ def taut_tendons_suffice(
     """Whether slopes promise that tendons that are taut come near a target without the others.
 
     Args:
-        problem: What is aimed at.
+        problem: Target quantities.
         taut: Which tendons those are.
         goal: The target; NaN where an entry is free.
         known: Values and slopes of the state before.

@@ -24,9 +24,9 @@ def why_unmet(
     """Return why a target is not met.
 
     Args:
-        problem: What is aimed at, and the limits.
+        problem: Target quantities and limits.
         point: Where the search ended.
-        entries: Which numbers of a response are aimed at.
+        entries: Entries of a response that have a target.
         weights: What an error of each counts.
         scale: Size of the drives.
         settled: Whether no step helped; otherwise the budget was spent.

@@ -1,4 +1,4 @@
-"""What deviates from the drawing in robots made within tolerances, as directions of a design."""
+"""Deviations of robots within tolerances, as directions of a design."""
 
 from __future__ import annotations
 

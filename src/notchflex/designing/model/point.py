@@ -71,7 +71,7 @@ class Point:
         return Reading(values, slopes.reshape(len(slopes), -1).T)
 
     def closings(self) -> Reading:
-        """Closing tensions, N; NaN for a notch that does not close."""
+        """Return closing tensions, N; NaN for a notch that does not close."""
         if CLOSINGS in self.kept:
             return Reading(self.kept[CLOSINGS], None)
         table: Closing = self.once("closing", lambda: closing(self.robot))
@@ -125,7 +125,7 @@ class Point:
 
     @property
     def deviations(self) -> Sequence[Deviation]:
-        """What deviates in robots made within the tolerances."""
+        """Deviations of robots within the tolerances."""
         tolerances = self.variables.tolerances
         return self.once("deviations", lambda: deviations_of(self.robot, tolerances))
 
@@ -165,7 +165,7 @@ class Point:
         return own + self.changes_of_deviations(model, load)
 
     def changes_of_deviations(self, model: ForwardModel, load: LoadPath) -> list[Change]:
-        """Directions of one standard deviation of everything that deviates, for a model."""
+        """Return directions of one standard deviation of every deviation, for a model."""
         changes: list[Change] = []
         for one in self.deviations:
             if one.law is not None:
@@ -178,7 +178,7 @@ class Point:
         return changes
 
     def change(self, model: ForwardModel, load: LoadPath, number: int) -> Change:
-        """Direction of a variable of the robot for a model; nothing for one of the loads."""
+        """Return the direction of a variable of the robot for a model; zero for a load."""
         column = self.variables.columns[number]
         if column.load is not None:
             return Change(None, np.zeros(model.ready.long.chain_layout.size))

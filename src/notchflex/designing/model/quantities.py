@@ -1,4 +1,4 @@
-"""What can be asked of a design beside the values of its robot file."""
+"""Quantities of a design beside the values of its robot file."""
 
 from __future__ import annotations
 

@@ -19,14 +19,14 @@ from notchflex.errors import InputError
 
 
 class Source(Protocol):
-    """What readings are taken from: a robot solved under its states."""
+    """Source of readings: a robot solved under its states."""
 
     def of_state(self, name: str, state: str) -> Reading:
         """Return a quantity of a state, flat, in the unit of the edges."""
         ...
 
     def closings(self) -> Reading:
-        """Closing tensions, N."""
+        """Return closing tensions, N."""
         ...
 
     def of_robot(self, name: str) -> Reading:
@@ -74,7 +74,7 @@ class Wish:
 
     @property
     def take(self) -> str:
-        """How several numbers are made one."""
+        """Reduction of several numbers to one."""
         if isinstance(self.asked, DesignConstraint) and self.asked.order is not None:
             return "steps"
         return self.asked.take or ("each" if len(self.rows) == 1 else self._usual)
@@ -103,7 +103,7 @@ class Wish:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What the numbers of `measure` are called; "" for one alone."""
+        """Labels of the numbers of `measure`; "" for a single one."""
         if self.take == "each":
             return self.parts if len(self.parts) > 1 else ("",)
         if self.take == "steps":

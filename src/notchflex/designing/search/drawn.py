@@ -42,7 +42,7 @@ def met_by(
     levels: Float[np.ndarray, "draws d"],
     numbers: Sequence[int],
 ) -> Bool[np.ndarray, "draws k"]:
-    """Solve robots within tolerances, and tell which meet which constraints.
+    """Solve robots within tolerances, and return which meet which constraints.
 
     Args:
         problem: The problem.

@@ -34,7 +34,7 @@ class _Stop(Exception):  # noqa: N818 - no error
 
 
 class LocalOptimum(NamedTuple):
-    """Where a search ended.
+    """Result of a local search.
 
     Attributes:
         z: The scaled variables.
@@ -60,10 +60,10 @@ def search_from(
         problem: The problem.
         z: The start.
         iterations: Most iterations.
-        settled: Searches that have settled: this one ends at their robot where it meets their way.
+        settled: Converged searches: this one ends at their robot if it meets their trajectory.
 
     Returns:
-        The best robot met.
+        The best robot.
     """
     trajectory = SearchTrajectory([one.trajectory for one in settled])
     try:

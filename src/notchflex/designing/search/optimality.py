@@ -1,4 +1,4 @@
-"""Multipliers of the limits that hold a design where it is.
+"""Multipliers of the active limits of a design.
 
 At the best robot the sum can only fall across limits: its gradient is a combination of those of the
 limits reached, with factors of the right sign. The factors say what a limit costs.
@@ -23,7 +23,7 @@ _FLAT = 1e-4
 
 @dataclass(frozen=True)
 class ActiveLimit:
-    """A limit that is reached.
+    """An active limit.
 
     Attributes:
         row: Number of the row, or of the variable.
@@ -40,10 +40,10 @@ class ActiveLimit:
 
 @dataclass(frozen=True)
 class Multipliers:
-    """What holds a design.
+    """Active limits of a design, with their costs.
 
     Attributes:
-        held: Limits that are reached.
+        held: Active limits.
         rest: What is left of the gradient of the sum, relative.
     """
 

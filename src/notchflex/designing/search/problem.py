@@ -1,7 +1,7 @@
 """The design as a problem of optimisation: scaled variables, one sum to minimise, constraints.
 
 Variables run from 0 to 1 between their limits. The largest of several numbers is not smooth: where
-it is to be small, a further variable that is above them all stands for it.
+it is minimised, an epigraph variable above all of them replaces it.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class DesignEvaluation:
 
     Attributes:
         point: The robot solved.
-        objective: The sum that is minimised, without what bounds stand for.
+        objective: The sum that is minimised, without terms replaced by epigraph bounds.
         rows: The numbers of all constraints.
         bounded: The numbers that each bound is above or below.
         total: The whole sum, the largest of several numbers taken as it is.
@@ -167,7 +167,7 @@ class DesignProblem:
         self.failures[reason] = self.failures.get(reason, 0) + 1
 
     def read(self, point: Point, z: Vector) -> DesignEvaluation | None:
-        """Return what is asked of a solved robot; None where it is not a number."""
+        """Return objectives and constraints of a solved robot; None if one is not a number."""
         terms, total = self._terms(point, z)
         bounded = tuple(self._joined([one.wish.every(point)]) for one in self.bounds)
         has_slopes = point.slopes_of is not None
@@ -179,7 +179,7 @@ class DesignProblem:
         return evaluation if self._is_finite(evaluation) else None
 
     def _terms(self, point: Point, z: Vector) -> tuple[list[Reading], float]:
-        """Return what is minimised without what bounds stand for, and the whole sum."""
+        """Return the smooth terms of the objective, and the whole sum."""
         if not self.objectives:  # the smallest change of the robot
             off = z[: self.count] - self.start
             by = 2.0 * off / self.solver.variables.span

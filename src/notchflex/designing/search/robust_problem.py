@@ -30,7 +30,7 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True)
 class Hold:
-    """How a constraint is to hold.
+    """Yield and factor that a constraint must hold with.
 
     Attributes:
         part: The part of robots that is wanted.

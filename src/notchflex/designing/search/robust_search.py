@@ -29,7 +29,7 @@ from notchflex.tolerancing.yields import REPLICATES, yield_interval
 # Searches from the best of the plain ones.
 _STARTS = 2
 _ROUNDS = 6
-# The lower end of a yield may be above what is wanted by this part of what may fail.
+# The lower end of a yield may exceed its target by this part of the allowed failures.
 _ABOVE = 0.1
 
 
@@ -59,7 +59,7 @@ class YieldOf:
 
 @dataclass(frozen=True)
 class YieldEstimate:
-    """Which of the robots drawn of a design meet which limits.
+    """Which drawn robots of a design meet which limits: an estimate of the yield.
 
     Attributes:
         met: By robot and constraint with limits.
@@ -78,7 +78,7 @@ class YieldEstimate:
 
 @dataclass(frozen=True)
 class YieldTarget:
-    """A part of robots that is wanted of some constraints together, by their columns."""
+    """The yield wanted of several constraints together, by their columns."""
 
     part: float
     columns: tuple[int, ...]
@@ -145,7 +145,7 @@ def robust_search(
 def _wanted(
     spec: DesignSpec, options: RobustOptions, problem: DesignProblem, numbers: Sequence[int]
 ) -> list[YieldTarget]:
-    """Return what is wanted: of each constraint that says so, and of all together."""
+    """Return the yield targets: of single constraints, and of all together."""
     targets: list[YieldTarget] = []
     for column, number in enumerate(numbers):
         asked = problem.constraints[number].asked
@@ -222,7 +222,7 @@ def _is_better(
     best: SearchResult,
     best_count: YieldEstimate,
 ) -> bool:
-    """Whether a design misses less of what is wanted than the best so far, or costs less."""
+    """Whether a design lacks less yield than the best so far, or has a smaller sum."""
     if not targets:
         every = range(count.met.shape[1])
         return (one.merit[0] == 0.0) >= (best.merit[0] == 0.0) and (

@@ -35,7 +35,7 @@ class Row:
 
     @property
     def title(self) -> str:
-        """What messages call it."""
+        """Name in messages."""
         return f"{self.wish.title}, {self.label}" if self.label else self.wish.title
 
     @property
@@ -144,7 +144,7 @@ def _size(row: Row) -> float:
 
 
 def epigraphs(wish: Wish) -> Iterator[tuple[str, float]]:
-    """Yield bounds that stand for the largest or smallest of several numbers in an objective.
+    """Yield epigraph bounds for the largest or smallest of several numbers in an objective.
 
     Each is "above" or "below" all numbers, with its factor in the sum that is minimised.
     """

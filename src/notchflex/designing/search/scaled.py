@@ -10,7 +10,7 @@ import numpy as np
 
 from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 
-# What a sum is taken to be where there is no robot or no equilibrium, in sizes of the sum.
+# Value of the sum without a valid robot or an equilibrium, in sizes of the sum.
 _PENALTY = 1e3
 
 
@@ -65,7 +65,7 @@ class Scaled:
 
     @property
     def y(self) -> Vector:
-        """Where the search begins."""
+        """Start of the search."""
         return np.concatenate([self.start, np.zeros(len(self.problem.bounds))])
 
     @property

@@ -24,7 +24,7 @@ _MAX_DIFFERENCE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """Where one search ended.
+    """Result of one search.
 
     Attributes:
         problem: Robots of which form.
@@ -40,7 +40,7 @@ class SearchResult:
 
     @property
     def merit(self) -> tuple[float, float]:
-        """What it misses, and its sum; less is better."""
+        """Largest violation, and the sum; less is better."""
         one = self.found.evaluation
         assert one is not None
         worst = self.problem.worst(one)

@@ -1,4 +1,4 @@
-"""Where searches start: robots drawn between the limits, ranked by one batch."""
+"""Starting points of searches: robots drawn between the limits, ranked by one batch."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def solved(
 
 
 def ranked(problem: DesignProblem, candidates: Sequence[StartingPoint]) -> list[StartingPoint]:
-    """Sort candidates: first those that miss least and whose sum is least."""
+    """Sort candidates by penalised objective: the sum plus a penalty on violated limits."""
     if not candidates:
         return []
     totals = np.array([one.evaluation.total for one in candidates])

@@ -1,7 +1,6 @@
-"""The ways of searches, which end where another search has been that settled.
+"""Trajectories of searches: a search ends at a point that a converged one has visited.
 
-Two searches that come to nearly the same robot end at the same one: the later one would only solve
-again what is known.
+Two searches through nearly the same robot end at the same one, so the later one is redundant.
 """
 
 from __future__ import annotations
@@ -19,24 +18,24 @@ _MAX_DIFFERENCE = 0.01
 
 
 class DuplicateSearch(Exception):  # noqa: N818 - no error
-    """Ends a search that has come to where another one has been.
+    """Ends a search that repeats an earlier, converged one.
 
     Attributes:
         number: Which of the others.
     """
 
     def __init__(self, number: int) -> None:
-        """Say which."""
+        """Keep the number."""
         super().__init__(number)
         self.number = number
 
 
 @dataclass(eq=False)
 class SearchTrajectory:
-    """The way of a search.
+    """The trajectory of a search.
 
     Attributes:
-        others: The ways of searches that settled, with where they ended.
+        others: Trajectories of converged searches, with their end points.
         steps: Scaled variables after each step.
     """
 
@@ -44,10 +43,10 @@ class SearchTrajectory:
     steps: list[Vector] = field(default_factory=list[Vector])
 
     def record(self, z: Vector) -> None:
-        """Keep a step.
+        """Record a step.
 
         Raises:
-            DuplicateSearch: Another search has been here.
+            DuplicateSearch: A converged search has visited this point.
         """
         self.steps.append(z)
         for number, other in enumerate(self.others):

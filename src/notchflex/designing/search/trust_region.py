@@ -1,6 +1,6 @@
 """From far away to where limits hold: linear programs within a trust region.
 
-Every step minimises the linearised sum plus what limits are missed by, at a price, within a box.
+Every step minimises the linearised sum plus a penalty on violated limits, within a box.
 There is always a step, also where limits contradict each other at first, and no step leaves the
 range in which derivatives predict anything: where a notch closes, the box shrinks.
 """
@@ -37,7 +37,7 @@ class _Model:
     size: float
 
     def merit(self, other: DesignEvaluation) -> float:
-        """Sum and price of what is missed."""
+        """Return the merit function: the sum plus the price of violated limits."""
         violation = np.abs(self.problem.violation(other)).sum()
         return other.total / self.size + self.price * float(violation)
 
@@ -97,7 +97,7 @@ def approach(
         z: The start, scaled.
         first: The robot there, with derivatives.
         iterations: Most steps.
-        trajectory: Told of every step; ends the search where another one has been.
+        trajectory: Records every step; ends a duplicate search.
 
     Returns:
         Where it ended, the robot there with derivatives, and the number of steps.

@@ -1,1 +1,1 @@
-"""What a design is asked for: the file, its checks and its schema."""
+"""The specification of a design: the file, its checks and its schema."""

@@ -1,4 +1,4 @@
-"""The tables of a design file that say what is asked: objectives, constraints, curves."""
+"""The tables of a design file: objectives, constraints, curves."""
 
 import itertools
 from typing import Annotated, Literal
@@ -22,7 +22,7 @@ _MAX_COORDINATE = 1e4
 
 @part(kw_only=True, refuse=REFUSE)
 class Measured:
-    """What is asked of a robot: a quantity at a state, or a value of the robot file.
+    """A quantity of a robot at a state, or a value of the robot file.
 
     Args:
         quantity: Name of a quantity, or path of the robot file.
@@ -60,7 +60,7 @@ class Measured:
 
 @part(kw_only=True, refuse=REFUSE)
 class DesignObjective(Measured):
-    """What is to be small, great or near a value.
+    """An objective: a quantity to minimise, maximise or bring near a value.
 
     Args:
         goal: "minimise" or "maximise"; not with `target`.
@@ -84,7 +84,7 @@ class DesignObjective(Measured):
 
 @part(kw_only=True, refuse=REFUSE)
 class DesignConstraint(Measured):
-    """What must hold.
+    """A constraint.
 
     Args:
         equal: The value it must have.

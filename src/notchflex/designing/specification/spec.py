@@ -59,7 +59,7 @@ class DesignState:
 
 @part(kw_only=True, refuse=REFUSE)
 class SearchOptions:
-    """How hard the search tries.
+    """Effort of the search.
 
     Args:
         starts: Number of starts, of which the robot as it is is one.
@@ -78,7 +78,7 @@ class SearchOptions:
 
 @part(kw_only=True, refuse=REFUSE)
 class RobustOptions:
-    """How robots made within tolerances are to meet the limits.
+    """Yield of robots within tolerances.
 
     Args:
         wanted_yield: Part of the robots that must meet all limits. Without it, and where no
@@ -95,7 +95,7 @@ class RobustOptions:
 
 @part(refuse=REFUSE, kw_only=True)
 class DesignSpec:
-    """What a design is asked for.
+    """Specification of a design.
 
     Args:
         robot: Name of a ready robot, or path of a robot file, beside the design file.

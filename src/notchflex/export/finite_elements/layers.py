@@ -58,7 +58,7 @@ def edge_angle(notch: ArcNotch, robot: Robot, radius: Float[np.ndarray, " a"]) -
 def layers_of(
     robot: Robot, notches: list[ArcNotch], options: DeckOptions
 ) -> tuple[Float[np.ndarray, " c"], list[float], list[tuple[int, int]]]:
-    """Heights of the layers, of both edges of every notch, and the indices of these layers."""
+    """Return heights of all layers and of the notch edges, with the indices of these layers."""
     height: list[np.ndarray] = [np.zeros(1)]
     edges: list[float] = []
     faces: list[tuple[int, int]] = []

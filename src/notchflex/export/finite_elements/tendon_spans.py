@@ -77,7 +77,7 @@ def tendon_spans(
 
 
 def _origins(robot: Robot) -> Float[np.ndarray, " bodies"]:
-    """Where the bodies begin on the straight tube, mm."""
+    """Start of each body on the straight tube, mm."""
     lengths = body_lengths(robot.tube, robot.notches)
     heights = [getattr(notch, "height", 0.0) for notch in robot.notches]
     return np.concatenate([[0.0], np.cumsum(lengths[:-1] + heights)])

@@ -21,7 +21,7 @@ _NODES = np.array(
 
 
 class GridOpening(NamedTuple):
-    """Where a notch is open on the grid.
+    """Opening of a notch on the grid.
 
     Attributes:
         first: Index of the angle at its first edge.

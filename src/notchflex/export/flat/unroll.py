@@ -22,7 +22,7 @@ _STRAIGHT = 1e-12
 
 
 class Path(NamedTuple):
-    """How the path of the beam differs from the edge of the cut.
+    """Offset of the path of the beam from the edge of the cut.
 
     Attributes:
         inside: Distance of the path from the edge, into the waste [mm].

@@ -35,7 +35,7 @@ def _model_of(subject: Subject, options: SimulatorOptions) -> JointModel:
 
 
 def _head(model: JointModel, *sentences: str) -> str:
-    """What stands at the head of a file: robot, units, range, and further sentences."""
+    """Head of a file: robot, units, range, and further sentences."""
     robot = model.robot
     return "\n".join(
         [

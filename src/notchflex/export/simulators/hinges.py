@@ -53,7 +53,7 @@ class HingeChain:
 def rotations(
     axis: Float[np.ndarray, " 3"], angle: Float[np.ndarray, " s"]
 ) -> Float[np.ndarray, "s 3 3"]:
-    """Rotations about one axis by several angles (Rodrigues)."""
+    """Return rotations about one axis by several angles (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine, rest = np.sin(angle)[:, None, None], (1.0 - np.cos(angle))[:, None, None]

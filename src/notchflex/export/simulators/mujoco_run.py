@@ -29,7 +29,7 @@ def has_mujoco() -> bool:
 
 @dataclass(frozen=True)
 class SimulatorError:
-    """How far the exported model lies from the chain over a pull and its release, one tendon.
+    """Error of the exported model over loading and unloading of one tendon.
 
     Attributes:
         tendon: The tendon, counted from 1.
@@ -58,7 +58,7 @@ class SimulatorError:
 
 @dataclass(frozen=True)
 class SimulatedPull:
-    """What the simulator does while one tendon is pulled and released: s levels.
+    """Simulated loading and unloading of one tendon: s levels.
 
     Attributes:
         tension: Tension, N.

@@ -15,7 +15,7 @@ from notchflex.robot import Robot
 
 _STEPS = 121
 _BEYOND_CLOSING = 1.1
-# Far beyond the closing of all notches hardly a sample is left in which anything moves.
+# Far beyond the closing of all notches nearly all samples would be at rest.
 _MAX_BEYOND = 3.0
 # A notch that turns by less in one step does not slip there, rad.
 _AT_REST = 1e-7

@@ -53,11 +53,11 @@ class HingeSpring:
     friction: Float[np.ndarray, " 3"]
 
     def moment(self, angle: Float[np.ndarray, " s"]) -> Float[np.ndarray, " s"]:
-        """Elastic moment at some angles."""
+        """Return the elastic moment at hinge angles, N·mm."""
         return _elastic(angle, self.knots) @ np.append(self.stiffness, self.further)
 
     def friction_moment(self, angle: Float[np.ndarray, " s"]) -> Float[np.ndarray, " s"]:
-        """Friction moment at some angles, positive to both sides where it is any."""
+        """Return the friction moment during loading at hinge angles, N·mm, with their sign."""
         return np.sign(angle) * (_friction(angle) @ self.friction)
 
     @property

@@ -97,7 +97,7 @@ def state_shape(subject: Subject, pieces: int = PIECES) -> RobotShape:
 
 
 class DeformationMap:
-    """How every point of the straight tube moves to its place in a state."""
+    """Map from points of the straight tube to their positions in a state."""
 
     def __init__(self, subject: Subject, cuts: RobotCuts) -> None:
         """Take the shapes of the straight tube and of the state."""

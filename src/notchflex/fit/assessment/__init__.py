@@ -1,1 +1,1 @@
-"""How far a calibration can be trusted, and what to measure next."""
+"""Assessment of a calibration, and the next measurement."""

@@ -1,4 +1,4 @@
-"""What a fit can and cannot determine, in plain words."""
+"""Diagnosis of a fit in sentences: what the data determine and what they do not."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from notchflex.fit.model.branch_residuals import branch_words
 from notchflex.fit.model.rows import SENSOR
 
 # A half-width of more than this part of the value is loose; constants more correlated than that
-# cannot be told apart.
+# cannot be distinguished.
 _LOOSE, _ALIKE = 0.5, 0.95
 # So many standard deviations from its prior a constant contradicts it.
 _UNLIKE_PRIOR = 3.0
@@ -21,19 +21,19 @@ _UNLIKE_PRIOR = 3.0
 _AT_LIMIT = 1e-6
 
 NO_PROBLEMS = "No problems found."
-"""What is printed if `diagnose` finds nothing."""
+"""Sentence that is printed if `diagnose` finds nothing."""
 
 
-def diagnose(calibration: Calibration) -> tuple[str, ...]:
+def diagnose(found: Calibration) -> tuple[str, ...]:
     """Say what a user should know before trusting the constants, the gravest first.
 
     Args:
-        calibration: The fit.
+        found: The fit.
 
     Returns:
         Sentences; none if no problem was found.
     """
-    return tuple(_sentences(calibration))
+    return tuple(_sentences(found))
 
 
 def with_unit(value: float, unit: str) -> str:
@@ -57,7 +57,7 @@ def _sentences(calibration: Calibration) -> Iterator[str]:
 
 
 def _branches(calibration: Calibration) -> Iterator[str]:
-    """Tables whose unloading rows the model misses otherwise than their loading rows."""
+    """Tables whose unloading rows deviate from the model by another amount than loading rows."""
     residuals = calibration.residuals
     for number, sample in enumerate(calibration.problem.samples.every):
         rows = len(sample.measured)
@@ -88,7 +88,7 @@ def _limits(calibration: Calibration) -> Iterator[str]:
             if near and push > 0.0:
                 yield (
                     f"{unknown.name} went to its {side} limit, {with_unit(limit, unknown.unit)}: "
-                    "the data would rather have it beyond, and the other constants make up for it."
+                    "the optimum lies outside the bound; the other constants compensate."
                 )
 
 
@@ -120,12 +120,14 @@ def _loose(calibration: Calibration, name: str, interval: Interval) -> Iterator[
     if lower is None and upper is None and interval.reason == NO_SOLUTION:
         yield f"How far {name} may go is not known: {interval.reason}."
     elif lower is None and upper is None:
-        yield f"The data cannot tell {name}: any value fits as well. Its estimate means nothing."
+        yield (
+            f"The data do not determine {name}: any value fits as well. Its estimate means nothing."
+        )
     elif upper is None or lower is None:
         word, end = ("at most", upper) if lower is None else ("at least", lower)
         assert end is not None
         limit = f"{word} {with_unit(end, unit)}"
-        yield f"The data only tell that {name} is {limit} ({interval.reason})."
+        yield f"The data only show that {name} is {limit} ({interval.reason})."
     else:
         unknown = calibration.problem.unknowns[calibration.names.index(name)]
         # A constant of either sign may well be 0: it is compared with where it is searched.
@@ -133,7 +135,7 @@ def _loose(calibration: Calibration, name: str, interval: Interval) -> Iterator[
         size = max(abs(value), 0.5 * unknown.scale if either else 0.0)
         if 0.5 * (upper - lower) > _LOOSE * size:
             ends = f"{with_unit(lower, unit)} to {with_unit(upper, unit)}"
-            yield f"The data hardly tell {name}: {ends}."
+            yield f"The data hardly determine {name}: {ends}."
 
 
 def _alike(calibration: Calibration) -> Iterator[str]:
@@ -143,7 +145,7 @@ def _alike(calibration: Calibration) -> Iterator[str]:
         if abs(value) > _ALIKE:
             way = "lower" if value < 0.0 else "higher"
             yield (
-                f"The data can hardly tell {names[j]} from {names[i]} (correlation "
+                f"{names[j]} and {names[i]} are strongly correlated (correlation "
                 f"{value:.3f}): a higher {names[j]} with a {way} {names[i]} fits nearly as "
                 "well. Measure one of them otherwise, or give a prior."
             )
@@ -160,16 +162,16 @@ def _noise(calibration: Calibration) -> Iterator[str]:
         yield f"{kind} is not a likelihood: it gives no intervals. LeastSquares does."
     elif calibration.tells_no_noise:
         yield (
-            "No more numbers were measured than constants fitted, and nothing tells their noise: "
-            "the fit goes through them whatever they are, and how far to trust it is not known. "
+            "No more numbers were measured than constants fitted, and their noise is unknown: "
+            "the fit passes through any such data, so its accuracy is unknown. "
             "Measure more, or give standard deviations."
         )
     elif not calibration.noise.is_known:
         sources = calibration.noise.source.items()
         names = sorted({name for (_, name), source in sources if source == "fit"})
         yield (
-            f"Nothing tells the noise of {' and '.join(names)} (no repeats, no standard "
-            "deviations): what the fit leaves is taken for it, as if the model were right."
+            f"The noise of {' and '.join(names)} is unknown (no repeats, no standard "
+            "deviations); it is estimated from the residuals, as if the model were right."
         )
 
 

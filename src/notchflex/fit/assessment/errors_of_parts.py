@@ -76,16 +76,16 @@ def part_title(quantity: str, part: int) -> str:
     return f"{title}, tendon {part}" if part else title
 
 
-def errors_of_parts(calibration: Calibration) -> tuple[PartError, ...]:
+def errors_of_parts(found: Calibration) -> tuple[PartError, ...]:
     """Return errors of every notch, the total angle, the tip and whatever else was measured.
 
     Args:
-        calibration: The fit.
+        found: The fit.
 
     Returns:
         Robot by robot, in the order of `Measurements.observed`.
     """
-    return tuple(one for label in calibration.given for one in _of_robot(calibration, label))
+    return tuple(one for label in found.given for one in _of_robot(found, label))
 
 
 def _of_robot(calibration: Calibration, label: str) -> Iterator[PartError]:

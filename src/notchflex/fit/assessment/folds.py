@@ -89,7 +89,7 @@ class LeftOut:
 
 
 def leave_out(
-    calibration: Calibration,
+    found: Calibration,
     *,
     by: Literal["pull", "robot"],
     photograph: float | None = None,
@@ -104,7 +104,7 @@ def leave_out(
     (`Fold.deviation`).
 
     Args:
-        calibration: A fit to everything.
+        found: A fit to everything.
         by: "pull" or "robot".
         photograph: Also update these constants by one row of the robot left out, whose load is
             nearest to this part of its largest (such as 0.6), and try them on its other rows.
@@ -136,35 +136,33 @@ def leave_out(
     if by not in ("pull", "robot"):
         raise InputError.UNKNOWN_NAME(f'leave out by "pull" or by "robot"; got {by!r}')
     check_search(starts, seed)
-    data = {
-        label: tuple(calibration.problem.samples.of_robot(label)) for label in calibration.given
-    }
+    data = {label: tuple(found.problem.samples.of_robot(label)) for label in found.given}
     parts = list(_parts(data, by))
     if len(parts) < 2:
         raise InputError.TOO_FEW_DATA(
             f"there is only one {by}; leaving it out leaves nothing to fit to"
         )
     if photograph is not None:
-        _check_photograph(calibration, by, photograph)
+        _check_photograph(found, by, photograph)
     folds: list[Fold] = []
     for number, (name, label, part, rest) in enumerate(parts, start=1):
-        kept = {label: calibration.given[label] for label, every in rest.items() if every}
-        every = [(one, one.among(kept)) for one in calibration.problem.unknowns]
+        kept = {label: found.given[label] for label, every in rest.items() if every}
+        every = [(one, one.among(kept)) for one in found.problem.unknowns]
         constants = tuple(one for _, one in every if one is not None)
-        samples = Samples.of(kept, rest, constants, calibration.settings)
+        samples = Samples.of(kept, rest, constants, found.settings)
         again = fitted(
-            kept, FitProblem(samples, calibration.problem.objective), starts, seed, intervals=False
+            kept, FitProblem(samples, found.problem.objective), starts, seed, intervals=False
         )
         own = [
             replace(one, prior=prior_of(one, again)) for one, remains in every if remains is None
         ]
-        fold = _blind(name, again, calibration, label, part, own)
+        fold = _blind(name, again, found, label, part, own)
         if photograph is not None and own:
-            fold = _with_photograph(fold, calibration, label, part, own, photograph)
+            fold = _with_photograph(fold, found, label, part, own, photograph)
         folds.append(fold)
         if progress is not None:
             progress("leaving out", number, len(parts))
-    return LeftOut(by, calibration, tuple(folds))
+    return LeftOut(by, found, tuple(folds))
 
 
 def _check_photograph(calibration: Calibration, by: str, photograph: float) -> None:

@@ -30,7 +30,7 @@ from notchflex.loads.load_path import load_path
 
 @dataclass(frozen=True, eq=False)
 class NextMeasurement:
-    """How much one more row would narrow the intervals, for each candidate.
+    """Reduction of the intervals by one more row, for each candidate.
 
     Attributes:
         label: The robot that is measured.
@@ -53,7 +53,7 @@ class NextMeasurement:
 
     @property
     def gain(self) -> Float[np.ndarray, " c"]:
-        """Width after over width before of what is wanted; NaN without a solution."""
+        """Width after over width before of the wanted intervals; NaN without a solution."""
         if not self.wanted:
             return self.volume
         columns = [self.names.index(name) for name in self.wanted]
@@ -66,7 +66,7 @@ class NextMeasurement:
 
 
 def next_measurement(
-    calibration: Calibration,
+    found: Calibration,
     candidates: Load | LoadPath | Iterable[Load],
     *,
     robot: str | None = None,
@@ -77,7 +77,7 @@ def next_measurement(
     """Rank loads by how much measuring under them would narrow the intervals.
 
     Args:
-        calibration: The fit so far.
+        found: The fit so far.
         candidates: Loads, each a row from rest.
         robot: Label of the robot that is measured; the first by default.
         narrow: Constants to be narrowed (c-optimal: mean width of their intervals); by default all
@@ -100,18 +100,18 @@ def next_measurement(
         >>> next_measurement(found, pull(0.2, 1.2, steps=6)).best
         5
     """
-    label = robot or next(iter(calibration.given))
-    _check(calibration, label, narrow, deviation or {})
-    path = load_path(candidates, calibration.robots[label].number_of_tendons)
+    label = robot or next(iter(found.given))
+    _check(found, label, narrow, deviation or {})
+    path = load_path(candidates, found.robots[label].number_of_tendons)
     if observed is None:
-        measured = calibration.problem.samples.of_robot(label)
+        measured = found.problem.samples.of_robot(label)
         observed = tuple(dict.fromkeys(name for one in measured for name in one.observed))
-    noise = {name: _noise(calibration, name, deviation or {}) for name in observed}
-    narrower = np.full((len(path), len(calibration.names)), np.nan)
+    noise = {name: _noise(found, name, deviation or {}) for name in observed}
+    narrower = np.full((len(path), len(found.names)), np.nan)
     volume = np.full(len(path), np.nan)
-    before = calibration.reached.curvature / calibration.widened**2
+    before = found.reached.curvature / found.widened**2
     width, size = _widths(before)
-    solved, residuals = _solved(calibration, label, path, observed)
+    solved, residuals = _solved(found, label, path, observed)
     if residuals is None:
         raise InputError.NOT_CONVERGED("none of the candidates has a solution; give smaller loads")
     sizes = np.array([noise[OBSERVED[quantity]] for quantity in residuals.quantity])
@@ -121,7 +121,7 @@ def next_measurement(
         width_after, size_after = _widths(before + slopes.T @ slopes)
         narrower[step], volume[step] = width_after / width, np.exp(size_after - size)
     names, able = tuple(narrow), np.isfinite(volume)
-    return NextMeasurement(label, path, narrower, volume, calibration.names, names, able)
+    return NextMeasurement(label, path, narrower, volume, found.names, names, able)
 
 
 def _check(
@@ -138,7 +138,7 @@ def _check(
         )
     if calibration.tells_no_noise:
         raise InputError.TOO_FEW_DATA(
-            "nothing tells the noise, so that nobody knows what another measurement would add; "
+            "the noise is unknown, so that the gain of another measurement is unknown; "
             "measure more, or give standard deviations"
         )
     if any(not 0.0 < value < np.inf for value in deviation.values()):
@@ -152,7 +152,7 @@ def _noise(calibration: Calibration, name: str, deviation: Mapping[str, float]) 
     mine = calibration.residuals.quantity == OBSERVED.index(name)
     if not mine.any():
         raise InputError.MISSING_VALUE(
-            f"{name} was not measured so far; tell its standard deviation"
+            f"{name} was not measured so far; give its standard deviation"
         )
     return float(np.sqrt(np.mean(calibration.noise.deviation[mine] ** 2)))
 

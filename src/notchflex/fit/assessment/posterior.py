@@ -53,7 +53,7 @@ class Posterior:
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:
-        """Where the middle 95 % of the draws of every constant lie."""
+        """Interval of the middle 95 % of the draws of every constant."""
         tail = 50.0 * (1.0 - LEVEL)
         ends = np.percentile(self.draws, [tail, 100.0 - tail], axis=(0, 1))
         every = zip(self.names, *ends.tolist(), strict=True)
@@ -61,7 +61,7 @@ class Posterior:
 
 
 def sample_posterior(
-    calibration: Calibration,
+    found: Calibration,
     *,
     draws: int = 500,
     warm_up: int = 100,
@@ -77,7 +77,7 @@ def sample_posterior(
     adjustment of Shaby 2014).
 
     Args:
-        calibration: A fit by `LeastSquares`.
+        found: A fit by `LeastSquares`.
         draws: Draws of each chain.
         warm_up: Steps before them, which adapt the step size.
         chains: Number of chains, one after the other.
@@ -88,7 +88,7 @@ def sample_posterior(
         InputError: The objective is not a likelihood, the data are too few, a number is too small,
             or numpyro is not installed (extra `bayes`).
     """
-    _check(calibration)
+    _check(found)
     if draws < MIN_DRAWS or chains < 1 or warm_up < 0:
         raise InputError.OUT_OF_RANGE(
             f"draws must be {MIN_DRAWS} or more (the chain's halves are compared), chains 1 or "
@@ -100,7 +100,7 @@ def sample_posterior(
     # The target has about unit spread in every direction: no mass matrix has to be adapted, and a
     # few steps of this size go from one side to the other.
     kernel = infer.NUTS(
-        potential_fn=_potential(calibration),
+        potential_fn=_potential(found),
         step_size=0.7,
         adapt_mass_matrix=False,
         max_tree_depth=4,
@@ -112,32 +112,32 @@ def sample_posterior(
             kernel, num_warmup=warm_up, num_samples=draws, num_chains=1, progress_bar=False
         )
         key = jax.random.PRNGKey(seed + chain)
-        start = 0.5 * jax.random.normal(key, (len(calibration.names),))
+        start = 0.5 * jax.random.normal(key, (len(found.names),))
         sampler.run(key, init_params=start, extra_fields=("diverging",))
-        every.append(_constants(calibration, np.asarray(sampler.get_samples())))
+        every.append(_constants(found, np.asarray(sampler.get_samples())))
         divergent += int(np.sum(sampler.get_extra_fields()["diverging"]))
         if progress is not None:
             progress("drawing", chain + 1, chains)
     drawn = np.stack(every)
-    by_name = list(zip(calibration.names, np.moveaxis(drawn, -1, 0), strict=True))
+    by_name = list(zip(found.names, np.moveaxis(drawn, -1, 0), strict=True))
     effective = {name: float(diagnostics.effective_sample_size(one)) for name, one in by_name}
     unlike = {name: float(diagnostics.split_gelman_rubin(one)) for name, one in by_name}
-    return Posterior(calibration.names, drawn, effective, unlike, divergent)
+    return Posterior(found.names, drawn, effective, unlike, divergent)
 
 
 def _check(calibration: Calibration) -> None:
     if not calibration.is_likelihood:
         raise InputError.UNSUPPORTED(
-            "a posterior needs LeastSquares(); other objectives are no likelihoods"
+            "a posterior needs LeastSquares(); other objectives are not likelihoods"
         )
     if calibration.tells_no_noise:
         raise InputError.TOO_FEW_DATA(
-            "nothing tells the noise: as many constants were fitted as numbers measured; "
+            "the noise is unknown: as many constants were fitted as numbers measured; "
             "measure more, or give standard deviations"
         )
     if not np.isfinite(calibration.covariance_by_rows).all():
         raise InputError.TOO_FEW_DATA(
-            "the data cannot tell some of the constants; fit only the others"
+            "the data do not determine some of the constants; fit only the others"
         )
 
 

@@ -1,4 +1,4 @@
-"""Constants of one specimen: what other specimens tell of them, and what one photograph adds."""
+"""Constants of one specimen: prior from other specimens, update by one photograph."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Specimen:
 
 
 def update_specimen(
-    calibration: Calibration,
+    found: Calibration,
     robot: Robot,
     measured: Measurements,
     constants: str | Sequence[str | Constant] = "sensor.force_factor",
@@ -60,13 +60,13 @@ def update_specimen(
     about it; the noise is what `found` misses of its measurements.
 
     Args:
-        calibration: A fit of other robots of the kind, some of whose constants are `each:` robot's.
+        found: A fit of other robots of the kind, some of whose constants are `each:` robot's.
         robot: The robot as drawn.
         measured: What was measured of it, one row or more.
         constants: Its own constants, by name without a label.
 
     Returns:
-        Its constants, and how much the rows tell.
+        Its constants, with their intervals after the update.
 
     Raises:
         InputError: Nothing is known of a constant before, or the model has no solution.
@@ -90,10 +90,10 @@ def update_specimen(
     names = (constants,) if isinstance(constants, str | Constant) else constants
     given = [one if isinstance(one, Constant) else Constant(one) for one in names]
     own = [
-        replace(one, prior=prior_of(one, calibration))
-        for one in unknowns({label: robot}, [_with_prior(one, calibration) for one in given])
+        replace(one, prior=prior_of(one, found))
+        for one in unknowns({label: robot}, [_with_prior(one, found) for one in given])
     ]
-    return updated(calibration, label, robot, measured, own)
+    return updated(found, label, robot, measured, own)
 
 
 def _with_prior(constant: Constant, calibration: Calibration) -> Constant:
@@ -143,7 +143,7 @@ def updated(
 
 
 def _missed(calibration: Calibration, measured: Measurements) -> dict[str, np.ndarray]:
-    """What a fit misses of each quantity (root mean square), for rows of another robot."""
+    """Residuals of a fit by quantity (root mean square), as deviations for another robot."""
     sizes = calibration.residuals.root_mean_squares()
     return {
         name: np.full(values.shape, sizes[name])

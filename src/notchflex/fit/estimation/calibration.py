@@ -104,7 +104,7 @@ class Calibration:
 
     @property
     def counted(self) -> int:
-        """How many of the measured numbers count.
+        """Number of measured numbers that count.
 
         A total angle that is the sum of the notches adds nothing to them in least squares.
         """
@@ -112,7 +112,7 @@ class Calibration:
 
     @property
     def freedom(self) -> int:
-        """How many more numbers were measured than fitted."""
+        """Degrees of freedom: numbers measured less numbers fitted."""
         return self.noise.counted - len(self.names)
 
     @property
@@ -186,7 +186,7 @@ class Calibration:
             )
         if not self.is_likelihood:
             raise InputError.UNSUPPORTED(
-                "an interval needs LeastSquares(); other objectives are no likelihoods"
+                "an interval needs LeastSquares(); other objectives are not likelihoods"
             )
         number = self.names.index(name)
         if not self.problem.lower[number] <= value <= self.problem.upper[number]:
@@ -207,7 +207,7 @@ class Calibration:
         """Covariance of the constants, with the model linearised.
 
         By rows; wider for constants for which whole pulls differ by more than their rows do
-        (`by_pulls`). By pulls alone (Huber's sandwich) for objectives that are no likelihood.
+        (`by_pulls`). By pulls alone (Huber's sandwich) for objectives that are not likelihoods.
         Infinite if nothing measured depends on a constant, or the noise is unknown.
         """
         if not self.is_likelihood:

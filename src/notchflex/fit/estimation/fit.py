@@ -61,7 +61,7 @@ def calibrate(
         settings: Settings of the solver.
         progress: Called with the name of the task, how much of it is done, and how much there is.
         folder: Search from every start as a piece that this folder keeps: by many processes
-            (`PieceFolder`), gone on with by the same call. The result is the same.
+            (`PieceFolder`), resumed by the same call. The result is the same.
 
     Returns:
         The fitted robots, and how far to trust their constants.
@@ -212,7 +212,7 @@ def _with_noise(problem: FitProblem, best: Minimum) -> tuple[Minimum, Cost]:
 def _intervals(calibration: Calibration, progress: Progress | None) -> dict[str, Interval]:
     if calibration.tells_no_noise:
         return {
-            name: Interval(None, None, np.array([[value, 0.0]]), "nothing tells the noise")
+            name: Interval(None, None, np.array([[value, 0.0]]), "the noise is unknown")
             for name, value in calibration.values.items()
         }
     intervals: dict[str, Interval] = {}

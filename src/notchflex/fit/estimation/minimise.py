@@ -41,7 +41,7 @@ class Cost(NamedTuple):
 
 
 class Minimum(NamedTuple):
-    """Where a search ended.
+    """Result of one search.
 
     Attributes:
         values: The values.
@@ -151,7 +151,7 @@ class _Scaled:
         return self.squares(cost)[1]
 
     def squares(self, cost: Cost) -> tuple[Float[np.ndarray, " k+1"], Float[np.ndarray, "k+1 k"]]:
-        """Residuals f with derivatives J: |f|^2 / 2 is the objective, J^T f its gradient.
+        """Return residuals f with derivatives J: |f|^2 / 2 is the objective, J^T f its gradient.
 
         J^T J is its curvature, or more: the objective is never below 0, so no step may promise to
         lower it by more than its value.

@@ -70,7 +70,7 @@ class FitProblem:
         return cost
 
     def scatter_of_priors(self, residuals: Residuals) -> Float[np.ndarray, " k"]:
-        """Return the variance of the gradient of the objective that the priors stand for."""
+        """Return the variance of the gradient of the objective that corresponds to the priors."""
         assert self.noise is not None
         weight = self.objective.weight_of_one(residuals, self.noise.deviation)
         return np.array(

@@ -1,4 +1,4 @@
-"""The searches of a fit as pieces: each from one starting point, kept and gone on with."""
+"""The searches of a fit as pieces: each from one starting point, stored and resumable."""
 
 from __future__ import annotations
 

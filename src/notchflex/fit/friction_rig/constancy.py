@@ -80,10 +80,10 @@ def constancy(readings: FrictionReadings) -> Constancy:
     y, variance = readings.coefficient, known_variance(readings)
     plain = fit_line(x[:, :1], y, variance)
     if not freedom:
-        words = "All readings have one load and one turn, so that nothing can be told."
+        words = "All readings have one load and one turn, so that constancy cannot be tested."
     elif len(readings) < len(used) + 2:
         words = (
-            f"{len(readings)} readings are too few to tell whether mu is constant; take "
+            f"{len(readings)} readings are too few to test whether mu is constant; take "
             f"{len(used) + 2} or more at different loads and turns."
         )
     elif np.isinf(plain.log_likelihood):

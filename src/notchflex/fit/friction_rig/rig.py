@@ -81,7 +81,7 @@ class FrictionRig:
                 if self.scatter < 0.5 * typical
                 else f"which leave a scatter of {self.scatter:.2g} unexplained"
             )
-            said.append(f"Their standard deviations stand for {typical:.2g}, {more}.")
+            said.append(f"Their standard deviations correspond to {typical:.2g} in mu, {more}.")
         said += [
             f"{self.readings.at(reading)}: mu = {self.readings.coefficient[reading]:.4g} lies too "
             "far from the others to be chance; look at this reading again."
@@ -117,7 +117,7 @@ def friction_rig(readings: FrictionReadings) -> FrictionRig:
     y, variance = readings.coefficient, known_variance(readings)
     count, test = len(y), constancy(readings)
     line = fit_line(np.ones((count, 1)), y, variance)
-    # Readings far off by their turn or load are no outliers if a constant is not enough.
+    # Readings far off by their turn or load are not outliers if a constant is not enough.
     varies = np.isfinite([0.0, test.by_turn, test.by_load]) & (test.enough is False)
     varies[0] = True
     off = outliers(design(readings)[:, varies], y, variance)

@@ -129,7 +129,10 @@ def impossible(
             "the string does not turn (0 deg over both edges), so that no friction could hold the "
             "difference of the weights.",
         ),
-        (a1 + a2 == 0.0, "the string does not turn (0 deg over both edges), which tells nothing."),
+        (
+            a1 + a2 == 0.0,
+            "the string does not turn (0 deg over both edges), so friction has no effect.",
+        ),
     )
     wrong = [(int(np.argmax(bad)), words) for bad, words in checks if bad.any()]
     return min(wrong, key=lambda reading: reading[0]) if wrong else None

@@ -109,7 +109,7 @@ def _order(
     row, name, top, bottom = order.unclear
     raise InputError.UNSUPPORTED(
         f"{table.at(row)}: the {name} falls from {top:g} to {bottom:g} neither step by step nor "
-        "to where the pull began, so the order of the rows does not tell how the robot was loaded. "
+        "to where the pull began, so the order of the rows does not show how the robot was loaded. "
         "Say so: --from-rest (a column from_rest "
         "of 1) if every row was loaded from rest, --path (0) if the rows of each pull are one "
         "loading path; a column trial separates pulls."
@@ -156,7 +156,7 @@ def _observed(
             components[:, *column.index] = np.radians(values) if column.in_degrees else values
     if not observed:
         raise InputError.NO_DATA(
-            f"{table.name}: nothing is measured; there is no number in a column such as "
+            f"{table.name}: nothing is measured; no column has a number, such as "
             f"notch_1_deg, total_deg, tip_x_mm or axis_5_x_mm; {table.columns}."
         )
     deviation = {name: values for name, values in deviation.items() if name in observed}

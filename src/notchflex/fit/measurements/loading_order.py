@@ -1,4 +1,4 @@
-"""How the rows of a table were loaded: each from rest, or one after the other along a path.
+"""Loading order of the rows of a table: each from rest, or along a path.
 
 Friction makes a robot bend less while it is loaded than while it is unloaded. A row on the way back
 is therefore no pull from rest, and the order of the rows shows which of the two they are.
@@ -45,7 +45,7 @@ class Fall(NamedTuple):
 
 @dataclass(frozen=True)
 class Order:
-    """How rows were loaded, as their order shows.
+    """Loading of rows inferred from their order.
 
     Attributes:
         from_rest: Whether every row is a pull from rest.

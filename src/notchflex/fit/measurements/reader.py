@@ -98,7 +98,7 @@ class MeasurementReader:
         differs = np.flatnonzero((turned != turned[0]).any(axis=1))
         if len(differs):
             raise InputError.UNSUPPORTED(
-                f"{self.table.at(differs[0])}: the base is turned otherwise than in the row before "
+                f"{self.table.at(differs[0])}: the base rotation differs from the row before "
                 "it; write a file for each way that it is turned."
             )
         return np.radians(turned[0])

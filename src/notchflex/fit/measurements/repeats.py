@@ -1,4 +1,4 @@
-"""How well measurements repeat: the standard deviation between pulls at the same loads."""
+"""Repeatability of measurements: the standard deviation between pulls at the same loads."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def repeats(measurements: Measurements, *, step: float | None = None) -> dict[st
     Otherwise pulls are interpolated linearly and compared at equal loads: the variance between the
     pulls, averaged over all loads that at least two of them cover (not over rows, which may be
     crowded). This includes errors that stay the same through a pull in full; errors that are
-    independent from row to row come out up to a fifth too small.
+    independent from row to row come out up to 20 % too small.
 
     Args:
         measurements: The rows.

@@ -1,4 +1,4 @@
-"""Whether unloading rows lie elsewhere about the model than loading rows: hysteresis it misses."""
+"""Difference of residuals between loading and unloading rows: hysteresis missing in the model."""
 
 from __future__ import annotations
 

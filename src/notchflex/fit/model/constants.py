@@ -241,15 +241,14 @@ def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant, each: b
 
 
 def _range(path: str, unit: str, value: float) -> tuple[float, float]:
-    """Where a search starts from, around a present value."""
+    """Range of starting points around a present value."""
     if path.startswith("friction."):
         return 0.0, max(0.5, 2.0 * value)
     if unit == "deg":
         return value - _TURN, value + _TURN
     if value == 0.0:
         raise InputError.MISSING_VALUE(
-            f"`{path}` is 0 in this robot, which tells nothing of its size; give limits to search "
-            "between"
+            f"`{path}` is 0 in this robot, so its scale is unknown; give limits to search between"
         )
     if unit == "mm":
         return value - _TOLERANCE * abs(value), value + _TOLERANCE * abs(value)

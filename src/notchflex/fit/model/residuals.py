@@ -56,7 +56,7 @@ class Residuals:
         return (self.sample == sample) & (self.quantity == OBSERVED.index(quantity))
 
     def root_mean_squares(self) -> dict[str, float]:
-        """Root mean square by quantity (rad, mm, N)."""
+        """Return the root mean square by quantity (rad, mm, N)."""
         return {
             OBSERVED[number]: float(np.sqrt(np.mean(self.values[self.quantity == number] ** 2)))
             for number in np.unique(self.quantity)

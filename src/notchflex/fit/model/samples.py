@@ -102,7 +102,7 @@ class Samples:
 
     @cached_property
     def _layout(self) -> dict[str, np.ndarray]:
-        """What each measured number belongs to."""
+        """Robot, row and quantity of each measured number."""
         labels = list(dict.fromkeys(one.label for one in self.every))
         parts: list[dict[str, np.ndarray]] = []
         for number, sample in enumerate(self.every):

@@ -1,1 +1,1 @@
-"""A board of markers beside the robot: it tells the scale and the tilt of a photograph."""
+"""A board of markers beside the robot: it gives the scale and the tilt of a photograph."""

@@ -1,4 +1,4 @@
-"""What gives the scale of photographs: the robot itself, a number, or a board beside it."""
+"""Scale of photographs: from the robot itself, a number, or a board beside it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _KNOWN = 0.003
 
 @dataclass(frozen=True)
 class Ruler:
-    """What is known of the scale of all photographs beside the outer diameter of the robot.
+    """Information about the scale of all photographs, beside the outer diameter of the robot.
 
     Attributes:
         scale: Pixels of the photographs per mm, at the robot; None if it is not given.
@@ -50,7 +50,7 @@ class Ruler:
             self.board.opencv_dictionary()
 
     def read(self, picture: NDArray[np.uint8], factor: float) -> RulerReading | str:
-        """Look for the board in a photograph, (height, width, 3); return why it is not found.
+        """Read the scale from a photograph, (height, width, 3); return why the board is not found.
 
         Args:
             picture: The photograph.
@@ -66,10 +66,10 @@ class Ruler:
 
 @dataclass(frozen=True)
 class RulerReading:
-    """What a ruler says about one photograph.
+    """What a ruler gives for one photograph: a prior of the view.
 
     Attributes:
-        everywhere: What is known at every place.
+        everywhere: Prior for the whole photograph.
         board: The board that is seen.
     """
 
@@ -77,7 +77,7 @@ class RulerReading:
     board: Sighting | None = None
 
     def prior(self, position: Numbers) -> ViewPrior:
-        """Return what is known of a robot at a place of the photograph, px."""
+        """Return the prior of the view of a robot at a position in the photograph, px."""
         return self.everywhere if self.board is None else self.board.prior(position)
 
     def hidden(self, contrast: Contrast) -> Contrast:

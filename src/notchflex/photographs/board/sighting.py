@@ -1,4 +1,4 @@
-"""Where a board of markers lies before the camera: scale, tilt and distance."""
+"""Pose of a board of markers relative to the camera: scale, tilt and distance."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def _fitted(points: Numbers, corners: Numbers) -> tuple[Numbers, Numbers] | None
         return np.concatenate([off, numbers[4:6] / _SLOPE, [near]])
 
     first_found = _least(residuals, np.array([*start, 0.0, 0.0, _CAMERA]))
-    # Seen from far away, a plane that is tilted the other way looks alike.
+    # Seen from far away, a plane with the opposite tilt looks the same.
     other = first_found.x * [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0]
     best, mirrored = sorted((first_found, _least(residuals, other)), key=lambda one: one.cost)
     off = np.linalg.norm(_projected(best.x, points) - corners, axis=1)

@@ -1,4 +1,4 @@
-"""What is known of a view before a fit: scale, tilt and distance of the camera."""
+"""Prior of a view before a fit: scale, tilt and distance of the camera."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from notchflex.photographs.chain.chain_table import Numbers
 
 @dataclass(frozen=True)
 class ViewPrior:
-    """What a board or a ruler says about the view at one place of a photograph.
+    """Prior of the view at one position of a photograph, from a board or a ruler.
 
     Attributes:
         scale: Pixels per mm there; NaN if it is not known.

@@ -38,7 +38,7 @@ def measure_cut(
     """Measure height, depth and uncut length of every notch in photographs of the straight robot.
 
     From the side, a notch that is rolled looks like one that is less deep. Two photographs between
-    which the robot was turned by some 20 deg about its axis tell roll and depth apart; with one,
+    which the robot was turned by some 20 deg about its axis separate roll from depth; with one,
     the standard deviations of the depths are some percent of the outer diameter.
 
     Args:
@@ -141,7 +141,7 @@ def _mean(fits: Sequence[StraightFit]) -> tuple[Numbers, Numbers, float]:
     apart = max(
         float((np.abs(fit.lengths - mean) / np.sqrt(np.diag(fit.spread))).max()) for fit in fits
     )
-    # Blur and shading shift edges alike in all photographs: a mean of several is no better known.
+    # Blur and shading shift edges equally in all photographs: a mean of several is no better.
     return mean, np.sqrt(len(fits) * np.diag(covariance)), apart
 
 

@@ -1,4 +1,4 @@
-"""What photographs of a straight robot say about its notches."""
+"""Dimensions of notches measured in photographs of a straight robot."""
 
 from __future__ import annotations
 

@@ -37,11 +37,11 @@ _MAX_ANGLE = math.radians(12.0)
 _STEP = 1e-5  # mm, rad
 _SHIFT = 0.2
 """How far blur and shading shift all edges of a photograph alike, px: by that the tube looks wider
-and all notches look lower, or the other way round. Nothing else in the photograph tells it."""
+and all notches look lower, or the other way round. Nothing else in the photograph shows it."""
 
 
 class StraightFit(NamedTuple):
-    """What one photograph says about the notches of a robot. Lengths mm.
+    """Notches of a robot measured in one photograph. Lengths mm.
 
     Attributes:
         photograph: The fit as a photograph, with the reason if it was refused.

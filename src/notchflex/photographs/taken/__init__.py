@@ -1,1 +1,1 @@
-"""How photographs were taken: the loads, and the texts in their EXIF."""
+"""Circumstances of photographs: the loads, and the texts in their EXIF."""

@@ -21,14 +21,14 @@ _MIN_ERROR = 1e-16
 _IN_PLANE = 1e-6
 
 
-def following_picture(following: Following, *, title: str = "") -> Picture:
+def following_picture(found: Following, *, title: str = "") -> Picture:
     """Describe targets that were followed.
 
-    Left the way of the tip with the positions aimed at; right the tension of every tendon over the
+    Left the path of the tip with the target positions; right the tension of every tendon over the
     targets, and how far each target was missed.
 
     Args:
-        following: The result of `notchflex.follow`.
+        found: The result of `notchflex.follow`.
         title: Heading; the name of the robot where not given.
 
     Example:
@@ -37,12 +37,12 @@ def following_picture(following: Following, *, title: str = "") -> Picture:
         >>> [cell.panel.y_label for cell in following_picture(found).cells][1]
         'tendon tension $T$ [N]'
     """
-    cells = [Cell(_tips(following), 0, 0, 2), *stack([_drives(following), _errors(following)], 1)]
-    return Picture(title or f"Targets followed by {following.robot.name}", 9.6, 5.0, cells)
+    cells = [Cell(_tips(found), 0, 0, 2), *stack([_drives(found), _errors(found)], 1)]
+    return Picture(title or f"Targets followed by {found.robot.name}", 9.6, 5.0, cells)
 
 
 def _tips(following: Following) -> Panel:
-    """Positions of the tip and those aimed at, in a plane if they lie in one."""
+    """Positions of the tip and targets, in a plane if they lie in one."""
     every, goals = following.path.tip_position, following.targets.values.get("tip_position")
     spread = np.ptp(every, axis=0)
     flat = int(np.argmin(spread[:2])) if spread[:2].min() < _IN_PLANE else None

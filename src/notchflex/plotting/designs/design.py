@@ -76,7 +76,7 @@ def _with_curves(panel: Panel, design: Design, path: EquilibriumPath, label: str
 
 
 def _variables(design: Design) -> Panel:
-    """Where each variable lies between its limits."""
+    """Position of each variable between its limits."""
     chosen = design.variables[:_VALUES]
     if not chosen:
         return Panel([Note("no variables")], "", "", title="variables")

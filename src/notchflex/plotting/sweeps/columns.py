@@ -47,7 +47,7 @@ def sweep_picture(sweep: Sweep, x: str, y: str) -> Picture:
     for name in (x, y):
         if name == "code":
             raise InputError.UNSUPPORTED(
-                "`code` is text, which has no place on an axis; it is told by the colour of points."
+                "`code` is text, and text has no axis; it is shown by the colour of points."
             )
         if name not in columns:
             raise InputError.UNKNOWN_NAME(

@@ -28,7 +28,7 @@ MAX_LIMITS, MAX_BARS = 4, 12
 _BINS = 60
 
 
-def tolerance_picture(analysis: ToleranceAnalysis) -> Picture:
+def tolerance_picture(found: ToleranceAnalysis) -> Picture:
     """Describe what tolerances do to a robot.
 
     For every limit, of many those that reject most, the histogram of drawn robots with the limits,
@@ -36,23 +36,23 @@ def tolerance_picture(analysis: ToleranceAnalysis) -> Picture:
     if one dimension were exact.
 
     Args:
-        analysis: The analysis.
+        found: The analysis.
     """
-    outside = analysis.below + analysis.above
+    outside = found.below + found.above
     shown = np.sort(np.argsort(-outside, kind="stable")[:MAX_LIMITS])
-    panels = [_histogram(analysis, int(index)) for index in shown]
-    order = [int(one) for one in analysis.order[:MAX_BARS]]
+    panels = [_histogram(found, int(index)) for index in shown]
+    order = [int(one) for one in found.order[:MAX_BARS]]
     worst = int(np.argmax(outside))
-    panels += [_sensitivity(analysis, worst, order), _yields(analysis, order)]
+    panels += [_sensitivity(found, worst, order), _yields(found, order)]
     columns = min(len(panels), 3)
     rows = -(-len(panels) // columns)
-    low, high = (100.0 * end for end in analysis.interval)
+    low, high = (100.0 * end for end in found.interval)
     title = (
-        f"{analysis.robot.name}: yield {100.0 * analysis.accepted_fraction:.1f} % "
-        f"({low:.1f} to {high:.1f} %) of {analysis.draws} robots"
+        f"{found.robot.name}: yield {100.0 * found.accepted_fraction:.1f} % "
+        f"({low:.1f} to {high:.1f} %) of {found.draws} robots"
     )
     cells, size = grid(panels, columns), (0.8 + 4.2 * columns, 1.0 + 3.0 * rows)
-    return Picture(title, *size, cells, _legend(analysis))
+    return Picture(title, *size, cells, _legend(found))
 
 
 def _legend(analysis: ToleranceAnalysis) -> list[Curve | Area]:

@@ -24,7 +24,7 @@ _CLASSES = 6
 _LABELS = ("x [mm]", "y [mm]", "z [mm]")
 
 
-def workspace_picture(workspace: Workspace) -> Picture:
+def workspace_picture(found: Workspace) -> Picture:
     """Describe a workspace.
 
     The convex hull and the tips in space, and below the voxels seen from the side (x or y, the
@@ -32,7 +32,7 @@ def workspace_picture(workspace: Workspace) -> Picture:
     was computed, stiffness.
 
     Args:
-        workspace: The workspace.
+        found: The workspace.
 
     Raises:
         InputError: No state is left.
@@ -43,9 +43,9 @@ def workspace_picture(workspace: Workspace) -> Picture:
         >>> picture.cells[1].panel.title
         'largest tension [N]'
     """
-    voxels = workspace.voxels()
-    across = 0 if np.ptp(workspace.extent[:, 0]) >= np.ptp(workspace.extent[:, 1]) else 1
-    hull = workspace.hull
+    voxels = found.voxels()
+    across = 0 if np.ptp(found.extent[:, 0]) >= np.ptp(found.extent[:, 1]) else 1
+    hull = found.hull
     title = f"convex hull {hull.size:.3g} {hull.unit}"
     flat = hull.dimension < 3
     maps = {
@@ -54,34 +54,34 @@ def workspace_picture(workspace: Workspace) -> Picture:
         "largest error by hysteresis [mm]": voxels.values["hysteresis"],
         "dexterity [% of directions]": 100.0 * voxels.dexterity,
     }
-    if np.isfinite(workspace.stiffness).any():
+    if np.isfinite(found.stiffness).any():
         maps["softest stiffness of the tip [N/mm]"] = voxels.values["stiffness"]
-    first = _plane(workspace, across, title) if flat else _space(workspace, title)
+    first = _plane(found, across, title) if flat else _space(found, title)
     panels = [first]
     points = voxels.centre[:, [across, 2]]
     panels += [_map(points, values, name, across) for name, values in maps.items()]
     width = 4.4
-    return Picture(f"Workspace of {workspace.robot.name}", 3 * width, 7.4, grid(panels, 3))
+    return Picture(f"Workspace of {found.robot.name}", 3 * width, 7.4, grid(panels, 3))
 
 
-def workspaces_picture(workspaces: Mapping[str, Workspace]) -> Picture:
+def workspaces_picture(found: Mapping[str, Workspace]) -> Picture:
     """Describe several workspaces in the same axes, seen from the front and from the side.
 
     Args:
-        workspaces: Workspaces by label.
+        found: Workspaces by label.
     """
     colours = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
     panels: list[Panel] = []
-    flat = all(np.ptp(one.extent[:, 1]) < 1e-9 for one in workspaces.values())
+    flat = all(np.ptp(one.extent[:, 1]) < 1e-9 for one in found.values())
     for across in (0,) if flat else (0, 1):
         items: list[Mark] = []
-        for (label, one), colour in zip(workspaces.items(), colours, strict=False):
+        for (label, one), colour in zip(found.items(), colours, strict=False):
             points = _thinned(one)[:, [across, 2]]
             name = f"{label}: convex hull {one.hull.size:.3g} {one.hull.unit}"
             items.append(dots(points, colour, 2.0, name=name, group=label))
         legend = BELOW if across or flat else ""
         panels.append(Panel(items, _LABELS[across], _LABELS[2], equal=True, legend=legend))
-    *others, last = workspaces
+    *others, last = found
     title = f"Workspaces of {', '.join(others)} and {last}"
     return Picture(title, 5.2 * len(panels), 5.2, grid(panels, 2))
 

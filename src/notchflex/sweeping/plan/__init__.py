@@ -1,4 +1,4 @@
-"""What a sweep computes: the plan file, its checks and its schema."""
+"""The plan of a sweep: the file, its checks and its schema."""
 
 from notchflex.sweeping.plan.parts import SweepPlan
 from notchflex.sweeping.plan.reading import read_plan

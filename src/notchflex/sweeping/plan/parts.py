@@ -78,7 +78,7 @@ class SweepVariable:
 
 @part(kw_only=True, refuse=_REFUSE)
 class Sampling:
-    """How variables without `count` or `values` are sampled.
+    """Sampling of variables without `count` or `values`.
 
     Args:
         method: "sobol" (scrambled) or "latin-hypercube".
@@ -135,7 +135,7 @@ class KeptQuantity:
 
 @part(kw_only=True, refuse=_REFUSE)
 class SweepOutput:
-    """What of all rows goes into files.
+    """Selection of what is written to files.
 
     Args:
         rows: Whether all rows are kept; if not, only those that `extremes` and `failures` keep.
@@ -162,7 +162,7 @@ class SweepOutput:
 
 @part(refuse=_REFUSE, kw_only=True)
 class SweepPlan:
-    """What a sweep computes.
+    """Plan of a sweep.
 
     Args:
         robot: Name of a ready robot, or path of a robot file beside the plan.

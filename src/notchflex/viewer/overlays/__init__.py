@@ -1,1 +1,1 @@
-"""What can be laid over the robot: a handle at the tip, the reachable cloud, the sensed force."""
+"""Overlays of the robot: a handle at the tip, the reachable cloud, the sensed force."""

@@ -1,4 +1,4 @@
-"""Work beside the solver thread, which goes on drawing meanwhile."""
+"""Background work beside the solver thread, which continues to draw."""
 
 from __future__ import annotations
 

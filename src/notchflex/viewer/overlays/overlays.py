@@ -22,7 +22,7 @@ _HANDLE, _ARROW = 0.25, 0.3
 
 
 class Overlays:
-    """What is laid over a robot; see `Shown`.
+    """Overlays of a robot; see `Shown`.
 
     Args:
         server: The server.

@@ -1,4 +1,4 @@
-"""The force at the tip as the readings of the tendons tell it: an arrow with its interval."""
+"""The force at the tip computed from readings of the tendons: an arrow with its interval."""
 
 from __future__ import annotations
 
@@ -158,10 +158,10 @@ def sensed(
     tension: Float[np.ndarray, "r t"],
     stroke: Float[np.ndarray, "r t"],
 ) -> SensedForce:
-    """Return the force at the tip that the readings tell.
+    """Return the force at the tip computed from the readings.
 
     Raises:
-        InputError: Readings that tell nothing of a force.
+        InputError: Readings without information about a force.
     """
     given = Load(base_rotation=POINTING[pointing])
     return sense(robot, tension, stroke, noise=NOISE, known=given)

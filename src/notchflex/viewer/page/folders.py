@@ -32,7 +32,7 @@ _OVERLAYS = {
 _HINTS = {
     "handle": "arrows at the tip: the tendons bring it where the mouse pulls them",
     "cloud": "where the tip can be under the loads at the tip: blue loading, orange unloading",
-    "sensed": "the force that tensions and strokes tell, with its interval",
+    "sensed": "the force computed from tensions and strokes, with its interval",
 }
 _CHOOSE = "choose ..."
 

@@ -126,7 +126,7 @@ class Marks:
             name, line = f"{root}/tendon_{tendon + 1}", _segments(rest, tendon)
             thick = _TENDON * outer
             self._tendons.append(scene.add_line_segments(name, line, TENDON, thickness=thick))
-            points = self._beside(rest, tendon)
+            points = self._ball_positions(rest, tendon)
             self._contacts.append(
                 scene.add_batched_meshes_simple(
                     f"{root}/contacts_{tendon + 1}",
@@ -143,7 +143,7 @@ class Marks:
             for number in range(len(rest.flexures))
         ]
 
-    def _beside(self, shape: RobotShape, tendon: int) -> NDArray[np.float32]:
+    def _ball_positions(self, shape: RobotShape, tendon: int) -> NDArray[np.float32]:
         return shape.contacts(tendon, _CONTACT_AT * self._outer).astype(np.float32)
 
     def move(self, path: EquilibriumPath, shape: RobotShape, shown: Shown) -> None:
@@ -153,7 +153,7 @@ class Marks:
             if shown.tendons:
                 line.points = _segments(shape, tendon)
             if shown.contacts:
-                balls.batched_positions = self._beside(shape, tendon)
+                balls.batched_positions = self._ball_positions(shape, tendon)
                 balls.batched_colors = linear(contact_colours(path[0], tendon))
         for notch, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
             ball.visible = bool(closed)
