@@ -11,9 +11,11 @@ import notchflex as nf
 
 
 @contextmanager
-def refused(code: str | nf.ErrorCode, *names: str) -> Iterator[pytest.ExceptionInfo[nf.InputError]]:
-    """Expect an InputError of a code, whose message names all of `names`."""
-    with pytest.raises(nf.InputError) as caught:
+def refused(
+    code: str | nf.ErrorCode, *names: str, error: type[nf.InputError] = nf.InputError
+) -> Iterator[pytest.ExceptionInfo[nf.InputError]]:
+    """Expect an InputError (or a class of it) of a code, whose message names all of `names`."""
+    with pytest.raises(error) as caught:
         yield caught
     wanted = (
         nf.ErrorCode[code] if isinstance(code, str) and code in nf.ErrorCode.__members__ else code

@@ -9,7 +9,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.analysis.outputs import OUTPUTS
-from notchflex.errors import ErrorCode, InputError
+from notchflex.errors import ErrorCode
 from refusals import refused
 
 
@@ -67,18 +67,18 @@ def test_a_row_that_fails_leaves_the_others(wrist):
 
 
 @pytest.mark.parametrize(
-    ("robots", "loads", "outputs", "said"),
+    ("robots", "loads", "outputs", "code", "said"),
     [
-        ([], [nf.Load(tension=1.0)], ("total_angle",), "needs a notchflex.Robot"),
-        ("pacheco2021-a", [nf.Load(tension=1.0)], ("total_angle",), "needs a notchflex.Robot"),
-        (2, [nf.Load(tension=1.0)] * 3, ("total_angle",), "got 2 robots and 3 loads"),
-        (1, [nf.Load(tension=1.0)], ("angle",), "no output 'angle'"),
-        (1, [], ("total_angle",), "no loads"),
+        ([], [nf.Load(tension=1.0)], ("total_angle",), "WRONG_TYPE", "[]"),
+        ("pacheco2021-a", [nf.Load(tension=1.0)], ("total_angle",), "WRONG_TYPE", "pacheco2021-a"),
+        (2, [nf.Load(tension=1.0)] * 3, ("total_angle",), "WRONG_SHAPE", "2 robots and 3 loads"),
+        (1, [nf.Load(tension=1.0)], ("angle",), "UNKNOWN_NAME", "'angle'"),
+        (1, [], ("total_angle",), "NO_DATA", "loads"),
     ],
 )
-def test_what_makes_no_batch(wrist, robots, loads, outputs, said):
+def test_what_makes_no_batch(wrist, robots, loads, outputs, code, said):
     given = [wrist] * robots if isinstance(robots, int) else robots
-    with pytest.raises(InputError, match=said):
+    with refused(code, said):
         nf.solve_batch(given, loads, outputs=outputs)
 
 
@@ -110,9 +110,12 @@ def test_what_is_no_batch_of_paths(wrist, given):
         nf.simulate_batch(given, nf.pull(0.0, 1.0, steps=2))
 
 
-@pytest.mark.parametrize("cores", [0, -2, 1.5, True])
-def test_cores_that_there_cannot_be(wrist, cores):
-    with pytest.raises(nf.InputError, match="cores"):
+@pytest.mark.parametrize(
+    ("cores", "code"),
+    [(0, "OUT_OF_RANGE"), (-2, "OUT_OF_RANGE"), (1.5, "WRONG_TYPE"), (True, "WRONG_TYPE")],
+)
+def test_cores_that_there_cannot_be(wrist, cores, code):
+    with refused(code, "cores", str(cores)):
         nf.solve_batch(wrist, nf.pull(0.0, 1.0, steps=2), cores=cores)
 
 

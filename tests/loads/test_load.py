@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.errors import InputError
 from notchflex.loads.load_path import load_path
 from refusals import refused
 
@@ -33,36 +32,37 @@ HUGE = pytest.param(10**5000, id="huge")  # more digits than Python writes
 @pytest.mark.parametrize("value", ["1", b"1", True, np.True_, 10**400, HUGE, 1j, [[1.0]], {}, NAN])
 @pytest.mark.parametrize("what", ["tension", "stroke"])
 def test_what_is_no_number_is_refused(what, value):
-    with pytest.raises(InputError, match=what):
+    with refused("NOT_FINITE" if value is NAN else "WRONG_TYPE", what):
         load_path(nf.Load(**{what: value}), 1)
 
 
 @pytest.mark.parametrize("value", [None, 0, "abc", [0, 0], [0, 0, NAN], [0, 0, 10**400]])
 def test_base_rotation_is_three_numbers(value):
-    with pytest.raises(InputError, match="base_rotation needs three finite numbers"):
+    with refused("NOT_FINITE", "base_rotation"):
         load_path(nf.Load(tension=1.0, base_rotation=value), 1)
-    with pytest.raises(InputError, match="base_rotation needs three finite numbers"):
+    with refused("NOT_FINITE", "base_rotation"):
         nf.LoadPath([[1.0]], [[NAN]], value)
 
 
 @pytest.mark.parametrize("loads", [None, 1.0, "1", [1.0], []])
 def test_what_is_no_load_is_refused(loads):
-    with pytest.raises(InputError, match="load"):
+    with refused("NO_DATA" if loads == [] else "WRONG_TYPE", "load"):
         load_path(loads, 1)
 
 
 @pytest.mark.parametrize("value", [None, "1", b"1", True, [["a"]], [[1.0], [1.0, 2.0]], 10**400])
 def test_load_paths_are_numbers(value):
-    with pytest.raises(InputError, match="tension of a load path must be numbers"):
+    with refused("WRONG_TYPE", "tension"):
         nf.LoadPath(value, [[NAN]])
 
 
 @pytest.mark.parametrize("make", [nf.pull, nf.stroke_path])
 @pytest.mark.parametrize("wrong", [2.5, "5", True, None, 0, -1])
 def test_steps_and_tendon_are_whole_numbers(make, wrong):
-    with pytest.raises(InputError, match="step"):
+    whole = type(wrong) is int
+    with refused("NO_DATA" if whole else "WRONG_TYPE", "step", str(wrong)):
         make(0, 3, wrong)
-    with pytest.raises(InputError, match="tendon"):
+    with refused("OUT_OF_RANGE" if whole else "WRONG_TYPE", "tendon", str(wrong)):
         make(0, 3, tendon=wrong)
     for huge in ({"steps": 10**9}, {"tendon": 10**9}):  # before any memory is taken
         with refused("OUT_OF_RANGE"):
@@ -80,7 +80,7 @@ def test_one_step_goes_nowhere(make):
 
 @pytest.mark.parametrize("end", [None, "3", True, 10**400, NAN, np.inf])
 def test_ends_of_a_ramp_are_finite_numbers(end):
-    with pytest.raises(InputError, match="tension"):
+    with refused("NOT_FINITE" if isinstance(end, float) else "WRONG_TYPE", "tension"):
         nf.pull(0, end)
 
 
@@ -90,5 +90,5 @@ def test_paths_of_different_tendons_follow_each_other():
     np.testing.assert_array_equal(both.stroke[2:], [[NAN, 0.0], [NAN, 0.5]])
     back = nf.pull(0, 1, 2, tendon=2).then(nf.pull(0, 1, 2))
     np.testing.assert_array_equal(back.tension[2:], [[0, NAN], [1, NAN]])
-    with pytest.raises(InputError, match=r"another notchflex\.LoadPath; got Load"):
+    with refused("WRONG_TYPE", "LoadPath"):
         both.then(nf.Load(tension=1.0))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from refusals import refused
 
 TUBE = nf.Tube(1.62, 1.40)
 NOTCH = nf.ArcNotch("on-axis", depth=1.4, height=0.8, uncut_length=1.2, repeat=2)
@@ -39,9 +40,9 @@ def test_replace(robot: nf.Robot):
     other = robot.replace(material=nf.Linear(7510.0), friction=nf.Frictionless())
     assert other.material.elastic_modulus == 7510.0
     assert robot.material.elastic_modulus == 60_000.0
-    with pytest.raises(nf.InputError, match=r"notch\[1\].depth"):
+    with refused("INVALID_ROBOT", "`notch[1].depth`"):
         robot.replace(tube=nf.Tube(1.3, 1.2))
-    with pytest.raises(nf.InputError, match="did you mean `material`"):
+    with refused("INVALID_ROBOT", "`materials`", "`material`"):
         robot.replace(materials=nf.Linear(7510.0))
 
 
@@ -70,25 +71,25 @@ def test_messages(make, message: str):
 
 
 def test_a_robot_needs_notches_and_tendons(robot: nf.Robot):
-    with pytest.raises(nf.InputError, match=r"`notch` .* at least one"):
+    with refused("INVALID_ROBOT", "`notch`"):
         robot.replace(notch=())
-    with pytest.raises(nf.InputError, match=r"`tendon` .* at least one"):
+    with refused("INVALID_ROBOT", "`tendon`"):
         robot.replace(tendon=())
-    with pytest.raises(nf.InputError, match="at most 10000"):
+    with refused("INVALID_ROBOT", "`notch`", "10000"):
         robot.replace(notch=(dataclasses.replace(NOTCH, repeat=9_000),) * 2)
-    with pytest.raises(nf.InputError, match="material"):
+    with refused("INVALID_ROBOT", "`material.kind`"):
         robot.replace(material=nf.Capstan(0.1))
 
 
 def test_problems_count_notches_from_the_base(robot: nf.Robot):
     deep = dataclasses.replace(NOTCH, depth=1.7)
-    with pytest.raises(nf.InputError, match=r"`notch\[3\].depth` is 1.7 mm"):
+    with refused("INVALID_ROBOT", "`notch[3].depth`", "1.7 mm"):
         robot.replace(notch=(NOTCH, deep))
 
 
 @pytest.mark.parametrize("number", [np.array([1.0, 2.0]), np.array(1.5), np.array([1, 2]), 2.0])
 def test_whole_numbers_are_asked_for_whatever_comes(number):
-    with pytest.raises(nf.InputError, match=r"`repeat` .* whole number"):
+    with refused("INVALID_ROBOT", "`repeat`"):
         dataclasses.replace(NOTCH, repeat=number)
-    with pytest.raises(nf.InputError, match=r"`end_body` .* whole number"):
+    with refused("INVALID_ROBOT", "`end_body`"):
         nf.Tendon(0.7, end_body=number)

@@ -5,8 +5,8 @@ import itertools
 import pytest
 
 import notchflex as nf
-from notchflex.errors import InputError
 from notchflex.robot import parse_assignment, set_values
+from refusals import refused
 
 
 @pytest.fixture
@@ -87,7 +87,7 @@ def test_a_change_of_kind_keeps_what_is_shared_and_tells_the_rest(robot: nf.Robo
     new, dropped = set_values(robot, {"friction.kind": "frictionless"})
     assert new.friction == nf.Frictionless()
     assert dropped == ("friction.coefficient", "friction.wrap")
-    with pytest.raises(nf.InputError, match=r"`material.superelastic_modulus` is missing"):
+    with refused("INVALID_ROBOT", "`material.superelastic_modulus`"):
         robot.with_value("material.kind", "linear").with_value("material.kind", "superelastic")
     assert set_values(robot, {"material.kind": "superelastic"}) == (robot, ())
 
@@ -124,7 +124,7 @@ def test_what_cannot_be_set(robot: nf.Robot, path: str, value: object, wanted: l
 
 
 def test_a_value_is_set_once(robot: nf.Robot):
-    with pytest.raises(nf.InputError, match="set twice"):
+    with refused("CONFLICT", "`notch[*].depth`"):
         set_values(robot, [("notch.depth", 1.3), ("notch[*].depth", 1.2)])
 
 
@@ -150,10 +150,10 @@ def test_assignments(text: str, value: object):
 
 @pytest.mark.parametrize("text", ["", "depth", "depth=", "=3", " = "])
 def test_no_assignment(text: str):
-    with pytest.raises(nf.InputError, match="sets nothing"):
+    with refused("BAD_SYNTAX", f"`{text}`"):
         parse_assignment(text)
 
 
 def test_a_number_of_thousands_of_digits_is_told():
-    with pytest.raises(InputError, match="no notch of that number"):
+    with refused("OUT_OF_RANGE"):
         nf.load_robot("pacheco2021-a").with_value(f"notch[{'9' * 5000}].depth", 1.0)

@@ -160,13 +160,13 @@ def test_template(tmp_path: Path):
 
 def test_what_cannot_be_written(tmp_path: Path):
     robot = nf.load_robot("pacheco2021-a")
-    with pytest.raises(nf.RobotFileError, match="cannot be written"):
+    with refused("FILE_UNWRITABLE", error=nf.RobotFileError):
         nf.save_robot(robot, tmp_path / "none" / "a.toml")
-    with pytest.raises(nf.RobotFileError, match="cannot be written"):
+    with refused("FILE_UNWRITABLE", error=nf.RobotFileError):
         nf.save_robot(robot, tmp_path)
-    with pytest.raises(nf.RobotFileError, match="cannot be written"):
+    with refused("FILE_UNWRITABLE", error=nf.RobotFileError):
         nf.save_robot(robot, tmp_path / "a\0.toml")
-    with pytest.raises(nf.RobotFileError, match="cannot be read"):
+    with refused("FILE_UNREADABLE", "none.toml", error=nf.RobotFileError):
         nf.save_robot(robot, tmp_path / "a.toml", template=tmp_path / "none.toml")
     assert list(tmp_path.iterdir()) == []
 

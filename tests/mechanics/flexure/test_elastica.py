@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 import notchflex as nf
 from reference_data import choose, reference
+from refusals import refused
 
 COLUMNS = ("slope", "along", "across", "chord")
 KINDS = {"clamp_angle": 0, "follower": 1}
@@ -75,19 +76,19 @@ def test_very_large_load_pulls_the_beam_straight():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "code"),
     [
-        ({"load": -1.0}, "load must be 0 or more"),
-        ({"length": 0.0}, "length must be greater than 0"),
-        ({"bending_stiffness": np.nan}, "bending_stiffness must be greater than 0"),
-        ({"clamp_angle": 3.2}, "clamp_angle must be between 0 and pi"),
-        ({"follower": 0.0}, "follower must be between 0 and pi"),
-        ({"follower": 1.0, "clamp_angle": 1.0}, "not both"),
-        ({"load": 1e6}, "below 3000"),
+        ({"load": -1.0}, "NOT_FINITE"),
+        ({"length": 0.0}, "NOT_FINITE"),
+        ({"bending_stiffness": np.nan}, "NOT_FINITE"),
+        ({"clamp_angle": 3.2}, "NOT_FINITE"),
+        ({"follower": 0.0}, "NOT_FINITE"),
+        ({"follower": 1.0, "clamp_angle": 1.0}, "CONFLICT"),
+        ({"load": 1e6}, "OUT_OF_RANGE"),
     ],
 )
-def test_bad_input(arguments, message):
-    with pytest.raises(nf.InputError, match=message):
+def test_bad_input(arguments, code):
+    with refused(code, *arguments):
         nf.elastica(**({"load": 1.0, "length": 1.0, "bending_stiffness": 1.0} | arguments))
 
 

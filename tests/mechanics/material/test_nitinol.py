@@ -20,6 +20,7 @@ from notchflex.mechanics.section.fibres import (
     sector_fibres,
     segment_fibres,
 )
+from refusals import refused
 
 STRAIGHT = dataclasses.replace(ENDS, odd=0.0, even=0.0)
 BILINEAR = nf.Nitinol(42000.0, 350.0, 6000.0, compression_ratio=1.3)
@@ -183,5 +184,5 @@ def test_bad_values_name_what_is_allowed() -> None:
         ({"unloading_stress": 400.0}, "unloading_stress"),
         ({"transformation_strain": 0.001}, "transformation_strain"),
     ):
-        with pytest.raises(nf.InputError, match=key):
+        with refused("INVALID_ROBOT", f"`{key}`"):
             nf.Nitinol(**keys)

@@ -8,7 +8,7 @@ import pytest
 import xarray
 
 import notchflex as nf
-from notchflex.errors import ErrorCode, InputError
+from notchflex.errors import ErrorCode
 from notchflex.results.files.dataset import dataset_of, record_dataset
 from notchflex.results.quantities.registry import QUANTITIES
 from refusals import refused
@@ -42,8 +42,7 @@ def test_a_missing_library_is_named(path, monkeypatch, library):
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == library else real(name)
     )
-    words = rf"to_dataframe\('{library}'\) needs {library}.*: pip install 'notchflex\[data\]'"
-    with pytest.raises(InputError, match=words):
+    with refused("MISSING_PACKAGE", library, "pip install 'notchflex[data]'"):
         path.to_dataframe(library)
 
 

@@ -5,7 +5,7 @@ import stat
 
 import pytest
 
-from notchflex.errors import ErrorCode, InputError
+from notchflex.errors import ErrorCode
 from notchflex.results.files.writing import (
     check_distinct,
     check_output,
@@ -23,28 +23,28 @@ def test_nothing_is_made_by_checking(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("target", "words"),
+    ("target", "code"),
     [
-        ("missing/a.json", "does not exist"),
-        (".", "is a folder"),
-        ("", "empty"),
-        ("file/a.json", "is a file, not a folder"),
-        ("a\0b", "cannot be written"),
+        ("missing/a.json", "FILE_UNWRITABLE"),
+        (".", "FILE_UNWRITABLE"),
+        ("", "MISSING_VALUE"),
+        ("file/a.json", "FILE_UNWRITABLE"),
+        ("a\0b", "FILE_UNWRITABLE"),
     ],
 )
-def test_targets_that_cannot_be_written(tmp_path, monkeypatch, target, words):
+def test_targets_that_cannot_be_written(tmp_path, monkeypatch, wording, target, code):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("x")
-    with pytest.raises(InputError, match=words):
+    with refused(code, "--json") as problem:
         check_output(target, "--json")
+    wording(f"output: {target!r}", str(problem.value))
 
 
 @pytest.mark.parametrize(
-    ("target", "words"),
-    [("a", "no suffix"), ("a.gif", r"the suffix \.gif"), ("-", "standard output")],
+    ("target", "named"), [("a", ".png"), ("a.gif", ".gif"), ("-", "standard output")]
 )
-def test_pictures_have_a_known_suffix(target, words):
-    with pytest.raises(InputError, match=words):
+def test_pictures_have_a_known_suffix(target, named):
+    with refused("FILE_FORMAT", "--plot", named):
         check_picture(target, "--plot")
 
 
