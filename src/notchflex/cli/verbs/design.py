@@ -72,13 +72,7 @@ def design(
         written = write_design(made, output, inputs=[spec])
         terminal.note(f"written: {', '.join(map(str, written))}.")
     outputs.write_json(lambda: designing.design_document(made))
-
-    def picture() -> object:
-        from notchflex._plot import plot as drawn
-
-        return drawn(made)
-
-    outputs.save_picture(picture)  # pyright: ignore[reportArgumentType]
+    outputs.draw(made)
     if outputs.prints_tables:
         _print(made)
     if not made.converged:
@@ -89,7 +83,6 @@ def design(
 def _front(spec: str, output: str | None, outputs: Outputs) -> int:
     """Find a front, write and print it."""
     import notchflex.designing as designing
-    from notchflex._plot import plot as drawn
 
     with terminal.bars("spreading over the front") as progress:
         found = designing.design_front(spec, progress=progress)
@@ -103,7 +96,7 @@ def _front(spec: str, output: str | None, outputs: Outputs) -> int:
             "points": [designing.design_document(point) for point in found.points],
         }
     )
-    outputs.save_picture(lambda: drawn(found))  # pyright: ignore[reportArgumentType]
+    outputs.draw(found)
     if outputs.prints_tables:
         heads = ["point", *(f">{title}" for title in found.titles)]
         rows = [
