@@ -20,9 +20,9 @@ import numpy as np
 import notchflex as nf
 from notchflex.export.finite_elements.meshes import mesh_of
 from notchflex.export.finite_elements.options import DeckOptions
-from notchflex.export.finite_elements.rings import RingMotion, read_rings
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from fem_rings import RingMotion, read_rings
 from fem_wrists import solid
 from reference_data import named_rows
 

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from jaxtyping import Array, Float
 
 from notchflex._jax import jax
-from notchflex.mechanics.motion import Motion, exponential
+from notchflex.mechanics.motion import Motion
 from notchflex.solver.body_poses import body_poses
-
-
-def moved(twists: Float[Array, "count size"]) -> tuple[Motion, Motion]:
-    """Steps of some twists, and the poses that they lead to."""
-    steps: Motion = jax.vmap(exponential)(twists)
-    return steps, body_poses(steps)
+from twists import exponential
 
 
 @pytest.mark.parametrize("size", [3, 6])
 @pytest.mark.parametrize("count", [1, 2, 5, 8, 27])
 def test_poses_are_products_of_all_before(size: int, count: int) -> None:
     twists = np.random.default_rng(count).normal(size=(count, size))
-    steps, poses = jax.jit(moved)(twists)
+    steps = Motion(*map(np.stack, zip(*map(exponential, twists), strict=True)))
+    poses = jax.jit(body_poses)(steps)
     rotation, translation = np.eye(size // 3 + 1), np.zeros(size // 3 + 1)
     for number in range(count + 1):
         np.testing.assert_allclose(poses.rotation[number], rotation, rtol=0, atol=1e-14)

@@ -105,6 +105,23 @@ class Outputs:
 
             write_json(target, document())
 
+    def write_csv(self, columns: Callable[[], Mapping[str, Any]]) -> None:
+        """Write the columns of `--csv`, if it was given."""
+        if target := self.targets.get("csv"):
+            from notchflex.results.files.csv import write_columns
+
+            write_columns(target, columns())
+
+    def draw(self, result: Any) -> None:
+        """Draw and write the usual picture of a result, if `--plot` was given."""
+
+        def picture() -> Picture:
+            from notchflex.plotting.picture import picture
+
+            return picture(result)
+
+        self.save_picture(picture)
+
     def save_picture(self, picture: Callable[[], Picture]) -> None:
         """Draw and write the picture of `--plot`, if it was given."""
         if target := self.targets.get("plot"):

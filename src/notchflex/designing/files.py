@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import importlib.util
-import io
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,6 +12,7 @@ from notchflex.designing.documents import HEADS, design_document, wish_rows
 from notchflex.designing.explanation import yield_sentences
 from notchflex.designing.result import Design, numbers
 from notchflex.errors import InputError
+from notchflex.results.files.csv import write_csv
 from notchflex.results.files.json import write_json
 from notchflex.results.files.writing import check_folder, write_text
 from notchflex.robot.robot import source_of
@@ -52,7 +51,7 @@ def write_design(
     files = check_folder(os.fspath(folder), names, "-o", inputs=inputs)
     make_folder(folder)
     write_text(files[0], designed_text(made))
-    write_text(files[1], table_text(made))
+    write_csv(files[1], HEADS, wish_rows(made))
     write_json(files[2], design_document(made))
     if PICTURE in names:
         from notchflex._plot import plot
@@ -75,13 +74,12 @@ def write_front(
     make_folder(folder)
     for file, point in zip(files, front.points, strict=False):
         write_text(file, designed_text(point))
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
     names = [f"{v.name} [{v.unit}]" if v.unit else v.name for v in front.points[0].variables]
-    writer.writerow(["robot", *front.titles, *names])
-    for name, point, values in zip(robots, front.points, front.objectives.tolist(), strict=True):
-        writer.writerow([name, *values, *(v.value for v in point.variables)])
-    write_text(files[len(robots)], out.getvalue())
+    rows = (
+        [name, *values, *(v.value for v in point.variables)]
+        for name, point, values in zip(robots, front.points, front.objectives.tolist(), strict=True)
+    )
+    write_csv(files[len(robots)], ["robot", *front.titles, *names], rows)
     if drawn:
         from notchflex._plot import plot
 
@@ -116,12 +114,3 @@ def designed_text(made: Design) -> str:
 
 def _one_line(text: str) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split("\n"))
-
-
-def table_text(made: Design) -> str:
-    """Return the table of what was asked and achieved, as CSV."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(HEADS)
-    writer.writerows(wish_rows(made))
-    return out.getvalue()

@@ -1,4 +1,4 @@
-"""Rigid motions of space or of a plane: exponential of a twist, products, wrenches carried along.
+"""Rigid motions of space or of a plane: rotations, products, wrenches carried along.
 
 A motion is a `Motion(rotation, translation)`: it takes coordinates of the inner frame to the
 outer one, `outer = rotation @ inner + translation`. A twist is (angular, linear), a wrench
@@ -193,22 +193,6 @@ def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Ar
 _WHOLE_TURN = 2.0 * np.pi
 _SINE = [(-1.0) ** k / factorial(2 * k + 1) for k in range(9)]
 _VERSINE = [(-1.0) ** k / factorial(2 * k + 2) for k in range(9)]
-
-
-def exponential(twist: Float[Array, " w"]) -> Motion:
-    """Motion reached by following a constant twist (angular, linear) for one unit of length."""
-    xp = array_module(twist)
-    axes = angular(twist)
-    turn, linear = twist[:axes], twist[axes:]
-    first, second, third = _coefficients(turn @ turn)
-    if axes == 1:
-        sine, versine = first * turn[0], second * turn[0] * turn[0]
-        rotation = xp.stack([1.0 - versine, sine, -sine, 1.0 - versine]).reshape(2, 2)
-        return Motion(rotation, first * linear + second * cross(turn, linear))
-    matrix = skew(turn)
-    twice = matrix @ matrix
-    rotation = constant(np.eye(3)) + first * matrix + second * twice
-    return Motion(rotation, linear + second * (matrix @ linear) + third * (twice @ linear))
 
 
 def wrench_at(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Array, " w"]:

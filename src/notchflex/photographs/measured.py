@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.fit.measurements.columns import measured_columns
-from notchflex.results.files.csv import write_csv
+from notchflex.results.files.csv import write_columns
 from notchflex.robot import Robot
 
 PHOTOGRAPH = "photograph"
@@ -120,5 +120,4 @@ class MeasuredPhotographs:
         Raises:
             InputError: The file cannot be written.
         """
-        table = self.columns()
-        write_csv(target, list(table), zip(*table.values(), strict=True))
+        write_columns(target, self.columns())

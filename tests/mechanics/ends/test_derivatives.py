@@ -1,4 +1,4 @@
-"""The stiffness of a notch as a function of its numbers; the limit point; the cache."""
+"""The stiffness of a notch as a function of its numbers; the cache."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from notchflex.mechanics.ends import Side, notch_stiffness
-from notchflex.mechanics.ends.flattening import limit_angle
 
 NUMBERS = np.array([0.81, 0.70, 1.4, 0.8, 0.33, 1.2, 1.0])
 
@@ -36,13 +35,6 @@ def test_smooth_in_every_number(cut, boundaries, margin):
     for k in range(len(NUMBERS)):
         scale = np.abs(stiffness(NUMBERS, cut, boundaries)) / NUMBERS[k]
         margin.within("two steps", (slope(k, 1e-4) - slope(k, 3e-4)) / scale, 1e-6)
-
-
-def test_limit_angle():
-    for alpha, beta in ((0.42, 1.27), (0.0, 1.0), (0.5, 0.0)):
-        limit = limit_angle(alpha, beta)
-        q, slope = 1 + alpha * limit / 2 + beta * limit**2 / 2, alpha / 2 + beta * limit
-        assert abs(q - 2 * limit * slope) < 1e-14  # dM/dθ of M = K₀θ/q²
 
 
 def test_computed_once():

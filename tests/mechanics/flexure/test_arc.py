@@ -13,8 +13,9 @@ from notchflex.mechanics.contact.spine import SpineContact
 from notchflex.mechanics.flexure import Rod, fibre_stretch, relative_pose, rod, with_level
 from notchflex.mechanics.flexure import flexure_state as plain_flexure_state
 from notchflex.mechanics.material import section_law
-from notchflex.mechanics.motion import Motion, exponential
+from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import SECTION_OF_CUT
+from twists import exponential
 
 flexure_state = jax.jit(plain_flexure_state, static_argnames="with_pose")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from notchflex.errors import InputError
-from notchflex.robot import Robot
+from notchflex.robot import Nitinol, Robot
 from notchflex.robot.fields import fields_of
 from notchflex.robot.tolerance import Tolerance
 from notchflex.robot.value_names import numbers_at
@@ -60,7 +60,7 @@ def _assumed(robot: Robot) -> Iterator[Tolerance]:
     wall = max(WALL, WALL_OF_DIAMETER * diameter)
     yield Tolerance("tube.inner_diameter", sd=_rounded(2.0 * wall))
     material = robot.material
-    nitinol = material.kind == "nitinol"
+    nitinol = isinstance(material, Nitinol)
     for name, field in fields_of(type(material)).items():
         is_modulus = (field.json_schema_extra or {}).get("unit") == "MPa"
         if is_modulus and name not in _LEFT_OUT and _is_number(robot, f"material.{name}"):

@@ -179,13 +179,8 @@ def _write(fit: Calibration, analyses: dict[str, Any], outputs: Outputs) -> None
         parts = {formats[one][0]: formats[one][1](value) for one, value in analyses.items()}
         return documents.calibration_document(fit) | parts
 
-    def picture() -> Any:
-        from notchflex.plotting import calibration_picture
-
-        return calibration_picture(fit)
-
     outputs.write_json(document)
-    outputs.save_picture(picture)
+    outputs.draw(fit)
     if outputs.prints_tables:
         tables.print_calibration(fit)
         for option, value in analyses.items():

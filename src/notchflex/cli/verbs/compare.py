@@ -105,11 +105,7 @@ def _write(comparison: Comparison, others: dict[str, Comparison], outputs: Outpu
         return comparison_picture(comparison, others)
 
     outputs.write_json(document)
-    if target := outputs.targets.get("csv"):
-        from notchflex.results.files.csv import write_csv
-
-        columns = comparison_columns(comparison)
-        write_csv(target, list(columns), zip(*columns.values(), strict=True))
+    outputs.write_csv(lambda: comparison_columns(comparison))
     outputs.save_picture(picture)
     if outputs.prints_tables:
         print_comparison(comparison, others)

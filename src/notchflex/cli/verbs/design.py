@@ -71,14 +71,8 @@ def design(
     if output is not None:
         written = write_design(result, output, inputs=[spec])
         terminal.note(f"written: {', '.join(map(str, written))}.")
-    outputs.write_json(lambda: designing.design_document(result))
-
-    def picture() -> object:
-        from notchflex._plot import plot as drawn
-
-        return drawn(result)
-
-    outputs.save_picture(picture)  # pyright: ignore[reportArgumentType]
+outputs.write_json(lambda: designing.design_document(result))
+    outputs.draw(result)
     if outputs.prints_tables:
         _print(result)
     if not result.converged:
@@ -89,7 +83,6 @@ def design(
 def _front(spec: str, output: str | None, outputs: Outputs) -> int:
     """Find a front, write and print it."""
     import notchflex.designing as designing
-    from notchflex._plot import plot as drawn
 
     with terminal.bars("spreading over the front") as progress:
         front = designing.design_front(spec, progress=progress)
@@ -103,7 +96,11 @@ def _front(spec: str, output: str | None, outputs: Outputs) -> int:
             "points": [designing.design_document(point) for point in front.points],
         }
     )
+<<<<<<< HEAD
     outputs.save_picture(lambda: drawn(front))  # pyright: ignore[reportArgumentType]
+=======
+    outputs.draw(found)
+>>>>>>> libs
     if outputs.prints_tables:
         heads = ["point", *(f">{title}" for title in front.titles)]
         rows = [

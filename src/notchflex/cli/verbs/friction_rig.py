@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -37,13 +37,8 @@ def friction_rig(
 
     rig = estimate(read_friction_rig(data))
 
-    def picture() -> Any:
-        from notchflex.plotting import friction_picture
-
-        return friction_picture(rig)
-
     outputs.write_json(lambda: friction_document(rig))
-    outputs.save_picture(picture)
+    outputs.draw(rig)
     if outputs.prints_tables:
         console = terminal.output()
         console.print(data, soft_wrap=True)

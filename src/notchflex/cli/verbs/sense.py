@@ -142,18 +142,9 @@ def sense(
 def _write(sensed: SensedForce, outputs: Outputs) -> None:
     from notchflex.sensing.tables import sensed_columns, sensed_document
 
-    def picture() -> Any:
-        from notchflex.plotting import sensed_picture
-
-        return sensed_picture(sensed)
-
     outputs.write_json(lambda: sensed_document(sensed))
-    if target := outputs.targets.get("csv"):
-        from notchflex.results.files.csv import write_csv
-
-        columns = sensed_columns(sensed)
-        write_csv(target, list(columns), zip(*columns.values(), strict=True))
-    outputs.save_picture(picture)
+    outputs.write_csv(lambda: sensed_columns(sensed))
+    outputs.draw(sensed)
     if outputs.prints_tables:
         _print(sensed)
 

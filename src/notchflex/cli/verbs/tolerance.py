@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -98,15 +98,6 @@ def tolerance(
 def _write(found: ToleranceAnalysis, outputs: Outputs) -> None:
     from notchflex.tolerancing.documents import tolerance_columns, tolerance_document
 
-    def picture() -> Any:
-        from notchflex.plotting import tolerance_picture
-
-        return tolerance_picture(found)
-
     outputs.write_json(lambda: tolerance_document(found))
-    if target := outputs.targets.get("csv"):
-        from notchflex.results.files.csv import write_csv
-
-        columns = tolerance_columns(found)
-        write_csv(target, list(columns), zip(*columns.values(), strict=True))
-    outputs.save_picture(picture)
+    outputs.write_csv(lambda: tolerance_columns(found))
+    outputs.draw(found)

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.errors import InputError
+from notchflex.export.finite_elements.layers import check_shape
 from notchflex.export.finite_elements.tube_mesh import TubeMesh
 from notchflex.export.tendon_holes import tendon_holes
 from notchflex.mechanics.chain.mass import body_lengths
@@ -79,5 +80,5 @@ def tendon_spans(
 def _origins(robot: Robot) -> Float[np.ndarray, " bodies"]:
     """Start of each body on the straight tube, mm."""
     lengths = body_lengths(robot.tube, robot.notches)
-    heights = [getattr(notch, "height", 0.0) for notch in robot.notches]
+    heights = [notch.height for notch in check_shape(robot)]
     return np.concatenate([[0.0], np.cumsum(lengths[:-1] + heights)])

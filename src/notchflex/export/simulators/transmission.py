@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
-
 import numpy as np
 
 from notchflex.export.simulators.joint_model import JointModel
 from notchflex.export.simulators.levers import tendon_levers
+from notchflex.results.files.csv import csv_text
 
 _ANGLES = 11
 
@@ -22,10 +20,9 @@ def transmission_table(model: JointModel) -> str:
     plus the friction moment; while it falls, their difference.
     """
     tendons = range(len(model.holes))
-    file = io.StringIO()
-    rows = csv.writer(file, lineterminator="\n")
+    rows: list[list[str]] = []
     levers = [f"tendon_{k + 1}_lever_mm" for k in tendons]
-    rows.writerow(["joint", "angle_rad", *levers, "elastic_moment_Nmm", "friction_moment_Nmm"])
+    header = ["joint", "angle_rad", *levers, "elastic_moment_Nmm", "friction_moment_Nmm"]
     count = len(model.springs)
     for j, spring in enumerate(model.springs):
         at = np.linspace(spring.low, spring.high, _ANGLES)
@@ -38,5 +35,5 @@ def transmission_table(model: JointModel) -> str:
             np.abs(spring.friction_moment(at)),
         ]
         for row in np.stack(columns, axis=1).tolist():
-            rows.writerow([f"notch_{j + 1}", *(f"{value:.7g}" for value in row)])
-    return file.getvalue()
+            rows.append([f"notch_{j + 1}", *(f"{value:.7g}" for value in row)])
+    return csv_text(header, rows)

@@ -13,7 +13,7 @@ from notchflex.errors import InputError
 from notchflex.fit.measurements import columns
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.loads import BodyForce
-from notchflex.results.files.csv import write_csv
+from notchflex.results.files.csv import write_columns
 from notchflex.results.quantities.registry import AXES, QUANTITIES
 
 
@@ -34,7 +34,7 @@ def write_measurements(measurements: Measurements, target: str | Path) -> None:
     table = {columns.PULL[0]: list(measurements.pull)} | _commands(measurements)
     table |= _external(measurements) | _observed(measurements)
     table[columns.FROM_REST] = [measurements.from_rest] * len(measurements)
-    write_csv(target, list(table), zip(*table.values(), strict=True))
+    write_columns(target, table)
 
 
 def exactly_in_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -90,16 +90,3 @@ def flattening_numbers(
     phi = 2.0 * wall * radius**3 * np.abs(first) / weak
     brazier = 48.0 * (1.0 - poisson_ratio**2) * radius**7 * second / (wall * weak)
     return outer_angle, phi, brazier
-
-
-def limit_angle(alpha: float, beta: float) -> float:
-    """Compute the closing angle of the largest moment, where 1 − αθ/2 − 3βθ²/2 = 0.
-
-    Args:
-        alpha: α, 1/rad, not negative.
-        beta: β, 1/rad², not negative; not both 0.
-
-    Returns:
-        The angle, rad.
-    """
-    return 4.0 / (alpha + np.sqrt(alpha**2 + 24.0 * beta))

@@ -11,7 +11,7 @@ import numpy as np
 from notchflex.errors import InputError
 from notchflex.photographs.chain.chain_table import Numbers
 from notchflex.photographs.measured import MeasuredPhotograph
-from notchflex.results.files.csv import write_csv
+from notchflex.results.files.csv import write_columns
 from notchflex.results.files.writing import write_text
 from notchflex.robot import Robot, robot_text
 from notchflex.robot.robot import source_of
@@ -67,10 +67,9 @@ class MeasuredCut:
         Raises:
             InputError: The file cannot be written.
         """
-        table = self.columns()
-        columns = [column.tolist() for column in table.values()]
-        columns[0] = [int(notch) for notch in columns[0]]
-        write_csv(target, list(table), zip(*columns, strict=True))
+        columns = self.columns()
+        notches = columns["notch"].astype(int)
+        write_columns(target, {**columns, "notch": notches})
 
     def as_cut(self) -> Robot:
         """Return the robot with the measured heights, depths and uncut lengths.

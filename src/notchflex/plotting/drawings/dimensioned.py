@@ -120,8 +120,8 @@ def _row(axes: Axes, robot: Robot, names: str, notch: Notch, view: NotchView, to
     scale = _scale(view, robot)
     outer = scale * robot.tube.outer_radius
     number = "notch" if names.isdigit() else "notches"
-    cut = f', cut "{getattr(notch, "cut")}"' if hasattr(notch, "cut") else ""  # noqa: B009
-    head = f'{number} {names}: kind "{notch.kind}"{cut}, bends toward {notch.direction_deg:g}°'
+    variant = f", {view.variant}" if view.variant else ""
+    head = f'{number} {names}: kind "{notch.kind}"{variant}, bends toward {notch.direction_deg:g}°'
     head += "".join(f", {name} 0" for name in view.absent)
     axes.text(0.25, top - 0.12, head, fontsize=9.0, va="center", fontweight="bold")
     along = _along(view, scale)

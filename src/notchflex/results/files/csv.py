@@ -48,7 +48,19 @@ def write_path_csv(
     Raises:
         InputError: The file cannot be written.
     """
-    columns = {**path_columns(path), **(more or {})}
+    write_columns(target, {**path_columns(path), **(more or {})})
+
+
+def write_columns(target: str | FilePath, columns: Mapping[str, Iterable[Any]]) -> None:
+    """Write columns as CSV, as `write_csv` does its rows.
+
+    Args:
+        target: Path, or `-` for standard output.
+        columns: As many values under every header.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
     write_csv(target, list(columns), zip(*columns.values(), strict=True))
 
 
@@ -63,12 +75,17 @@ def write_csv(target: str | FilePath, header: Sequence[str], rows: Iterable[Iter
     Raises:
         InputError: The file cannot be written.
     """
+    write_text(target, csv_text(header, rows))
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
+    """Return what `write_csv` writes."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
     for row in rows:
         writer.writerow([_field(value) for value in row])
-    write_text(target, text.getvalue())
+    return text.getvalue()
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from notchflex.errors import InputError
 from notchflex.export.finite_elements.deck import ring_layers
 from notchflex.export.finite_elements.tube_mesh import TubeMesh
 
@@ -49,7 +48,7 @@ def read_rings(mesh: TubeMesh, text: str) -> RingMotion:
         text: The .dat file.
 
     Raises:
-        InputError: The file has no displacements of the rings.
+        ValueError: The file has no displacements of the rings.
     """
     moved = _displacements(text)
     rotation, position = [], []
@@ -57,7 +56,7 @@ def read_rings(mesh: TubeMesh, text: str) -> RingMotion:
         numbers = mesh.layer(index)
         missing = [number for number in numbers.tolist() if number not in moved]
         if missing:
-            raise InputError.NO_DATA(
+            raise ValueError(
                 f"the .dat file has no displacement of node {missing[0]}: the run did not finish, "
                 "or belongs to another deck"
             )
