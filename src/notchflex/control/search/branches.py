@@ -198,16 +198,7 @@ def _meet_from(
     nearest: Attempt,
     error: float,
 ) -> Attempt:
-    """Solve from several starting drives, or continue from the nearest result.
-
-    Args:
-        problem: Target quantities and limits.
-        before: The state before, packed.
-        starts: The drives.
-        goal: The target.
-        nearest: What came nearest so far.
-        error: What it must be nearer than, to go on from it.
-    """
+    """Solve from several starting drives, or continue from the nearest if its error is smaller."""
     solves = 0
     for start in starts:
         other = solve_directly(problem, before, start, goal)

@@ -96,13 +96,6 @@ def solve_directly(
 ) -> Attempt:
     """Search drives from the present ones by one compiled program; this suffices in most cases.
 
-    Args:
-        problem: Target quantities and limits.
-        before: The state before, packed.
-        start: Its drives.
-        goal: The target; NaN where an entry is free.
-        known: Values and slopes there, where they are known.
-
     Returns:
         What was found, or the present drives where that is no nearer; where the target is not met
         within the limits, `failure` says that the search stopped.
