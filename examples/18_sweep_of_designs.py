@@ -17,7 +17,7 @@ plan = {
         {"quantity": "peak_strain", "notch": 1, "upper": 0.04},
     ],
 }
-with tempfile.TemporaryDirectory() as folder:  # a folder of your own goes on where it stopped
+with tempfile.TemporaryDirectory() as folder:  # a folder of your own resumes an interrupted sweep
     found = nf.sweep(plan, folder)
     rows = found.lazy().filter(code="accepted").sort("peak_strain_1").collect()
 best = rows.row(0, named=True)

@@ -33,7 +33,7 @@ BAD = {
         TEXT + '[[constraint]]\nquantity = "total_angle"\nstate = "pulled"\nupper = 80.0\n',
         "CONFLICT",
     ),
-    "nothing asked": (TEXT.split("# --- What is to be small")[0], "INVALID_SPECIFICATION"),
+    "nothing asked": (TEXT.split("# --- Objectives")[0], "INVALID_SPECIFICATION"),
     "in a circle": (
         TEXT.replace("tension = 2.0", 'tension = 2.0\nafter = "pulled"'),
         "CONFLICT",
@@ -64,7 +64,7 @@ ROBUST = (
     .replace("# material.elastic_modulus", "material.elastic_modulus")
 )
 SECOND = '[[objective]]\nquantity = "total_angle"\nstate = "pulled"\ngoal = "maximise"\n\n'
-FRONT = TEXT.replace("# --- What must hold", f"{SECOND}# --- What must hold")
+FRONT = TEXT.replace("# --- Constraints", f"{SECOND}# --- Constraints")
 KINDS = {
     "plain": (TEXT, ()),
     "robust": (ROBUST, ()),

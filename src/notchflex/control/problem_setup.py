@@ -18,7 +18,7 @@ from notchflex.loads.validation import short_repr
 from notchflex.results.state import SavedState, State, check_robot
 from notchflex.robot import Robot
 
-# Drives are sought up to so many times what about closes a notch, where no limit is given.
+# Default limit of drives, as a multiple of about the closing value of a notch.
 _MAX_FACTOR = {"tension": 4.0, "stroke": 2.0}
 # A program is compiled for every set of quantities; those of a group cost little beside each other.
 _ASKED_TOGETHER = (

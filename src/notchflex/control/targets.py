@@ -1,4 +1,4 @@
-"""Targets: what quantities of the robot are to become, one after the other."""
+"""Targets: series of values of quantities of the robot."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LARGEST_TARGET = 1e9
 LARGEST_WEIGHT = 1e9
 """Weights beyond this, or below its inverse, are refused: one quantity alone would count."""
 
-# Rows of a rotation may miss those of a true one by so much.
+# Tolerance of the rows of a rotation matrix.
 _ROTATION_ERROR = 1e-6
 _FORMS = "x, y, z of the tip in mm, or names of quantities with their values"
 

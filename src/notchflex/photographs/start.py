@@ -144,14 +144,9 @@ def _stretches(table: ChainTable, centre: Numbers, width: Numbers) -> Iterator[R
 def _numbers(
     table: ChainTable, ribbon: Ribbon, side: float, slip: float, middle: Numbers
 ) -> Numbers | None:
-    """Return the numbers of a robot along a ribbon, its notches on one side of it.
+    """Return the numbers of a robot along a ribbon (from the tip on), slipped toward the base.
 
-    Args:
-        table: The robot.
-        ribbon: From the tip on.
-        side: 1 if the first notch is cut on the right of the way from base to tip, else -1.
-        slip: How far the robot lies farther toward the base, pitches.
-        middle: Middle of the photograph, px.
+    The slip is in pitches; `side` is 1 if the first notch is cut on the right from base to tip.
     """
     scale = ribbon.width / (2.0 * table.outer)
     centre = ribbon.centre[1:]

@@ -34,7 +34,7 @@ _AHEAD = 2
 """So many pieces wait for each worker of dask, so that none is idle."""
 
 _TRIES = 20
-"""A piece whose worker is lost so many times is given up."""
+"""Largest number of lost workers for one piece."""
 
 _BEAT, _FETCH = 1.0, 10.0
 """Seconds to wait for a piece, and for its result, until the connection is checked."""

@@ -18,7 +18,7 @@ from notchflex.robot import Robot
 MAX_READINGS = 2000
 """More readings than this are refused: the time grows with the square of their number."""
 
-# Negative tensions up to so many standard deviations may be noise.
+# Negative tensions up to this number of standard deviations may be noise.
 _MAX_NOISE = 10.0
 
 

@@ -9,27 +9,26 @@ from jaxtyping import Float
 
 from notchflex.sensing.candidates import Candidate, ReadingProblem
 
-# Lengths that are tried of a step: of what slopes promise, and where that fails of any.
+# Trial lengths of a step, relative to the predicted step or to any step.
 _WHOLE = np.array([1.0])
 _FULL = np.array([1.0, 0.5, 0.2, 0.05, 0.01])
 _FIRST_LENGTHS = np.array([1.02, 1.0, 0.98, 0.9])
 _REACH = np.array([2.0, 1.4, 1.0, 0.8, 0.6, 0.4, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001])
 _BETWEEN = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 _MAX_STEPS, _MAX_REACHES, _MAX_HALVINGS = 20, 16, 6
-# So many forces are solved at once.
+# Number of forces solved in one batch.
 _TOGETHER = 3
 BAD_FIT = 12.0
-"""A fit that misses the readings by more than this, in squares of the noise for each number that
-was read, explains nothing."""
-# It is tried again from all over the range, and with differences over these parts of it.
+"""Largest accepted misfit, in squares of the noise for each number read."""
+# A bad fit is repeated from this number of starts, with differences over these parts of the range.
 _STARTS, _WIDTHS = 9, (1e-2, 1e-3, 1e-4, 1e-5)
-# A whole step is taken where it brings this part of what slopes promise.
+# Gain ratio above which a full step is accepted.
 _GOOD_GAIN = 0.5
-# The search ends where the misfit falls, or an extreme moves, by less than these parts.
+# The search ends if the misfit falls, or an extreme moves, by less than these parts.
 _SMALL_GAIN, _SMALL_MOVE = 1e-9, 1e-3
-# Ends of an interval are found to the first part of the range; a step below the second is none.
+# Accuracy of the ends of an interval, and smallest step, relative to the range.
 _NARROW, _NO_MOVE = 1e-7, 1e-9
-# A force far outside the range, by which nothing is measured, weighs this little against readings.
+# Weight of a prior that keeps an unobservable force near the range.
 _WEAK = 1e-3
 
 

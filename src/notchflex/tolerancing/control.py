@@ -14,7 +14,7 @@ from notchflex.tolerancing.study import Study
 
 _POINTS = 2048
 _WIDEST = 2.0
-"""A tolerance is widened so many times at most."""
+"""Largest factor on a tolerance that is tried."""
 _EXACT = 0.02
 """Relative accuracy of the factor on a tolerance."""
 

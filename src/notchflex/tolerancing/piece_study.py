@@ -25,7 +25,7 @@ _EACH = 1024
 """Largest number of separately assembled robots at a time: a chain takes much memory."""
 
 _PIECES = 16
-"""A study is cut into about so many pieces, unless they would be too small or too large."""
+"""Approximate number of pieces of a study, unless they would be too small or too large."""
 _MIN_ROWS, _MAX_ROWS = 2**12, 2**18
 _MAX_SLOW_ROWS = 2**12
 """Rows of a piece at most where robots are assembled one by one, which takes a thousand times as

@@ -68,7 +68,7 @@ def rays(
     pretension: float,
     seed: int,
 ) -> Float[np.ndarray, "r s t"]:
-    """Return tensions along rays: so many levels up to a peak, and the same down again.
+    """Return tensions along rays: a number of levels up to a peak, and the same levels down.
 
     Half of the rays reach the largest tensions, the others a part of them: unloading begins at many
     peaks. Directions, peaks and levels are drawn from a sequence of low discrepancy.

@@ -22,7 +22,7 @@ Workers = Annotated[
     int | None,
     converted(whole(1, 1024), "N"),
     Parameter(
-        help="Work in so many processes of this machine (extra `cluster`); by default in "
+        help="Work in this number of processes of this machine (extra `cluster`); by default in "
         "one process."
     ),
 ]

@@ -45,23 +45,23 @@ from notchflex.solver.programs.pytree_layout import lane_sizes
 from notchflex.solver.residual import Evaluation, evaluate
 from notchflex.solver.solver_state import SolverState
 
-# Redundant drives are as small as they get where a step would change them by this part.
+# Redundant drives are minimal if a step would change them by less than this part.
 _SMALL_RELAXATION = 1e-3
 # A corrected state is solved where its residual is below this multiple of the tolerance.
 _SOLVED = 100.0
 # A tendon sticks where its slopes, squared, are `NO_SLOPE` of those with which it last slid,
-# and, beside others, stays where it is if it must slide by less than this part of its dead band.
+# and, beside others, does not move if it must slide by less than this part of its dead band.
 _SMALL_LEAP = 1e-3
-# Where it still sticks beyond its dead band, the next step is this part of the way from the present
-# drive.
+# If it still sticks beyond its dead band, the next step is this part of the distance from the
+# present drive.
 _ONWARD = 0.5
-# Corrections go on while each leaves this part of the error at most, or the target is this multiple
-# of its tolerance away.
+# Corrections continue while each reduces the error to this part at most, or the error is above this
+# multiple of the tolerance.
 _MAX_FALL, _NEAR_TARGET = 0.5, 100.0
 # The next correction leaves about the square of the error, over the size of what the drives move:
 # it meets the target where that is this part of the tolerance.
 _CLOSE = 0.1
-# A correction of the drives by less than this part of them is none.
+# Smallest relative correction of the drives.
 _NO_CHANGE = 1e-11
 
 

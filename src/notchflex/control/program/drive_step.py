@@ -10,11 +10,11 @@ from notchflex._jax import array_module, jnp
 from notchflex.solver.linear_step.block_elimination import gauss_jordan
 
 MIN_DRIVES = 1e-10
-"""Where drives are redundant the smallest meet the target. This weight decides among those that
-meet it equally well, and is too small to act against the target."""
+"""Regularisation weight of the drives: selects the smallest redundant drives. It is too small to
+act against the target."""
 GROWTH, FIRST_PART = 1.0, 0.05
-"""A step may change a drive by so many times the largest one, or the first by a part of what closes
-a notch."""
+"""Largest change of a drive in a step, relative to the largest drive; and in the first step,
+relative to the closing value of a notch."""
 
 SLACK = 1e-10
 """Drives within this part of what about closes a notch of their limit are at it."""
@@ -66,7 +66,7 @@ def drive_step(
     several = jnp.sum(driven) > 1.0
     damping = jnp.where(several, _DAMPING * jnp.minimum(part, 1.0), 0.0) * size
     hessian = normal + (small + damping) * eye
-    # What moves nothing stays.
+    # Drives without effect do not change.
     column = jnp.sum(slopes**2, axis=0)
     driven = driven * (column > NO_SLOPE * jnp.max(column))
     free, step = driven, jnp.zeros(count)

@@ -22,17 +22,17 @@ from notchflex.errors import Failure
 
 Approach = Literal["direct", "loading", "unloading", "least"]
 
-# An overshoot goes so far beyond what reverses all contacts.
+# Overshoot beyond the drives that reverse all contacts, relative.
 _OVERSHOOT = 0.05
-# Limits count as kept within this part of them.
+# Relative tolerance of limits.
 _KEPT = 1e-6
-# Where the search from the present drives and others fails, it starts again from the best that it
-# found without the drives that are smaller than this part of the largest.
+# If all searches fail, one restarts from the best result without drives smaller than this part of
+# the largest.
 _SMALL = 0.2
-# A target is out of reach where one of so many last searches brings less than this part of the
-# error.
+# A target is out of reach if one of this number of last searches reduces the error by less than
+# this part.
 _LAST_SEARCHES, _NO_NEARER = 3, 1e-6
-# The search also follows the target from the present values in so many parts.
+# Number of parts in which the target moves from the present values.
 _PARTS = 6
 
 
@@ -198,16 +198,7 @@ def _meet_from(
     nearest: Attempt,
     error: float,
 ) -> Attempt:
-    """Solve from several starting drives, or continue from the nearest result.
-
-    Args:
-        problem: Target quantities and limits.
-        before: The state before, packed.
-        starts: The drives.
-        goal: The target.
-        nearest: What came nearest so far.
-        error: What it must be nearer than, to go on from it.
-    """
+    """Solve from several starting drives, or continue from the nearest if its error is smaller."""
     solves = 0
     for start in starts:
         other = solve_directly(problem, before, start, goal)

@@ -19,10 +19,10 @@ from notchflex.control.search.unmet import why_unmet
 _STUCK = 1e-8
 # Drive changes, as parts of the drives, that make a tendon slide and show its slopes.
 _SIDE_STEPS = (1e-6, -1e-6, 0.3, -0.3)
-# Where a step moves nothing the next one is so many times longer; where it then moves something it
-# may increase the error so many times.
+# Factor on the step length after a step without motion, and the factor by which the error may then
+# increase.
 _STRIDE, _ACROSS = 4.0, 30.0
-# An error whose slope by the drives is this part of what it could be is as small as it gets.
+# The error is minimal if its slope by the drives is below this part of the largest possible one.
 _FLAT = 1e-6
 
 

@@ -16,23 +16,23 @@ from notchflex.control.search.problem import Attempt, Problem, size_of
 from notchflex.control.search.search_point import KEPT, largest_violation, limit_rows
 from notchflex.errors import Failure
 
-# Damping: where a step fails, its factor after one that did, the gain above which it is lifted, and
-# the largest with which a step is worth trying.
+# Damping after a failed step, its factor after further ones, the gain ratio above which it
+# decreases, and its maximum.
 _FIRST, _FACTOR, _GOOD_GAIN, _MAX_DAMPING = 1e-3, 8.0, 0.5, 1e12
-# The part of the promised improvement that a step must bring.
+# Smallest accepted ratio of actual to predicted reduction.
 _MIN_GAIN = 1e-3
-# Tendons whose slopes (mm, N or rad per N or mm) are below this stick. They slide at drives that
+# Tendons with slopes (mm, N or rad per N or mm) below this stick. They slide at drives that
 # differ by these parts.
 _STUCK = 1e-9
 _SIDE_STEPS = (1e-6, -1e-6)
-# Loads that the program may solve for a target.
+# Largest number of loads that the program solves for a target.
 _ROUNDS = 6
-# A step that changes drives by less than this part of them is none.
+# Smallest relative change of drives by a step.
 _NO_STEP = 1e-11
-# A search ends where so many solves leave this part of the squared error.
+# A search ends if this number of solves leaves more than this part of the squared error.
 _IMPATIENT, _PATIENT = (8, 0.98), (16, 1.0 - 1e-8)
-# Drives that are redundant are made smaller in so many rounds of so many corrections, while a round
-# changes them and their size by more than these parts.
+# Redundant drives are reduced in at most this number of rounds, each with at most this number of
+# corrections, while a round changes them and their size by more than these parts.
 _MAX_RELAXATIONS, _CORRECTIONS, _SMALL_RELAXATION, _SMALL_GAIN = 6, 5, 1e-3, 1e-4
 
 
@@ -95,13 +95,6 @@ def solve_directly(
     known: Response | None = None,
 ) -> Attempt:
     """Search drives from the present ones by one compiled program; this suffices in most cases.
-
-    Args:
-        problem: Target quantities and limits.
-        before: The state before, packed.
-        start: Its drives.
-        goal: The target; NaN where an entry is free.
-        known: Values and slopes there, where they are known.
 
     Returns:
         What was found, or the present drives where that is no nearer; where the target is not met

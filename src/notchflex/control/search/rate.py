@@ -12,7 +12,7 @@ from notchflex.control.search.iterative_search import search_iteratively, within
 from notchflex.control.search.problem import Attempt, Problem, size_of
 from notchflex.errors import Failure
 
-# A drive that changes by less than this part of the largest stays where it is.
+# A drive that changes by less than this part of the largest counts as unchanged.
 _STAYS = 1e-9
 
 

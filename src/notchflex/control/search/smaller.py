@@ -16,25 +16,23 @@ from notchflex.control.search.problem import Attempt, Problem, size_of
 from notchflex.control.search.starts import corners
 from notchflex.errors import Failure
 
-# The lower end of a range is found to this part of the tension.
+# Relative accuracy of the lower end of a range of tensions.
 _EXACT = 5e-7
-# Where a tension next to the end still holds, the next is lower by this part, then by so many times
-# more.
+# If a tension next to the end still holds, the next one is lower by this part; the part then grows
+# by this factor.
 _FURTHER, _MORE = 0.01, 4.0
 # From below, slopes lead to the end; this part of the way, so as not to pass it.
 _PART_OF_WAY = 0.9999
 _MAX_SOLVES = 30
-# Tendons that were slack and are pulled by this part of the largest tension at most are tried to do
-# without.
+# Tendons that were slack, with at most this part of the largest tension, are left out on trial.
 _SMALL = 0.1
-# A tendon that has slid by less than this since the state before, mm, is at an end of the range in
-# which it sticks, or within.
+# A tendon that slid by less than this since the state before, mm, sticks or is about to slip.
 _NO_SLIP = 1e-6
-# Notches are taken to be pressed together where the target changes by less than this (mm, N or rad)
-# for a change of the tension by what about closes a notch.
+# Notches count as closed if the target changes by less than this (mm, N or rad) for a change of the
+# tension by about the closing tension of a notch.
 _STUCK = 0.1
-# The end of the range in which the first contact sticks is passed by this part of it: then slopes
-# are those of a tendon that slides, and nothing lower holds.
+# The end of the range in which the first contact sticks is passed by this part of it: there slopes
+# are those of a sliding tendon, and no lower tension holds.
 _PASSED = 1e-9
 
 

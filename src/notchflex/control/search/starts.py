@@ -29,11 +29,6 @@ def other_starts(
     """Yield drives to start from, and whether the search leaves dead bands out.
 
     Drives just beyond the dead band of each tendon, parts of all, and each tendon pulled alone.
-
-    Args:
-        problem: Target quantities and limits.
-        before: The state before, packed.
-        start: Its drives.
     """
     driven = np.flatnonzero(problem.driven)
     taut = [tendon for tendon in driven if start[tendon] > 0.0]

@@ -31,7 +31,7 @@ class Deviation:
         return path if path.startswith(("material.", "friction.")) else None
 
     def moved(self, robot: Robot, part: float) -> Robot:
-        """Return a robot that deviates by so many standard deviations.
+        """Return a robot that deviates by a number of standard deviations.
 
         Raises:
             InputError: No robot can have these values.

@@ -145,7 +145,7 @@ class Variables:
         return {one.load: number for one, number in pairs if one.load is not None}
 
 
-# Limits so many times below or above the value of the robot are in another unit.
+# Limits beyond this factor of the value of the robot are in another unit.
 _OTHER_UNIT = 100.0
 
 

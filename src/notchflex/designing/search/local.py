@@ -18,19 +18,19 @@ from notchflex.designing.search.squares import is_sum_of_squares, nearest_square
 from notchflex.designing.search.trajectories import DuplicateSearch, SearchTrajectory
 from notchflex.designing.search.trust_region import approach
 
-# SLSQP keeps an estimate of the curvature, which a kink (a notch that closes) spoils: it begins
-# anew where it ended, up to so many times, while the sum falls by this part.
+# SLSQP estimates the Hessian, which a kink (a closing notch) invalidates: it restarts at its end
+# point, at most this number of times, while the sum falls by this part.
 _AGAIN, _GAIN = 4, 1e-7
-# It ends where the sum falls no further by this part in so many iterations.
+# It ends if the sum falls by less than this part in this number of iterations.
 _STALLED, _PATIENCE = 1e-10, 4
 _PRECISION = 1e-14
-# SLSQP begins where limits are missed by no more than this, in their sizes.
+# Largest violation at the start of SLSQP, in sizes of the limits.
 _MAX_VIOLATION = 0.02
 _TRUST = 40
 
 
 class _Stop(Exception):  # noqa: N818 - no error
-    """Ends a search that gains nothing more."""
+    """Ends a search without further progress."""
 
 
 class LocalOptimum(NamedTuple):

@@ -14,10 +14,10 @@ from scipy.optimize import lsq_linear
 
 from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 
-# A limit is reached up to this part of its size, a variable's up to this part of its span.
+# Tolerance of active limits, relative to their size or to the span of a variable.
 _REACHED = 1e-5
 _REST = 1e-3
-# A gradient of less than this part of the steepest one met is flat.
+# A gradient below this part of the steepest one is flat.
 _FLAT = 1e-4
 
 

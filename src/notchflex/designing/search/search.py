@@ -16,9 +16,9 @@ from notchflex.designing.search.starts import starts
 from notchflex.designing.specification.spec import SearchOptions
 from notchflex.errors import InputError
 
-# A robot that misses by less than this part is searched from once more.
+# Largest violation of a robot from which another search starts.
 _MAX_VIOLATION = 1e-3
-# Searches end at the same robot where none of its scaled variables differ by more.
+# Largest difference of scaled variables of equal robots.
 _MAX_DIFFERENCE = 1e-3
 
 

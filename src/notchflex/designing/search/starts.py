@@ -19,11 +19,11 @@ from notchflex.loads import LoadPath
 from notchflex.robot import Robot
 
 _NUMBER = re.compile(r"\[\d+\]")
-# What a limit that is missed by its own size weighs against the spread of the sums.
+# Penalty on a violation of one size, relative to the spread of the sums.
 _WEIGHT = 10.0
-# So many robots are drawn before the first search, or two for every variable.
+# Number of robots drawn before the first search; at least two for every variable.
 _FEW = 8
-# Starts lie this far from each other, in parts of the whole diagonal.
+# Smallest distance between starts, relative to the diagonal of the box.
 _APART = 0.1
 
 

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 Vector = Float[np.ndarray, " v"]
 
-# Searches are at the same robot where none of the scaled variables differ by more.
+# Largest difference of scaled variables of equal robots.
 _MAX_DIFFERENCE = 0.01
 
 

@@ -1,4 +1,4 @@
-"""From far away to where limits hold: linear programs within a trust region.
+"""Feasible points from distant starts: linear programs within a trust region.
 
 Every step minimises the linearised sum plus a penalty on violated limits, within a box.
 There is always a step, also where limits contradict each other at first, and no step leaves the
@@ -16,13 +16,13 @@ from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, 
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.trajectories import SearchTrajectory
 
-# The box at first, at most and at last, in parts of the ranges of the variables.
+# Initial, largest and smallest box, in parts of the ranges of the variables.
 _FIRST_BOX, _MAX_BOX, _MIN_BOX = 0.15, 0.5, 1e-4
-# What all limits missed by their sizes cost, in sizes of the sum; it grows where they stay missed.
+# Penalty on violations in sizes of the sum, its factor while limits stay violated, its maximum.
 _PRICE, _DEARER, _DEAREST = 10.0, 10.0, 1e5
-# A step is taken if it gains this part of what was promised; the box grows beyond the other part.
+# Gain ratio above which a step is accepted, and above which the box grows.
 _ACCEPTED_GAIN, _GOOD_GAIN = 0.05, 0.7
-# Little is left to be gained, or nothing is missed by more than this: SLSQP takes over.
+# Predicted gain, or largest violation, below which SLSQP takes over.
 _MIN_GAIN, _MAX_VIOLATION = 1e-5, 1e-3
 _STEPS = 30
 
@@ -42,7 +42,7 @@ class _Model:
         return other.total / self.size + self.price * float(violation)
 
     def step(self, z: Vector, box: float) -> tuple[Vector, float]:
-        """Return the best step within a box, and the merit that it promises."""
+        """Return the best step within a box, and the predicted merit."""
         problem, one = self.problem, self.one
         span = problem.solver.variables.span
         assert one.objective.slopes is not None

@@ -40,8 +40,8 @@ class LeastSquares:
     """Half the sum of squared residuals over their noise (Gaussian noise).
 
     Args:
-        huber: Residuals beyond so many standard deviations count linearly, not by their square
-            (Huber 1964), which limits the weight of outliers; by default none do.
+        huber: Residuals beyond this number of standard deviations count linearly, not by their
+            square (Huber 1964), which limits the weight of outliers; by default none do.
 
     Example:
         >>> LeastSquares(huber=1.5).is_likelihood
