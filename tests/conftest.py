@@ -1,5 +1,6 @@
 """Settings that all tests share."""
 
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -39,6 +40,8 @@ def pytest_configure(config: pytest.Config) -> None:
         options.append("--xla_cpu_use_fusion_emitters=false")
     os.environ["XLA_FLAGS"] = " ".join([flags, *options]).strip()
     os.environ["NOTCHFLEX_OPTIMISATION"] = "0"
+    # Tracing makes many objects that stay: looking for garbage that often costs 5 % of the time.
+    gc.set_threshold(100_000, 20, 100)
     # Compiled code is kept beside pytest's own cache, for the other process of `-n 2` and later.
     cache = getattr(config, "cache", None)
     if cache is not None:

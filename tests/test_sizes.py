@@ -1,6 +1,7 @@
 """Sizes that keep the sources readable: lengths of files and functions, numbers of parameters.
 
-Of functions, commands are excluded: their parameters are the options that `--help` shows.
+The parameters of commands are the options that `--help` shows: they count neither as parameters nor
+as lines.
 """
 
 import ast
@@ -14,7 +15,10 @@ SOURCE = Path(notchflex.__file__).parents[1]
 MOST_LINES_OF_A_FILE = 300
 
 MOST_LINES = 60
-"""Lines of a function without its docstring."""
+"""Lines of a function without its docstring; of a command without its parameters, too."""
+
+_LONGER = {"notchflex/cli/verbs/simulate.py": 69}
+"""Files with one function that is still longer: its lines. Only to be shortened."""
 
 MOST_PARAMETERS = 10
 
@@ -27,22 +31,25 @@ _Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 @cache
 def _functions() -> dict[str, _Function]:
-    """Every function of the sources by its place; those of the command line's verbs excluded."""
+    """Every function of the sources by its place."""
     functions: dict[str, _Function] = {}
     for package in ("notchflex", "lanewise"):
         for file in sorted((SOURCE / package).rglob("*.py")):
-            place = file.relative_to(SOURCE)
-            if place.parts[:3] == ("notchflex", "cli", "verbs"):
-                continue
+            place = file.relative_to(SOURCE).as_posix()
             for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
                 if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                     functions[f"{place}:{node.lineno} {node.name}"] = node
     return functions
 
 
-def _lines(function: _Function) -> int:
+def _is_verb(place: str) -> bool:
+    return place.startswith("notchflex/cli/verbs/")
+
+
+def _lines(place: str, function: _Function) -> int:
     assert function.end_lineno is not None
-    lines = function.end_lineno - function.lineno + 1
+    first = function.body[0].lineno if _is_verb(place) else function.lineno
+    lines = function.end_lineno - first + 1
     if (text := ast.get_docstring(function, clean=False)) is not None:
         lines -= text.count("\n") + 1
     return lines
@@ -68,12 +75,18 @@ def test_files_are_short():
 def test_functions_are_short():
     functions = _functions()
     assert len(functions) > 3000
-    long = {place: n for place, one in functions.items() if (n := _lines(one)) > MOST_LINES}
+    long = {
+        place: n
+        for place, one in functions.items()
+        if (n := _lines(place, one)) > _LONGER.get(place.partition(":")[0], MOST_LINES)
+    }
     assert not long, f"a function has at most {MOST_LINES} lines without its docstring; {long}"
 
 
 def test_functions_have_few_parameters():
     many = {
-        place: n for place, one in _functions().items() if (n := _parameters(one)) > MOST_PARAMETERS
+        place: n
+        for place, one in _functions().items()
+        if not _is_verb(place) and (n := _parameters(one)) > MOST_PARAMETERS
     }
     assert not many, f"a function has at most {MOST_PARAMETERS} parameters; {many}"

@@ -27,6 +27,14 @@ from shared_data import measured_path
 
 WRIST = nf.load_robot("pacheco2021-a")
 NOISE = {"notch_angle": 0.01}
+# Standard deviations of what else is measured.
+ALL = {
+    "tip_position": 0.05,
+    "tip_rotation": 0.01,
+    "tip_tension": 0.01,
+    "axis_points": 0.05,
+    "total_angle": 0.01,
+}
 UP = nf.pull(0.2, 1.8, steps=8)
 FOUR = (
     "material.elastic_modulus",
@@ -124,22 +132,15 @@ def test_data_that_cannot_tell_a_constant_say_so():
 
 def test_a_path_with_memory_points_poses_tensions_and_the_sensor_itself():
     load = nf.pull(0.0, 1.5, steps=6).release()
-    noise = {
-        "tip_position": 0.05,
-        "tip_rotation": 0.01,
-        "tip_tension": 0.01,
-        "axis_points": 0.05,
-        "total_angle": 0.01,
-    }
     exact = simulate_measurements(
-        WRIST, load, observed=tuple(noise), axis_at=[1.0, 5.0, 9.0], from_rest=False
+        WRIST, load, observed=tuple(ALL), axis_at=[1.0, 5.0, 9.0], from_rest=False
     )
-    deviation = {name: np.full(one.shape, noise[name]) for name, one in exact.observed.items()}
+    deviation = {name: np.full(one.shape, ALL[name]) for name, one in exact.observed.items()}
     offset = 0.04  # what the gauge shows too much: the robot had that much less
     truth = simulate_measurements(
         WRIST,
         nf.LoadPath(np.maximum(load.tension - offset, 0.0), load.stroke),
-        observed=tuple(noise),
+        observed=tuple(ALL),
         axis_at=[1.0, 5.0, 9.0],
         from_rest=False,
     )
@@ -272,9 +273,14 @@ def test_a_fit_makes_no_program_of_xla(monkeypatch):
 
     monkeypatch.setattr(Native, "_by_xla", refuse)
     load = nf.pull(0.4, 1.6, steps=3).release()
-    observed = ("notch_angle", "tip_position", "axis_points", "tip_rotation", "tip_tension")
     seen = simulate_measurements(
-        WRIST, load, observed=observed, axis_at=[5.0], from_rest=False, deviation=NOISE, seed=1
+        WRIST,
+        load,
+        observed=tuple(ALL),
+        axis_at=[1.0, 5.0, 9.0],
+        from_rest=False,
+        deviation=ALL,
+        seed=1,
     )
     names = ("friction.coefficient", "notch.depth", "sensor.force_offset")
     found = calibrate(WRIST, seen, names, starts=1, intervals=False)

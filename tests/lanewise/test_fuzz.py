@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 
 from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code
 from lanewise._jax import jax, jnp
-from random_programs import DENORMAL, SPECIAL, Drawing, Value, numbers, run
+from random_operations import DENORMAL, SPECIAL, Value, run
+from random_programs import Drawing, numbers
 
 TINY = 2.0**-1022
 X86 = platform.machine().lower() in ("x86_64", "amd64")

@@ -7,6 +7,7 @@ import pytest
 from jax.extend.core import Primitive
 
 from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code
+from lanewise.ir import graph
 from notchflex._jax import jax, jnp
 
 # Fewer than a vector's lanes, as many, more, and several vectors.
@@ -226,11 +227,14 @@ def test_primitives_of_later_versions_of_jax(values):
         np.testing.assert_allclose(own, want, rtol=1e-15)
 
 
-def test_what_is_not_known_is_said():
+def test_what_is_not_known_is_said(monkeypatch):
     with pytest.raises(UnsupportedPrimitiveError, match="sort"):
         program(jnp.sort, [np.ones(4)], (4,))
-    with pytest.raises(UnsupportedPrimitiveError, match="400000"):
-        program(lambda v: jnp.sin(v[:, None] * v[None, :] + 1.0), [np.ones(700)], ())
+    assert graph._MAX_NODES == 400_000
+    monkeypatch.setattr(graph, "_MAX_NODES", 4_000)
+    with pytest.raises(UnsupportedPrimitiveError, match="4000"):
+        program(lambda v: jnp.sin(v[:, None] * v[None, :] + 1.0), [np.ones(70)], ())
+    program(lambda v: jnp.sin(v[:, None] * v[None, :] + 1.0), [np.ones(10)], ())
 
 
 @pytest.mark.parametrize("size", SIZES)

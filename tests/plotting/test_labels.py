@@ -77,7 +77,8 @@ def drawn() -> dict[str, Picture]:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_picture_is_drawn_and_holds_the_text_as_it_is(drawn, tmp_path, kind):
-    for suffix in (".png", ".pdf", ".svg", ".html"):
+    # Other formats of matplotlib get the same texts: one kind is enough.
+    for suffix in (".svg", ".html", *((".png", ".pdf") if kind == "rig" else ())):
         drawn[kind].save(tmp_path / f"a{suffix}")
     svg = (tmp_path / "a.svg").read_text(encoding="utf-8")
     texts = [html.unescape(one) for one in re.findall(r"<text[^>]*>([^<]*)</text>", svg)]
@@ -105,7 +106,7 @@ def test_animation_of_a_nasty_robot(tmp_path, monkeypatch):
     assert (tmp_path / "a.gif").stat().st_size > 1000
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg", "html"])
+@pytest.mark.parametrize("suffix", ["png", "html"])
 def test_command_line_draws_nasty_robots(tmp_path, monkeypatch, capsys, suffix):
     monkeypatch.chdir(tmp_path)
     robot = nf.load_robot(WRIST).replace(name=NASTY)

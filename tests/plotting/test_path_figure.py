@@ -216,18 +216,15 @@ def test_load_out_of_the_plane_is_drawn_in_space():
     assert path_figure(path).axes[0].name == "rectilinear"
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf", ".PNG"])
-def test_every_format_is_written(tmp_path, suffix):
-    file = tmp_path / f"wrist{suffix}"
-    save(path_figure(fake_path(3)), file)
-    start = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}[suffix.lower()]
-    assert file.read_bytes().startswith(start)
-    assert [found.name for found in tmp_path.iterdir()] == [file.name]
+def test_letters_of_a_suffix_may_be_large(tmp_path):
+    save(path_figure(part_of(fake_path(2), slice(1, 2))), tmp_path / "wrist.PNG")
+    assert (tmp_path / "wrist.PNG").read_bytes().startswith(b"\x89PNG")
+    assert [found.name for found in tmp_path.iterdir()] == ["wrist.PNG"]
 
 
 def test_same_picture_is_the_same_file(tmp_path):
     for name in ("a.svg", "b.svg"):
-        save(path_figure(fake_path(3)), tmp_path / name)
+        save(path_figure(part_of(fake_path(3), slice(0, 3))), tmp_path / name)
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
 
 

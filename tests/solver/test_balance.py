@@ -35,7 +35,10 @@ CASES = {
     "gao2017": Case((8.0,), (7.0,), 0.05, 0.5),
 }
 # Those that take longest to compile.
-LINKS, STRIPS = (pytest.param(name, marks=pytest.mark.nightly) for name in ("gao2017", "liu2022"))
+LINKS, STRIPS, BOTH_AXES = (
+    pytest.param(name, marks=pytest.mark.nightly)
+    for name in ("gao2017", "liu2022", "two-axis-wrist")
+)
 ROBOTS = [*(name for name in CASES if name not in ("gao2017", "liu2022")), LINKS, STRIPS]
 
 
@@ -83,7 +86,10 @@ def test_friction_keeps_within_its_cone(name, margin):
     margin.note(f"least friction in use after the change: {changed.min():.3f} of what can be")
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(
+    "name",
+    ["pacheco2021-a", "pacheco2021-b", BOTH_AXES, LINKS, STRIPS],
+)
 def test_stability_is_known(name, margin):
     path = loaded(name)[0]
     margin.note(f"smallest eigenvalue: {path.smallest_eigenvalue[0]:.4g}")

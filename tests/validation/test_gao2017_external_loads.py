@@ -48,10 +48,8 @@ def test_more_modes(case, margin):
     check(margin, path, external_rows(case), FINE_LENGTH, FINE_ANGLE, FINE_FORCE)
 
 
-@pytest.mark.parametrize(
-    "case",
-    [pytest.param(one, marks=pytest.mark.nightly) for one in (TIP_ONLY, TIP_AWAY)] + [BODY_AWAY],
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("case", [TIP_ONLY, TIP_AWAY, BODY_AWAY])
 def test_moments_are_met_better_by_more_modes(case, margin):
     """The largest |EI kappa - M| over the largest |M|, at every step."""
     usual, more = (under_weight(case, refinement).moment_error for refinement in (0, 1))

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import numpy as np
 import pytest
 
 import notchflex as nf
+from margins import Margin
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.flexure import Site, flexure_state, relative_pose, rod, validity_warnings
 from notchflex.mechanics.material import section_law
@@ -21,11 +25,13 @@ GAO = {"rx": 2.741072e-3, "uy": 2.909225e-4, "uz": 2.625105e-3, "uy_uz": -3.4804
 GAO_SIDEWAYS = {"ux": 2.243258e-3, "ry": 3.827097e-4, "rz": 9.271828e-5, "ry_rz": 3.893311e-5}
 
 
-def liu(height=3.5, thickness=1.5, depth=6.9, **keys):
+def liu(
+    height: float = 3.5, thickness: float = 1.5, depth: float = 6.9, **keys: Any
+) -> nf.StripNotch:
     return nf.StripNotch(height, thickness, depth, ends="elastic", uncut_length=5.0, **keys)
 
 
-def part(row):
+def part(row: Mapping[str, Any]) -> tuple[Any, nf.Tube]:
     tube = nf.Tube(2.0 * row["outer"], 2.0 * row["inner"])
     if "depth" in row:
         return liu(row["height"], row["thickness"], row["depth"]), tube
@@ -33,21 +39,21 @@ def part(row):
     return nf.ULink(slot, row["thickness"], length, "toward", ends="elastic"), tube
 
 
-def site(nu=0.33):
+def site(nu: float = 0.33) -> Site:
     side = nf.mechanics.ends.Side("between", 1.0)
     return Site(side, side, nu)
 
 
-def left_ranges(notch, tube):
+def left_ranges(notch: Any, tube: nf.Tube) -> list[str]:
     return validity_warnings(notch, tube, site())
 
 
-def compliance(notch, tube, modulus=1.0, nu=0.33):
+def compliance(notch: Any, tube: nf.Tube, modulus: float = 1.0, nu: float = 0.33) -> np.ndarray:
     """Compliance (6, 6) at the middle of the strip, mm/N, rad/(N mm), displacements first."""
     shape = rod(notch, tube, 0, site(nu))
     law = section_law(nf.Linear(modulus, poisson_ratio=nu))
 
-    def forces(modes):
+    def forces(modes: jax.Array) -> jax.Array:
         return flexure_state(shape, law, (), modes, with_pose=True).internal
 
     rest = jnp.zeros(shape.modes)
@@ -61,12 +67,12 @@ def compliance(notch, tube, modulus=1.0, nu=0.33):
     return np.roll(np.roll(own, 3, axis=0), 3, axis=1)
 
 
-def entry(found, name):
+def entry(found: np.ndarray, name: str) -> float:
     first, second = name.split("_") if "_" in name else (name, name)
     return found[AXES.index(first), AXES.index(second)]
 
 
-def errors(rows, inside):
+def errors(rows: Sequence[Mapping[str, Any]], inside: bool) -> np.ndarray:
     """Errors in % of entries of cells: rx, uy, uz, their coupling; ux, ry, rz, their coupling."""
     made: list[list[float]] = []
     for row in rows:
@@ -84,7 +90,7 @@ def errors(rows, inside):
     return 100.0 * np.array(made)
 
 
-def test_the_cells_repeat_the_full_meshes(margin):
+def test_the_cells_repeat_the_full_meshes(margin: Margin) -> None:
     """Our cells against the finer full meshes; of Liu's bodies the cell holds less."""
     for name, value in LIU.items():
         error = STRIPS[0][f"EC_{name}_{name}"] / (1000.406 * value) - 1.0
@@ -95,7 +101,7 @@ def test_the_cells_repeat_the_full_meshes(margin):
 
 
 @pytest.mark.nightly
-def test_liu_and_gao_at_small_loads(margin):
+def test_liu_and_gao_at_small_loads(margin: Margin) -> None:
     found = compliance(liu(), nf.Tube(10.0, 6.0), 1000.406, 0.4)
     for name, value in LIU.items():
         margin.within(f"strip, {name}", 100.0 * (entry(found, name) / value - 1.0), 2.0, "%")
@@ -107,7 +113,7 @@ def test_liu_and_gao_at_small_loads(margin):
         margin.within(f"link, {name}", 100.0 * (entry(found, name) / value - 1.0), 2.0, "%")
 
 
-def pulled_strip():
+def pulled_strip() -> nf.Robot:
     ready = nf.load_robot("liu2022").with_values({"friction.coefficient": 0.0})
     return nf.Robot(
         name="one strip",
@@ -119,7 +125,7 @@ def pulled_strip():
     )
 
 
-def test_liu_pulled_to_12_degrees(margin):
+def test_liu_pulled_to_12_degrees(margin: Margin) -> None:
     rows = named_rows("fem_liu_strip.csv")
     path = nf.simulate(pulled_strip(), [nf.Load(tension=[row["F_N"]]) for row in rows])
     angle = np.degrees(path.quantity("notch_angle")[:, 0])
@@ -135,7 +141,7 @@ def test_liu_pulled_to_12_degrees(margin):
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("use", ["fit", "judge"])
-def test_cells_inside_validity(use, margin):
+def test_cells_inside_validity(use: str, margin: Margin) -> None:
     """The rule against the cells it was fitted to, and against those that only judge it."""
     found = np.concatenate(
         [errors([row for row in rows if row["use"] == use], True) for rows in (STRIPS, LINKS)]
@@ -149,7 +155,7 @@ def test_cells_inside_validity(use, margin):
 
 
 @pytest.mark.nightly
-def test_cells_outside_validity(margin):
+def test_cells_outside_validity(margin: Margin) -> None:
     """What the sentence on thin walls says."""
     rows = [row for row in STRIPS + LINKS if row["inner"] / row["outer"] > 0.77]
     assert len(rows) == 4
@@ -160,7 +166,7 @@ def test_cells_outside_validity(margin):
     assert found[2] > 10.0
 
 
-def test_validity_names_each_range():
+def test_validity_names_each_range() -> None:
     tube = nf.Tube(10.0, 6.0)
     assert left_ranges(liu(), tube) == []
     assert left_ranges(nf.StripNotch(3.5, 1.5, 6.9), tube) == []
@@ -173,7 +179,7 @@ def test_validity_names_each_range():
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("direction", [0.0, 35.0, 180.0])
-def test_the_frame_turns_with_the_notch(direction):
+def test_the_frame_turns_with_the_notch(direction: float) -> None:
     """The compliance along the strip turns with it, and halves of a row mirror each other."""
     tube, turn = nf.Tube(10.0, 6.0), np.radians(direction)
     plain = compliance(liu(), tube)
@@ -190,7 +196,7 @@ def test_the_frame_turns_with_the_notch(direction):
 
 @pytest.mark.nightly
 @pytest.mark.parametrize(("name", "tensions"), [("liu2022", (6.0, 0.0)), ("gao2017", (8.0,))])
-def test_robots_with_friction_and_loads(name, tensions):
+def test_robots_with_friction_and_loads(name: str, tensions: tuple[float, ...]) -> None:
     robot = nf.load_robot(name).with_values({"notch[*].ends": "elastic"})
     sideways = (-0.02, 0.03, 0.0)
     up = [
@@ -206,7 +212,7 @@ def test_robots_with_friction_and_loads(name, tensions):
     np.testing.assert_allclose(force[:, :2], np.tile(sideways[:2], (3, 1)), atol=1e-6)
 
 
-def test_rigid_ends_stay_as_they_were():
+def test_rigid_ends_stay_as_they_were() -> None:
     """The paper's rods do not know of elastic ends: no part of the walls is added."""
     for notch, tube in (
         (nf.StripNotch(3.5, 1.5, 6.9), nf.Tube(10.0, 6.0)),

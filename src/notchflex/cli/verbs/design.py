@@ -71,7 +71,7 @@ def design(
     if output is not None:
         written = write_design(result, output, inputs=[spec])
         terminal.note(f"written: {', '.join(map(str, written))}.")
-outputs.write_json(lambda: designing.design_document(result))
+    outputs.write_json(lambda: designing.design_document(result))
     outputs.draw(result)
     if outputs.prints_tables:
         _print(result)
@@ -96,11 +96,7 @@ def _front(spec: str, output: str | None, outputs: Outputs) -> int:
             "points": [designing.design_document(point) for point in front.points],
         }
     )
-<<<<<<< HEAD
-    outputs.save_picture(lambda: drawn(front))  # pyright: ignore[reportArgumentType]
-=======
-    outputs.draw(found)
->>>>>>> libs
+    outputs.draw(front)
     if outputs.prints_tables:
         heads = ["point", *(f">{title}" for title in front.titles)]
         rows = [
