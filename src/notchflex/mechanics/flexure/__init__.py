@@ -1,12 +1,17 @@
 """Flexures: one notch becomes a short rod with a few strain modes."""
 
 from notchflex._packages import import_all
-from notchflex.mechanics.flexure.build import LEVELS, MOST_REFINEMENT, stack, with_level
+from notchflex.mechanics.flexure.build import LEVELS, MAX_REFINEMENT, stack, with_level
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
 from notchflex.mechanics.flexure.geometric_stiffness import geometric_stiffness
 from notchflex.mechanics.flexure.registry import Site, rod, rod_at, unchecked
 from notchflex.mechanics.flexure.rod import Rod, flattened
-from notchflex.mechanics.flexure.rod_kinematics import free_pose, relative_pose, rod_end, turn_doubt
+from notchflex.mechanics.flexure.rod_kinematics import (
+    free_pose,
+    relative_pose,
+    rod_end,
+    rotation_error_estimate,
+)
 from notchflex.mechanics.flexure.state import (
     FlexureState,
     fibre_slope,
@@ -21,7 +26,7 @@ import_all(__name__, __path__)
 
 __all__ = [
     "LEVELS",
-    "MOST_REFINEMENT",
+    "MAX_REFINEMENT",
     "Elastica",
     "FlexureState",
     "Rod",
@@ -41,8 +46,8 @@ __all__ = [
     "rod",
     "rod_at",
     "rod_end",
+    "rotation_error_estimate",
     "stack",
-    "turn_doubt",
     "unchecked",
     "with_level",
 ]
