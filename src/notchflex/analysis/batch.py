@@ -63,7 +63,7 @@ def solve_batch(
         (100,)
     """
     every = BatchRobots.of(robots)
-    path = load_path(loads, every.most_tendons)
+    path = load_path(loads, every.max_tendons)
     arrays = _simulate(every, path, len(path), outputs, settings, refinement, cores, progress)
     return Batch({name: array[:, 0] for name, array in arrays.items()})
 
@@ -103,7 +103,7 @@ def simulate_batch(
         (2, 8)
     """
     every = BatchRobots.of(robots)
-    tendons = every.most_tendons
+    tendons = every.max_tendons
     message = "simulate_batch needs a notchflex.LoadPath, or some in order"
     paths = [load_path(one, tendons) for one in one_or_several(loads, LoadPath, message)]
     if not paths or len({len(path) for path in paths}) > 1:

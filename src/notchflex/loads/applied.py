@@ -94,7 +94,7 @@ def out_of_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
 
 
 def _in_basis(loads: BodyLoads, along: np.ndarray, about: np.ndarray) -> BodyLoads:
-    """Loads in another basis, given by columns for forces and for moments."""
+    """Transform loads to another basis, given by columns for forces and for moments."""
     force, moment, arm, following = map(np.asarray, loads)
     axes = about.shape[0]
     turning = [following[..., :axes] @ about, following[..., axes:] @ along]
@@ -166,14 +166,14 @@ def _sticks_out(
     normal: Float[np.ndarray, " 3"],
     normal_of_body: Float[np.ndarray, " 3"],
 ) -> bool:
-    """Whether a force leaves a plane or acts beside it, or a moment turns out of it."""
+    """Return whether a force or its point leaves a plane, or a moment's axis is not its normal."""
     across = hypot(*_cross(moment, normal.tolist()))
     (off_plane,) = _components(force, (normal.tolist(),))
-    (beside,) = _components(point, (normal_of_body.tolist(),))
+    (component,) = _components(point, (normal_of_body.tolist(),))
     return (
         abs(off_plane) > _ROUNDING * hypot(*force)
         or across > _ROUNDING * hypot(*moment)
-        or (any(force) and abs(beside) > _ROUNDING * hypot(*point))
+        or (any(force) and abs(component) > _ROUNDING * hypot(*point))
     )
 
 
@@ -188,13 +188,13 @@ def _cross(first: Sequence[float], second: Sequence[float]) -> list[float]:
 
 
 def _turn(load_path: LoadPath) -> tuple[float, ...]:
-    """Rotation vector of the base, by which rotations are looked up."""
+    """Return the rotation vector of the base, the key of cached rotations."""
     return tuple(load_path.base_rotation.tolist())
 
 
 @lru_cache(maxsize=64)
 def _turned_by(vector: tuple[float, ...]) -> Float[np.ndarray, "3 3"]:
-    """Rotation of a rotation vector: the base stays as it is from load to load."""
+    """Return the rotation of a rotation vector, cached: the base is the same for all loads."""
     rotation = np.array(rotation_about(constant(vector)))
     rotation.setflags(write=False)
     return rotation
@@ -221,7 +221,7 @@ _Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool]
 
 
 def _forces(external: ExternalLoad, last: int, tip: float) -> Iterator[_Force]:
-    """All loads but the robot's own weight: body, force, moment, point, whether it follows.
+    """List all loads but the robot's weight: body, force, moment, point, whether it follows.
 
     The tip is `tip` (mm) beyond the origin of the last body.
     """
@@ -242,7 +242,7 @@ _Axes = tuple[tuple[Sequence[float], ...], ...]
 
 @lru_cache(maxsize=64)
 def _axes(base: tuple[float, ...], frame: tuple[float, ...] | None) -> _Axes:
-    """Axes of a frame (of all three axes, or of the plane of its x and z) on a turned base."""
+    """Return the axes of a frame (all three, or x and z of a plane) on a rotated base."""
     turn, along, about = _turned_by(base), np.eye(3), np.eye(3)
     if frame is not None:
         along, about = np.reshape(frame, (3, 3))[:, IN_PLANE], np.reshape(frame, (3, 3))[:, 1:2]
@@ -257,7 +257,7 @@ def _sums(
     body_centre: Float[np.ndarray, "bodies 3"],
     tip: float,
 ) -> tuple[np.ndarray, ...]:
-    """The sums for all bodies."""
+    """Return the sums for all bodies."""
     along, about, world_along, world_about = axes
     count, d, a = len(body_mass), len(along), len(about)
     moments, arms_end = d + a, d + a + d * d

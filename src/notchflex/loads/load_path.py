@@ -83,14 +83,14 @@ class LoadPath(Displayed):
         external: tuple[ExternalLoad, ...],
     ) -> LoadPath:
         """Make a path of valid values; a control loop makes one for every solve."""
-        made = object.__new__(cls)
-        vars(made).update(
+        path = object.__new__(cls)
+        vars(path).update(
             tension=tension, stroke=stroke, base_rotation=base_rotation, external=external
         )
-        return made
+        return path
 
     def __len__(self) -> int:
-        """Number of steps."""
+        """Return the number of steps."""
         return len(self.tension)
 
     def __getitem__(self, step: int) -> Load:

@@ -67,7 +67,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         return self.prepared.chain
 
     def __len__(self) -> int:
-        """Number of steps."""
+        """Return the number of steps."""
         return len(self.load)
 
     @overload
@@ -75,7 +75,7 @@ class EquilibriumPath(PathQuantities, Displayed):
     @overload
     def __getitem__(self, step: slice) -> list[Equilibrium]: ...
     def __getitem__(self, step: int | slice) -> Equilibrium | list[Equilibrium]:
-        """One state, or some of them."""
+        """Return one state, or some of them."""
         if isinstance(step, slice):
             return [Equilibrium(self, i) for i in range(*step.indices(len(self)))]
         if not -len(self) <= step < len(self):
@@ -91,8 +91,8 @@ class EquilibriumPath(PathQuantities, Displayed):
         kept = vars(self).setdefault("_kept", {})
         if name not in kept:
             if name not in QUANTITIES:
-                known = ", ".join(QUANTITIES)
-                raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {known}")
+                names = ", ".join(QUANTITIES)
+                raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {names}")
             quantity = QUANTITIES[name]
             if quantity.source in ("path", "derived"):
                 kept[name] = quantity.formula(self)

@@ -173,8 +173,8 @@ class SavedState:
             if not np.isfinite(array).all():
                 raise _damaged(self.source, f"{name} holds what is not a finite number")
             read[name] = array
-        wanted, _ = tree_util.tree_flatten_with_path(at_rest(chain))
-        for name in (leaf_name(key) for key, _ in wanted):
+        expected, _ = tree_util.tree_flatten_with_path(at_rest(chain))
+        for name in (leaf_name(key) for key, _ in expected):
             if name not in read and not name.startswith(_LOADS):
                 raise _damaged(self.source, f"{name} is missing")
         return _on_chain(read, chain, f"{self.source} holds a state of robot {self.robot!r}")
@@ -233,7 +233,7 @@ def fitted(state: State | SavedState | None, chain: Chain) -> SolverState:
 
 
 def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> SolverState:
-    """A state on a chain that may have been assembled for more loads than that of the state."""
+    """Convert arrays to a state on a chain, which may be assembled for more kinds of loads."""
     rest = at_rest(chain)
     frame = chain.frame
     if rest.applied is not None and frame is not None:  # a state holds loads as those of space

@@ -94,13 +94,13 @@ def _coarse(path: EquilibriumPath) -> Iterator[str]:
         return
     step = int(np.argmax(error))
     # Not at the head of the file: what only reads this table needs no solver.
-    from notchflex.mechanics.flexure import MOST_REFINEMENT
+    from notchflex.mechanics.flexure import MAX_REFINEMENT
 
     refinement = path.chain.refinement
     remedy = (
         f"simulate with --refinement {refinement + 1} (in Python refinement={refinement + 1}) "
         "and see what changes"
-        if refinement < MOST_REFINEMENT
+        if refinement < MAX_REFINEMENT
         else "there is no finer --refinement, so take the result with care"
     )
     yield (

@@ -72,9 +72,9 @@ class Robot:
 
     @model_validator(mode="after")
     def _parts_fit(self) -> "Robot":
-        found = list(robot_problems(self))
-        if found:
-            raise ProblemError(found)
+        problems = list(robot_problems(self))
+        if problems:
+            raise ProblemError(problems)
         return self
 
     @functools.cached_property
@@ -82,15 +82,15 @@ class Robot:
         return hash(tuple(getattr(self, one.name) for one in dataclasses.fields(self)))
 
     def __hash__(self) -> int:
-        """Of all its values, worked out once: robots are looked up at every solve."""
+        """Return the hash of all values, cached: robots are keys at every solve."""
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the hash, which is another one in another process."""
+        """Return the state without the hash, which differs between processes."""
         return {name: value for name, value in vars(self).items() if name != "_hash"}
 
     def __repr__(self) -> str:
-        """A few lines of text."""
+        """Return a summary of a few lines."""
         from notchflex.robot.summary import robot_summary
 
         return robot_summary(self).text
@@ -236,8 +236,8 @@ def _part_table(value: object) -> dict[str, Any]:
 def _repeats(table: Mapping[str, Any]) -> list[int]:
     """Read `repeat` of every notch of a table that may hold anything."""
     notches = table.get("notch")
-    found = [
+    repeated = [
         one.get("repeat", 1) if isinstance(one, Mapping) else 1
         for one in (notches if isinstance(notches, list) else [])
     ]
-    return [one if isinstance(one, int) and one > 0 else 1 for one in found]
+    return [one if isinstance(one, int) and one > 0 else 1 for one in repeated]

@@ -86,7 +86,7 @@ class VectorSolver:
         return list(zip(self.start, parts, shapes, strict=True))
 
     def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
-        """The path at some values; the last one is kept, as its derivatives are asked for next."""
+        """Solve the path at some values; the last one is cached for its derivatives."""
         if not np.isfinite(flat).all():  # a tension that is not a number would mean a slack tendon
             raise InputError.NOT_FINITE("values must be finite numbers")
         key = flat.tobytes()
@@ -109,7 +109,7 @@ class VectorSolver:
         return {}
 
     def _changes(self, path: EquilibriumPath, values: Mapping[str, np.ndarray]) -> Iterator[Change]:
-        """Change of loads and chain per unit of every value."""
+        """Compute the change of loads and chain per unit of every value."""
         # One program for all: with a change of the chain where any value changes it.
         still = np.zeros(self.model.ready.long.chain_layout.size) if self.numbers else None
         by_number = self._by_numbers(path, values)
@@ -117,16 +117,16 @@ class VectorSolver:
             if name in by_number:
                 yield by_number[name]
                 continue
-            for place in np.ndindex(value.shape):
+            for index in np.ndindex(value.shape):
                 varied = np.array(value)
-                varied[place] += 1.0  # loads are linear in tension, stroke, tip force and moment
+                varied[index] += 1.0  # loads are linear in tension, stroke, tip force and moment
                 more = self.load({**values, name: varied})
                 yield Change(self.model.load_change(path, more), still)
 
     def _by_numbers(
         self, path: EquilibriumPath, values: Mapping[str, np.ndarray]
     ) -> Mapping[str, Change]:
-        """Changes by numbers of the robot, kept for the next tensions and strokes."""
+        """Compute the changes by numbers of the robot, cached for the next tensions and strokes."""
         numbers = [float(values[one]) for one in self.numbers]
         key = (*numbers, *(values[one].tobytes() for one in values if one in TIP))
         if key not in self._kept:

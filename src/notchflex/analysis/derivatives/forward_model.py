@@ -22,7 +22,7 @@ from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import LoadPath
-from notchflex.mechanics.chain import FlexureOf, Shaped, assemble, laws, shape_of
+from notchflex.mechanics.chain import ChainTemplate, FlexureOf, assemble, chain_template, laws
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
@@ -98,18 +98,18 @@ class ForwardModel:
         Raises:
             InputError: A number cannot be varied.
         """
-        found = {name: self._of_law(robot, name) for name in names if _is_of_law(name)}
-        others = tuple(name for name in names if name not in found)
+        by_name = {name: self._of_law(robot, name) for name in names if _is_of_law(name)}
+        others = tuple(name for name in names if name not in by_name)
         if len(others) == 1:
             at = number_at(robot, others[0])
             moved = partial(robot.with_value, others[0])
-            found[others[0]] = self.change_along(moved, at, load)
+            by_name[others[0]] = self.change_along(moved, at, load)
         elif others:
             if others not in self._geometry:
                 self._geometry[others] = GeometrySlopes(self.ready, others)
             slopes = self._geometry[others].at(self._moved, robot, load)
-            found |= zip(others, slopes, strict=True)
-        return [found[name] for name in names]
+            by_name |= zip(others, slopes, strict=True)
+        return [by_name[name] for name in names]
 
     def _of_law(self, robot: Robot, name: str) -> Change:
         """Differentiate the law of the material, or of friction, by a number of its own."""
@@ -120,7 +120,7 @@ class ForwardModel:
             return flat(laws(replace(part, **{key: value}), shape))
 
         chain = np.zeros(self.ready.long.chain_layout.size)
-        chain[self._places[section]] = slope(of_laws, getattr(part, key), order=2)
+        chain[self._field_indices[section]] = slope(of_laws, getattr(part, key), order=2)
         return Change(None, chain)
 
     def change_along(
@@ -142,11 +142,11 @@ class ForwardModel:
         return Change(by_number[size:].reshape(len(load), -1), by_number[:size])
 
     def _packed(self, robot: Robot, load: LoadPath) -> Float[np.ndarray, " packed"]:
-        """The long chain and the loads of all steps as one vector."""
+        """Pack the long chain and the loads of all steps into one vector."""
         return _vector_of(self._prepared(robot), robot, load)
 
     def _moved(self, robot: Robot, load: LoadPath, flexures: FlexureOf) -> np.ndarray:
-        """The same of one of many robots that differ little, whose flexures are given."""
+        """Pack one of many robots that differ little, from given flexures."""
         chain = self.ready.chain
         ready = PreparedChain(
             assemble(
@@ -168,11 +168,11 @@ class ForwardModel:
     def load_change(
         self, path: EquilibriumPath, load: LoadPath
     ) -> Float[np.ndarray, "s make_commands"]:
-        """Difference of other loads from those of a path, packed for the long chain."""
+        """Compute the difference of other loads from those of a path, packed for the long chain."""
         ready, robot = path.prepared, path.robot
-        here, _ = ready.padded_commands(path.commands)
-        there, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
-        return there - here
+        present, _ = ready.padded_commands(path.commands)
+        target, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
+        return target - present
 
     def derivatives(
         self,
@@ -202,17 +202,17 @@ class ForwardModel:
             return {name: np.stack([one[name] for one in columns]) for name in outputs}
         derivatives = {name: np.empty((len(directions), *shape)) for name, shape in shapes.items()}
         for name, shape in shapes.items():
-            for place in np.ndindex(shape):
+            for index in np.ndindex(shape):
                 weight = np.zeros(shape)
-                weight[place] = 1.0
+                weight[index] = 1.0
                 by = gradient(path, {name: weight})
-                derivatives[name][:, *place] = [by.along(one) for one in directions]
+                derivatives[name][:, *index] = [by.along(one) for one in directions]
         return derivatives
 
     def takes_adjoint(
         self, path: EquilibriumPath, outputs: tuple[str, ...], directions: int
     ) -> bool:
-        """Whether derivatives along so many directions are found by the adjoint of each number."""
+        """Return whether the adjoint is cheaper for a number of directions."""
         numbers = sum(np.asarray(path.quantity(name)).size for name in outputs)
         return _ADJOINT * numbers <= directions
 
@@ -245,24 +245,24 @@ class ForwardModel:
         return ready
 
     @cached_property
-    def _places(self) -> dict[str, np.ndarray]:
+    def _field_indices(self) -> dict[str, np.ndarray]:
         """Where the long chain's vector holds what follows from material and friction."""
         shape = self._shape(self.robot)
         parts = {"material": self.robot.material, "friction": self.robot.friction}
-        return {name: self.ready.places(laws(part, shape)) for name, part in parts.items()}
+        return {name: self.ready.field_indices(laws(part, shape)) for name, part in parts.items()}
 
-    def _shape(self, robot: Robot) -> Shaped:
+    def _shape(self, robot: Robot) -> ChainTemplate:
         chain = self.ready.chain
-        return shape_of(robot, chain.level, chain.refinement)
+        return chain_template(robot, chain.level, chain.refinement)
 
 
 def _is_of_law(name: str) -> bool:
-    """Whether only the law of the material, or of friction, depends on a number."""
+    """Return whether only the law of the material, or of friction, depends on a number."""
     section, _, key = name.partition(".")
     return section in ("material", "friction") and key not in _OF_THE_CHAIN
 
 
 def _vector_of(ready: PreparedChain, robot: Robot, load: LoadPath) -> np.ndarray:
-    """The long chain and the loads of all steps as one vector."""
+    """Pack the long chain and the loads of all steps into one vector."""
     loads, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
     return np.concatenate([ready.long.vector, loads.ravel()])

@@ -139,7 +139,7 @@ class ArcNotch(Notch):
             )
 
     def _open(self, tube: Tube) -> bool:
-        """Whether the lips are apart when nothing pulls."""
+        """Return whether the notch is open without loads."""
         free = math.radians(self.precurvature_deg)
         # The neutral axis lies between the tube axis and the spine: for most notches this tells,
         # and no section need be worked out to make a robot.

@@ -34,23 +34,23 @@ def number_at(robot: Robot, path: str) -> float:
     if not isinstance(path, str):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InputError.UNKNOWN_NAME(f"{path!r} is not the name of a value; {EXAMPLES}.")
     target = parse_path(path)
-    found: set[object] = set()
+    numbers: set[object] = set()
     allowed: dict[str, None] = {}
     for one in tables_at(to_table(robot), target) if target.section != "name" else ():
         keys = fields_of(class_of(target.section, one))
         allowed |= dict.fromkeys(keys)
         if target.key in keys:
-            found.add(one.get(target.key, keys[target.key].default))
-    if not found:
+            numbers.add(one.get(target.key, keys[target.key].default))
+    if not numbers:
         near = nearest(target.key, allowed)
         raise InputError.UNKNOWN_NAME(
             f"`{path}` is not the name of a number of this robot{near}; {EXAMPLES}."
         )
-    if len(found) > 1:
+    if len(numbers) > 1:
         raise InputError.UNSUPPORTED(
             f"`{path}` has unlike values in this robot; name one, such as [1]."
         )
-    value = found.pop()
+    value = numbers.pop()
     if not isinstance(value, float) or not math.isfinite(value):
         raise InputError.UNSUPPORTED(
             f"`{path}` is {value!r} in this robot, and no number that changes smoothly."
@@ -77,14 +77,14 @@ def numbers_at(robot: Robot, path: str) -> dict[str, float]:
     counts = {"notch": robot.number_of_notches, "tendon": robot.number_of_tendons}
     if target.section not in counts or target.number is not None:
         return {path: number_at(robot, path)}
-    found: dict[str, float] = {}
+    numbers: dict[str, float] = {}
     for number in range(1, counts[target.section] + 1):
         name = f"{target.section}[{number}].{target.key}"
         try:
-            found[name] = number_at(robot, name)
+            numbers[name] = number_at(robot, name)
         except InputError:  # a notch of another kind
             continue
-    return found or {path: number_at(robot, path)}
+    return numbers or {path: number_at(robot, path)}
 
 
 def described_at(robot: Robot, path: str) -> Described:
