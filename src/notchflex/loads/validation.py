@@ -96,7 +96,7 @@ def check_table(value: Any, what: str) -> np.ndarray:
 def check_pulls(tension: np.ndarray, minimum: float = 0.0, source: str = "") -> None:
     """Refuse measured tensions of a tendon that are all negative.
 
-    Small ones are the offset of a sensor, of a slack tendon or beside others that are pulled.
+    Small ones are a sensor's offset, of a slack tendon or among others that are pulled.
 
     Args:
         tension: Tensions by rows and tendons, N, NaN where not measured.

@@ -1,4 +1,4 @@
-"""Why a step of a path did not converge, in words for the person who gave the load."""
+"""Reasons why a step of a path did not converge, as sentences for the user."""
 
 from __future__ import annotations
 
@@ -21,19 +21,20 @@ from notchflex.solver.programs.run import run
 if TYPE_CHECKING:  # for the type only: a path tells its reasons
     from notchflex.results.path import EquilibriumPath
 
-# A stroke is followed up to the last good state before the last notch closes, which leaves it
-# open by less than this part of its height.
+# Largest opening of a notch that counts as closed, as a fraction of its height: a stroke converges
+# up to the last state before the last notch closes.
 _CLOSED_TOLERANCE = 1e-3
-# Steps that come to where the edges of a tendon's channel meet end within this part of its span.
+# Largest free span of a tendon at which the edges of its channel count as meeting, relative to the
+# natural span.
 _EDGES_MEET = 5e-2
-# Axial stiffnesses, in forces that close a notch, each ten times the one before. Where nothing but
-# stretch lets a tendon be drawn so far, the second step changes its tension about ten times as much
-# as the first; where the shape fixes the tension, a tenth as much.
+# Axial stiffnesses, in closing forces of a notch, in ratios of ten. Where only stretch allows a
+# stroke, the second step changes the tension about ten times as much as the first; where the shape
+# determines the tension, a tenth as much.
 _STIFFNESSES, _GROWS = (1e2, 1e3, 1e4), 3.0
 
 
 def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
-    """Return what stopped the solver at a step, and a sentence on it; None and "" if nothing."""
+    """Return the failure at a step, and a sentence on it; None and "" where it converged."""
     if path.converged[step]:
         return None, ""
     if not path.run.tried[step]:
@@ -74,10 +75,10 @@ def _past_closing(path: EquilibriumPath, step: int) -> bool:
 
 
 def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None:
-    """Return a straight tendon and a notch, from 0, whose faces leave it no free length.
+    """Return a straight tendon and a notch, from 0, where its free span vanishes.
 
-    Where the edges of its channel meet before the lips of the notch do, the span between them has
-    no direction, and beyond it would push. Yielding lips let a closed notch come there.
+    Where the edges of its channel meet before those of the notch, the span between them has no
+    direction. A compliant contact lets a closed notch reach that state.
     """
     chain = path.chain
     position, rotation = path.body_position[step], path.body_rotation[step]
@@ -104,9 +105,9 @@ def _in_space(chain: Chain, points: ArrayLike) -> Float[np.ndarray, "n t 3"]:
 
 
 def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray, " some"]:
-    """Return the inextensible tendons, from 0, that no shape of the robot lets be drawn so far.
+    """Return the inextensible tendons, from 0, whose stroke no shape of the robot allows.
 
-    Solved once more with tendons that stretch, their tension grows as their stiffness does.
+    Solved again with extensible tendons, their tension grows with their stiffness.
     """
     chain = path.chain
     inextensible = np.isinf(np.asarray(chain.axial_stiffness))

@@ -1,4 +1,4 @@
-"""A run read back from a file: its numbers are reported again, and nothing is solved."""
+"""A run read back from a file: its numbers are reported without solving."""
 
 from __future__ import annotations
 

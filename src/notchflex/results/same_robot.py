@@ -10,8 +10,7 @@ from typing import Any
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
-# What a robot is called, when a strain is warned of and how exact its values are has no effect on
-# its states.
+# Values without effect on states: the name, the limit of strain warnings and tolerances.
 _NO_EFFECT = ("name", "material.allowed_strain", "tolerance.")
 _MAX_NAMED = 3
 

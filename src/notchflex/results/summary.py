@@ -1,6 +1,6 @@
-"""Summaries of results: what `repr` and a notebook show of them.
+"""Summaries of results for `repr` and notebooks.
 
-Only quantities of the first compiled program are shown, so that a summary never compiles another.
+They show only quantities of the first compiled program, so that a summary never compiles another.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def path_summary(path: EquilibriumPath) -> Summary:
 
 
 def state_summary(state: State) -> Summary:
-    """Summarise a saved state: whose it is, and what its tendons carry."""
+    """Summarise a saved state: its robot, and the tensions and strokes of its tendons."""
     point = state.solved.point
     rows = [
         ("tendon tension", f"{_few(np.asarray(point.base_tension))} N"),
@@ -84,7 +84,7 @@ def _converged(path: EquilibriumPath) -> str:
 
 
 def _few(values: np.ndarray, digits: int | None = None) -> str:
-    """Return numbers one after the other, the first and the last of many."""
+    """Format numbers as a list, of many the first and the last."""
     texts = [
         short(float(value)) if digits is None else f"{round(float(value), digits) + 0.0:.{digits}f}"
         for value in values

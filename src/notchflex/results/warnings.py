@@ -1,4 +1,4 @@
-"""What a user should know about a result before trusting it."""
+"""Warnings on the validity of a result."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
 
 MOMENT_ERROR = 0.01
-"""A larger part of the bending moment than this that the strain modes miss is warned of."""
+"""Relative error of the bending moment of the strain modes above which a path has a warning."""
 
 
 def path_warnings(path: EquilibriumPath) -> list[str]:

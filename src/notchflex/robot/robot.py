@@ -1,4 +1,4 @@
-"""A robot as a person describes it."""
+"""Description of a robot."""
 
 import dataclasses
 import functools
@@ -31,10 +31,10 @@ else:
 
 @part
 class Robot:
-    """A notched tube with its tendons, as in a robot file; it never changes, copies are made.
+    """A notched tube with its tendons, as in a robot file; immutable.
 
     Args:
-        name: What the robot is called in tables and pictures.
+        name: Name of the robot in tables and pictures.
         tube: The tube before it is cut.
         notch: The notches from base to tip; one entry may stand for several equal ones (`repeat`).
         tendon: The tendons.
@@ -127,12 +127,12 @@ class Robot:
 
     @property
     def number_of_notches(self) -> int:
-        """How many notches there are, repeated ones counted each."""
+        """Number of notches, with repeated ones counted each."""
         return sum(notch.repeat for notch in self.notch)
 
     @property
     def number_of_tendons(self) -> int:
-        """How many tendons there are."""
+        """Number of tendons."""
         return len(self.tendon)
 
     def replace(self, **parts: Any) -> "Robot":
@@ -182,7 +182,7 @@ class Robot:
 
 
 def to_table(robot: Robot) -> dict[str, Any]:
-    """Return a robot as the plain table that its file holds: dicts, lists, numbers and text."""
+    """Convert a robot to the plain table of its file: dicts, lists, numbers and text."""
     tolerances = {one.value: one.written for one in robot.tolerance}
     return {
         "name": robot.name,
@@ -219,7 +219,7 @@ def source_of(robot: Robot) -> str | None:
 
 
 def remember_source(robot: Robot, text: str | None) -> Robot:
-    """Keep the text of a robot's file beside it, so that its comments survive a rewrite.
+    """Store the text of a robot's file with it, so that its comments survive a rewrite.
 
     It is not a field: two robots with the same values are equal whatever their files say.
     """
@@ -228,7 +228,7 @@ def remember_source(robot: Robot, text: str | None) -> Robot:
 
 
 def _part_table(value: object) -> dict[str, Any]:
-    """List the values of a part, without those that are left out (None)."""
+    """List the values of a part, without those that are None."""
     values = {name: getattr(value, name) for name in fields_of(type(value))}
     return {name: one for name, one in values.items() if one is not None}
 

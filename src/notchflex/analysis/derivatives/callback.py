@@ -1,7 +1,7 @@
-"""A plain function with a Jacobian as a function that JAX can differentiate, map and compile.
+"""Wrapper of a plain function with a Jacobian that JAX can differentiate, map and compile.
 
-JAX calls back to compiled programs of the library, so that nothing of the mechanics is compiled
-again for what users write around it.
+JAX calls back to compiled programs of the library, so that user code around it does not compile
+the mechanics again.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from notchflex.results.path import EquilibriumPath
 
 TENDONS = ("tension", "stroke")
 TIP = ("tip_force", "tip_moment")
-# Robots whose derivatives by their numbers are kept.
+# Number of robots whose derivatives by their numbers are cached.
 _REMEMBERED = 16
 
 
@@ -37,9 +37,9 @@ class VectorSolver:
     Attributes:
         model: The forward model.
         start: Present values of the parameters, by name.
-        outputs: Names of what is returned.
+        outputs: Names of the outputs.
         numbers: Names of the parameters that are numbers of the robot.
-        solve: Solves the path at named values; raises `InputError` for values that cannot be.
+        solve: Solves the path at named values; raises `InputError` for invalid values.
         load: Returns the loads at named values.
     """
 
@@ -51,20 +51,20 @@ class VectorSolver:
     load: Callable[[Mapping[str, Any]], LoadPath]
 
     def values(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
-        """Return the outputs; raise `InputError` where no robot or load can have these values."""
+        """Return the outputs; raise `InputError` for values that no robot or load can have."""
         path = self._path(flat)
         return {name: np.asarray(getattr(path, name)) for name in self.outputs}
 
     def slopes(self, flat: Float[np.ndarray, " k"], output: str) -> np.ndarray:
         """Return the derivatives of an output by every value, as last axis.
 
-        Tangents give those of all outputs at once, which are kept; the adjoint one after the other.
+        Tangents give those of all outputs at once, which are cached; the adjoint one by one.
         """
         path = self._path(flat)
         kept = self._kept_slopes.setdefault(path, {})
         if output in kept:
             return kept[output]
-        if output == "residual":  # what the solver leaves of it does not depend on the values
+        if output == "residual":  # the remaining error of the solver does not depend on the values
             return np.zeros((len(path), len(flat)))
         names = (output,)
         if not self.model.takes_adjoint(path, names, len(flat)):
@@ -79,7 +79,7 @@ class VectorSolver:
 
     @cached_property
     def _parts(self) -> list[tuple[str, slice, tuple[int, ...]]]:
-        """Where the vector holds which value, and in which shape."""
+        """Name, slice of the vector and shape of every value."""
         shapes = [np.shape(at) for at in self.start.values()]
         ends = np.cumsum([0, *(math.prod(shape) for shape in shapes)]).tolist()
         parts = [slice(*ends[number : number + 2]) for number in range(len(shapes))]
@@ -144,14 +144,13 @@ def _is_float(path: EquilibriumPath, name: str) -> bool:
 def outputs_function(
     solver: VectorSolver, start: Float[np.ndarray, " k"]
 ) -> Callable[[Array], OutputTable]:
-    """Make a solver a function of JAX.
+    """Wrap a solver as a function of JAX.
 
-    Values that the solver refuses give NaN for numbers and false for truth values, as a program of
-    JAX cannot raise.
+    Invalid values give NaN for numbers and false for flags, as a program of JAX cannot raise.
 
     Args:
         solver: Gives outputs and Jacobians.
-        start: Values at which it has outputs; their shapes are those of all others.
+        start: Valid values, whose outputs define the shapes.
 
     Returns:
         A function of a vector of values, differentiable once, forward and reverse.
@@ -187,7 +186,7 @@ def _differentiable_once(
         for name, shape in shapes.items()
     }
     values_of = _callback(solver.values, shapes)
-    # One for each: JAX then leaves out those of outputs that nobody differentiates.
+    # One for each, so that JAX omits those of outputs that are not differentiated.
     slopes_of = {
         name: _callback(lambda at, name=name: {name: solver.slopes(at, name)}, {name: shape})
         for name, shape in slope_shapes.items()

@@ -1,8 +1,7 @@
-"""The forward model: numbers of a robot and its loads in, solved states and derivatives out.
+"""The forward model: from numbers of a robot and its loads to solved states and derivatives.
 
-All that differentiates results goes through it. States and derivatives are found by compiled
-programs along the path; the arrays of a robot are differentiated by its numbers where plain Python
-makes them.
+All derivatives of results use it. Compiled programs compute states and derivatives along the path;
+the arrays of a robot are differentiated by its numbers with differences of plain Python.
 """
 
 from __future__ import annotations
@@ -31,9 +30,9 @@ from notchflex.solver.programs.prepare import PreparedChain, flat, prepare
 from notchflex.solver.programs.run import run
 from notchflex.solver.solver_state import SolverState
 
-# One gradient of a number takes about as long as derivatives along so many directions.
+# Cost of the gradient of one number, in derivatives along single directions.
 _ADJOINT = 4
-# Numbers of the material on which more than the law of the sections depends.
+# Numbers of the material on which more depends than the section law.
 _OF_THE_CHAIN = ("density", "poisson_ratio")
 
 
@@ -42,9 +41,9 @@ class ForwardModel:
     """A robot under loads as a function of its numbers and of the loads.
 
     Attributes:
-        robot: The robot as it is.
-        load: The loads as they are.
-        settings: How hard the solver tries.
+        robot: The nominal robot.
+        load: The nominal loads.
+        settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
         from_rest: Which steps start from rest, (s,); the others from the step before.
         any_load: Whether loads on the bodies may vary, and so may point anywhere.
@@ -59,18 +58,18 @@ class ForwardModel:
 
     @cached_property
     def ready(self) -> PreparedChain:
-        """The robot as it is, as arrays."""
+        """The nominal robot as arrays."""
         return self._assembled(self.robot)
 
     def solve(
         self, robot: Robot, load: LoadPath, start: SolverState | None = None
     ) -> EquilibriumPath:
-        """Follow loads with the robot that has some other numbers.
+        """Solve loads with a robot that has other numbers.
 
         Args:
             robot: The robot.
             load: Loads of the same kind as those of the model.
-            start: The state to start from, in the place of rest.
+            start: The state to start from; rest where not given.
 
         Raises:
             InputError: The arrays of the robot have another form than those of the model's.
@@ -87,13 +86,13 @@ class ForwardModel:
     def changes(self, robot: Robot, load: LoadPath, names: Sequence[str]) -> list[Change]:
         """Differentiate arrays and loads by numbers of the robot.
 
-        Numbers that change other parts of the robot, such as dimensions of its notches, are moved
-        together.
+        Numbers that change different parts of the robot, such as dimensions of its notches, are
+        varied together.
 
         Args:
-            robot: The robot, with the values where.
+            robot: The robot with the values at which to differentiate.
             load: The loads.
-            names: Which numbers.
+            names: Names of the numbers.
 
         Raises:
             InputError: A number cannot be varied.
@@ -130,7 +129,7 @@ class ForwardModel:
 
         Args:
             robot_at: The robot of a number; only its geometry and loads on its mass may vary.
-            at: The number where.
+            at: The number at which to differentiate.
             load: The loads.
             order: Order of accuracy, as for `slope`.
 
@@ -165,9 +164,7 @@ class ForwardModel:
     def _geometry(self) -> dict[tuple[str, ...], GeometrySlopes]:
         return {}
 
-    def load_change(
-        self, path: EquilibriumPath, load: LoadPath
-    ) -> Float[np.ndarray, "s make_commands"]:
+    def load_change(self, path: EquilibriumPath, load: LoadPath) -> Float[np.ndarray, "s command"]:
         """Compute the difference of other loads from those of a path, packed for the long chain."""
         ready, robot = path.prepared, path.robot
         present, _ = ready.padded_commands(path.commands)
@@ -191,8 +188,8 @@ class ForwardModel:
             remembers: Whether changes pass from state to state through the memory of the contacts.
 
         Returns:
-            By name, directions and then steps as leading axes, in the world. NaN from a step on
-            that did not converge, or was so hard that its derivatives are not known.
+            By name, directions and then steps as leading axes, in the world. NaN from the first
+            step that did not converge, or whose derivatives are not known.
         """
         directions = tuple(changes)
         shapes = {name: np.shape(path.quantity(name)) for name in outputs}
@@ -223,21 +220,21 @@ class ForwardModel:
 
     @cached_property
     def _prepared(self) -> Callable[[Robot], PreparedChain]:
-        """Arrays of the robot with some other numbers; a control loop asks for the same again."""
+        """Function that prepares a robot with other numbers; the last results are cached."""
         return lru_cache(maxsize=4)(self._varied)
 
     def _varied(self, robot: Robot) -> PreparedChain:
         present, shape = self.robot, self._shape(robot)
         if robot is present:
             return self.ready
-        # A search for constants of the material and friction varies a few numbers of the chain.
+        # Fits of material and friction constants vary a few numbers of the chain.
         if shape is self._shape(present) and robot.material.density == present.material.density:
             fields = laws(robot.material, shape) | laws(robot.friction, shape)
             return self.ready.with_fields(fields)
         return self._of_form(self._assembled(robot))
 
     def _of_form(self, ready: PreparedChain) -> PreparedChain:
-        """Raise if a robot has other arrays."""
+        """Check that a robot has arrays of the same form."""
         if ready.chain_layout is not self.ready.chain_layout:
             raise InputError.UNSUPPORTED(
                 "with these values the robot has another form; it must stay the same"
@@ -246,7 +243,7 @@ class ForwardModel:
 
     @cached_property
     def _field_indices(self) -> dict[str, np.ndarray]:
-        """Where the long chain's vector holds what follows from material and friction."""
+        """Indices in the long chain's vector of the fields of material and of friction."""
         shape = self._shape(self.robot)
         parts = {"material": self.robot.material, "friction": self.robot.friction}
         return {name: self.ready.field_indices(laws(part, shape)) for name, part in parts.items()}

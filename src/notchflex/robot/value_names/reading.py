@@ -13,7 +13,7 @@ from notchflex.robot.value_names.paths import EXAMPLES, class_of, parse_path, ta
 
 
 class Described(NamedTuple):
-    """A number of a robot: its unit ("" for none) and between what it must lie."""
+    """A number of a robot: its unit ("" for none) and its limits."""
 
     unit: str
     lower: float
@@ -21,15 +21,15 @@ class Described(NamedTuple):
 
 
 def number_at(robot: Robot, path: str) -> float:
-    """Return the number of a robot that has a name, in the units of the robot file.
+    """Return a number of a robot by its name, in the units of the robot file.
 
     Args:
         robot: The robot.
         path: Its name, as for `Robot.with_value`.
 
     Raises:
-        InputError: There is no such value, it is not a number that may change little by little, or
-            several notches have unlike ones.
+        InputError: There is no such value, it is not a number that can vary continuously, or
+            notches have different ones.
     """
     if not isinstance(path, str):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InputError.UNKNOWN_NAME(f"{path!r} is not the name of a value; {EXAMPLES}.")
@@ -59,7 +59,7 @@ def number_at(robot: Robot, path: str) -> float:
 
 
 def numbers_at(robot: Robot, path: str) -> dict[str, float]:
-    """Return every number that a path means, each by its own name.
+    """Return every number that a path refers to, each by its own name.
 
     Args:
         robot: The robot.
@@ -88,7 +88,7 @@ def numbers_at(robot: Robot, path: str) -> dict[str, float]:
 
 
 def described_at(robot: Robot, path: str) -> Described:
-    """Return unit and limits of the number of a robot that has a name.
+    """Return unit and limits of a number of a robot by its name.
 
     Args:
         robot: The robot.
