@@ -78,7 +78,7 @@ def room_for_compiled_code() -> Iterator[None]:
     with maps.open() as lines:
         if sum(1 for _ in lines) > _PIECES:
             jax.clear_caches()
-            sys.modules["notchflex.solver.programs.compiled"].Native.made.clear()
+            sys.modules["notchflex.solver.programs.compiled"].Native.programs.clear()
 
 
 @pytest.fixture(scope="session")

@@ -150,7 +150,7 @@ def check_friction(robot: Table, path: Any, step: int) -> Iterator[Finding]:
         yield from above("slips below its bound", step, off.max(initial=0.0), 1e-6, name)
         # A step that was solved in parts may slide one way and then the other. From a slack state
         # on, it may first draw the tendon along without any friction.
-        whole = step and path.converged[step - 1] and path.run.parts[step] == 1
+        whole = step and path.converged[step - 1] and path.run.substeps[step] == 1
         if whole and path.tension[step - 1, t] > 1e-6 * highest:
             moved = path.contact_slid[step, t] - path.contact_slid[step - 1, t]
             moved = moved[: count - 1] / reach

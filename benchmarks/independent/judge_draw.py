@@ -233,7 +233,7 @@ def _guises(
         found.append((f"{which}: converges otherwise", 0, 0.0, more + f" {other.reason[-1]}"))
     off = same(path, other, mapped, factor)
     # Rounding decides where a hard step is cut into parts, and friction remembers the parts.
-    in_parts = max(path.run.parts.max(), other.run.parts.max()) > 1
+    in_parts = max(path.run.substeps.max(), other.run.substeps.max()) > 1
     if off > 1e-6 and not in_parts:
         found.append((f"{which}: another state", 0, off, f"factor {factor}"))
 

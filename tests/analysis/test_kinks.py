@@ -73,7 +73,7 @@ def test_robots_of_one_form_share_a_program():
     first = nf.differentiable(TWO, LOADS[:2], ["notch.depth"], outputs=("total_angle",))
     first()
     jax.grad(lambda values: first(values)["total_angle"][-1])(first.start)
-    before = len(Native.made)
+    before = len(Native.programs)
     other = TWO.with_values({"notch.depth": 1.3, "friction.coefficient": 0.1})
     loads = [nf.Load(tension=value) for value in (0.3, 0.7, 0.9)]  # also with more steps
     second = nf.differentiable(
@@ -85,7 +85,7 @@ def test_robots_of_one_form_share_a_program():
     )
     angle = second()["total_angle"]
     jax.grad(lambda values: second(values)["total_angle"][-1])(second.start)
-    assert len(Native.made) == before
+    assert len(Native.programs) == before
     expected = nf.simulate(other, loads).total_angle
     assert np.asarray(angle) == pytest.approx(expected, rel=1e-11)
 

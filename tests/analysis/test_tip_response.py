@@ -111,7 +111,7 @@ AGAINST = (-0.114, -0.024, -0.189)
 def test_slopes_go_through_what_loads_did_before_the_tendons(wrist, margin):
     rubs = wrist.with_value("friction.coefficient", 0.4)
     response = nf.tip_response(rubs, nf.pull(0.373, 0.373, steps=1).loaded(tip_force=AGAINST))
-    assert response.path.run.parts[0] == 2
+    assert response.path.run.substeps[0] == 2
     width = 1e-5
     cases = {"tension": (response.jacobian[0, :, 0], 1.0, np.zeros(3))}
     for axis, push in enumerate(np.eye(3)):
@@ -134,7 +134,7 @@ def test_slopes_that_nobody_knows_are_not_told(wrist):
     rubs = wrist.with_value("friction.coefficient", 0.4)
     response = nf.tip_response(rubs, HARD)
     assert response.path.converged[0]
-    assert response.path.run.parts[0] == 3
+    assert response.path.run.substeps[0] == 3
     assert np.isfinite(response.path.tip_position).all()
     assert np.isnan(response.jacobian).all()
     assert np.isnan(response.compliance).all()
@@ -144,7 +144,7 @@ def test_slopes_that_nobody_knows_are_not_told(wrist):
 def test_without_friction_a_load_may_be_cut(wrist, margin):
     smooth = wrist.with_value("friction.kind", "frictionless")
     response = nf.tip_response(smooth, HARD)
-    assert response.path.run.parts[0] > 2
+    assert response.path.run.substeps[0] > 2
     width = 1e-5
     loads = [nf.pull(t, t, steps=1) for t in (0.122 + 0.5 * width, 0.122 - 0.5 * width)]
     push = HARD.external[0].tip_force

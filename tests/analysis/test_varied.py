@@ -138,7 +138,7 @@ def test_a_polynomial_finds_what_a_polynomial_is():
     made = fit_polynomial(
         exact, np.array([0.5, 1.0, -1.0]), np.array([1.0, 2.0, 3.0]), [[0, 1, 2]],
         lambda sizes: np.maximum(sizes, 1e-6), [np.array([0]), np.array([1]), np.array([2])],
-        wanted=[PolynomialAccuracy(1e-9, 500)], checks=np.array([[0.7, 1.3, 2.0]]),
+        accuracies=[PolynomialAccuracy(1e-9, 500)], checks=np.array([[0.7, 1.3, 2.0]]),
     )  # fmt: skip
     assert made is not None
     assert made.entries.tolist() == [0, 1]

@@ -99,7 +99,7 @@ def test_other_laws_make_the_chain_that_is_assembled_anew(name):
     other = robot.with_values(values)
     found, expected = model._prepared(other), PreparedChain(assemble(other))
     np.testing.assert_array_equal(found.vector, expected.vector)
-    own = found.places({name: getattr(found.chain, name) for name in ("law", "friction")})
+    own = found.field_indices({name: getattr(found.chain, name) for name in ("law", "friction")})
     np.testing.assert_array_equal(found.long.vector[own], expected.long.vector[own])
 
 

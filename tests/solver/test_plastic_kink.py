@@ -20,7 +20,7 @@ def test_every_load_around_the_kink_converges() -> None:
     path = nf.solve_each(YORK, loads(2.7, 4.4, 2000))
     assert path.converged.all()
     assert path.iterations.max() <= 15  # one took 674
-    assert path.run.parts.max() == 1  # type: ignore[union-attr]
+    assert path.run.substeps.max() == 1  # type: ignore[union-attr]
 
 
 def test_the_state_on_the_plateau_is_an_equilibrium() -> None:

@@ -113,14 +113,14 @@ def test_wrists_under_tension_are_stable(wrist: nf.Robot) -> None:
 def test_a_new_load_or_robot_of_the_same_shape_needs_no_new_program(wrist: nf.Robot) -> None:
     nf.simulate(wrist, nf.pull(0.0, 1.0, steps=5))
     nf.simulate(wrist, nf.stroke_path(0.0, 1.0, steps=5))  # strokes are a program of their own
-    programs = set(Native.made)
+    programs = set(Native.programs)
     nf.simulate(wrist, nf.pull(0.0, 2.0, steps=17).release())
     nf.simulate(nf.load_robot("pacheco2021-b-specimen"), nf.stroke_path(0.0, 1.0, steps=40))
     nf.simulate(wrist.with_value("notch[2].depth", 1.3), nf.pull(0.0, 2.0, steps=3))
     for notches in (1, 4, 7):
         shorter = wrist.replace(notch=wrist.notches[:1] * notches, tendon=(nf.Tendon(0.7),))
         assert nf.solve(shorter, nf.Load(tension=0.5)).converged
-    assert set(Native.made) <= programs
+    assert set(Native.programs) <= programs
 
 
 @pytest.mark.nightly

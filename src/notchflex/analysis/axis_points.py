@@ -1,8 +1,8 @@
 """Points on the tube axis, given by their distance from the base on the straight robot.
 
 A point on a rigid piece moves with it. Across a notch the axis is a cubic from face to face, at
-right angles to both. Where the two faces lie on one arc, the length of its tangents keeps it to
-the arc within 5e-6 of its radius up to 45 degrees. It depends on the poses of the bodies alone.
+right angles to both. Where the two faces lie on one arc, the length of its tangents fits it to the
+arc within 5e-6 of its radius up to 45 degrees. It depends only on the poses of the bodies.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from notchflex.robot import Robot
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
 
-# A place may stick out of the robot by this part of its length: a tip that was rounded.
+# Tolerance of a position beyond the robot, relative to its length, for rounded tips.
 _BEYOND = 1e-6
 # Its square is far below rounding, its product with a change of any size is no denormal.
 _COMPLEX_STEP = 1e-30
 
 
 class AxisPlaces(NamedTuple):
-    """Places of m points on a straight robot of n notches.
+    """Positions of m points on a straight robot of n notches.
 
     Attributes:
         body: The body that each point is on, or the one before its notch, (m,).
         along: Its distance from that body's proximal face along the axis, mm, (m,).
         after: The body beyond its notch, or any other where it is on a body, (m,).
         length: Length of the body before, mm, (m,).
-        fraction: How far across its notch it is, 0 to 1; -1 where it is on a body, (m,).
+        fraction: Position across its notch, 0 to 1; -1 where it is on a body, (m,).
     """
 
     body: Int[np.ndarray, " m"]
@@ -49,14 +49,14 @@ class AxisPlaces(NamedTuple):
 
 
 def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
-    """Find the places of points on the axis of the straight robot.
+    """Locate points on the axis of the straight robot.
 
     Args:
         robot: The robot.
         axis_at: Distances from the base when the robot is straight, mm, (m,).
 
     Returns:
-        The places, for `points_on_axis`.
+        The positions, for `points_on_axis`.
 
     Raises:
         InputError: A distance is not finite, negative or beyond the tip.
@@ -75,7 +75,7 @@ def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
             f"there is no point on the axis {wrong[0]:g} mm from the base: {robot.name} is "
             f"{tip:.6g} mm long; give 0 to {tip:.6g} mm"
         )
-    # A point on a face belongs to the body; rounding must not lay it into the notch.
+    # A point on a face belongs to the body, in spite of rounding.
     body = np.searchsorted(start - _BEYOND * tip, at, side="right") - 1
     body = np.maximum(body, 0)
     along = at - start[body]
@@ -91,20 +91,20 @@ def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
 def _straight(
     robot: Robot,
 ) -> tuple[Float[np.ndarray, " bodies"], Float[np.ndarray, " bodies"]]:
-    """Where the bodies of the straight robot begin, and their lengths, mm."""
+    """Return start and length of the bodies of the straight robot, mm."""
     straight, _ = bodies_from_angles(robot, np.zeros((1, robot.number_of_notches)))
     return straight[0, :, 2], body_lengths(robot.tube, robot.notches)
 
 
 def points_on_axis(
-    places: AxisPlaces,
+    positions: AxisPlaces,
     body_position: Float[Array, "*s bodies 3"],
     body_rotation: Float[Array, "*s bodies 3 3"],
 ) -> Float[Array, "*s m 3"]:
     """Return points on the axis of a bent robot.
 
     Args:
-        places: Where they lie on the straight robot.
+        positions: Their positions on the straight robot.
         body_position: Origins of the bodies, base first, mm; plain or traced numbers.
         body_rotation: Their rotations.
 
@@ -120,19 +120,19 @@ def points_on_axis(
     """
     xp = array_module(body_position, body_rotation)
     axis = body_rotation[..., :, 2]
-    first, last = axis[..., places.body, :], axis[..., places.after, :]
-    origin = body_position[..., places.body, :]
-    on_body = origin + places.along[..., None] * first
-    near = origin + places.length[..., None] * first
-    far = body_position[..., places.after, :]
-    inside = places.fraction >= 0.0
+    first, last = axis[..., positions.body, :], axis[..., positions.after, :]
+    origin = body_position[..., positions.body, :]
+    on_body = origin + positions.along[..., None] * first
+    near = origin + positions.length[..., None] * first
+    far = body_position[..., positions.after, :]
+    inside = positions.fraction >= 0.0
     # Length of the tangents: 2 c / (1 + cos(turn / 2)) with the chord c, which makes the cubic meet
     # an arc in the middle too. Where a point is on a body there may be no chord.
     chord = xp.where(inside[:, None], far - near, np.ones(3))
     between = xp.where(inside, xp.sum(first * last, axis=-1), 1.0)
     half = xp.sqrt(0.5 * (1.0 + between))
     reach = (2.0 * xp.sqrt(xp.sum(chord**2, axis=-1)) / (1.0 + half))[..., None]
-    u = xp.where(inside, places.fraction, 0.0)[:, None]
+    u = xp.where(inside, positions.fraction, 0.0)[:, None]
     across = (
         (1.0 + 2.0 * u) * (1.0 - u) ** 2 * near
         + u**2 * (3.0 - 2.0 * u) * far
@@ -183,7 +183,7 @@ def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> NDArray[np.float64
 
     Args:
         path: The states, s steps.
-        axis_at: How far from the base the points lie when the robot is straight, mm, (m,).
+        axis_at: Distances of the points from the base when the robot is straight, mm, (m,).
 
     Returns:
         The points, mm, (s, m, 3).
@@ -197,7 +197,7 @@ def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> NDArray[np.float64
         >>> bool(np.allclose(axis_points(path, [10.0])[0, 0], path.tip_position[0]))
         True
     """
-    places = axis_places(path.robot, axis_at)
+    positions = axis_places(path.robot, axis_at)
     return np.asarray(
-        points_on_axis(places, constant(path.body_position), constant(path.body_rotation))
+        points_on_axis(positions, constant(path.body_position), constant(path.body_rotation))
     )

@@ -1,8 +1,8 @@
 """Batches: many robots or many loads at once, in pieces that fit the cache.
 
-Robots of one form (as many notches, tendons and modes, the same laws) run through one program, a
-row of numbers each. A batch is cut into pieces; the cores take one after the other, so that memory
-is bounded whatever the batch. Where JAX has a GPU they run there, whole pieces side by side.
+One program solves all robots of one form (equal numbers of notches, tendons and modes, the same
+laws), one row of numbers each. A batch is divided into pieces that the cores take in turn, which
+bounds the memory. Where JAX has a GPU, whole pieces run there in parallel.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def solve_batch(
         outputs: What to return, by names of `EquilibriumPath`; fewer names need less memory.
         settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
-        cores: How many cores to use; all where not given.
+        cores: Number of cores to use; all where not given.
         progress: Called with the rows done and the rows of the whole batch.
 
     Returns:
@@ -63,7 +63,7 @@ def solve_batch(
         (100,)
     """
     every = BatchRobots.of(robots)
-    path = load_path(loads, every.most_tendons)
+    path = load_path(loads, every.max_tendons)
     arrays = _simulate(every, path, len(path), outputs, settings, refinement, cores, progress)
     return Batch({name: array[:, 0] for name, array in arrays.items()})
 
@@ -78,7 +78,7 @@ def simulate_batch(
     cores: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Batch:
-    """Follow many paths of loads, each with its own friction history.
+    """Simulate many paths of loads, each with its own friction history.
 
     Args:
         robots: One robot, or one per row.
@@ -103,7 +103,7 @@ def simulate_batch(
         (2, 8)
     """
     every = BatchRobots.of(robots)
-    tendons = every.most_tendons
+    tendons = every.max_tendons
     message = "simulate_batch needs a notchflex.LoadPath, or some in order"
     paths = [load_path(one, tendons) for one in one_or_several(loads, LoadPath, message)]
     if not paths or len({len(path) for path in paths}) > 1:
@@ -116,7 +116,7 @@ def simulate_batch(
 def simulate_varied(
     chains: VariedChains, *, outputs: Sequence[str], settings: Settings | None = None
 ) -> Batch:
-    """Follow one path of loads with varied robots, in the calling thread.
+    """Simulate one path of loads with varied robots, in the calling thread.
 
     Args:
         chains: Chains of the robots under the path.
@@ -145,7 +145,7 @@ def _simulate(
     cores: int | None,
     progress: Callable[[int, int], None] | None,
 ) -> dict[str, np.ndarray]:
-    """Follow paths, given one after the other as a long one, each from rest."""
+    """Simulate paths, joined to one, each from rest."""
     asked = check_outputs(outputs)
     threads = number_of_cores() if cores is None else check_integer(cores, "cores")
     if threads < 1:

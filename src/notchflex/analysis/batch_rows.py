@@ -1,4 +1,4 @@
-"""The rows of a batch: robots of one form that run through one compiled program, in pieces."""
+"""Rows of a batch: robots of one form, solved by one compiled program in pieces."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from notchflex.solver.programs.prepare import PreparedChain, pad_prepared
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.programs.static_structure import StaticStructure
 
-# Rows of a piece at most, by how many rows there are.
-_PIECES = {0: 64, 512: 256, 8192: 2048}
+# Largest number of rows of a piece, by the number of rows.
+_PIECE_SIZES = {0: 64, 512: 256, 8192: 2048}
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class BatchRobots:
 
     Attributes:
         every: One for all rows, or one per row.
-        varied: The same where they are one robot with other numbers, which need not be made.
+        varied: The same as one robot with varied numbers, where the robots need not be built.
     """
 
     every: Sequence[Robot]
@@ -46,7 +46,7 @@ class BatchRobots:
 
     @classmethod
     def of(cls, robots: Any) -> BatchRobots:
-        """Take what a caller gives for the robots of a batch."""
+        """Convert the robots that a caller gives."""
         if isinstance(robots, VariedRobots):
             return cls(robots, robots)
         message = "a batch needs a notchflex.Robot, or some of them"
@@ -56,17 +56,16 @@ class BatchRobots:
         return cls(every)
 
     @property
-    def most_tendons(self) -> int:
-        """Number of tendons of the robot that has most."""
+    def max_tendons(self) -> int:
+        """Largest number of tendons of a robot."""
         unlike = self.every if self.varied is None else [self.varied.robot]
         return max(robot.number_of_tendons for robot in unlike)
 
     @property
     def threads(self) -> AbstractContextManager[Any]:
-        """What limits threads while rows are solved.
+        """Context that limits the threads of matrix products while rows are solved.
 
-        Every core has a piece of its own: a product of matrices, by which varied robots are found,
-        is not to take the others too.
+        Every core has its own piece; a product that assembles varied robots must not use others.
         """
         return nullcontext() if self.varied is None else threadpool_limits(1)
 
@@ -76,7 +75,7 @@ class BatchRows:
     """Rows of a batch whose robots run through one program.
 
     Attributes:
-        rows: Which rows of the batch these are.
+        rows: Indices of these rows in the batch.
         chains: A row per robot, or one for all.
         commands: A row per path, or one for all, then the steps.
         flexures: Number of flexures of each robot, by row, or one for all.
@@ -90,17 +89,17 @@ class BatchRows:
     layouts: tuple[StaticStructure, PytreeLayout, tuple[str, ...]]
 
     def pieces(self, cores: int) -> Iterator[slice]:
-        """Return the rows of each call of the program: equal pieces, as many for each core."""
+        """Return the rows of each call of the program: equal pieces, balanced over the cores."""
         rows = len(self.rows)
-        most = max(size for least, size in _PIECES.items() if rows >= least)
-        each = -(-rows // (most * cores))
+        max_size = max(size for limit, size in _PIECE_SIZES.items() if rows >= limit)
+        each = -(-rows // (max_size * cores))
         size = -(-rows // (each * cores * WIDTH)) * WIDTH
         return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
 
     def packed(
         self, index: slice
     ) -> tuple[Float[np.ndarray, "*k chain"], Float[np.ndarray, "k s command"]]:
-        """Chains of a piece of the rows, one alone if they share it, and their commands."""
+        """Return chains of a piece of the rows (one if shared), and their commands."""
         commands = self.commands[index]
         if len(self.commands) == 1:
             commands = np.repeat(self.commands, index.stop - index.start, axis=0)
@@ -117,17 +116,17 @@ class BatchRows:
 
 @dataclass(frozen=True)
 class VariedRows(BatchRows):
-    """Rows whose robots differ by a few numbers: chains are worked out piece by piece."""
+    """Rows whose robots differ by a few numbers: chains are computed piece by piece."""
 
     varied: VariedChains
 
     def packed(self, index: slice) -> tuple[np.ndarray, np.ndarray]:
-        """Chains and commands of a piece of the rows."""
+        """Return chains and commands of a piece of the rows."""
         return self.varied.rows(index)
 
 
 def varied_rows(varied: VariedChains, count: int, outputs: tuple[str, ...]) -> VariedRows:
-    """Return the rows of robots whose chains are worked out piece by piece."""
+    """Return the rows of robots whose chains are computed piece by piece."""
     layouts = (varied.structure, varied.command, outputs)
     flexures = np.array([varied.ready.chain.flexures])
     nothing = np.zeros((0, 0))
@@ -135,7 +134,7 @@ def varied_rows(varied: VariedChains, count: int, outputs: tuple[str, ...]) -> V
 
 
 def _unpad(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
-    """Values by flexure or body, empty where a robot has none, rows and steps as leading axes."""
+    """Blank the values of flexures or bodies that a robot lacks; rows and steps lead."""
     along = REGISTERED[name].per[:1]
     count = flexures + (along == ("body",))
     if along in (("notch",), ("body",)) and (count < values.shape[2]).any():
@@ -145,7 +144,7 @@ def _unpad(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) ->
 
 
 def missing_value(values: np.ndarray) -> float:
-    """Return what fills places without a number: NaN, or 0 in whole numbers and flags."""
+    """Return the value for missing entries: NaN, or 0 for integers and flags."""
     return np.nan if values.dtype.kind == "f" else 0
 
 
@@ -163,7 +162,7 @@ def tables_of(
         varied = varied_chains(robots.varied, joined, refinement)
         if varied is not None:
             return [varied_rows(varied, count, outputs)]
-    # The modes that any of the loads asks for, so that rows share a program.
+    # Modes for all of the loads, so that rows share a program.
     every = [prepare_for(robot, joined, None, refinement) for robot in robots.every]
     flexures = max(ready.chain.flexures for ready in every)
     edges = max(ready.chain.contacts.shape[1] for ready in every)

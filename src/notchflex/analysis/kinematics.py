@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from notchflex._jax import jax, jit, jnp
 from notchflex.errors import InputError
 from notchflex.mechanics.chain import Chain, assemble
-from notchflex.mechanics.contact import closing_travel, free_angle
+from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.mechanics.flexure import relative_pose
 from notchflex.mechanics.motion import Motion
 from notchflex.robot import Robot
@@ -149,7 +149,7 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
         )
     share = drawn[:, None] / chain.flexures
     free = free_angle(chain.rods)
-    closing = free + closing_travel(chain.rods)
+    closing = free + closing_angles(chain.rods)
     angle = np.clip(free + share / arm, free, closing)
     lost = np.maximum(share - arm * (angle - free), 0.0)
     # A share that is taken up completely loses nothing, whatever rounding says.

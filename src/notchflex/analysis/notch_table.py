@@ -15,12 +15,12 @@ from notchflex.robot.fields import fields_of
 from notchflex.robot.kinds import Notch
 
 
-def notch_table(robot: Robot, found: Closing | None = None) -> list[dict[str, Any]]:
+def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict[str, Any]]:
     """Return geometry, section and closing of every notch, base to tip.
 
     Args:
         robot: The robot, n notches, t tendons.
-        found: What `closing` returned of it; found anew where not given.
+        closing_table: What `closing` returned of it; found anew where not given.
 
     Returns:
         n rows with the values of the robot file, their units in their names, and
@@ -41,7 +41,7 @@ def notch_table(robot: Robot, found: Closing | None = None) -> list[dict[str, An
         >>> round(row["closing_angle_deg"], 2), round(row["moment_arm_mm"][0], 3)
         (30.63, 1.387)
     """
-    table = closing(robot) if found is None else found
+    table = closing(robot) if closing_table is None else closing_table
     arms = moment_arms(assemble(robot, flat=False))
     placed = list(zip(robot.notches, sites_of(robot), strict=True))
     described = {each: _description(*each, robot.tube) for each in dict.fromkeys(placed)}

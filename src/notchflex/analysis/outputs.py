@@ -36,8 +36,8 @@ class UnknownOutputError(InputError, KeyError):
 
     def __init__(self, name: object, names: Iterable[str]) -> None:
         """Name what there is."""
-        there = ", ".join(names) or "none"
-        message = f"there is no output {short_repr(name)}; there are {there}"
+        available = ", ".join(names) or "none"
+        message = f"there is no output {short_repr(name)}; there are {available}"
         super().__init__(message, ErrorCode.UNKNOWN_NAME)
 
     def __str__(self) -> str:
@@ -60,17 +60,17 @@ class Batch(Displayed, Mapping[str, np.ndarray]):
         self._arrays = arrays
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """One of the arrays."""
+        """Return one of the arrays."""
         if name not in self._arrays:
             raise UnknownOutputError(name, self._arrays)
         return self._arrays[name]
 
     def __iter__(self) -> Iterator[str]:
-        """The names."""
+        """Iterate over the names."""
         return iter(self._arrays)
 
     def __len__(self) -> int:
-        """How many arrays there are."""
+        """Return the number of arrays."""
         return len(self._arrays)
 
     def _summary(self) -> Summary:

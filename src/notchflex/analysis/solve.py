@@ -11,7 +11,7 @@ from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import load_path
 from notchflex.loads.validation import check_is_robot
 from notchflex.mechanics.chain import tendons_in_plane
-from notchflex.mechanics.flexure import LEVELS, MOST_REFINEMENT
+from notchflex.mechanics.flexure import LEVELS, MAX_REFINEMENT
 from notchflex.results.equilibrium import Equilibrium
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.state import SavedState, State, check_robot, fitted
@@ -141,9 +141,9 @@ def _follow(
 
 def check_refinement(refinement: int) -> None:
     """Raise if there is no such refinement."""
-    if not isinstance(refinement, int) or not 0 <= refinement <= MOST_REFINEMENT:  # pyright: ignore
+    if not isinstance(refinement, int) or not 0 <= refinement <= MAX_REFINEMENT:  # pyright: ignore
         raise InputError.OUT_OF_RANGE(
-            f"refinement is a whole number from 0 to {MOST_REFINEMENT}; got {refinement!r}"
+            f"refinement is a whole number from 0 to {MAX_REFINEMENT}; got {refinement!r}"
         )
 
 

@@ -1,7 +1,7 @@
-"""Batches that go on: rows of one robot, each with a friction history, loaded step by step.
+"""Incremental batches: rows of one robot, each with a friction history, loaded step by step.
 
-`simulate_batch` knows all loads of a path beforehand. In a loop the next load depends on the state,
-so that the state of every row is handed out and back.
+`simulate_batch` takes all loads of a path in advance. In a control loop the next load depends on
+the state, so the states of all rows are returned and passed back.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ States = Float[np.ndarray, "k state"]
 
 @dataclass(frozen=True, eq=False)
 class BatchStepper:
-    """A robot whose tendons are pulled in many rows side by side.
+    """A robot simulated in many independent rows, step by step.
 
     Attributes:
         robot: The robot.
         outputs: Quantities that a step returns, in the frame of the base.
-        cores: How many cores to use; all where not given.
+        cores: Number of cores to use; all where not given.
 
     Example:
         >>> from notchflex import load_robot
@@ -61,21 +61,21 @@ class BatchStepper:
     cores: int | None = None
 
     def at_rest(self, rows: int) -> States:
-        """Return so many rows of the free robot with slack tendons, packed."""
+        """Return a number of rows of the free robot with slack tendons, packed."""
         return np.repeat(self._prepared.rest_vector[None], rows, axis=0)
 
     def step(
         self, states: States, tension: Float[np.ndarray, "k t"]
     ) -> tuple[States, dict[str, np.ndarray], Bool[np.ndarray, " k"]]:
-        """Pull the tendons of every row from the state that it is in.
+        """Pull the tendons of every row from its state.
 
         Args:
             states: Packed states before.
             tension: Tension of every tendon, N.
 
         Returns:
-            States, outputs by name, and which rows converged. A row that did not stays in the state
-            before.
+            States, outputs by name, and which rows converged. A row that did not converge keeps its
+            state.
         """
         loads = np.repeat(self._load[None], len(states), axis=0)
         loads[:, self._targets] = tension
@@ -91,15 +91,15 @@ class BatchStepper:
         if len(starts) < 2:
             return solve(0)
         with closing(on_cores(solve, starts, cores)) as solving:
-            every = list(solving)
-        found = {name: np.concatenate([one[1][name] for one in every]) for name in self.outputs}
+            results = list(solving)
+        outputs = {name: np.concatenate([one[1][name] for one in results]) for name in self.outputs}
         stack = np.concatenate
-        return stack([one[0] for one in every]), found, stack([one[2] for one in every])
+        return stack([one[0] for one in results]), outputs, stack([one[2] for one in results])
 
     def path(
         self, state: Float[np.ndarray, " state"], tension: Float[np.ndarray, " t"]
     ) -> EquilibriumPath:
-        """Return one row with all that is known of it: its next step as a path of one load.
+        """Return the next step of one row as a path of one load, with all quantities.
 
         Args:
             state: Packed state before.
@@ -154,12 +154,12 @@ def _step_row(
     state_layout: PytreeLayout,
     outputs: tuple[str, ...],
 ) -> tuple[Array, dict[str, Array], Array]:
-    """State, quantities and success of one load from a state; the state before if it failed."""
+    """Solve one load from a state; a failure returns that state."""
     robot, last = chain_layout.unpack(chain), state_layout.unpack(before)
     result = solve_load_step(robot, command_layout.unpack(load), last, Settings.of(numbers))
-    good = result.converged & believable(SolvedState(robot, result.solved).quantity)
-    solved = choose(good, result.solved, last)
-    return state_layout.pack(solved), report_quantities(robot, solved, outputs), good
+    converged = result.converged & believable(SolvedState(robot, result.solved).quantity)
+    solved = choose(converged, result.solved, last)
+    return state_layout.pack(solved), report_quantities(robot, solved, outputs), converged
 
 
 __all__ = ["BatchStepper"]

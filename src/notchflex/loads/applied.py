@@ -1,4 +1,4 @@
-"""External loads as the solver takes them: sums over each body, in the frame of the base.
+"""External loads of the solver: sums over each body, in the frame of the base.
 
 With R the rotation of a body against the base, a force f of constant direction in the base acts on
 the body's frame as R^T f, at a point p of the body with the moment p x R^T f about its origin. Of
@@ -24,7 +24,7 @@ from notchflex.mechanics.chain import bending_normal
 from notchflex.mechanics.motion import IN_PLANE, rotation_about, turned, unskew
 from notchflex.robot import Robot
 
-# Part of a vector that may stick out of a plane by rounding.
+# Tolerance of a vector's component out of a plane.
 _ROUNDING = 1e-12
 
 
@@ -36,7 +36,7 @@ class BodyLoads(NamedTuple):
         dead_moment: Sum of the moments of constant direction, in the base frame.
         dead_arm: Sum of the products p f^T of the points where those forces act (in the body's
             frame) and the forces (in the base frame).
-        following: Moment and force of what turns with a body, about its origin, in its frame.
+        following: Moment and force of loads that turn with a body, about its origin, in its frame.
     """
 
     dead_force: Float[Array, "*s bodies d"]
@@ -53,7 +53,7 @@ def applied(
     body_length: Float[np.ndarray, " bodies"],
     frame: Float[np.ndarray, "3 3"] | None = None,
 ) -> BodyLoads:
-    """Sum up the external loads on each body.
+    """Sum the external loads on each body.
 
     Args:
         load_path: The loads, s steps.
@@ -76,25 +76,25 @@ def applied(
         sums.append(_sums(external, axes, body_mass, body_centre, float(body_length[-1])))
     if len(load_path) == 1:
         return BodyLoads(*(constant(field[None]) for field in sums[0]))
-    # Loads that stay the same over many steps are summed up once.
+    # Loads that are equal over many steps are summed once.
     every = (np.array(field)[load_path.which] for field in zip(*sums, strict=True))
     return BodyLoads(*map(constant, every))
 
 
 def in_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
-    """Return loads of space as those of the plane that x and z of a frame span."""
+    """Reduce loads of space to the plane that x and z of a frame span."""
     turn = np.asarray(frame)
     return _in_basis(loads, turn[:, IN_PLANE], turn[:, 1:2])
 
 
 def out_of_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
-    """Return loads of the plane that x and z of a frame span as those of space."""
+    """Expand loads of the plane that x and z of a frame span to space."""
     turn = np.asarray(frame)
     return _in_basis(loads, turn[:, IN_PLANE].T, turn[:, 1:2].T)
 
 
 def _in_basis(loads: BodyLoads, along: np.ndarray, about: np.ndarray) -> BodyLoads:
-    """Loads in another basis, given by columns for forces and for moments."""
+    """Transform loads to another basis, given by columns for forces and for moments."""
     force, moment, arm, following = map(np.asarray, loads)
     axes = about.shape[0]
     turning = [following[..., :axes] @ about, following[..., axes:] @ along]
@@ -149,7 +149,7 @@ def is_planar(load_path: LoadPath, robot: Robot) -> bool:
         return False
     turned_normal = _turned_by(_turn(load_path)) @ normal
     for external in load_path.different:
-        # Only directions matter here: any mass will do, and where on the tube axis it is.
+        # Only directions matter here, not the mass or its position on the tube axis.
         forces = list(_forces(external, 0, 0.0))
         if external.gravity is not None:
             forces.append((0, external.weight(1.0), _NONE, _NONE, False))
@@ -166,14 +166,14 @@ def _sticks_out(
     normal: Float[np.ndarray, " 3"],
     normal_of_body: Float[np.ndarray, " 3"],
 ) -> bool:
-    """Whether a force leaves a plane or acts beside it, or a moment turns out of it."""
+    """Return whether a force or its point leaves a plane, or a moment's axis is not its normal."""
     across = hypot(*_cross(moment, normal.tolist()))
     (off_plane,) = _components(force, (normal.tolist(),))
-    (beside,) = _components(point, (normal_of_body.tolist(),))
+    (component,) = _components(point, (normal_of_body.tolist(),))
     return (
         abs(off_plane) > _ROUNDING * hypot(*force)
         or across > _ROUNDING * hypot(*moment)
-        or (any(force) and abs(beside) > _ROUNDING * hypot(*point))
+        or (any(force) and abs(component) > _ROUNDING * hypot(*point))
     )
 
 
@@ -188,13 +188,13 @@ def _cross(first: Sequence[float], second: Sequence[float]) -> list[float]:
 
 
 def _turn(load_path: LoadPath) -> tuple[float, ...]:
-    """Rotation vector of the base, by which rotations are looked up."""
+    """Return the rotation vector of the base, the key of cached rotations."""
     return tuple(load_path.base_rotation.tolist())
 
 
 @lru_cache(maxsize=64)
 def _turned_by(vector: tuple[float, ...]) -> Float[np.ndarray, "3 3"]:
-    """Rotation of a rotation vector: the base stays as it is from load to load."""
+    """Return the rotation of a rotation vector, cached: the base is the same for all loads."""
     rotation = np.array(rotation_about(constant(vector)))
     rotation.setflags(write=False)
     return rotation
@@ -221,7 +221,7 @@ _Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool]
 
 
 def _forces(external: ExternalLoad, last: int, tip: float) -> Iterator[_Force]:
-    """All loads but the robot's own weight: body, force, moment, point, whether it follows.
+    """List all loads but the robot's weight: body, force, moment, point, whether it follows.
 
     The tip is `tip` (mm) beyond the origin of the last body.
     """
@@ -235,14 +235,14 @@ def _forces(external: ExternalLoad, last: int, tip: float) -> Iterator[_Force]:
         yield last, external.weight(external.tip_mass), _NONE, point, False
 
 
-# Axes to sum forces along and moments about, in the frame of the bodies, then both in the world; as
-# plain numbers, which for few forces are faster than arrays.
+# Axes of force and moment components in the frame of the bodies, then in the world; as plain
+# numbers, which are faster than arrays for few forces.
 _Axes = tuple[tuple[Sequence[float], ...], ...]
 
 
 @lru_cache(maxsize=64)
 def _axes(base: tuple[float, ...], frame: tuple[float, ...] | None) -> _Axes:
-    """Axes of a frame (of all three axes, or of the plane of its x and z) on a turned base."""
+    """Return the axes of a frame (all three, or x and z of a plane) on a rotated base."""
     turn, along, about = _turned_by(base), np.eye(3), np.eye(3)
     if frame is not None:
         along, about = np.reshape(frame, (3, 3))[:, IN_PLANE], np.reshape(frame, (3, 3))[:, 1:2]
@@ -257,7 +257,7 @@ def _sums(
     body_centre: Float[np.ndarray, "bodies 3"],
     tip: float,
 ) -> tuple[np.ndarray, ...]:
-    """The sums for all bodies."""
+    """Return the sums for all bodies."""
     along, about, world_along, world_about = axes
     count, d, a = len(body_mass), len(along), len(about)
     moments, arms_end = d + a, d + a + d * d

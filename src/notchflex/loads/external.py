@@ -107,9 +107,9 @@ class ExternalLoad:
         given = vars(self)
         if all(given[name] is default for name, default in _DEFAULTS):
             return NOTHING
-        found = object.__new__(ExternalLoad)
-        vars(found).update({name: given[name] for name in EXTERNAL})  # checked already
-        return found
+        load = object.__new__(ExternalLoad)
+        vars(load).update({name: given[name] for name in EXTERNAL})  # checked already
+        return load
 
     @property
     def pulls_down(self) -> bool:

@@ -58,7 +58,7 @@ class LoadPath(Displayed):
         fields = {"tension": tension, "stroke": stroke, "base_rotation": base_rotation}
         vars(self).update(fields, external=external)
         if tension.size and np.isnan(stroke).all() and 0.0 <= tension.min() < np.inf:
-            return  # valid tensions alone, as most often
+            return  # valid tensions alone: the common case
         if len(tension) == 0:
             raise InputError.NO_DATA("a load path needs at least one step; got none")
         if np.isinf(tension).any() or np.isinf(stroke).any():
@@ -82,15 +82,15 @@ class LoadPath(Displayed):
         base_rotation: np.ndarray,
         external: tuple[ExternalLoad, ...],
     ) -> LoadPath:
-        """Make a path of valid values; a control loop makes one for every solve."""
-        made = object.__new__(cls)
-        vars(made).update(
+        """Make a path of valid values without checks, for control loops."""
+        path = object.__new__(cls)
+        vars(path).update(
             tension=tension, stroke=stroke, base_rotation=base_rotation, external=external
         )
-        return made
+        return path
 
     def __len__(self) -> int:
-        """Number of steps."""
+        """Return the number of steps."""
         return len(self.tension)
 
     def __getitem__(self, step: int) -> Load:
@@ -120,15 +120,15 @@ class LoadPath(Displayed):
 
     @cached_property
     def different(self) -> list[ExternalLoad]:
-        """The external loads, each different one once, in order."""
+        """The distinct external loads, in order."""
         if len(self.external) == 1:
             return list(self.external)
-        # Usually all steps have the same object, which is found faster than equal ones.
+        # Usually all steps share one object; identity is faster than equality.
         return list(dict.fromkeys({id(one): one for one in self.external}.values()))
 
     @cached_property
     def which(self) -> Int[np.ndarray, " s"]:
-        """Which of the different loads acts at each step."""
+        """Index of the distinct load of each step."""
         number = {one: i for i, one in enumerate(self.different)}
         seen = {id(one): one for one in self.external}
         by_identity = {identity: number[one] for identity, one in seen.items()}
@@ -214,12 +214,12 @@ class LoadPath(Displayed):
             [(0.0, 0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0)]
         """
         given = {n: v for n, v in locals().items() if n in EXTERNAL and v is not None}
-        # Usually all steps carry the same: each different load is made and checked once.
+        # Each distinct load is made and checked once.
         changed = [replace(one, **given) for one in self.different]
         return replace(self, external=tuple(changed[number] for number in self.which.tolist()))
 
     def for_tendons(self, count: int) -> LoadPath:
-        """Return the path for a robot of so many tendons; those added are slack."""
+        """Return the path for a number of tendons; those added are slack."""
         given = self.tension.shape[1]
         if given == count:
             return self
@@ -253,7 +253,7 @@ def join_paths(paths: Sequence[LoadPath]) -> LoadPath:
 
 
 def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
-    """Convert loads of any form to a path for a robot of so many tendons.
+    """Convert loads of any form to a path for a robot with a number of tendons.
 
     Args:
         loads: A path, one load, or loads in order.

@@ -9,7 +9,7 @@ from notchflex.errors import InputError
 from notchflex.loads.load_path import LoadPath
 from notchflex.loads.validation import check_integer, check_number
 
-_MOST_TENDONS = 1000
+_MAX_TENDONS = 1000
 
 
 def pull(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
@@ -66,9 +66,9 @@ def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> Load
         raise InputError.OUT_OF_RANGE(
             f"a range has at most {MOST_STEPS:,} steps; got {steps:,}. Take fewer."
         )
-    if not 1 <= tendon <= _MOST_TENDONS:
+    if not 1 <= tendon <= _MAX_TENDONS:
         raise InputError.OUT_OF_RANGE(
-            f"tendons are counted from 1, to {_MOST_TENDONS} at most; got {tendon}"
+            f"tendons are counted from 1, to {_MAX_TENDONS} at most; got {tendon}"
         )
     first, last = check_number(start, f"the first {what}"), check_number(stop, f"the last {what}")
     if steps == 1 and first != last:

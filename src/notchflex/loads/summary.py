@@ -93,12 +93,12 @@ def tendon_rows(
 ) -> Iterator[tuple[str, str]]:
     """Yield the course of every tendon; of many, the first that are not slack."""
     count = values.shape[1]
-    there = [i for i in range(count) if np.isfinite(values[:, i]).any()]
-    shown = there[: MOST - 2] if len(there) > MOST - 1 else there
+    moving = [i for i in range(count) if np.isfinite(values[:, i]).any()]
+    shown = moving[: MOST - 2] if len(moving) > MOST - 1 else moving
     for index in shown:
         which = f" {index + 1}" if count > 1 else ""
         yield (f"tendon{which} {name}", f"{course(values[:, index])} {unit}")
-    if len(there) > len(shown):
-        yield (f"tendon {name}", f"and {len(there) - len(shown)} more tendons")
-    if not there and not commanded:
+    if len(moving) > len(shown):
+        yield (f"tendon {name}", f"and {len(moving) - len(shown)} more tendons")
+    if not moving and not commanded:
         yield (f"tendon {name}", "none")

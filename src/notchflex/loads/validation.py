@@ -93,28 +93,28 @@ def check_table(value: Any, what: str) -> np.ndarray:
         ) from None
 
 
-def check_pulls(tension: np.ndarray, least: float = 0.0, source: str = "") -> None:
+def check_pulls(tension: np.ndarray, minimum: float = 0.0, source: str = "") -> None:
     """Refuse measured tensions of a tendon that are all negative.
 
-    Small ones are the offset of a sensor, of a slack tendon or beside others that are pulled.
+    Small ones are a sensor's offset, of a slack tendon or among others that are pulled.
 
     Args:
         tension: Tensions by rows and tendons, N, NaN where not measured.
-        least: Negative tensions up to this are an offset, N, if it is more than 0.05 N.
+        minimum: Negative tensions up to this are an offset, N, if it is more than 0.05 N.
         source: The file, for the message.
 
     Raises:
         InputError: The sign or the zero of the sensor is wrong.
     """
     largest = float(np.nanmax(np.abs(tension), initial=0.0))
-    least = max(least, _OFFSET, _PART * largest)
-    place = f"{source}: " if source else ""
+    minimum = max(minimum, _OFFSET, _PART * largest)
+    prefix = f"{source}: " if source else ""
     for tendon, values in enumerate(tension.T, 1):
-        known = values[np.isfinite(values)]
-        if len(known) and known.max() < 0.0 and known.min() < -least:
+        finite = values[np.isfinite(values)]
+        if len(finite) and finite.max() < 0.0 and finite.min() < -minimum:
             raise InputError.OUT_OF_RANGE(
-                f"{place}all tensions of tendon {tendon} are negative, down to {known.min():g} N, "
-                "but a tendon only pulls; change their sign, or take away the sensor's offset"
+                f"{prefix}all tensions of tendon {tendon} are negative, down to {finite.min():g} "
+                "N, but a tendon only pulls; change their sign, or take away the sensor's offset"
             )
 
 

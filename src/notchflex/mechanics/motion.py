@@ -1,11 +1,11 @@
-"""Rigid motions of space or of a plane: rotations, products, wrenches carried along.
+"""Rigid motions of space or of a plane: rotations, products, transformation of wrenches.
 
 A motion is a `Motion(rotation, translation)`: it takes coordinates of the inner frame to the
 outer one, `outer = rotation @ inner + translation`. A twist is (angular, linear), a wrench
 (moment, force), so that their dot product is a power.
 
-Everything is written once for both groups; the shapes tell which it is. Space has three angular and
-three linear components. The plane is that of x and z, its angular component is about y: twists and
+All functions serve both groups, distinguished by the shapes. Space has three angular and three
+linear components. The plane is that of x and z, its angular component is about y: twists and
 wrenches have three numbers, `PLANE` of the six of space, and points two, `IN_PLANE` of three. A
 "rotation" of the plane may also mirror x, as a frame does that is turned by half a turn about z.
 """
@@ -38,24 +38,24 @@ class Motion(NamedTuple):
     translation: Float[Array, "... d"]
 
     def then(self, inner: Motion) -> Motion:
-        """Product: this motion, and inside its frame another."""
+        """Compose with another motion, given in the inner frame."""
         return Motion(
             _times(self.rotation, inner.rotation),
             _times(self.rotation, inner.translation) + self.translation,
         )
 
     def point(self, inside: Float[Array, " d"]) -> Float[Array, " d"]:
-        """Outer coordinates of a point of the inner frame (mm)."""
+        """Transform a point of the inner frame to outer coordinates (mm)."""
         return _times(self.rotation, inside) + self.translation
 
     def point_inside(self, outside: Float[Array, "*n d"]) -> Float[Array, "*n d"]:
-        """Inner coordinates of a point of the outer frame (mm), or of many."""
+        """Transform a point of the outer frame, or many, to inner coordinates (mm)."""
         return _times(self.rotation.T, (outside - self.translation).T).T
 
     def wrench(self, inside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
-        """Return a wrench (moment, force) about the inner origin, about and along the outer frame.
+        """Transform a wrench (moment, force) from the inner to the outer frame.
 
-        Or many as columns, as for the two functions that follow.
+        This and the two methods below also accept many, as columns.
         """
         axes = angular(inside)
         force = _times(self.rotation, inside[axes:])
@@ -63,7 +63,7 @@ class Motion(NamedTuple):
         return array_module(inside, force).concatenate([moment, force])
 
     def wrench_inside(self, outside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
-        """Return a wrench about the outer origin, about the inner one and along the inner frame."""
+        """Transform a wrench from the outer to the inner frame."""
         axes = angular(outside)
         force = outside[axes:]
         moment = outside[:axes] - moment_of(self.translation, force)
@@ -72,7 +72,7 @@ class Motion(NamedTuple):
         return array_module(outside, inside).concatenate([inside, along])
 
     def twist_inside(self, outside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
-        """Return a twist at the outer origin, at and along the inner frame."""
+        """Transform a twist from the outer to the inner frame."""
         axes = angular(outside)
         moved = outside[axes:] + cross(outside[:axes], self.translation)
         turn = turned(self.rotation.T, outside[:axes])
@@ -80,10 +80,10 @@ class Motion(NamedTuple):
 
 
 def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[Array, "d ..."]:
-    """Product with a vector or with columns.
+    """Multiply by a vector or by columns.
 
-    Compiled it is written out, and becomes part of what stands around it: of so small matrices a
-    product for itself takes longer to begin than to do.
+    In compiled code the product is written out, so that it fuses with its surroundings: for such
+    small matrices the overhead of a separate product exceeds its cost.
     """
     if array_module(matrix, other) is np:
         return matrix @ other
@@ -97,21 +97,21 @@ def angular(twist: Float[Array, "w ..."]) -> int:
 
 
 def identity(dimensions: int = 3) -> Motion:
-    """Return the motion of space, or of the plane, that moves nothing."""
+    """Return the identity motion of space, or of the plane."""
     return Motion(constant(np.eye(dimensions)), constant(np.zeros(dimensions)))
 
 
 def turned(rotation: Float[Array, "d d"], axis: Float[Array, "a ..."]) -> Float[Array, "a ..."]:
-    """Angular vectors along the outer frame; in the plane a mirror changes their sign."""
+    """Rotate angular vectors to the outer frame; in the plane a mirror changes their sign."""
     if axis.shape[0] == 3:
         return _times(rotation, axis)
     return (rotation[0, 0] * rotation[1, 1] - rotation[0, 1] * rotation[1, 0]) * axis
 
 
 def skew(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
-    """Matrix of the cross product with an angular vector: `skew(a) @ b = a x b`.
+    """Return the matrix of the cross product with an angular vector: `skew(a) @ b = a x b`.
 
-    In space of many vectors at once.
+    In space it accepts many vectors.
     """
     xp = array_module(vector)
     if vector.shape[-1] == 1:
@@ -123,9 +123,9 @@ def skew(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
 
 
 def cross(first: Float[Array, "a ..."], second: Float[Array, "d ..."]) -> Float[Array, "d ..."]:
-    """Cross product of an angular vector and a linear one (in space, of any two).
+    """Compute the cross product of an angular vector and a linear one (in space, of any two).
 
-    Written out: it is compiled and run faster so than as a matrix.
+    Written out it compiles and runs faster than as a matrix.
     """
     xp = array_module(first, second)
     if first.shape[0] == 1:
@@ -143,7 +143,7 @@ def moment_of(point: Float[Array, "d ..."], force: Float[Array, "d ..."]) -> Flo
 
 
 def unskew(matrix: Float[Array, "d d"]) -> Float[Array, " a"]:
-    """Vector of the skew part of a matrix, the inverse of `skew`."""
+    """Return the vector of the skew part of a matrix, the inverse of `skew`."""
     xp = array_module(matrix)
     if matrix.shape[0] == 2:
         return 0.5 * xp.stack([matrix[0, 1] - matrix[1, 0]])
@@ -153,7 +153,7 @@ def unskew(matrix: Float[Array, "d d"]) -> Float[Array, " a"]:
 
 
 def _coefficients(squared: Float[Array, ""]) -> tuple[Array, Array, Array]:
-    """sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 for a squared angle."""
+    """Compute sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 from a squared angle."""
     xp = array_module(squared)
     small = squared < _SERIES_BELOW
     near = xp.where(small, squared, 0.0)
@@ -175,10 +175,10 @@ def _polynomial(coefficients: list[float], at: Float[Array, ""]) -> Float[Array,
 
 
 def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
-    """Sine and cosine, right to rounding.
+    """Compute sine and cosine to rounding accuracy.
 
-    Compiled, those of the C library are taken number by number: this is several times as fast. The
-    angle is brought to within half a turn, a quarter of it put into the series, and doubled twice.
+    In compiled code this is several times as fast as the scalar C library. The angle is reduced to
+    half a turn, a quarter of it is put into the series, and the result is doubled twice.
     """
     if array_module(angle) is np:
         return cast("tuple[Array, Array]", (np.sin(angle), np.cos(angle)))
@@ -196,12 +196,12 @@ _VERSINE = [(-1.0) ** k / factorial(2 * k + 2) for k in range(9)]
 
 
 def wrench_at(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Array, " w"]:
-    """Return a force at a point as a wrench (moment, force) about the origin."""
+    """Return the wrench (moment, force) about the origin of a force at a point."""
     return array_module(point, force).concatenate([moment_of(point, force), force])
 
 
 def wrench_turn(wrench: Float[Array, " w"]) -> Float[Array, "w w"]:
-    """Return how a wrench that goes along with a frame changes, per unit of the frame's own twist.
+    """Differentiate a wrench that moves with a frame by the twist of the frame.
 
     With moment m and force f, a twist (omega, v) changes it by (omega x m + v x f, omega x f).
     """
@@ -220,18 +220,18 @@ def wrench_turn(wrench: Float[Array, " w"]) -> Float[Array, "w w"]:
 
 
 def outer_twists(motion: Motion, twists: Float[Array, "*n 6 k"]) -> Float[Array, "*n 6 k"]:
-    """Twists of the inner frame, as columns, at and along the outer one: in space, of many at once.
+    """Transform twists, as columns, from the inner to the outer frame; in space, of many motions.
 
-    For plain arrays, as robots are put together of them.
+    For NumPy arrays only.
     """
     turn = motion.rotation @ twists[..., :3, :]
-    place = motion.translation[..., None]
-    moved = motion.rotation @ twists[..., 3:, :] + np.cross(place, turn, axis=-2)
+    offset = motion.translation[..., None]
+    moved = motion.rotation @ twists[..., 3:, :] + np.cross(offset, turn, axis=-2)
     return constant(np.concatenate([turn, moved], axis=-2))
 
 
 def rotation_about(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
-    """Return the rotation matrix of a rotation vector (rad); in space of many at once."""
+    """Return the rotation matrix of a rotation vector (rad); in space of many."""
     xp = array_module(vector)
     if vector.shape[-1] == 1:
         sine, cosine = sine_cosine(vector[0])
@@ -242,26 +242,29 @@ def rotation_about(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
 
 
 def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
-    """How the rotation of a rotation vector turns on, along the outer axes, per change of it."""
+    """Return the left Jacobian of SO(3): rotation in the outer frame per change of its vector."""
     _, second, third = _coefficients(_squared(vector))
     matrix = skew(vector)
     return constant(np.eye(3)) + _each(second) * matrix + _each(third) * (matrix @ matrix)
 
 
-def left_slope_change(vector: Float[Array, " 3"], held: Float[Array, " 3"]) -> Float[Array, "3 3"]:
-    """Return the change of `left_slope(vector).T @ held` per change of the rotation vector.
+def left_slope_change(
+    vector: Float[Array, " 3"], constant_vector: Float[Array, " 3"]
+) -> Float[Array, "3 3"]:
+    """Differentiate `left_slope(vector).T @ constant_vector` by the rotation vector.
 
-    That product is held - b (v x held) + c v x (v x held), with coefficients b and c of |v|^2.
+    With a the constant vector the product is a - b (v x a) + c v x (v x a), with coefficients b and
+    c of |v|^2.
     """
     squared = vector @ vector
     (_, second, third), (_, by_second, by_third) = jax.jvp(
         _coefficients, (squared,), (jnp.ones_like(squared),)
     )
-    once = cross(vector, held)
+    once = cross(vector, constant_vector)
     twice = cross(vector, once)
     of_coefficients = jnp.outer(2.0 * (by_third * twice - by_second * once), vector)
-    of_products = skew(once) + skew(vector) @ skew(held)
-    return of_coefficients + second * skew(held) - third * of_products
+    of_products = skew(once) + skew(vector) @ skew(constant_vector)
+    return of_coefficients + second * skew(constant_vector) - third * of_products
 
 
 def _squared(vector: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
@@ -269,5 +272,5 @@ def _squared(vector: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
 
 
 def _each(values: Float[Array, "*n"]) -> Float[Array, "*n 1 1"]:
-    """Numbers that matrices are to be multiplied by."""
+    """Shape numbers so that they multiply matrices."""
     return values if np.ndim(values) == 0 else values[..., None, None]

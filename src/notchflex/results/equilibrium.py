@@ -99,7 +99,7 @@ class Equilibrium(EquilibriumQuantities, Displayed):
         return step_document(self._path, self._step)
 
     def to_xarray(self) -> Dataset:
-        """This state as a labelled data set: what `EquilibriumPath.to_xarray` has, at this step."""
+        """Convert the state to a labelled data set, as `EquilibriumPath.to_xarray` at this step."""
         return self._path.to_xarray().isel(step=self._step)
 
     @overload

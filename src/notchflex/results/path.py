@@ -1,4 +1,4 @@
-"""What a simulation returns: the states of a path."""
+"""Result of a simulation: the states of a path."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ class EquilibriumPath(PathQuantities, Displayed):
     """Equilibria along a load path. Units mm, N, N mm, rad; s steps, n notches, t tendons.
 
     Where a step did not converge its row holds the last good state (its `tension` and `stroke`
-    are that state's, not the commanded ones), `converged` is false and `reason` says why; the
-    steps after it were not tried and hold the same state.
+    are that state's, not the commanded ones), `converged` is false and `reason` explains it; the
+    later steps were not tried and hold the same state.
 
     Attributes:
         robot: The robot.
         load: The loads.
         prepared: The robot as arrays.
-        run: What the solver returned, as arrays, or what was read of it from a file.
+        run: Arrays that the solver returned, or those read from a file.
         each_from_rest: Whether every state starts from the same one, not from its neighbour.
-        settings: How hard the solver tried.
+        settings: Tolerance and limits of the solver.
     """
 
     robot: Robot
@@ -67,7 +67,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         return self.prepared.chain
 
     def __len__(self) -> int:
-        """Number of steps."""
+        """Return the number of steps."""
         return len(self.load)
 
     @overload
@@ -75,7 +75,7 @@ class EquilibriumPath(PathQuantities, Displayed):
     @overload
     def __getitem__(self, step: slice) -> list[Equilibrium]: ...
     def __getitem__(self, step: int | slice) -> Equilibrium | list[Equilibrium]:
-        """One state, or some of them."""
+        """Return one state, or some of them."""
         if isinstance(step, slice):
             return [Equilibrium(self, i) for i in range(*step.indices(len(self)))]
         if not -len(self) <= step < len(self):
@@ -91,8 +91,8 @@ class EquilibriumPath(PathQuantities, Displayed):
         kept = vars(self).setdefault("_kept", {})
         if name not in kept:
             if name not in QUANTITIES:
-                known = ", ".join(QUANTITIES)
-                raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {known}")
+                names = ", ".join(QUANTITIES)
+                raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {names}")
             quantity = QUANTITIES[name]
             if quantity.source in ("path", "derived"):
                 kept[name] = quantity.formula(self)
@@ -103,9 +103,9 @@ class EquilibriumPath(PathQuantities, Displayed):
         return kept[name]
 
     def solver_quantity(self, name: str) -> np.ndarray:
-        """Return what the solver reports of every step, by its name.
+        """Return a quantity that the solver reports of every step, by its name.
 
-        Steps that were not tried repeat the last one that was: the solver leaves their rows empty.
+        Steps that were not tried repeat the last one that was: their rows are empty.
         """
         values = np.asarray(self.run.quantity(name))
         if len(self) == 1:  # always tried
@@ -117,13 +117,13 @@ class EquilibriumPath(PathQuantities, Displayed):
 
     @cached_property
     def base_to_world(self) -> Float[np.ndarray, "3 3"] | None:
-        """Rotation of the base in the world, shape (3, 3); None for a base that is not turned."""
+        """Rotation of the base in the world, shape (3, 3); None for the identity."""
         turn = self.load.base_rotation
         return np.asarray(rotation_about(constant(turn))) if any(turn.tolist()) else None
 
     @cached_property
     def front(self) -> tuple[Int[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
-        """How far the friction has reversed along every tendon, m and eta, (s, t) each.
+        """Front of reversed friction along every tendon, m and eta, (s, t) each.
 
         Gao 2017, eq. 26: the friction of contact i is that of unloading for i < m, eta times
         the largest for i = m, and that of loading for i > m. Contacts are counted from 1 at the
@@ -134,12 +134,12 @@ class EquilibriumPath(PathQuantities, Displayed):
 
     @cached_property
     def failures(self) -> list[tuple[Failure | None, str]]:
-        """What stopped the solver at every step, and the sentence that says so; None and ""."""
+        """Failure at every step, and a sentence on it; None and "" where it converged."""
         return [why_not(self, step) for step in range(len(self))]
 
     @cached_property
     def commands(self) -> Command:
-        """The loads as the solver takes them."""
+        """The loads as arrays for the solver."""
         return make_commands(self.load, self.robot, self.chain)
 
     @cached_property
@@ -149,7 +149,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         return np.asarray(value), np.asarray(sign)
 
     def state_at(self, step: int) -> State:
-        """Return state after a step (or the last good one before it), to save or continue from."""
+        """Return the state after a step (or the last good one), to save or continue from."""
         solved: SolverState = tree_util.tree_map(
             lambda leaf: np.asarray(leaf)[step], self.run.solved
         )

@@ -1,4 +1,4 @@
-"""Why a step of a path did not converge, in words for the person who gave the load."""
+"""Reasons why a step of a path did not converge, as sentences for the user."""
 
 from __future__ import annotations
 
@@ -21,19 +21,20 @@ from notchflex.solver.programs.run import run
 if TYPE_CHECKING:  # for the type only: a path tells its reasons
     from notchflex.results.path import EquilibriumPath
 
-# A stroke is followed up to the last good state before the last notch closes, which leaves it
-# open by less than this part of its height.
-_NEARLY_CLOSED = 1e-3
-# Steps that come to where the edges of a tendon's channel meet end within this part of its span.
+# Largest opening of a notch that counts as closed, as a fraction of its height: a stroke converges
+# up to the last state before the last notch closes.
+_CLOSED_TOLERANCE = 1e-3
+# Largest free span of a tendon at which the edges of its channel count as meeting, relative to the
+# natural span.
 _EDGES_MEET = 5e-2
-# Axial stiffnesses, in forces that close a notch, each ten times the one before. Where nothing but
-# stretch lets a tendon be drawn so far, the second step changes its tension about ten times as much
-# as the first; where the shape fixes the tension, a tenth as much.
+# Axial stiffnesses, in closing forces of a notch, in ratios of ten. Where only stretch allows a
+# stroke, the second step changes the tension about ten times as much as the first; where the shape
+# determines the tension, a tenth as much.
 _STIFFNESSES, _GROWS = (1e2, 1e3, 1e4), 3.0
 
 
 def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
-    """Return what stopped the solver at a step, and a sentence on it; None and "" if nothing."""
+    """Return the failure at a step, and a sentence on it; None and "" where it converged."""
     if path.converged[step]:
         return None, ""
     if not path.run.tried[step]:
@@ -48,14 +49,14 @@ def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
     drawn = ", ".join(f"{value:.4g}" for value in path.stroke[step])
     last = f"; the last good state has tension {tension} N and stroke {drawn} mm"
     opening = np.asarray(path.chain.rods.length).sum(axis=-1)
-    all_closed = (path.gap[step] < _NEARLY_CLOSED * opening).all()
+    all_closed = (path.gap[step] < _CLOSED_TOLERANCE * opening).all()
     if (all_closed or _past_closing(path, step)) and not np.isnan(path.load.stroke[step]).all():
         return _said(Failure.NOTCHES_CLOSED, last)
-    held = [str(tendon + 1) for tendon in _drawn_by_stretch_alone(path, step)]
-    if len(held) == 1:
-        return _said(Failure.STROKE_OUT_OF_REACH, last, tendon=held[0])
-    if held:
-        return _said(Failure.STROKES_CONTRADICT, last, tendons=" and ".join(held))
+    tendons = [str(tendon + 1) for tendon in _drawn_by_stretch_alone(path, step)]
+    if len(tendons) == 1:
+        return _said(Failure.STROKE_OUT_OF_REACH, last, tendon=tendons[0])
+    if tendons:
+        return _said(Failure.STROKES_CONTRADICT, last, tendons=" and ".join(tendons))
     if (met := _edges_that_meet(path, step)) is not None:
         return _said(Failure.TENDON_EDGES_MEET, last, tendon=met[0] + 1, notch=met[1] + 1)
     reached, left = 100.0 * float(path.run.reached[step]), float(path.residual[step])
@@ -67,20 +68,20 @@ def _said(failure: Failure, last: str = "", **values: object) -> tuple[Failure, 
 
 
 def _past_closing(path: EquilibriumPath, step: int) -> bool:
-    """Whether a stroke of a step is more than an inextensible tendon can lose."""
+    """Return whether a stroke of a step exceeds the closing stroke of an inextensible tendon."""
     reach = closing_stroke(path.chain)
     inextensible = np.isinf(np.asarray(path.chain.axial_stiffness))
     return bool((inextensible & (path.load.stroke[step] >= reach)).any())
 
 
 def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None:
-    """Return a straight tendon and a notch, from 0, whose faces leave it no free length.
+    """Return a straight tendon and a notch, from 0, where its free span vanishes.
 
-    Where the edges of its channel meet before the lips of the notch do, the span between them has
-    no direction, and beyond it would push. Yielding lips let a closed notch come there.
+    Where the edges of its channel meet before those of the notch, the span between them has no
+    direction. A compliant contact lets a closed notch reach that state.
     """
     chain = path.chain
-    place, turn = path.body_position[step], path.body_rotation[step]
+    position, rotation = path.body_position[step], path.body_rotation[step]
     for group in chain.groups:
         if not isinstance(group, Straight):
             continue
@@ -88,15 +89,15 @@ def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None
         runs, natural = np.asarray(group.runs), np.asarray(group.natural_gap)
         for (notch, one), before in np.ndenumerate(np.asarray(group.back)):
             at, anchor = notch + 1, notch + 1 - int(before)
-            entered = place[at] + turn[at] @ enters[notch, one]
-            left = place[anchor] + turn[anchor] @ leaves[notch, one]
+            entered = position[at] + rotation[at] @ enters[notch, one]
+            left = position[anchor] + rotation[anchor] @ leaves[notch, one]
             if runs[notch, one] and norm(entered - left) < _EDGES_MEET * natural[notch, one]:
                 return group.numbers[one], notch
     return None
 
 
 def _in_space(chain: Chain, points: ArrayLike) -> Float[np.ndarray, "n t 3"]:
-    """Points of the tendons in the frames of the bodies."""
+    """Transform points of the tendons to the frames of the bodies."""
     points = np.asarray(points)
     if chain.frame is None:
         return points
@@ -104,9 +105,9 @@ def _in_space(chain: Chain, points: ArrayLike) -> Float[np.ndarray, "n t 3"]:
 
 
 def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray, " some"]:
-    """Return the inextensible tendons, from 0, that no shape of the robot lets be drawn so far.
+    """Return the inextensible tendons, from 0, whose stroke no shape of the robot allows.
 
-    Solved once more with tendons that stretch, their tension grows as their stiffness does.
+    Solved again with extensible tendons, their tension grows with their stiffness.
     """
     chain = path.chain
     inextensible = np.isinf(np.asarray(chain.axial_stiffness))
@@ -123,6 +124,6 @@ def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray,
         tensions.append(came.quantity("tension")[0])
     if not tensions:
         return np.zeros(0, int)
-    least = 1e-3 * float(chain.closing_force)
+    threshold = 1e-3 * float(chain.closing_force)
     first, second = np.diff(tensions, axis=0)
-    return np.flatnonzero(asked & (second > np.maximum(_GROWS * first, least)))
+    return np.flatnonzero(asked & (second > np.maximum(_GROWS * first, threshold)))

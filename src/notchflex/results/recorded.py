@@ -1,4 +1,4 @@
-"""A run read back from a file: its numbers are reported again, and nothing is solved."""
+"""A run read back from a file: its numbers are reported without solving."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Recorded:
         return self.first[name]
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
-        """Smallest real part of the stiffness's eigenvalues and sign of the determinant."""
+        """Return the smallest real part of the eigenvalues, and the determinant's sign."""
         del commands  # they were counted when it was computed
         return self.held
 

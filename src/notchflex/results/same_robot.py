@@ -10,10 +10,9 @@ from typing import Any
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
-# What a robot is called, when a strain is warned of and how exact its values are has no effect on
-# its states.
+# Values without effect on states: the name, the limit of strain warnings and tolerances.
 _NO_EFFECT = ("name", "material.allowed_strain", "tolerance.")
-_MOST = 3
+_MAX_NAMED = 3
 
 
 def differences(robot: Robot, other: Robot) -> list[str]:
@@ -53,12 +52,12 @@ def mismatch(robot: Robot, other: Robot) -> str:
     if robot is other:  # robots do not change
         return ""
     changed = differences(robot, other)
-    more = len(changed) - _MOST
-    return ", ".join(changed[:_MOST]) + (f" and {more} more" if more > 0 else "")
+    more = len(changed) - _MAX_NAMED
+    return ", ".join(changed[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _values(robot: Robot) -> dict[str, Any]:
-    """Every value of a robot by its name, notch by notch."""
+    """Return every value of a robot by its name, notch by notch."""
     table = to_table(robot.replace(notch=robot.notches))
     values: dict[str, Any] = {}
     for section, part in table.items():
@@ -76,7 +75,7 @@ def _values(robot: Robot) -> dict[str, Any]:
 
 
 def _general(name: str) -> str:
-    """The name that means a value of all notches or tendons."""
+    """Return the name that means a value of all notches or tendons."""
     section, _, key = name.partition(".")
     return f"{section.partition('[')[0]}.{key}"
 

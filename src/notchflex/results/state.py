@@ -29,15 +29,15 @@ _FORMAT = "notchflex state 3"
 
 @dataclass(frozen=True, repr=False)
 class State(Displayed):
-    """Everything that the next load needs to know of the past.
+    """A solved state with the memory that the next load needs.
 
     Attributes:
         robot: Name of the robot it belongs to.
         solved: Unknowns, base tensions (N), memory of contacts and material, stroke (mm) and
             loads, those as of space.
-        level: For which loads its chain was assembled.
+        level: Loads that its chain was assembled for.
         loaded: Whether loads other than the tendons' act in it.
-        refinement: How many more modes its chain has than for usual loads.
+        refinement: Number of refinements of its modes beyond those for usual loads.
         description: The robot it belongs to; None if that is not known.
     """
 
@@ -52,7 +52,7 @@ class State(Displayed):
         """Write the state to a JSON file.
 
         Args:
-            path: Where to; an existing file is replaced, whole or not at all.
+            path: The file; an existing one is replaced atomically.
 
         Raises:
             InputError: The file cannot be written.
@@ -173,8 +173,8 @@ class SavedState:
             if not np.isfinite(array).all():
                 raise _damaged(self.source, f"{name} holds what is not a finite number")
             read[name] = array
-        wanted, _ = tree_util.tree_flatten_with_path(at_rest(chain))
-        for name in (leaf_name(key) for key, _ in wanted):
+        expected, _ = tree_util.tree_flatten_with_path(at_rest(chain))
+        for name in (leaf_name(key) for key, _ in expected):
             if name not in read and not name.startswith(_LOADS):
                 raise _damaged(self.source, f"{name} is missing")
         return _on_chain(read, chain, f"{self.source} holds a state of robot {self.robot!r}")
@@ -224,7 +224,7 @@ def check_robot(state: object, robot: Robot) -> None:
 
 
 def fitted(state: State | SavedState | None, chain: Chain) -> SolverState:
-    """Return what to start from: rest, or a state that must fit the chain."""
+    """Return the start state on a chain: rest, or a given state, which must fit."""
     if state is None:
         return at_rest(chain)
     if isinstance(state, SavedState):
@@ -233,7 +233,7 @@ def fitted(state: State | SavedState | None, chain: Chain) -> SolverState:
 
 
 def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> SolverState:
-    """A state on a chain that may have been assembled for more loads than that of the state."""
+    """Convert arrays to a state on a chain, which may be assembled for more kinds of loads."""
     rest = at_rest(chain)
     frame = chain.frame
     if rest.applied is not None and frame is not None:  # a state holds loads as those of space

@@ -1,6 +1,6 @@
-"""Summaries of results: what `repr` and a notebook show of them.
+"""Summaries of results for `repr` and notebooks.
 
-Only quantities of the first compiled program are shown, so that a summary never compiles another.
+They show only quantities of the first compiled program, so that a summary never compiles another.
 """
 
 from __future__ import annotations
@@ -42,20 +42,20 @@ def equilibrium_summary(state: Equilibrium) -> Summary:
 
 def path_summary(path: EquilibriumPath) -> Summary:
     """Summarise a path: how load, angle and tip change along it, and whether it converged."""
-    good = np.asarray(path.converged)
+    converged = np.asarray(path.converged)
     rows = list(external_rows(path.load))
     for name, unit, values in (
         ("tension", "N", path.tension),
         ("stroke", "mm", path.stroke),
     ):
-        rows += tendon_rows(name, unit, np.where(good[:, None], values, np.nan))
-    angle = np.where(good, path.total_angle * _ANGLE.scale, np.nan)
+        rows += tendon_rows(name, unit, np.where(converged[:, None], values, np.nan))
+    angle = np.where(converged, path.total_angle * _ANGLE.scale, np.nan)
     rows.append(("total angle", f"{course(angle, 1)} {_ANGLE.unit}"))
-    tips = path.tip_position[good]
+    tips = path.tip_position[converged]
     if len(tips):
         ends = dict.fromkeys(
             vector(tips[step], 2)
-            for step in (0, int(np.nanargmax(np.abs(path.total_angle[good]))), -1)
+            for step in (0, int(np.nanargmax(np.abs(path.total_angle[converged]))), -1)
         )
         rows.append(("tip position", f"{' to '.join(ends)} mm"))
     rows.append(("converged", _converged(path)))
@@ -65,7 +65,7 @@ def path_summary(path: EquilibriumPath) -> Summary:
 
 
 def state_summary(state: State) -> Summary:
-    """Summarise a saved state: whose it is, and what its tendons carry."""
+    """Summarise a saved state: its robot, and the tensions and strokes of its tendons."""
     point = state.solved.point
     rows = [
         ("tendon tension", f"{_few(np.asarray(point.base_tension))} N"),
@@ -76,15 +76,15 @@ def state_summary(state: State) -> Summary:
 
 
 def _converged(path: EquilibriumPath) -> str:
-    good = np.asarray(path.converged)
-    if good.all():
+    converged = np.asarray(path.converged)
+    if converged.all():
         return "all steps"
-    first = int(np.argmin(good))
-    return f"{int(good.sum())} of {len(path)} steps; step {first + 1}: {path.reason[first]}"
+    first = int(np.argmin(converged))
+    return f"{int(converged.sum())} of {len(path)} steps; step {first + 1}: {path.reason[first]}"
 
 
 def _few(values: np.ndarray, digits: int | None = None) -> str:
-    """Return numbers one after the other, the first and the last of many."""
+    """Format numbers as a list, of many the first and the last."""
     texts = [
         short(float(value)) if digits is None else f"{round(float(value), digits) + 0.0:.{digits}f}"
         for value in values

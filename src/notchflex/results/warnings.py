@@ -1,4 +1,4 @@
-"""What a user should know about a result before trusting it."""
+"""Warnings on the validity of a result."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
 
 MOMENT_ERROR = 0.01
-"""A larger part of the bending moment than this that the strain modes miss is warned of."""
+"""Relative error of the bending moment of the strain modes above which a path has a warning."""
 
 
 def path_warnings(path: EquilibriumPath) -> list[str]:
@@ -94,13 +94,13 @@ def _coarse(path: EquilibriumPath) -> Iterator[str]:
         return
     step = int(np.argmax(error))
     # Not at the head of the file: what only reads this table needs no solver.
-    from notchflex.mechanics.flexure import MOST_REFINEMENT
+    from notchflex.mechanics.flexure import MAX_REFINEMENT
 
     refinement = path.chain.refinement
     remedy = (
         f"simulate with --refinement {refinement + 1} (in Python refinement={refinement + 1}) "
         "and see what changes"
-        if refinement < MOST_REFINEMENT
+        if refinement < MAX_REFINEMENT
         else "there is no finer --refinement, so take the result with care"
     )
     yield (

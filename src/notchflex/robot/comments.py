@@ -12,7 +12,7 @@ _FITTED = re.compile(rf"(?:;|#)\s*{FITTED_TO} .*$")
 
 
 def set_value(table: Any, key: str, value: object) -> None:
-    """Change a value; a comment beside it says from what."""
+    """Set a value, and note the old one in a comment."""
     was, comment = table[key].as_string(), table[key].trivia.comment
     table[key] = value
     if not comment:

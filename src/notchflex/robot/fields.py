@@ -43,7 +43,7 @@ def fields_of(cls: type) -> Mapping[str, Any]:
 
     That is `kind`, then what the class itself declares, then what all kinds share.
     """
-    known: dict[str, Any] = getattr(cls, "__pydantic_fields__", {})
+    pydantic_fields: dict[str, Any] = getattr(cls, "__pydantic_fields__", {})
     shared = {f.name for f in dataclasses.fields(cls) if f.kw_only}
-    order = sorted(known.items(), key=lambda item: (item[0] != "kind", item[0] in shared))
+    order = sorted(pydantic_fields.items(), key=lambda item: (item[0] != "kind", item[0] in shared))
     return types.MappingProxyType(dict(order))

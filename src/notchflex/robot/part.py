@@ -21,8 +21,8 @@ class ProblemError(ValueError):
     The text goes on after the name of the key: "is 1.7 mm; it must be ...".
     """
 
-    def __init__(self, found: Iterable[tuple[str, str]]):
-        self.found = list(found)
+    def __init__(self, problems: Iterable[tuple[str, str]]):
+        self.found = list(problems)
         super().__init__("\n".join(f"`{key}` {text}" for key, text in self.found))
 
 
@@ -57,19 +57,19 @@ def _part(cls: type[T], *, kw_only: bool, refuse: Callable[[str], InputError]) -
     dataclass = pydantic.dataclasses.dataclass(
         frozen=True, kw_only=kw_only, config=ConfigDict(extra="forbid")
     )
-    made: Any = dataclass(cls)
-    checked_init = made.__init__
+    decorated: Any = dataclass(cls)
+    checked_init = decorated.__init__
 
     @functools.wraps(checked_init)
     def checked(self: Any, *args: Any, **kwargs: Any) -> None:
         try:
             checked_init(self, *args, **kwargs)
         except ValidationError as error:
-            found = sentences(error, made)
-            raise refuse("\n".join(f"{made.__name__}: {one}" for one in found)) from None
+            problems = sentences(error, decorated)
+            raise refuse("\n".join(f"{decorated.__name__}: {one}" for one in problems)) from None
 
-    made.__init__ = checked
-    return made
+    decorated.__init__ = checked
+    return decorated
 
 
 def _as_float(value: object) -> float:
@@ -102,8 +102,8 @@ Int = Annotated[int, BeforeValidator(_as_int)]
 
 # What a number of a unit may be at most, and at least where it must be greater than 0: far beyond
 # every robot, and near enough that nothing computed from it overflows.
-_SMALLEST = {"mm": 1e-6, "MPa": 1e-6, "N": 1e-6, "kg/m3": 1e-6, "": 1e-9}
-_LARGEST = {"mm": 1e6, "MPa": 1e9, "kg/m3": 1e6, "deg": 3600.0, "": 1e3}
+_MIN_MAGNITUDE = {"mm": 1e-6, "MPa": 1e-6, "N": 1e-6, "kg/m3": 1e-6, "": 1e-9}
+_MAX_MAGNITUDE = {"mm": 1e6, "MPa": 1e9, "kg/m3": 1e6, "deg": 3600.0, "": 1e3}
 
 MOST_STRAIN = 0.5
 """Beyond every material of a robot; a strain above it was meant in percent."""
@@ -132,11 +132,11 @@ def quantity(
     deg and so on.
     """
     if above == 0.0 and at_least is None:
-        at_least = _SMALLEST[unit]
+        at_least = _MIN_MAGNITUDE[unit]
     if at_most is None and below is None:
-        at_most = _LARGEST.get(unit)
-    if above is None and at_least is None and unit in _LARGEST:
-        at_least = -_LARGEST[unit]
+        at_most = _MAX_MAGNITUDE.get(unit)
+    if above is None and at_least is None and unit in _MAX_MAGNITUDE:
+        at_least = -_MAX_MAGNITUDE[unit]
     return Field(
         gt=above,
         lt=below,

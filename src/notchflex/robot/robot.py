@@ -1,4 +1,4 @@
-"""A robot as a person describes it."""
+"""Description of a robot."""
 
 import dataclasses
 import functools
@@ -31,10 +31,10 @@ else:
 
 @part
 class Robot:
-    """A notched tube with its tendons, as in a robot file; it never changes, copies are made.
+    """A notched tube with its tendons, as in a robot file; immutable.
 
     Args:
-        name: What the robot is called in tables and pictures.
+        name: Name of the robot in tables and pictures.
         tube: The tube before it is cut.
         notch: The notches from base to tip; one entry may stand for several equal ones (`repeat`).
         tendon: The tendons.
@@ -72,9 +72,9 @@ class Robot:
 
     @model_validator(mode="after")
     def _parts_fit(self) -> "Robot":
-        found = list(robot_problems(self))
-        if found:
-            raise ProblemError(found)
+        problems = list(robot_problems(self))
+        if problems:
+            raise ProblemError(problems)
         return self
 
     @functools.cached_property
@@ -82,15 +82,15 @@ class Robot:
         return hash(tuple(getattr(self, one.name) for one in dataclasses.fields(self)))
 
     def __hash__(self) -> int:
-        """Of all its values, worked out once: robots are looked up at every solve."""
+        """Return the hash of all values, cached: robots are keys at every solve."""
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the hash, which is another one in another process."""
+        """Return the state without the hash, which differs between processes."""
         return {name: value for name, value in vars(self).items() if name != "_hash"}
 
     def __repr__(self) -> str:
-        """A few lines of text."""
+        """Return a summary of a few lines."""
         from notchflex.robot.summary import robot_summary
 
         return robot_summary(self).text
@@ -127,12 +127,12 @@ class Robot:
 
     @property
     def number_of_notches(self) -> int:
-        """How many notches there are, repeated ones counted each."""
+        """Number of notches, with repeated ones counted each."""
         return sum(notch.repeat for notch in self.notch)
 
     @property
     def number_of_tendons(self) -> int:
-        """How many tendons there are."""
+        """Number of tendons."""
         return len(self.tendon)
 
     def replace(self, **parts: Any) -> "Robot":
@@ -182,7 +182,7 @@ class Robot:
 
 
 def to_table(robot: Robot) -> dict[str, Any]:
-    """Return a robot as the plain table that its file holds: dicts, lists, numbers and text."""
+    """Convert a robot to the plain table of its file: dicts, lists, numbers and text."""
     tolerances = {one.value: one.written for one in robot.tolerance}
     return {
         "name": robot.name,
@@ -219,7 +219,7 @@ def source_of(robot: Robot) -> str | None:
 
 
 def remember_source(robot: Robot, text: str | None) -> Robot:
-    """Keep the text of a robot's file beside it, so that its comments survive a rewrite.
+    """Store the text of a robot's file with it, so that its comments survive a rewrite.
 
     It is not a field: two robots with the same values are equal whatever their files say.
     """
@@ -228,7 +228,7 @@ def remember_source(robot: Robot, text: str | None) -> Robot:
 
 
 def _part_table(value: object) -> dict[str, Any]:
-    """List the values of a part, without those that are left out (None)."""
+    """List the values of a part, without those that are None."""
     values = {name: getattr(value, name) for name in fields_of(type(value))}
     return {name: one for name, one in values.items() if one is not None}
 
@@ -236,8 +236,8 @@ def _part_table(value: object) -> dict[str, Any]:
 def _repeats(table: Mapping[str, Any]) -> list[int]:
     """Read `repeat` of every notch of a table that may hold anything."""
     notches = table.get("notch")
-    found = [
+    repeated = [
         one.get("repeat", 1) if isinstance(one, Mapping) else 1
         for one in (notches if isinstance(notches, list) else [])
     ]
-    return [one if isinstance(one, int) and one > 0 else 1 for one in found]
+    return [one if isinstance(one, int) and one > 0 else 1 for one in repeated]

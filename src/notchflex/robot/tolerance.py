@@ -71,18 +71,18 @@ def read_tolerances(table: Any) -> Any:
     if not isinstance(table, Mapping):
         text = "is not a table; write [tolerance] and below it lines such as notch.depth = 0.01."
         raise ProblemError([("", text)])
-    found: dict[str, Tolerance] = {}
+    tolerances: dict[str, Tolerance] = {}
     problems: list[tuple[str, str]] = []
     for name, entry in _flat(cast("Mapping[str, Any]", table)):
         value = name.replace("[*]", "")
-        if value in found:
+        if value in tolerances:
             problems.append((name, "is given twice; give it once."))
         keys = cast("dict[str, Any]", entry if isinstance(entry, dict) else {"sd": entry})
         problems += [(name, text) for text in _entry_problems(name, keys)]
-        found[value] = Tolerance(value, **{key: keys[key] for key in _KEYS if key in keys})
+        tolerances[value] = Tolerance(value, **{key: keys[key] for key in _KEYS if key in keys})
     if problems:
         raise ProblemError(problems)
-    return tuple(found.values())
+    return tuple(tolerances.values())
 
 
 def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:

@@ -97,15 +97,15 @@ def robot_text(
 
 
 def _notes_of(notes: _Notes, section: str, first: int, count: int) -> dict[str, str]:
-    """Notes of the keys of a part; of notches or tendons of those from `first` (from 1) on."""
-    found: dict[str, str] = {}
+    """Return the notes of the keys of a part; for notches or tendons from `first` (from 1) on."""
+    by_key: dict[str, str] = {}
     for path, note in notes.items():
         match = _NUMBERED.fullmatch(path.strip())
         if match is None or match[1] != section:
             continue
         if match[2] in (None, "*") or first <= int(match[2]) < first + count:
-            found[match[3]] = note
-    return found
+            by_key[match[3]] = note
+    return by_key
 
 
 def _fresh(robot: Robot, notes: _Notes) -> str:
@@ -184,28 +184,28 @@ def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
     old = to_table(robot_from_text(template))
     new = to_table(robot)
     blocks = _split(template)
-    wanted: list[tuple[_Block, dict[str, Any]]] = []
+    rewritten: list[tuple[_Block, dict[str, Any]]] = []
     done: set[str] = set()
     for block in blocks:
         if block.name in ("notch", "tendon"):
             if block.name not in done:
                 done.add(block.name)
                 mine = [one for one in blocks if one.name == block.name]
-                wanted += _matched(mine, old[block.name], new[block.name])
+                rewritten += _matched(mine, old[block.name], new[block.name])
         elif block.name in new:
-            wanted.append((block, new[block.name]))
+            rewritten.append((block, new[block.name]))
         elif block.name:  # a robot without the tolerances of its file
             continue
         else:  # the head of the file: the name, and whatever is not under a header of its own
             headed = {one.name for one in blocks}
-            wanted.append(
+            rewritten.append(
                 (block, {k: v for k, v in new.items() if k not in (*headed, "tolerance")})
             )
     if "tolerance" in new and all(block.name != "tolerance" for block in blocks):
-        wanted.append((_Block("tolerance", ["\n"], "[tolerance]\n"), new["tolerance"]))
+        rewritten.append((_Block("tolerance", ["\n"], "[tolerance]\n"), new["tolerance"]))
     texts: list[str] = []
     first = {"notch": 1, "tendon": 1}
-    for block, table in wanted:
+    for block, table in rewritten:
         start, count = first.get(block.name, 1), table.get("repeat", 1)
         first[block.name] = start + count
         texts.append(block.text(table, _notes_of(notes, block.name, start, count)))
@@ -241,17 +241,17 @@ def _matched(
     result: list[tuple[_Block, dict[str, Any]]] = []
     first, used = 0, -1
     for table in new:
-        place = owner[min(first, len(owner) - 1)]
-        block = blocks[place]
+        position = owner[min(first, len(owner) - 1)]
+        block = blocks[position]
         # a group of equal notches that was split: its comment stands once
-        result.append((replace(block, lead=["\n"]) if place == used else block, table))
-        used = place
+        result.append((replace(block, lead=["\n"]) if position == used else block, table))
+        used = position
         first += table.get("repeat", 1)
     return result
 
 
 def _update(table: Any, values: dict[str, Any], section: str, notes: _Notes) -> None:
-    """Bring a tomlkit table to the given values, touching only what differs."""
+    """Update a tomlkit table to the given values, changing only what differs."""
     for key in [key for key in table if key not in values]:
         del table[key]
     defaults = defaults_of(section, values) if section else {}

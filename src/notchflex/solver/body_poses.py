@@ -67,7 +67,7 @@ def anchor_poses(chain: Chain, pose: Motion | None) -> Motion | None:
 
 
 def select_anchors(anchors: Motion | None, back: Array) -> Motion | None:
-    """Select for every tendon or contact the body that it comes from, of those before."""
+    """Select the anchor of every tendon or contact among the bodies before."""
     if anchors is None:
         return None
 
@@ -78,14 +78,14 @@ def select_anchors(anchors: Motion | None, back: Array) -> Motion | None:
 
 
 def select_back(by_body: Sequence[Array], back: Array) -> Float[Array, "n t *k"]:
-    """Select values of the first, second ... body before, for every tendon or contact its own."""
+    """Select for every tendon or contact the values of its anchor, of those by body before."""
     selected = by_body[0][:, None]
     for number, values in enumerate(by_body[1:], start=2):
-        here = (back == number).reshape(*back.shape, *(1,) * (values.ndim - 1))
-        selected = jnp.where(here, values[:, None], selected)
+        selects = (back == number).reshape(*back.shape, *(1,) * (values.ndim - 1))
+        selected = jnp.where(selects, values[:, None], selected)
     return jnp.broadcast_to(selected, (*back.shape, *by_body[0].shape[1:]))
 
 
 def shift_from_base(values: Array, first: Array) -> Array:
-    """Return the values of the flexure before; `first` for the first flexure."""
+    """Shift values by one flexure: each gets that of the one before, the first gets `first`."""
     return jnp.concatenate([jnp.asarray(first)[None], values[:-1]])

@@ -1,7 +1,6 @@
-"""Unknowns and history of every flexure, and its two laws with a switch: contact and friction.
+"""Unknowns and history of every flexure, and its two complementarity laws: contact and friction.
 
-Both are complementarity conditions, each written as one equation that Newton's method solves
-together with the balance.
+Each law is written as one equation that Newton's method solves together with the equilibrium.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from jaxtyping import Array, Bool, Float
 from notchflex._jax import jnp
 from notchflex.mechanics.chain import Chain
 
-# The friction law x = clip(x + rate (slip - give (x - x_prev))). The rate is how strongly slip
-# changes the log ratio while Newton searches, and drops out at the solution; what sticking contacts
-# give only keeps the equation regular where a slack tendon makes the tension ratio meaningless.
-# Slip is in heights of the notch, so that a scaled robot is solved in the same way.
-RATE = 8.0
-LEAST_GIVE = 1e-15
+# Friction law: x = clip(x + r (slip - c (x - x_prev))). The augmentation parameter r only affects
+# convergence and drops out at the solution; the compliance c of sticking contacts keeps the law
+# regular where a slack tendon leaves the tension ratio undefined. Slip is in heights of the notch,
+# so that a scaled robot is solved in the same way.
+AUGMENTATION = 8.0
+MIN_STICK_COMPLIANCE = 1e-15
 
 
 class Unknowns(NamedTuple):
@@ -44,23 +43,27 @@ class Memory(NamedTuple):
         slid: Tendon slid over them, mm.
         bound: Their largest log ratios, for the predictor of the next state alone.
         material: Memory of the material at every node; () where it has none.
-        drag: While a notch snaps: viscosity as a part of the stiffness at rest, and the modes of
-            the state before, which it drags on; None otherwise.
-        creep: Slip over a sticking contact, in heights of the notch, per change of its log ratio;
-            None for next to none.
+        damping: While a notch snaps: viscosity as a fraction of the stiffness at rest, and the
+            modes that it refers to; None otherwise.
+        stick_compliance: Additional slip over a sticking contact, in heights of the notch, per
+            change of its log ratio; None for none.
     """
 
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
     slid: tuple[Float[Array, "*n t 2"], ...]
     bound: tuple[Float[Array, "*n t 2"], ...]
     material: Any = ()
-    drag: tuple[Float[Array, ""], Float[Array, "*n modes"]] | None = None
-    creep: Float[Array, ""] | None = None
+    damping: tuple[Float[Array, ""], Float[Array, "*n modes"]] | None = None
+    stick_compliance: Float[Array, ""] | None = None
 
     @property
-    def give(self) -> Float[Array, ""] | float:
-        """Slip per change of a log ratio that sticks, the least there is included."""
-        return LEAST_GIVE if self.creep is None else LEAST_GIVE + self.creep
+    def slip_per_log_ratio(self) -> Float[Array, ""] | float:
+        """Slip over a sticking contact per change of its log ratio, in heights of the notch."""
+        return (
+            MIN_STICK_COMPLIANCE
+            if self.stick_compliance is None
+            else MIN_STICK_COMPLIANCE + self.stick_compliance
+        )
 
 
 def notch_heights(chain: Chain) -> Float[Array, " n"]:
@@ -75,18 +78,20 @@ def trial_log_ratio(
     memory: Memory,
     k: int,
 ) -> Float[Array, "n t 2"]:
-    """Return the log ratios of the k-th group that slip asks for, before they are clipped."""
+    """Compute the trial log ratios of the k-th group from the slip, before they are clipped."""
     slip = (slid - memory.slid[k]) / notch_heights(chain)[:, None, None]
-    return log_ratio + RATE * (slip - memory.give * (log_ratio - memory.log_ratio[k]))
+    return log_ratio + AUGMENTATION * (
+        slip - memory.slip_per_log_ratio * (log_ratio - memory.log_ratio[k])
+    )
 
 
 def clip_symmetric(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
-    """Clip to +-limit; at a tie the result is the limit, so that a contact at rest can slide."""
+    """Clip to +-limit; an equal value counts as the limit, so that a contact at rest can slide."""
     return jnp.where(value >= limit, limit, jnp.where(value <= -limit, -limit, value))
 
 
 def bound_side(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
-    """+1 where a log ratio lies on its upper bound, -1 on its lower, 0 inside."""
+    """Return +1 where a log ratio lies on its upper bound, -1 on its lower, 0 inside."""
     near = 1e-9
     return jnp.where(value >= limit - near, 1, jnp.where(value <= -limit + near, -1, 0))
 
@@ -107,7 +112,7 @@ def signorini(
     force: Float[Array, "n l"],
     gap: Float[Array, "n l"],
 ) -> Float[Array, "n l"]:
-    """Return residual of Signorini's condition as one equation, as a part of the notch's height."""
+    """Compute the residual of Signorini's condition, as a fraction of the notch's height."""
     stiffness = chain.contact_stiffness
     by_force = force / (stiffness * notch_heights(chain))[:, None]
     by_gap = gap / notch_heights(chain)[:, None]

@@ -1,13 +1,12 @@
 """Predictor of the tensions along a tendon: the play operator of hysteresis.
 
-Where the loads on the bodies do not change, the tension behind every contact stays as it is unless
-the tension before it leaves the friction band of the contact (Gao 2017, eq. 26, as a local rule).
-From base to tip this gives which contacts slide which way; Newton's method alone would find that
-one contact at a time.
+Where the loads on the bodies do not change, the tension beyond every contact is constant until the
+tension before it leaves the friction band of the contact (Gao 2017, eq. 26, as a local rule).
+From base to tip this gives the direction in which every contact slides; Newton's method alone would
+find one contact at a time.
 
-A contact with log ratio r, of at most l, takes l - r of a rise of ln T before it, or l + r of a
-fall, and transmits the rest. So the contacts up to any one together take the sums of these, and all
-are found at once.
+A contact with log ratio r and bound l absorbs l - r of a rise of ln T before it, or l + r of a
+fall, and transmits the rest. Cumulative sums from the base therefore give all contacts at once.
 """
 
 from __future__ import annotations
@@ -19,20 +18,19 @@ from jaxtyping import Array, Float
 from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.friction.registry import LEAST_RATIO
+from notchflex.mechanics.friction.registry import MIN_TENSION_RATIO
 from notchflex.solver.element import Memory
 from notchflex.solver.linear_step.block_elimination import Iterate
 from notchflex.solver.tendon_spans import slip_mask
 
-LARGEST_LOG_RATIO = 1.0
-"""A step may change a log ratio by so much; beyond, the linear model says nothing of use."""
+MAX_LOG_RATIO_STEP = 1.0
+"""Largest change of a log ratio in one step; beyond, the linear model is not valid."""
 
-# Base tensions up to these parts of the force that closes a notch act on next to nothing, and on
-# nothing that the tolerance of the solver could show. A log ratio behind them may change by so much
-# in a step: whichever way the contact slides, it is soon found.
-_NEARLY_SLACK, _NOTHING, _SMALL_LOG_RATIO = 1e-8, 1e-14, 0.1
+# Fractions of the closing force below which a tendon is nearly slack, or below the solver's
+# tolerance; limit of the change of its log ratios in one step (only their sign counts).
+_NEARLY_SLACK, _NEGLIGIBLE, _SMALL_LOG_RATIO = 1e-8, 1e-14, 0.1
 # Tensions below this (N) count as slack, so that logarithms stay finite.
-_SLACK = 1e-100
+_MIN_TENSION = 1e-100
 
 
 def predict_log_ratios(
@@ -53,48 +51,48 @@ def predict_log_ratios(
     for group, old_ratio, bound in zip(chain.groups, memory.log_ratio, memory.bound, strict=True):
         numbers = jnp.array(group.numbers)
         old, new = (
-            jnp.maximum(tension[numbers], _SLACK) for tension in (last_tension, base_tension)
+            jnp.maximum(tension[numbers], _MIN_TENSION) for tension in (last_tension, base_tension)
         )
-        none = jnp.zeros_like(group.natural_gap)  # a loss at rest is good enough for a prediction
-        losses = chain.friction.constant_loss(none, none)
+        zero = jnp.zeros_like(group.natural_gap)  # the loss at rest suffices for a prediction
+        losses = chain.friction.constant_loss(zero, zero)
         if losses is not None:
-            old, new = (chain.friction.least_taut(one, none, none) for one in (old, new))
+            old, new = (chain.friction.minimum_tension(one, zero, zero) for one in (old, new))
             loss = slip_mask(group) * jnp.stack(losses, axis=-1)
-            predicted.append(_march(old, new, old_ratio, bound, loss))
+            predicted.append(_predict_sequentially(old, new, old_ratio, bound, loss))
             continue
         change = jnp.broadcast_to(jnp.log(new / old)[None, :, None], old_ratio.shape)
         rise, fall = (_cumulate(jnp.maximum(bound - side * old_ratio, 0.0)) for side in (1.0, -1.0))
-        behind = jnp.maximum(change - rise, 0.0) + jnp.minimum(change + fall, 0.0)
-        # The change before an edge is that behind the edge before, which may be of the gap before.
-        at_exit = jnp.concatenate([change[:1, :, :1], behind[:-1, :, 1:]])
-        ahead = jnp.concatenate([at_exit, behind[..., :1]], axis=-1)
-        # A contact that nothing drives sticks: it stays within its bound, if only just.
+        change_beyond = jnp.maximum(change - rise, 0.0) + jnp.minimum(change + fall, 0.0)
+        # The change before an edge is the change beyond the previous one, perhaps of another gap.
+        at_exit = jnp.concatenate([change[:1, :, :1], change_beyond[:-1, :, 1:]])
+        change_before = jnp.concatenate([at_exit, change_beyond[..., :1]], axis=-1)
+        # A contact without a change sticks, slightly within its bound.
         stuck = (1.0 - 1e-13) * old_ratio
-        sliding = jnp.clip(old_ratio + ahead, -bound, bound)
-        predicted.append(jnp.where(ahead == 0.0, stuck, sliding))
+        sliding = jnp.clip(old_ratio + change_before, -bound, bound)
+        predicted.append(jnp.where(change_before == 0.0, stuck, sliding))
     return tuple(predicted)
 
 
 def _cumulate(values: Float[Array, "n t 2"]) -> Float[Array, "n t 2"]:
-    """Sums over all edges up to each, base to tip."""
+    """Sum over all edges up to each, from base to tip."""
     both = jnp.cumsum(jnp.sum(values, axis=-1), axis=0)
     return jnp.stack([both - values[..., 1], both], axis=-1)
 
 
 def limit_slack(chain: Chain, point: Iterate, step: Iterate) -> Iterate:
-    """Limit the log-ratio step of slack tendons, and of those that are all but slack.
+    """Limit the log-ratio step of slack and nearly slack tendons.
 
-    Without tension they act on nothing, and a sticking contact would change them at random: all
-    that matters is which way it slides. The rest of the step need not be shortened for their sake.
+    Without tension their log ratios have no effect, and a sticking contact would change them at
+    random: only the direction of sliding matters. They must not shorten the rest of the step.
     """
     tension = jnp.maximum(jnp.abs(point.base_tension), jnp.abs(step.base_tension))
-    part = tension / chain.closing_force
-    most = jnp.where(part <= _NOTHING, _SMALL_LOG_RATIO, LARGEST_LOG_RATIO)
-    most = jnp.where(part <= _NEARLY_SLACK, most, jnp.inf)
+    relative = tension / chain.closing_force
+    limits = jnp.where(relative <= _NEGLIGIBLE, _SMALL_LOG_RATIO, MAX_LOG_RATIO_STEP)
+    limits = jnp.where(relative <= _NEARLY_SLACK, limits, jnp.inf)
     logs = tuple(
         jnp.clip(change, -limit, limit)
         for group, change in zip(chain.groups, step.unknowns.log_ratio, strict=True)
-        for limit in (most[jnp.array(group.numbers)][None, :, None],)
+        for limit in (limits[jnp.array(group.numbers)][None, :, None],)
     )
     return step._replace(unknowns=step.unknowns._replace(log_ratio=logs))
 
@@ -106,62 +104,66 @@ def predict_contacts(
     last_tension: Float[Array, " t"],
     point: Iterate,
     step: Iterate,
-    whole: Float[Array, ""],
-    part: Float[Array, ""],
+    linear_fraction: Float[Array, ""],
+    fraction: Float[Array, ""],
 ) -> Iterate:
-    """Replace the log ratios of a step by those that the friction predictor gives.
+    """Replace the log ratios of a step by those of the friction predictor.
 
-    For tendons driven by stroke, while their tensions are still to be found. Sticking contacts make
-    a tendon very stiff; the change of its tension is limited. Of the step that is returned `part`
-    is to be taken, of the linear one it would have been `whole`. `last_tension` are the base
-    tensions (N) of the last solved state.
+    For tendons driven by stroke, whose tensions are unknown. Sticking contacts make a tendon very
+    stiff, so the change of its tension is limited. `fraction` of the returned step is to be taken;
+    of the linear step it would be `linear_fraction`. `last_tension` are the base tensions (N) of
+    the last solved state.
     """
     assert command.by_stroke is not None
-    tension = point.base_tension + whole * step.base_tension
+    tension = point.base_tension + linear_fraction * step.base_tension
     moderate = jnp.clip(
         tension, 0.5 * point.base_tension, 2.0 * point.base_tension + chain.closing_force
     )
     tension = command.either(moderate, tension)
     predicted = predict_log_ratios(chain, last_tension, tension, memory)
     logs = []
-    for group, there, here, change in zip(
+    for group, new, present, change in zip(
         chain.groups, predicted, point.unknowns.log_ratio, step.unknowns.log_ratio, strict=True
     ):
         by_stroke = command.by_stroke[jnp.array(group.numbers)][None, :, None]
-        logs.append(jnp.where(by_stroke, there - here, whole * change) / part)
+        logs.append(jnp.where(by_stroke, new - present, linear_fraction * change) / fraction)
     return Iterate(
-        step.unknowns._replace(log_ratio=tuple(logs)), (tension - point.base_tension) / part
+        step.unknowns._replace(log_ratio=tuple(logs)), (tension - point.base_tension) / fraction
     )
 
 
-def _march(
+def _predict_sequentially(
     old: Float[Array, " t"],
     new: Float[Array, " t"],
     remembered: Float[Array, "n t 2"],
     limits: Float[Array, "n t 2"],
     loss: Float[Array, "n t 2"],
 ) -> Float[Array, "n t 2"]:
-    """Predict log ratios contact by contact where sliding costs a constant force too.
+    """Predict log ratios contact by contact, for laws with a constant loss.
 
-    Limits then depend on the tension, and no sum over several contacts tells what they hold.
+    Bounds then depend on the tension, so cumulative sums over contacts do not apply.
     """
 
     def step(tensions: tuple[Array, Array], contact: tuple[Array, ...]) -> Any:
         old, new = tensions
         ratio, limit, force = contact
-        part = force / jnp.maximum(old, LEAST_RATIO * jnp.maximum(force, _SLACK))
-        pulled = limit + jnp.log(jnp.maximum(1.0 - part, LEAST_RATIO))
-        let_go = jnp.log(jnp.maximum(jnp.exp(limit) - part, 1.0))
-        bound = jnp.maximum(jnp.where(ratio < 0.0, let_go, pulled), 0.0)  # without the loss
-        behind = old * jnp.exp(-ratio)
-        lowest = jnp.maximum(new - force, LEAST_RATIO * new) * jnp.exp(-bound)
-        onward = jnp.clip(behind, lowest, new * jnp.exp(bound) + force)
-        guess = jnp.log(new / onward)
+        relative_loss = force / jnp.maximum(
+            old, MIN_TENSION_RATIO * jnp.maximum(force, _MIN_TENSION)
+        )
+        loading_bound = limit + jnp.log(jnp.maximum(1.0 - relative_loss, MIN_TENSION_RATIO))
+        unloading_bound = jnp.log(jnp.maximum(jnp.exp(limit) - relative_loss, 1.0))
+        bound = jnp.maximum(
+            jnp.where(ratio < 0.0, unloading_bound, loading_bound), 0.0
+        )  # without the loss
+        old_beyond = old * jnp.exp(-ratio)
+        lowest = jnp.maximum(new - force, MIN_TENSION_RATIO * new) * jnp.exp(-bound)
+        tension_beyond = jnp.clip(old_beyond, lowest, new * jnp.exp(bound) + force)
+        predicted = jnp.log(new / tension_beyond)
         stuck = (1.0 - 1e-13) * ratio
-        return (behind, onward), jnp.where(new == old, stuck, guess)
+        return (old_beyond, tension_beyond), jnp.where(new == old, stuck, predicted)
 
     edges = tuple(
         jnp.moveaxis(values, 2, 1).reshape(-1, len(old)) for values in (remembered, limits, loss)
     )
-    guesses = jax.lax.scan(step, (old, new), edges)[1]
-    return jnp.moveaxis(guesses.reshape(-1, 2, len(old)), 1, 2)
+    log_ratios = jax.lax.scan(step, (old, new), edges)[1]
+    return jnp.moveaxis(log_ratios.reshape(-1, 2, len(old)), 1, 2)

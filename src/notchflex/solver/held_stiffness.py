@@ -1,14 +1,14 @@
-"""Stiffness of the whole robot against its modes, its tendons held where they stick; stability.
+"""Stiffness of the whole robot by its modes, with sticking contacts held; stability.
 
-Tension ratios, contact forces and base tensions are eliminated: a contact that sticks holds its
-tendon, one that slides keeps its tension ratio at the bound, which moves with the shape. The
-stiffness is not symmetric then. The rows of every flexure are those of Newton's linear step; here
+Tension ratios, contact forces and base tensions are eliminated: a sticking contact holds its
+tendon, a sliding one keeps its tension ratio at the bound, which changes with the shape. The
+stiffness is then not symmetric. The rows of every flexure are those of Newton's linear step; here
 they are assembled to one dense matrix per state, for many states at once.
 
-An equilibrium is stable where every eigenvalue has a positive real part. Where the symmetric part
-of the stiffness is positive definite, which is found at a fraction of their cost, they have. The
-converse does not hold (a stuck contact adds the product of two different vectors), so elsewhere the
-eigenvalues themselves are found.
+An equilibrium is stable where every eigenvalue has a positive real part. A positive definite
+symmetric part, which costs a fraction of the eigenvalues, is sufficient. It is not necessary (a
+sticking contact adds the product of two different vectors), so elsewhere the eigenvalues are
+computed.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from notchflex.solver.programs.static_structure import StaticStructure
 from notchflex.solver.residual import evaluate
 from notchflex.solver.solver_state import SolverState
 
-# Closed lips and tendons driven by stroke are held by springs this much stiffer than the notches:
-# they only stiffen; without it their forces would be multipliers and the stiffness not defined.
+# Springs this much stiffer than the notches hold closed contacts and tendons driven by stroke;
+# otherwise their forces would be multipliers and the stiffness undefined.
 _HOLDING_STIFFNESS = 1e3
-# A contact on its bound goes on sliding: it is taken as having slid by so much (mm).
+# Slip assumed for a contact at its bound, which goes on sliding, mm.
 _SLIP = 1e-3
-# So many states at once.
-_PIECE = 16
+# Number of states computed at once.
+_BATCH = 16
 
 
 class HeldStiffness(NamedTuple):
@@ -58,12 +58,12 @@ class HeldStiffness(NamedTuple):
 def held_stiffness(
     prepared: PreparedChain, commands: Command, solved: SolverState
 ) -> Iterator[HeldStiffness]:
-    """Find the stiffness of the whole robot in every state, some states at a time.
+    """Compute the stiffness of the whole robot in every state, in batches.
 
     Args:
         prepared: The robot.
-        commands: Commands of the states, as leading axis: by stroke a tendon is held, by tension
-            it gives way.
+        commands: Commands of the states, as leading axis: a tendon driven by stroke is held, one
+            driven by tension moves.
         solved: The equilibria.
 
     Yields:
@@ -75,8 +75,8 @@ def held_stiffness(
     states = pad_rows(packed, prepared.state, long.state)
     form = row_layout(prepared.chain, by_stroke=commands.by_stroke is not None)
     layouts = (long.static_structure, command_layout, long.state)
-    for start in range(0, len(loads), _PIECE):
-        some = slice(start, start + _PIECE)
+    for start in range(0, len(loads), _BATCH):
+        some = slice(start, start + _BATCH)
         vectors = (np.zeros(1), long.dynamic_vector, loads[some], states[some])
         *rows, slopes = _rows.along((False, False, True, True), *vectors, *layouts)
         rows = LinearisedRows(*(one[:, : prepared.chain.flexures] for one in rows))
@@ -95,7 +95,7 @@ def _rows(
     command_layout: PytreeLayout,
     state_layout: PytreeLayout,
 ) -> tuple[Array, tuple[Array, ...]]:
-    """Rows of all flexures of a state, and slopes of the command; nothing is carried on."""
+    """Compute the rows of all flexures of a state, and slopes of the command."""
     solved: SolverState = state_layout.unpack(state)
     chain: Chain = chain_layout.unpack(vector)
     command: Command = command_layout.unpack(load)
@@ -125,26 +125,26 @@ def _assemble(
     tensions = flexures * count + np.arange(len(order))
     size = flexures * count + (0 if by_stroke is None else len(order))
     unit = np.broadcast_to(np.eye(size), (states, size, size))
-    # What is carried to every flexure, over all unknowns: to the first only base tensions.
+    # Rows of what is carried to each flexure, over all unknowns: only base tensions to the first.
     carried = [np.zeros((states, form.carried, size))]
     if by_stroke is not None:
         carried[0][:, form.carried - len(order) :] = unit[:, tensions[order]]
     own = [slice(number * count, (number + 1) * count) for number in range(flexures)]
     for number in range(flexures - 1):
-        around = np.concatenate([unit[:, own[number]], carried[-1]], axis=1)
-        carried.append(np.asarray(rows.onward)[:, number, :, : around.shape[1]] @ around)
+        operands = np.concatenate([unit[:, own[number]], carried[-1]], axis=1)
+        carried.append(np.asarray(rows.to_next)[:, number, :, : operands.shape[1]] @ operands)
     matrix, back = np.zeros((states, size, size)), np.zeros((states, form.beyond, size))
     for number in reversed(range(flexures)):
-        around = np.concatenate([unit[:, own[number]], carried[number], back], axis=1)
-        matrix[:, own[number]] = np.asarray(rows.residual)[:, number] @ around
-        back = np.asarray(rows.behind)[:, number] @ around
+        operands = np.concatenate([unit[:, own[number]], carried[number], back], axis=1)
+        matrix[:, own[number]] = np.asarray(rows.residual)[:, number] @ operands
+        back = np.asarray(rows.to_previous)[:, number] @ operands
     first = np.arange(flexures)[:, None] * count
     modes = first + np.arange(form.modes)
     matrix[:, modes] *= np.asarray(chain.stiffness)[..., None]
     contacts = first + np.arange(form.modes, form.modes + sum(form.contact_pairs))
     natural_gap = np.asarray(chain.rods.length).sum(-1)
-    give = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.contact_stiffness) * natural_gap)
-    matrix[:, contacts, contacts] += give[:, None]
+    compliance = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.contact_stiffness) * natural_gap)
+    matrix[:, contacts, contacts] += compliance[:, None]
     if by_stroke is not None:
         lengths = np.zeros((2, states, len(order), size))
         by_tendon = back[:, form.beyond - 2 * len(order) :].reshape(states, 2, len(order), size)
@@ -159,10 +159,10 @@ def _assemble(
 def _condense_on_modes(
     chain: Chain, form: RowLayout, matrix: Float[np.ndarray, "s m m"]
 ) -> HeldStiffness:
-    """Eliminate all but the robot's modes."""
+    """Condense the matrix to the robot's modes."""
     modes = np.arange(chain.flexures)[:, None] * form.unknowns + np.arange(form.modes)
     others = np.setdiff1d(np.arange(matrix.shape[-1]), modes)
-    own = modes[np.asarray(chain.rods.padding_mask) == 0.0]  # the rest only fill up the arrays
+    own = modes[np.asarray(chain.rods.padding_mask) == 0.0]  # without padding
     finite = np.isfinite(matrix).all(axis=(1, 2))
     stiffness = np.full((len(matrix), len(own), len(own)), np.nan)
     sign = np.full(len(matrix), np.nan)
@@ -176,7 +176,7 @@ def _condense_on_modes(
 def stable(
     prepared: PreparedChain, commands: Command, solved: SolverState
 ) -> Bool[np.ndarray, " s"]:
-    """Return whether every state is stable, contacts that stick held."""
+    """Return whether every state is stable, with sticking contacts held."""
     verdicts = [
         sign > 0.0 and bool(_positive_definite(one) or _smallest(one) > 0.0)
         for stiffness, signs in held_stiffness(prepared, commands, solved)
@@ -189,13 +189,13 @@ def stability(
     prepared: PreparedChain, commands: Command, solved: SolverState
 ) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
     """Return the smallest real part of the eigenvalues and the determinant's sign, by state."""
-    found = list(held_stiffness(prepared, commands, solved))
-    smallest = [_smallest(one) for stiffness, _ in found for one in stiffness]
-    return np.array(smallest), np.array([one for _, sign in found for one in sign])
+    results = list(held_stiffness(prepared, commands, solved))
+    smallest = [_smallest(one) for stiffness, _ in results for one in stiffness]
+    return np.array(smallest), np.array([one for _, sign in results for one in sign])
 
 
 def _positive_definite(stiffness: Float[np.ndarray, "m m"]) -> bool:
-    """Whether the symmetric part is positive definite."""
+    """Return whether the symmetric part is positive definite."""
     try:
         np.linalg.cholesky(stiffness + stiffness.T)
     except np.linalg.LinAlgError:
@@ -204,7 +204,7 @@ def _positive_definite(stiffness: Float[np.ndarray, "m m"]) -> bool:
 
 
 def _smallest(stiffness: Float[np.ndarray, "m m"]) -> float:
-    """Smallest real part of the eigenvalues; NaN where the state is not finite."""
+    """Return the smallest real part of the eigenvalues; NaN for a state that is not finite."""
     if not np.isfinite(stiffness).all():
         return float("nan")
     return float(np.real(np.linalg.eigvals(stiffness)).min())

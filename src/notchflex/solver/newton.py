@@ -16,7 +16,7 @@ from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.flexure import in_space
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
 from notchflex.solver.element import Memory
-from notchflex.solver.friction_predictor import LARGEST_LOG_RATIO, limit_slack, predict_contacts
+from notchflex.solver.friction_predictor import MAX_LOG_RATIO_STEP, limit_slack, predict_contacts
 from notchflex.solver.linear_step.block_elimination import Iterate, linear_step
 from notchflex.solver.residual import Evaluation, evaluate
 from notchflex.solver.step_limits import limit_closing
@@ -41,7 +41,7 @@ class Settings(Pytree, eq=True):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """All of them in order."""
+        """All settings, in the order of the fields."""
         return tuple(getattr(self, one.name) for one in dataclasses.fields(self))
 
     @classmethod
@@ -85,7 +85,7 @@ class _Iteration(NamedTuple):
         allowed: Norm of the residual that the next point must not exceed.
         step: Step from the best point.
         fraction: Fraction of the step that is tried next.
-        tries: Number of points tried from the best one.
+        backtracks: Number of points tried from the best one.
         terminate: Whether the search is over.
     """
 
@@ -93,7 +93,7 @@ class _Iteration(NamedTuple):
     allowed: Float[Array, ""]
     step: Iterate
     fraction: Float[Array, ""]
-    tries: Int[Array, ""]
+    backtracks: Int[Array, ""]
     terminate: Bool[Array, ""]
 
 
@@ -105,8 +105,8 @@ class NewtonProblem(NamedTuple):
         command: Tensions and strokes commanded, external loads.
         memory: History of contacts and material, as of the last solved state.
         last_tension: Base tensions of that state, N.
-        predicts: Whether contacts are predicted where a stroke is commanded. The predictor takes
-            it that a tendon is pulled as its tension rises, which is not so where a notch softens.
+        predicts: Whether contacts are predicted where a stroke is commanded. The predictor assumes
+            that the tension rises with the stroke, which is false where a notch softens.
     """
 
     chain: Chain
@@ -116,65 +116,65 @@ class NewtonProblem(NamedTuple):
     predicts: Bool[Array, ""] | bool = True
 
 
-# A step may turn a flexure by so much (rad); as `LARGEST_LOG_RATIO`.
-_LARGEST_TURN = 0.5
-_TRIES = 7
-# The first steps are taken whole, whatever they do to the residual: where a tendon turns round,
-# all its contacts must leave their bound at once, and the way there is not downhill.
-_UNLIMITED = 8
-# With a stroke commanded, the predictor sets the contacts in so many first iterations, while the
-# residual is above this.
-_PREDICTED = 15
-_PREDICTED_ABOVE = 1e-4
-# A state whose residual has stopped falling at this multiple of the tolerance is as good as
-# rounding allows.
+# Largest rotation of a flexure in one step, rad; compare `MAX_LOG_RATIO_STEP`.
+_MAX_ROTATION_STEP = 0.5
+_MAX_BACKTRACKS = 7
+# The line search does not guard the first steps: where the motion of a tendon reverses, all its
+# contacts leave their bounds at once, and the residual rises before it falls.
+_UNGUARDED_STEPS = 8
+# With a stroke commanded, the predictor sets the contacts in the first iterations, while the
+# residual is above this value.
+_PREDICTOR_STEPS = 15
+_PREDICTOR_MIN_RESIDUAL = 1e-4
+# A residual below this multiple of the tolerance that no longer falls is rounding error.
 _ROUNDING = 100.0
-_LARGEST_GROWTH = 1e4
+_MAX_TOLERANCE_GROWTH = 1e4
 
 
 def newton(
-    problem: NewtonProblem, start: Iterate, settings: Settings, enough: Float[Array, ""]
+    problem: NewtonProblem, start: Iterate, settings: Settings, residual_target: Float[Array, ""]
 ) -> NewtonResult:
     """Find the equilibrium under a command near a starting point.
 
     Every pass of the loop evaluates one point: the start, a full Newton step, or half of the
-    fraction tried before where that did not lessen the residual.
+    fraction tried before if that did not reduce the residual.
 
     Args:
         problem: The chain, the command and the history.
         start: Where to begin.
         settings: Tolerance and limits.
-        enough: Residual that is small enough, should it be above the tolerance.
+        residual_target: Residual at which to stop, where it is above the tolerance.
 
     Returns:
         The result; `converged` is false after a failure.
     """
     chain, command, memory, *_ = problem
     tolerance = _tolerance(chain, start, settings)
-    small_enough = jnp.maximum(tolerance, enough)
+    target = jnp.maximum(tolerance, residual_target)
 
     def proceed(search: _Iteration) -> Bool[Array, ""]:
         return ~search.terminate & (search.best.iterations <= settings.max_iterations)
 
     def iterate(search: _Iteration) -> _Iteration:
         best = search.best
-        y = jax.tree.map(lambda at, by: at + search.fraction * by, best.point, search.step)
-        at = evaluate(chain, y.unknowns, memory, y.base_tension, command.applied)
-        demand = command_residual(chain, command, y.base_tension, at.base)
-        fx = ravel_pytree((at.residual, demand))[0]
-        largest, size = jnp.max(jnp.abs(fx)), jnp.linalg.norm(fx)
-        unlimited = (best.iterations < _UNLIMITED) & (best.residual >= _ROUNDING * tolerance)
+        trial = jax.tree.map(lambda x, dx: x + search.fraction * dx, best.point, search.step)
+        evaluation = evaluate(chain, trial.unknowns, memory, trial.base_tension, command.applied)
+        demand = command_residual(chain, command, trial.base_tension, evaluation.base)
+        scaled_residual = ravel_pytree((evaluation.residual, demand))[0]
+        largest, size = jnp.max(jnp.abs(scaled_residual)), jnp.linalg.norm(scaled_residual)
+        unguarded = (best.iterations < _UNGUARDED_STEPS) & (best.residual >= _ROUNDING * tolerance)
         falls = size <= search.allowed
-        better = falls | (unlimited & jnp.isfinite(size))
+        better = falls | (unguarded & jnp.isfinite(size))
         near = best.residual < _ROUNDING * tolerance
         at_rounding = near & (largest >= best.residual) & ~falls
-        accept = better | (jnp.isfinite(size) & (search.tries >= _TRIES) & ~at_rounding)
-        solved = accept & (largest < small_enough)
+        exhausted = search.backtracks >= _MAX_BACKTRACKS
+        accept = better | (jnp.isfinite(size) & exhausted & ~at_rounding)
+        solved = accept & (largest < target)
         within = solved | (largest < _ROUNDING * tolerance)
-        new = _result(chain, command, y, at, largest, best.iterations + 1, within)
+        new = _result(chain, command, trial, evaluation, largest, best.iterations + 1, within)
         step, fraction = jax.lax.cond(
             accept & ~solved,
-            lambda: _next_step(problem, new, at, best.iterations),
+            lambda: _next_step(problem, new, evaluation, best.iterations),
             lambda: (search.step, 0.5 * search.fraction),
         )
         return _Iteration(
@@ -182,14 +182,14 @@ def newton(
             allowed=jnp.where(accept, (1.0 - 1e-4) * size, search.allowed),
             step=step,
             fraction=fraction,
-            tries=jnp.where(accept, 0, search.tries + 1),
-            terminate=solved | at_rounding | (~accept & (search.tries >= _TRIES)),
+            backtracks=jnp.where(accept, 0, search.backtracks + 1),
+            terminate=solved | at_rounding | (~accept & exhausted),
         )
 
     best = jax.lax.while_loop(proceed, iterate, _begin(problem, start)).best
     if not chain.law.remembers:
         return best
-    # Not carried through the loop: it is long, and only that of the last point counts.
+    # The loop does not carry the memory: it is long, and only that of the last point counts.
     modes = best.point.unknowns.modes
     return best._replace(
         material=flexure_states(chain, modes, memory.material, with_pose=False).memory
@@ -197,8 +197,8 @@ def newton(
 
 
 def _begin(problem: NewtonProblem, start: Iterate) -> _Iteration:
-    """The search before anything is evaluated: its first point is the start."""
-    nowhere = NewtonResult(
+    """Return the state of the line search before the first evaluation."""
+    unevaluated = NewtonResult(
         point=start,
         slid=problem.memory.slid,
         bound=problem.memory.bound,
@@ -209,22 +209,22 @@ def _begin(problem: NewtonProblem, start: Iterate) -> _Iteration:
         converged=jnp.array(False),
     )
     return _Iteration(
-        best=nowhere,
+        best=unevaluated,
         allowed=jnp.array(jnp.inf),
         step=jax.tree.map(jnp.zeros_like, start),
         fraction=jnp.ones(()),
-        tries=jnp.zeros((), int),
+        backtracks=jnp.zeros((), int),
         terminate=jnp.array(False),
     )
 
 
 def _tolerance(chain: Chain, start: Iterate, settings: Settings) -> Float[Array, ""]:
-    """Tolerance for these tensions: rounding grows with the moments that must balance."""
+    """Scale the tolerance with the tensions: rounding grows with the moments in balance."""
     height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
     softest = jnp.min(jnp.where(chain.rods.padding_mask > 0.0, jnp.inf, chain.stiffness))
     turn_per_newton = height / softest
     largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
-    growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)
+    growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _MAX_TOLERANCE_GROWTH)
     return settings.tolerance * growth
 
 
@@ -232,65 +232,66 @@ def _result(
     chain: Chain,
     command: Command,
     point: Iterate,
-    at: Evaluation,
+    evaluation: Evaluation,
     residual: Float[Array, ""],
     iterations: Int[Array, ""],
     within: Bool[Array, ""],
 ) -> NewtonResult:
-    """Result at a point that is within the tolerance, or not."""
+    """Assemble the result at a point."""
     return NewtonResult(
         point=point,
-        slid=tuple(span.slid for span in at.spans),
-        bound=tuple(span.bound for span in at.spans),
+        slid=tuple(span.slid for span in evaluation.spans),
+        bound=tuple(span.bound for span in evaluation.spans),
         material=(),
-        stroke=stroke(chain, point.base_tension, at.base),
+        stroke=stroke(chain, point.base_tension, evaluation.base),
         residual=residual,
         iterations=iterations,
         converged=within
         & tension_is_bounded(chain, command, point.base_tension)
-        & _is_possible(chain, at),
+        & _is_possible(chain, evaluation),
     )
 
 
-def _is_possible(chain: Chain, at: Evaluation) -> Bool[Array, ""]:
-    """Whether no notch is opened so far that its law of flattening has no meaning."""
+def _is_possible(chain: Chain, evaluation: Evaluation) -> Bool[Array, ""]:
+    """Return whether every notch is within the range of its law of flattening."""
     ends = chain.rods.section.ends
     if ends is None:
         return jnp.array(True)
-    curvature = in_space(at.flexure.strain)[..., 1]
+    curvature = in_space(evaluation.flexure.strain)[..., 1]
     return ~jnp.any((curvature < 0.0) & (ends.slope_factor(curvature) < 0.0))
 
 
 def _next_step(
-    problem: NewtonProblem, new: NewtonResult, at: Evaluation, iterations: Int[Array, ""]
+    problem: NewtonProblem, new: NewtonResult, evaluation: Evaluation, iterations: Int[Array, ""]
 ) -> tuple[Iterate, Float[Array, ""]]:
-    """Step from an accepted point, and the fraction of it to try first."""
+    """Return the step from an accepted point, and the fraction of it to try first."""
     chain, command, memory, last_tension, predicts = problem
     point = new.point
-    step = linear_step(chain, command, point.unknowns, memory, point.base_tension, at)
+    step = linear_step(chain, command, point.unknowns, memory, point.base_tension, evaluation)
     step = limit_slack(chain, point, step)
-    # Where strokes are commanded, contacts that turn round must not be held up on their way.
+    # Where strokes are commanded, contacts that reverse must not be limited on the way.
     by_tension = command.by_stroke is None
-    limited = partial(limit_closing, chain, point.unknowns, at, step)
-    turning = limited(jnp.ones(())) if by_tension else step
-    turn = jnp.max(jnp.abs(turning.unknowns.modes))
+    limited = partial(limit_closing, chain, point.unknowns, evaluation, step)
+    limited_linear = limited(jnp.ones(())) if by_tension else step
+    rotation = jnp.max(jnp.abs(limited_linear.unknowns.modes))
     logs = [jnp.max(jnp.abs(leaf), initial=0.0) for leaf in step.unknowns.log_ratio]
     log_ratio = jnp.max(jnp.array([0.0, *logs]))
-    by_turn = jnp.minimum(1.0, _LARGEST_TURN / turn)
-    whole = jnp.minimum(by_turn, LARGEST_LOG_RATIO / log_ratio)
+    max_fraction = jnp.minimum(1.0, _MAX_ROTATION_STEP / rotation)
+    linear_fraction = jnp.minimum(max_fraction, MAX_LOG_RATIO_STEP / log_ratio)
     if by_tension:
-        return limited(whole), whole
+        return limited(linear_fraction), linear_fraction
     assert command.by_stroke is not None
-    early = (iterations < _PREDICTED) & predicts
-    early = jnp.any(command.by_stroke) & early & (new.residual > _PREDICTED_ABOVE)
+    early = (iterations < _PREDICTOR_STEPS) & predicts
+    early = jnp.any(command.by_stroke) & early & (new.residual > _PREDICTOR_MIN_RESIDUAL)
 
     def predicted() -> Iterate:
         limits = memory._replace(bound=new.bound)
-        return predict_contacts(chain, command, limits, last_tension, point, step, whole, by_turn)
+        fractions = linear_fraction, max_fraction
+        return predict_contacts(chain, command, limits, last_tension, point, step, *fractions)
 
     chosen = jax.lax.cond(early, predicted, lambda: step)
-    part = jnp.where(early, by_turn, whole)
+    fraction = jnp.where(early, max_fraction, linear_fraction)
     if predicts is not True:
-        held = limit_closing(chain, point.unknowns, at, chosen, part)
-        chosen = choose(predicts, chosen, held)
-    return chosen, part
+        limited_step = limit_closing(chain, point.unknowns, evaluation, chosen, fraction)
+        chosen = choose(predicts, chosen, limited_step)
+    return chosen, fraction

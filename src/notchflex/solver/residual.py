@@ -1,7 +1,7 @@
 """Residual of the whole chain at given unknowns, all flexures at once.
 
-Wrenches on body j are taken about the origin and along the axes of body j. Three things alone are
-accumulated along the chain: logarithms of tensions from the base, released tendon lengths and
+Wrenches on body j are taken about the origin and along the axes of body j. Only three quantities
+are accumulated along the chain: logarithms of tensions from the base, released tendon lengths and
 external loads from the tip.
 """
 
@@ -97,7 +97,7 @@ def evaluate(
     base_tension: Float[Array, " t"],
     applied: BodyLoads | None,
 ) -> Evaluation:
-    """Evaluate the residual of the chain, and what it is made of.
+    """Evaluate the residual of the chain, with its terms.
 
     Equilibrium is stated as virtual work with the true work of the tendon, -T times the change of
     its span lengths: normal and friction forces need not be summed.
@@ -120,7 +120,7 @@ def evaluate(
         for k, group in enumerate(chain.groups)
     )
     contacts = tuple(
-        _yielding(
+        _with_contact_compliance(
             chain,
             jax.vmap(type(group).gap_response)(
                 group, chain.rods, flexure, select_anchors(anchors, group.back)
@@ -135,8 +135,8 @@ def evaluate(
         rotation, external, at_base = external_wrenches(flexure.pose, applied)
         wrenches = _wrenches(chain, flexure.pose, unknowns, spans, contacts, external)
     balance = _balance(chain, unknowns, flexure, spans, contacts, wrenches)
-    if memory.drag is not None:
-        viscosity, before = memory.drag
+    if memory.damping is not None:
+        viscosity, before = memory.damping
         balance = balance + viscosity * chain.stiffness * (unknowns.modes - before)
     contact_force = tuple(
         signorini(chain, group.has_contact, force, response.gap)
@@ -157,8 +157,10 @@ def evaluate(
     return Evaluation(flexure, anchors, rotation, spans, contacts, wrenches, base, residual)
 
 
-def _yielding(chain: Chain, response: GapResponse, force: Float[Array, "n l"]) -> GapResponse:
-    """Gaps between lips that yield to their contact force."""
+def _with_contact_compliance(
+    chain: Chain, response: GapResponse, force: Float[Array, "n l"]
+) -> GapResponse:
+    """Add the closing by the contact force to the gaps."""
     if chain.contact_flexibility is None:
         return response
     return response._replace(gap=response.gap + chain.contact_flexibility[:, None] * force)
@@ -172,7 +174,7 @@ def _balance(
     contacts: tuple[GapResponse, ...],
     wrenches: BodyWrenches | None,
 ) -> Float[Array, "n modes"]:
-    """Virtual work of every strain mode, N mm."""
+    """Compute the virtual work of every strain mode, N mm."""
     balance = flexure.internal
     if chain.elastic is not None:
         balance = jnp.einsum("nmk,nk->nm", chain.elastic, unknowns.modes)
@@ -196,12 +198,12 @@ def _spans(
     unknowns: Unknowns,
     base_tension: Float[Array, " t"],
 ) -> TendonSpans:
-    """Tensions, released lengths and friction bounds of the k-th group."""
+    """Compute tensions, released lengths and friction bounds of the k-th group."""
     group, log_ratio = chain.groups[k], unknowns.log_ratio[k]
     runs = group.runs
     # Not written with ln T, so that a slack tendon stays regular.
     turning = crossing.exit_turning, crossing.entry_turning
-    at_base = chain.friction.least_taut(of_group(base_tension, group), *turning)[None]
+    at_base = chain.friction.minimum_tension(of_group(base_tension, group), *turning)[None]
     tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
     beyond_both = at_base * jnp.cumprod(tension_ratio[..., 0] * tension_ratio[..., 1], axis=0)
     transmitted = shift_from_base(beyond_both, at_base[0])
@@ -238,7 +240,7 @@ def _wrenches(
     contacts: tuple[GapResponse, ...],
     external: Float[Array, "n w"] | None,
 ) -> BodyWrenches:
-    """Wrenches of spans, contacts and loads on the bodies."""
+    """Compute the wrenches of spans, contacts and loads on the bodies."""
     size = chain.rods.basis.shape[-2]
     terminating = jnp.zeros((chain.flexures, chain.window, size))
     for group, span in zip(chain.groups, spans, strict=True):
@@ -253,8 +255,8 @@ def _wrenches(
             terminating += jnp.einsum("nlw,nlk->nkw", push, span_mask(chain, group.back))
     transmitted = [jnp.zeros((chain.flexures, size))]
     for number in reversed(range(chain.window - 1)):
-        behind = jax.vmap(Motion.wrench)(pose, terminating[:, number + 1] + transmitted[0])
-        from_tip = jnp.concatenate([behind[1:], jnp.zeros_like(behind[:1])])
+        from_beyond = jax.vmap(Motion.wrench)(pose, terminating[:, number + 1] + transmitted[0])
+        from_tip = jnp.concatenate([from_beyond[1:], jnp.zeros_like(from_beyond[:1])])
         transmitted.insert(0, from_tip)
     resultant = terminating[:, 0] + transmitted[0]
     if external is not None:

@@ -1,8 +1,8 @@
-"""How a solved state changes with all that it was found from: derivatives by one linear step.
+"""Derivatives of a solved state by chain, command and previous state, from one linear step.
 
-Newton's iteration itself is not differentiated. Where it has arrived, one more of its steps is
-nothing; but its derivative, with the linear system held still, is the derivative of the solution
-(implicit function theorem), forward and backward, and along a path through the memory.
+Newton's iteration itself is not differentiated. At the solution one more step is zero, but its
+derivative, with the linear system constant, is the derivative of the solution (implicit function
+theorem), in forward and reverse mode, and along a path through the memory.
 """
 
 from __future__ import annotations
@@ -26,100 +26,108 @@ class SubstepHistory(NamedTuple):
     """How the solver reached a state from the one before, from `LoadStepResult`.
 
     Attributes:
-        between: The state before the last part of the load.
-        part_before: Part of the way at which it is.
-        parts: How many parts the load was cut into.
+        between: The state before the last substep.
+        fraction_before: Fraction of the load step at that state.
+        substeps: Number of substeps.
         reached: Whether the load was reached.
     """
 
     between: SolverState
-    part_before: Float[Array, ""]
-    parts: Int[Array, ""]
+    fraction_before: Float[Array, ""]
+    substeps: Int[Array, ""]
     reached: Bool[Array, ""]
 
 
-# From rest, loads on the bodies come on before the tendons; and a load that fails is halved.
-_PARTS_FOLLOWED = 2
+# From rest, loads on the bodies come before the tendons; a load step that fails is halved.
+_MAX_SUBSTEPS = 2
 
 
 def attach_derivatives(
-    chain: Chain, command: Command, last: SolverState, solved: SolverState, way: SubstepHistory
+    chain: Chain, command: Command, last: SolverState, solved: SolverState, history: SubstepHistory
 ) -> SolverState:
-    """Return a solved state with its derivatives by chain, command and the state before.
+    """Return a solved state with its derivatives by chain, command and the previous state.
 
-    Contacts and material remember: where a load was taken in two parts, the derivatives go through
-    both. Of more parts only the last states are known; with memory the derivatives are then NaN.
+    Contacts and material have memory: where a load took two substeps, the derivatives go through
+    both. Of more substeps only the last states are stored; with memory the derivatives are then
+    NaN.
 
     Args:
         chain: The chain.
         command: The load.
-        last: The state before, whose memory the contacts had.
-        solved: The state that was found.
-        way: How it was found.
+        last: The previous state, with the memory of the contacts.
+        solved: The solution.
+        history: Substeps that led to it.
 
     Returns:
         The same state.
     """
     if not chain.remembers:
-        return _answering_part(chain, command, last, solved, way.reached)
-    known = way.reached & (way.parts <= _PARTS_FOLLOWED)
-    halfway = interpolate_command(chain, command, last, _still(way.part_before))
-    items = (halfway, way.between, way.parts > 1), (command, solved, jnp.array(True))
+        return _attach_to_substep(chain, command, last, solved, history.reached)
+    has_history = history.reached & (history.substeps <= _MAX_SUBSTEPS)
+    first_command = interpolate_command(
+        chain, command, last, _stop_gradient(history.fraction_before)
+    )
+    items = (
+        (first_command, history.between, history.substeps > 1),
+        (command, solved, jnp.array(True)),
+    )
 
     def follow(
         before: SolverState, item: tuple[Command, SolverState, Array]
     ) -> tuple[SolverState, None]:
-        towards, found, taken = item
+        towards, solution, exists = item
 
-        def answer() -> SolverState:
-            return _answering_part(chain, towards, before, found, known)
+        def attach() -> SolverState:
+            return _attach_to_substep(chain, towards, before, solution, has_history)
 
-        return jax.lax.cond(taken, answer, lambda: before), None
+        return jax.lax.cond(exists, attach, lambda: before), None
 
     both = jax.tree.map(lambda *leaves: jnp.stack(leaves), *items)
     return jax.lax.scan(follow, last, both)[0]
 
 
-def _answering_part(
+def _attach_to_substep(
     chain: Chain, command: Command, last: SolverState, solved: SolverState, reached: Bool[Array, ""]
 ) -> SolverState:
-    """The same of a load, or a part of one, that was solved in one go."""
-    point = _still(solved.point)
-    at = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
-    step = linear_step(chain, command, point.unknowns, last.memory, point.base_tension, at)
+    """Attach the derivatives to the solution of one substep."""
+    point = _stop_gradient(solved.point)
+    evaluation = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
+    step = linear_step(chain, command, point.unknowns, last.memory, point.base_tension, evaluation)
     moved = Iterate(step.unknowns, step.base_tension)
     point = jax.tree.map(lambda value, by: value + by, point, moved)
-    at = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
+    evaluation = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
     memory = Memory(
         log_ratio=point.unknowns.log_ratio,
-        slid=tuple(span.slid for span in at.spans),
-        bound=tuple(span.bound for span in at.spans),
-        material=at.flexure.memory,
+        slid=tuple(span.slid for span in evaluation.spans),
+        bound=tuple(span.bound for span in evaluation.spans),
+        material=evaluation.flexure.memory,
     )
-    drawn = stroke(chain, point.base_tension, at.base)
-    answer = SolverState(point, memory, drawn, command.applied)
+    drawn = stroke(chain, point.base_tension, evaluation.base)
+    varied_state = SolverState(point, memory, drawn, command.applied)
     return jax.tree.map(
-        lambda value, varied: _varying(value, varied, reached), _still(solved), answer
+        lambda value, varied: _with_tangent_of(value, varied, reached),
+        _stop_gradient(solved),
+        varied_state,
     )
 
 
-def _still(tree: Any) -> Any:
+def _stop_gradient(tree: Any) -> Any:
     return jax.tree.map(jax.lax.stop_gradient, tree)
 
 
-def _varying(value: Array, varied: Array, known: Bool[Array, ""]) -> Array:
-    """A value that changes as another does; its derivative is NaN where it is not known."""
-    return value + _change_alone(known, varied)
+def _with_tangent_of(value: Array, varied: Array, known: Bool[Array, ""]) -> Array:
+    """Return a value with the tangent of another, NaN where that is not known."""
+    return value + _zero_with_tangent(known, varied)
 
 
 @jax.custom_jvp
-def _change_alone(known: Array, varied: Array) -> Array:
-    """Nothing, with the derivative of a value."""
+def _zero_with_tangent(known: Array, varied: Array) -> Array:
+    """Return zeros with the tangent of a value."""
     del known
     return jnp.zeros_like(varied)
 
 
-@_change_alone.defjvp
+@_zero_with_tangent.defjvp
 def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Array, Array]:
     known, varied = primals
     return jnp.zeros_like(varied), tangents[1] * jnp.where(known, 1.0, jnp.nan)

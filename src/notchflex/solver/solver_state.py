@@ -1,4 +1,4 @@
-"""A solved state and all that the next one needs; the first is the free robot."""
+"""Solved states with their memory; the first is the free robot."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from notchflex.solver.linear_step.block_elimination import Iterate
 
 
 class SolverState(NamedTuple):
-    """A solved state and all that the next one needs: the state that can be saved.
+    """A solved state with its memory, which the next state needs; it can be saved.
 
     Attributes:
         point: Unknowns and base tensions.
@@ -31,7 +31,7 @@ class SolverState(NamedTuple):
 
 
 def at_rest(chain: Chain) -> SolverState:
-    """Return the free robot with slack tendons that have not yet slid."""
+    """Return the state of the free robot, with slack tendons."""
     none = tuple(constant(np.zeros((*group.present.shape, 2))) for group in chain.groups)
     unknowns = Unknowns(
         modes=constant(np.zeros(chain.stiffness.shape)),
@@ -46,7 +46,7 @@ def at_rest(chain: Chain) -> SolverState:
 
 
 def unloaded(chain: Chain) -> BodyLoads | None:
-    """Return the absence of loads on all bodies, in the form of the chain."""
+    """Return zero loads on all bodies of the chain; None where it takes no loads."""
     if not chain.loaded:
         return None
     bodies = chain.flexures + 1

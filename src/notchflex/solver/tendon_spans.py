@@ -52,7 +52,7 @@ def crossings(
 
 
 def of_group(values: Float[Array, " all"], group: TendonGroup) -> Float[Array, " t"]:
-    """Select the tendons of a group; by slices, whose adjoint the native compiler knows."""
+    """Select the tendons of a group by slices, whose adjoint the native compiler supports."""
     return jnp.stack([values[number] for number in group.numbers])
 
 
@@ -62,8 +62,8 @@ def slip_mask(group: TendonGroup) -> Float[Array, "n t 2"]:
 
 
 def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...]) -> Array:
-    """Bring values per group of tendons into the order of the robot's tendons, as last axis."""
+    """Order values per group of tendons as the robot's tendons, along the last axis."""
     if not grouped:
         return jnp.zeros(0)
     together = jnp.concatenate(grouped, axis=-1)
-    return jnp.stack([together[..., place] for place in np.argsort(chain.tendon_order)], axis=-1)
+    return jnp.stack([together[..., column] for column in np.argsort(chain.tendon_order)], axis=-1)

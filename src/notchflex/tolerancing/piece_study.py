@@ -53,7 +53,7 @@ class PieceStudy(Study):
         if not robots.valid().all():
             return dict.fromkeys(self.loads)
         return {
-            name: varied_chains(robots, load, self.refinement, known=False)
+            name: varied_chains(robots, load, self.refinement, reuse=False)
             for name, load in self.loads.items()
         }
 

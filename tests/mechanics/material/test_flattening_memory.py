@@ -40,7 +40,9 @@ def history() -> tuple[np.ndarray, np.ndarray, np.ndarray, Flattening]:
         return (
             moment,
             memory,
-            *jax.vmap(lambda *at: LAW.held(at[0], SECTION, at[1]))(strains, memory),
+            *jax.vmap(lambda *at: LAW.stored_energy_density(at[0], SECTION, at[1]))(
+                strains, memory
+            ),
         )
 
     return jax.tree.map(np.asarray, jax.jit(every)(CURVATURE[:, None] * bending(1.0)))

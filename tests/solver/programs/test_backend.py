@@ -32,10 +32,10 @@ def doubled(values):
 def test_xla_when_asked_for(monkeypatch):
     monkeypatch.setenv(backend.BACKEND, "xla")
     assert Native(doubled, 1, lambda: ())(np.arange(3.0)).tolist() == [0.0, 2.0, 4.0]
-    assert list(Native.made.values())[-1] is None  # no program of lanewise
+    assert list(Native.programs.values())[-1] is None  # no program of lanewise
     monkeypatch.setenv(backend.BACKEND, "")
     assert Native(doubled, 1, lambda: ())(np.arange(3.0)).tolist() == [0.0, 2.0, 4.0]
-    assert list(Native.made.values())[-1] is not None
+    assert list(Native.programs.values())[-1] is not None
 
 
 @pytest.mark.parametrize(
@@ -71,8 +71,8 @@ def test_ready_robots_are_native(name, monkeypatch):
     state = nf.solve(nf.load_robot(name), nf.Load(tension=0.1))
     assert state.converged
     assert np.isfinite(state.span_tension).all()
-    assert Native.made
-    assert all(made is not None for made in Native.made.values())
+    assert Native.programs
+    assert all(made is not None for made in Native.programs.values())
 
 
 @pytest.mark.nightly

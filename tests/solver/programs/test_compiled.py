@@ -30,7 +30,7 @@ def test_xla_finds_the_same(wrist, monkeypatch, margin):
     outputs = ("total_angle", "peak_strain", "contact_force")
     own = nf.simulate_batch(wrist, loads, outputs=outputs)
     alone = nf.simulate(wrist, loads[1])
-    monkeypatch.setattr(Native, "_made", lambda *_: None)
+    monkeypatch.setattr(Native, "_program", lambda *_: None)
     other = nf.simulate_batch(wrist, loads, outputs=outputs)
     for name in outputs:
         np.testing.assert_allclose(own[name], other[name], rtol=1e-9, atol=1e-10, err_msg=name)
@@ -80,11 +80,11 @@ def test_rows_in_order_carry_a_vector(rows):
 
 def test_programs_not_used_for_longest_are_let_go(monkeypatch):
     monkeypatch.setattr(Native, "made", OrderedDict())
-    monkeypatch.setattr("notchflex.solver.programs.compiled._MOST", 2)
+    monkeypatch.setattr("notchflex.solver.programs.compiled._MAX_PROGRAMS", 2)
     functions = [Native(lambda values, own=k: own * values, 1, lambda *_: ()) for k in range(3)]
     for one in (*functions, functions[1]):
         one(np.ones(2))
-    assert [key[0] for key in Native.made] == [functions[2], functions[1]]
+    assert [key[0] for key in Native.programs] == [functions[2], functions[1]]
 
 
 def test_programs_are_kept_and_what_is_no_program_is_not_taken(tmp_path, monkeypatch):

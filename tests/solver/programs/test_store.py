@@ -106,7 +106,7 @@ def test_programs_not_used_for_longest_are_removed_beyond_a_size(folder, monkeyp
         store.write(name, content)
         os.utime(folder / store._name(name), (number, number))
     assert store.read("a") == content  # used now
-    monkeypatch.setattr(store, "MOST_BYTES", 2200)
+    monkeypatch.setattr(store, "MAX_BYTES", 2200)
     store.write("one", b"first")
     assert store.read("a") == content
     assert store.read("b") is None

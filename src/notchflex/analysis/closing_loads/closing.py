@@ -16,7 +16,7 @@ from notchflex.analysis.closing_loads.search import (
 )
 from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import Chain, assemble
-from notchflex.mechanics.contact import closing_travel, free_angle
+from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings
@@ -25,9 +25,9 @@ from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run
 
 _ANGLE = QUANTITIES["total_angle"]
-_MOST_ROWS = 12
-# Steps of the first pull, up to so many times the tension that would close the softest notch if it
-# were linear and alone; what does not close by then is reported as never closing.
+_MAX_ROWS = 12
+# Number of steps of the first pull, and its end over the tension that would close the softest notch
+# if it were linear and alone; notches that do not close by then are reported as never closing.
 _STEPS, _BEYOND_LINEAR = 40, 2.0
 
 
@@ -36,7 +36,7 @@ class Closing(Displayed):
     """Closing of every notch, base to tip.
 
     Attributes:
-        angle: Notch angle at which its lips meet, precurvature included, rad.
+        angle: Notch angle at which its edges touch, precurvature included, rad.
         tension: Base tension that closes it, N, loading from rest; NaN where none was found.
         status: A `ClosingStatus`: "closes"; "never", no tension up to 64 times the one that
             would close a linear notch alone (twice that of the softest for slots); or "not found",
@@ -62,9 +62,9 @@ class Closing(Displayed):
             )
             for notch, (angle, tension) in enumerate(zip(self.angle, self.tension, strict=True))
         ]
-        left = len(rows) - _MOST_ROWS
+        left = len(rows) - _MAX_ROWS
         hint = f"and {left} more notches" if left > 0 else ""
-        return Summary("Closing of every notch", rows[:_MOST_ROWS], hint)
+        return Summary("Closing of every notch", rows[:_MAX_ROWS], hint)
 
 
 def closing(robot: Robot) -> Closing:
@@ -87,22 +87,22 @@ def closing(robot: Robot) -> Closing:
     """
     chain = assemble(robot, flat=False)
     rods = chain.rods
-    travel, free = closing_travel(rods), free_angle(rods)
+    closing_angle, free = closing_angles(rods), free_angle(rods)
     height = np.asarray(rods.length.sum(-1))
     section = rods.section
     spine, near = np.asarray(section.edge_spine)[:, 0], np.asarray(section.edge_near)[:, 0]
     arm = moment_arms(chain)
     tendon = np.argmax(arm, axis=1)
     longest = arm[np.arange(len(arm)), tendon]
-    if np.isfinite(travel).all():
-        tension, status = _tensions(prepare(robot), tendon, longest, travel)
-        met = travel
+    if np.isfinite(closing_angle).all():
+        tension, status = _tensions(prepare(robot), tendon, longest, closing_angle)
+        contact_angle = closing_angle
     else:
-        tension, met, status = _edge_closing(prepare(robot), tendon, longest)
-    has_spine = np.isfinite(travel)
-    elastic = np.where(has_spine, travel / height, np.nan)
+        tension, contact_angle, status = _edge_closing(prepare(robot), tendon, longest)
+    has_spine = np.isfinite(closing_angle)
+    elastic = np.where(has_spine, closing_angle / height, np.nan)
     return Closing(
-        angle=np.where(has_spine, travel + free, met),
+        angle=np.where(has_spine, closing_angle + free, contact_angle),
         tension=tension,
         status=status,
         tendon=tendon + 1,
@@ -112,17 +112,17 @@ def closing(robot: Robot) -> Closing:
 
 
 def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
-    """Return the lever of every tendon about the neutral axis of every notch at rest, mm.
+    """Compute the moment arm of every tendon about the neutral axis of every notch at rest, mm.
 
-    Positive where it bends the notch toward its direction; 0 where it does not go. The chain must
+    Positive where it bends the notch toward its direction; 0 where it does not run. The chain must
     be assembled with `flat=False`.
     """
-    place = np.einsum("nba,tb->nta", chain.notch_frame, chain.tendon_place)[..., 0]
+    entry_x = np.einsum("nba,tb->nta", chain.notch_frame, chain.tendon_entry)[..., 0]
     spine = np.where(np.asarray(chain.rods.has_closure) > 0.0, chain.rods.end_offset[:, 0], 0.0)
     arm = np.zeros((chain.flexures, chain.tendons))
     for group in chain.groups:
         tendons = list(group.numbers)
-        arm[:, tendons] = np.asarray(group.present) * (place[:, tendons] + spine[:, None])
+        arm[:, tendons] = np.asarray(group.present) * (entry_x[:, tendons] + spine[:, None])
     return arm
 
 
@@ -130,17 +130,17 @@ def _tensions(
     ready: PreparedChain,
     tendon: np.ndarray,
     arm: Float[np.ndarray, " n"],
-    travel: Float[np.ndarray, " n"],
+    closing_angle: Float[np.ndarray, " n"],
 ) -> tuple[Float[np.ndarray, " n"], np.ndarray]:
-    """Base tension that closes every notch against its spine, pulling its own tendon; status."""
+    """Find the base tension that closes every notch against its spine, and its status."""
     chain = ready.chain
     tension = np.full(chain.flexures, np.nan)
     status = np.full(chain.flexures, ClosingStatus.NEVER, dtype=object)
-    notches = np.flatnonzero((arm > 0.0) & (travel > 0.0))
+    notches = np.flatnonzero((arm > 0.0) & (closing_angle > 0.0))
     if len(notches) == 0:
         return tension, status
     stiffness = np.asarray(chain.contact_stiffness)
-    # Always as many rows as notches, whichever are searched: one compiled program.
+    # As many rows as notches, whichever are searched: one compiled program.
     which, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
 
     def overlap(tension: Float[np.ndarray, " m"], _: Bool[np.ndarray, " m"]) -> np.ndarray:
@@ -152,7 +152,7 @@ def _tensions(
         overlap = force[rows, which] / stiffness[which] - gap[rows, which]
         return np.where(converged, overlap, np.nan)[: len(notches)]
 
-    linear = np.asarray(chain.stiffness)[notches, 0] * travel[notches] / arm[notches]
+    linear = np.asarray(chain.stiffness)[notches, 0] * closing_angle[notches] / arm[notches]
     tension[notches], status[notches] = closing_tensions(overlap, linear)
     return tension, status
 
@@ -160,7 +160,7 @@ def _tensions(
 def _edge_closing(
     ready: PreparedChain, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], np.ndarray]:
-    """Tension that closes every notch whose edges belong to rigid pieces, its angle, and status.
+    """Find tension, angle and status of closing for notches with edges on rigid pieces.
 
     The tendon is pulled in steps from rest, which brackets the tension where an edge touches.
     """
@@ -178,7 +178,7 @@ def _edge_closing(
 def _by_one_tendon(
     ready: PreparedChain, tendon: int, notches: np.ndarray
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], np.ndarray]:
-    """The same for the notches `notches`, pulling one tendon."""
+    """Find them for some notches, pulling one tendon."""
     free, _ = _pull(ready, tendon, np.zeros(1))
     reach = -free[0, notches]  # the gap at rest: an edge so far from closing
     # Tendon and edges are about as far from the axis.
@@ -190,7 +190,7 @@ def _by_one_tendon(
     after = np.maximum(touching.argmax(axis=0), 1)
 
     def at(tension: Float[np.ndarray, " m"]) -> tuple[np.ndarray, np.ndarray]:
-        """Overlap and angle of every notch, each at its own tension, on one path."""
+        """Compute overlap and angle of every notch, each at its own tension, on one path."""
         order = np.argsort(tension)
         back = np.argsort(order)
         overlap, angle = _pull(ready, tendon, tension[order])
@@ -208,12 +208,12 @@ def _by_one_tendon(
 def _pull(
     ready: PreparedChain, tendon: int, tensions: Float[np.ndarray, " s"]
 ) -> tuple[Float[np.ndarray, "s n"], Float[np.ndarray, "s n"]]:
-    """Overlap of every notch's edges (contact force / stiffness - gap, mm) and its angle (rad)."""
+    """Compute every notch's overlap (contact force / stiffness - gap, mm) and angle (rad)."""
     value = np.zeros((len(tensions), ready.chain.tendons))
     value[:, tendon] = tensions
     states = run(ready, tension_commands(value), ready.rest, Settings(), each_from_start=False)
     stiffness = np.asarray(ready.chain.contact_stiffness)
     overlap = states.quantity("contact_force") / stiffness - states.quantity("gap")
-    good = states.converged[:, None]
+    converged = states.converged[:, None]
     angle = states.quantity("notch_angle")
-    return np.where(good, overlap, np.nan), np.where(good, angle, np.nan)
+    return np.where(converged, overlap, np.nan), np.where(converged, angle, np.nan)

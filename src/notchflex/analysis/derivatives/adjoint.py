@@ -82,7 +82,7 @@ def gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradie
 def _packed(
     path: EquilibriumPath, weights: Mapping[str, np.ndarray], shapes: dict[str, tuple[int, ...]]
 ) -> Float[np.ndarray, "s outputs"]:
-    """Weights in the frame of the base and for the outputs of the long chain."""
+    """Pack weights in the frame of the base, for the outputs of the long chain."""
     seeds: list[np.ndarray] = []
     turn = path.base_to_world
     for name, weight in weights.items():
@@ -100,7 +100,7 @@ def _packed(
 
 @lru_cache(maxsize=64)
 def _shapes(layouts: StepLayouts) -> dict[str, tuple[int, ...]]:
-    """Shapes of the outputs of the long chain."""
+    """Return the shapes of the outputs of the long chain."""
 
     def report(chain: Array, state: Array) -> dict[str, Array]:
         unpacked = layouts.chain.unpack(chain), layouts.state.unpack(state)
@@ -122,7 +122,7 @@ def _adjoint(
     weights: Float[Array, " outputs"],
     layouts: StepLayouts,
 ) -> tuple[Float[Array, " state"], dict[str, Array]]:
-    """Adjoint of a state, which is carried to the one before, and of its load and chain."""
+    """Compute the adjoint of a state, carried to the previous one, and of its load and chain."""
     step = step_function(state, between, how, layouts)
     leaves, structure = jax.tree.flatten(layouts.chain.unpack(chain))
     varies = [jnp.issubdtype(leaf.dtype, jnp.floating) for leaf in leaves]

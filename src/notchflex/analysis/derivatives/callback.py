@@ -1,7 +1,7 @@
-"""A plain function with a Jacobian as a function that JAX can differentiate, map and compile.
+"""Wrapper of a plain function with a Jacobian that JAX can differentiate, map and compile.
 
-JAX calls back to compiled programs of the library, so that nothing of the mechanics is compiled
-again for what users write around it.
+JAX calls back to compiled programs of the library, so that user code around it does not compile
+the mechanics again.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from notchflex.results.path import EquilibriumPath
 
 TENDONS = ("tension", "stroke")
 TIP = ("tip_force", "tip_moment")
-# Robots whose derivatives by their numbers are kept.
+# Number of robots whose derivatives by their numbers are cached.
 _REMEMBERED = 16
 
 
@@ -37,9 +37,9 @@ class VectorSolver:
     Attributes:
         model: The forward model.
         start: Present values of the parameters, by name.
-        outputs: Names of what is returned.
+        outputs: Names of the outputs.
         numbers: Names of the parameters that are numbers of the robot.
-        solve: Solves the path at named values; raises `InputError` for values that cannot be.
+        solve: Solves the path at named values; raises `InputError` for invalid values.
         load: Returns the loads at named values.
     """
 
@@ -51,20 +51,20 @@ class VectorSolver:
     load: Callable[[Mapping[str, Any]], LoadPath]
 
     def values(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
-        """Return the outputs; raise `InputError` where no robot or load can have these values."""
+        """Return the outputs; raise `InputError` for values that no robot or load can have."""
         path = self._path(flat)
         return {name: np.asarray(getattr(path, name)) for name in self.outputs}
 
     def slopes(self, flat: Float[np.ndarray, " k"], output: str) -> np.ndarray:
         """Return the derivatives of an output by every value, as last axis.
 
-        Tangents give those of all outputs at once, which are kept; the adjoint one after the other.
+        Tangents give those of all outputs at once, which are cached; the adjoint one by one.
         """
         path = self._path(flat)
         kept = self._kept_slopes.setdefault(path, {})
         if output in kept:
             return kept[output]
-        if output == "residual":  # what the solver leaves of it does not depend on the values
+        if output == "residual":  # the remaining error of the solver does not depend on the values
             return np.zeros((len(path), len(flat)))
         names = (output,)
         if not self.model.takes_adjoint(path, names, len(flat)):
@@ -79,14 +79,14 @@ class VectorSolver:
 
     @cached_property
     def _parts(self) -> list[tuple[str, slice, tuple[int, ...]]]:
-        """Where the vector holds which value, and in which shape."""
+        """Name, slice of the vector and shape of every value."""
         shapes = [np.shape(at) for at in self.start.values()]
         ends = np.cumsum([0, *(math.prod(shape) for shape in shapes)]).tolist()
         parts = [slice(*ends[number : number + 2]) for number in range(len(shapes))]
         return list(zip(self.start, parts, shapes, strict=True))
 
     def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
-        """The path at some values; the last one is kept, as its derivatives are asked for next."""
+        """Solve the path at some values; the last one is cached for its derivatives."""
         if not np.isfinite(flat).all():  # a tension that is not a number would mean a slack tendon
             raise InputError.NOT_FINITE("values must be finite numbers")
         key = flat.tobytes()
@@ -109,7 +109,7 @@ class VectorSolver:
         return {}
 
     def _changes(self, path: EquilibriumPath, values: Mapping[str, np.ndarray]) -> Iterator[Change]:
-        """Change of loads and chain per unit of every value."""
+        """Compute the change of loads and chain per unit of every value."""
         # One program for all: with a change of the chain where any value changes it.
         still = np.zeros(self.model.ready.long.chain_layout.size) if self.numbers else None
         by_number = self._by_numbers(path, values)
@@ -117,16 +117,16 @@ class VectorSolver:
             if name in by_number:
                 yield by_number[name]
                 continue
-            for place in np.ndindex(value.shape):
+            for index in np.ndindex(value.shape):
                 varied = np.array(value)
-                varied[place] += 1.0  # loads are linear in tension, stroke, tip force and moment
+                varied[index] += 1.0  # loads are linear in tension, stroke, tip force and moment
                 more = self.load({**values, name: varied})
                 yield Change(self.model.load_change(path, more), still)
 
     def _by_numbers(
         self, path: EquilibriumPath, values: Mapping[str, np.ndarray]
     ) -> Mapping[str, Change]:
-        """Changes by numbers of the robot, kept for the next tensions and strokes."""
+        """Compute the changes by numbers of the robot, cached for the next tensions and strokes."""
         numbers = [float(values[one]) for one in self.numbers]
         key = (*numbers, *(values[one].tobytes() for one in values if one in TIP))
         if key not in self._kept:
@@ -144,14 +144,13 @@ def _is_float(path: EquilibriumPath, name: str) -> bool:
 def outputs_function(
     solver: VectorSolver, start: Float[np.ndarray, " k"]
 ) -> Callable[[Array], OutputTable]:
-    """Make a solver a function of JAX.
+    """Wrap a solver as a function of JAX.
 
-    Values that the solver refuses give NaN for numbers and false for truth values, as a program of
-    JAX cannot raise.
+    Invalid values give NaN for numbers and false for flags, as a program of JAX cannot raise.
 
     Args:
         solver: Gives outputs and Jacobians.
-        start: Values at which it has outputs; their shapes are those of all others.
+        start: Valid values, whose outputs define the shapes.
 
     Returns:
         A function of a vector of values, differentiable once, forward and reverse.
@@ -187,7 +186,7 @@ def _differentiable_once(
         for name, shape in shapes.items()
     }
     values_of = _callback(solver.values, shapes)
-    # One for each: JAX then leaves out those of outputs that nobody differentiates.
+    # One for each, so that JAX omits those of outputs that are not differentiated.
     slopes_of = {
         name: _callback(lambda at, name=name: {name: solver.slopes(at, name)}, {name: shape})
         for name, shape in slope_shapes.items()

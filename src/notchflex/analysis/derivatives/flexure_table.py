@@ -1,9 +1,9 @@
-"""Flexures of notches that are alike but for one number, as polynomials of that number.
+"""Flexures of notches that differ in one number only, as polynomials of that number.
 
-Slopes by the depths of 27 notches need 162 flexures, whose arrays plain Python makes one after the
-other. They are values of few smooth functions: one of the depth for all notches whose other numbers
-are equal. These are interpolated to rounding at Chebyshev's points; where that cannot be, as at a
-kink, flexures are made one by one.
+Slopes by the depths of 27 notches need 162 flexures, which plain Python assembles one by one. They
+are values of few smooth functions: one of the depth for all notches whose other numbers are equal.
+These are interpolated to rounding at Chebyshev points; where that fails, as at a kink, flexures are
+assembled one by one.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from notchflex.robot import Tube
 from notchflex.robot.kinds import Notch
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 
-Made = tuple[Rod, Motion]
+BuiltFlexure = tuple[Rod, Motion]
 # Points of an interpolation, and halves of its range, of the number: the second where a number is
 # near one at which flexures are not smooth. The coefficients of wrist A's depth and of the links'
 # dimensions end at rounding with them.
 _POINTS = 16
-_HALVES = (0.1, 0.03)
+_HALF_WIDTHS = (0.1, 0.03)
 _NODES = chebyshev.chebpts1(_POINTS)
-# What coefficients count for rounding, of the largest number of their array.
+# Coefficients below this fraction of the largest number of their array are rounding.
 _ROUNDING = 1e-14
-# Flexures of a family that are asked for before it is interpolated: as many as that takes.
-_ASKED = _POINTS
-# Families whose polynomials are kept.
-_KEPT = 64
+# Requests of a family before it is interpolated: as many as the interpolation takes.
+_MIN_REQUESTS = _POINTS
+# Number of families whose polynomials are cached.
+_MAX_FAMILIES = 64
 
 
 class Family(tuple[Any, ...]):
-    """Notches, with all around them, that are alike but for one number."""
+    """Notches with their surroundings that differ in one number only."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Polynomial:
     layout: PytreeLayout
     coefficients: Float[np.ndarray, "degrees m"]
 
-    def at(self, value: float) -> Made | None:
+    def at(self, value: float) -> BuiltFlexure | None:
         """Return the flexure of a value; None beyond the range."""
         part = (value - self.middle) / self.half
         if abs(part) > 1.0:
@@ -74,15 +74,15 @@ class FlexureTable:
     """Makes flexures, many of notches that differ in one number; for arguments see `flexure`."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
-        self._made: dict[Any, Made] = {}
-        self._asked: defaultdict[Family, list[float]] = defaultdict(list)
+        """Create an empty table."""
+        self._flexures: dict[Any, BuiltFlexure] = {}
+        self._requests: defaultdict[Family, list[float]] = defaultdict(list)
         self._polynomials: dict[Family, list[Polynomial]] = {}
 
     def forget(self) -> None:
-        """Forget single flexures, which are asked for again and again within one task only."""
-        self._made.clear()
-        self._asked.clear()
+        """Clear the single flexures, which only one task requests repeatedly."""
+        self._flexures.clear()
+        self._requests.clear()
 
     def __call__(
         self,
@@ -92,26 +92,26 @@ class FlexureTable:
         level: str,
         refinement: int,
         by_fibres: bool,
-    ) -> Made:
+    ) -> BuiltFlexure:
         """Return a flexure and its pose in the free robot."""
         key = (notch, site, tube, level, refinement, by_fibres)
-        if key not in self._made:
-            self._made[key] = self._interpolated(key) or flexure(*key)
-        return self._made[key]
+        if key not in self._flexures:
+            self._flexures[key] = self._interpolated(key) or flexure(*key)
+        return self._flexures[key]
 
-    def _interpolated(self, key: tuple[Any, ...]) -> Made | None:
+    def _interpolated(self, key: tuple[Any, ...]) -> BuiltFlexure | None:
         for name, value, family in _families(key):
             for polynomial in self._polynomials.get(family, ()):
-                if (made := polynomial.at(value)) is not None:
-                    return made
-            asked = self._asked[family]
-            asked.append(value)
-            near = [one for one in asked if abs(one - value) <= min(_HALVES) * abs(value)]
-            if len(near) > _ASKED:
-                asked.clear()
-                new = _interpolate(key, name, float(np.mean(near)))
+                if (built := polynomial.at(value)) is not None:
+                    return built
+            requests = self._requests[family]
+            requests.append(value)
+            nearby = [one for one in requests if abs(one - value) <= min(_HALF_WIDTHS) * abs(value)]
+            if len(nearby) > _MIN_REQUESTS:
+                requests.clear()
+                new = _interpolate(key, name, float(np.mean(nearby)))
                 if new is not None:
-                    if len(self._polynomials) >= _KEPT:
+                    if len(self._polynomials) >= _MAX_FAMILIES:
                         del self._polynomials[next(iter(self._polynomials))]
                     self._polynomials.setdefault(family, []).append(new)
                     return new.at(value)
@@ -119,7 +119,7 @@ class FlexureTable:
 
 
 def _families(key: tuple[Any, ...]) -> Iterator[tuple[str, float, Family]]:
-    """Every number of a notch with its value, and all else that the flexure is made of."""
+    """Yield every number of a notch with its value, and its family."""
     notch, *around = key
     values = {one.name: getattr(notch, one.name) for one in dataclasses.fields(notch)}
     for name, value in values.items():
@@ -129,19 +129,19 @@ def _families(key: tuple[Any, ...]) -> Iterator[tuple[str, float, Family]]:
 
 
 def _interpolate(key: tuple[Any, ...], name: str, middle: float) -> Polynomial | None:
-    """Interpolate a family around a value; None where it is not smooth enough, or ends there."""
+    """Interpolate a family around a value; None where it is not smooth or not defined."""
     notch, *around = key
-    for half in (part * abs(middle) for part in _HALVES):
+    for half in (part * abs(middle) for part in _HALF_WIDTHS):
         values = middle + half * _NODES
         try:
             notches = [dataclasses.replace(notch, **{name: float(value)}) for value in values]
         except InputError:
             continue
-        made = [flexure(one, *around) for one in notches]
-        layout = PytreeLayout.of(made[0])
-        if any(PytreeLayout.of(one) is not layout for one in made):
+        built = [flexure(one, *around) for one in notches]
+        layout = PytreeLayout.of(built[0])
+        if any(PytreeLayout.of(one) is not layout for one in built):
             continue
-        rows = np.stack([layout.pack(one) for one in made])
+        rows = np.stack([layout.pack(one) for one in built])
         constant = (rows == rows[:1]).all(axis=0)
         coefficients = np.linalg.solve(chebyshev.chebvander(_NODES, _POINTS - 1), rows)
         coefficients[0, constant], coefficients[1:, constant] = rows[0, constant], 0.0
@@ -157,7 +157,7 @@ def _counts(
     rows: Float[np.ndarray, "points m"],
     layout: PytreeLayout,
 ) -> Bool[np.ndarray, " points"]:
-    """Which degrees count for more than rounding."""
+    """Return which degrees exceed rounding."""
     counts = np.zeros(len(coefficients), bool)
     for indices in layout.indices:
         own = indices.ravel()

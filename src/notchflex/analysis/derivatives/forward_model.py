@@ -1,8 +1,7 @@
-"""The forward model: numbers of a robot and its loads in, solved states and derivatives out.
+"""The forward model: from numbers of a robot and its loads to solved states and derivatives.
 
-All that differentiates results goes through it. States and derivatives are found by compiled
-programs along the path; the arrays of a robot are differentiated by its numbers where plain Python
-makes them.
+All derivatives of results use it. Compiled programs compute states and derivatives along the path;
+the arrays of a robot are differentiated by its numbers with differences of plain Python.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import LoadPath
-from notchflex.mechanics.chain import FlexureOf, Shaped, assemble, laws, shape_of
+from notchflex.mechanics.chain import ChainTemplate, FlexureOf, assemble, chain_template, laws
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
@@ -31,9 +30,9 @@ from notchflex.solver.programs.prepare import PreparedChain, flat, prepare
 from notchflex.solver.programs.run import run
 from notchflex.solver.solver_state import SolverState
 
-# One gradient of a number takes about as long as derivatives along so many directions.
+# Cost of the gradient of one number, in derivatives along single directions.
 _ADJOINT = 4
-# Numbers of the material on which more than the law of the sections depends.
+# Numbers of the material on which more depends than the section law.
 _OF_THE_CHAIN = ("density", "poisson_ratio")
 
 
@@ -42,9 +41,9 @@ class ForwardModel:
     """A robot under loads as a function of its numbers and of the loads.
 
     Attributes:
-        robot: The robot as it is.
-        load: The loads as they are.
-        settings: How hard the solver tries.
+        robot: The nominal robot.
+        load: The nominal loads.
+        settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
         from_rest: Which steps start from rest, (s,); the others from the step before.
         any_load: Whether loads on the bodies may vary, and so may point anywhere.
@@ -59,18 +58,18 @@ class ForwardModel:
 
     @cached_property
     def ready(self) -> PreparedChain:
-        """The robot as it is, as arrays."""
+        """The nominal robot as arrays."""
         return self._assembled(self.robot)
 
     def solve(
         self, robot: Robot, load: LoadPath, start: SolverState | None = None
     ) -> EquilibriumPath:
-        """Follow loads with the robot that has some other numbers.
+        """Solve loads with a robot that has other numbers.
 
         Args:
             robot: The robot.
             load: Loads of the same kind as those of the model.
-            start: The state to start from, in the place of rest.
+            start: The state to start from; rest where not given.
 
         Raises:
             InputError: The arrays of the robot have another form than those of the model's.
@@ -87,29 +86,29 @@ class ForwardModel:
     def changes(self, robot: Robot, load: LoadPath, names: Sequence[str]) -> list[Change]:
         """Differentiate arrays and loads by numbers of the robot.
 
-        Numbers that change other parts of the robot, such as dimensions of its notches, are moved
-        together.
+        Numbers that change different parts of the robot, such as dimensions of its notches, are
+        varied together.
 
         Args:
-            robot: The robot, with the values where.
+            robot: The robot with the values at which to differentiate.
             load: The loads.
-            names: Which numbers.
+            names: Names of the numbers.
 
         Raises:
             InputError: A number cannot be varied.
         """
-        found = {name: self._of_law(robot, name) for name in names if _is_of_law(name)}
-        others = tuple(name for name in names if name not in found)
+        by_name = {name: self._of_law(robot, name) for name in names if _is_of_law(name)}
+        others = tuple(name for name in names if name not in by_name)
         if len(others) == 1:
             at = number_at(robot, others[0])
             moved = partial(robot.with_value, others[0])
-            found[others[0]] = self.change_along(moved, at, load)
+            by_name[others[0]] = self.change_along(moved, at, load)
         elif others:
             if others not in self._geometry:
                 self._geometry[others] = GeometrySlopes(self.ready, others)
             slopes = self._geometry[others].at(self._moved, robot, load)
-            found |= zip(others, slopes, strict=True)
-        return [found[name] for name in names]
+            by_name |= zip(others, slopes, strict=True)
+        return [by_name[name] for name in names]
 
     def _of_law(self, robot: Robot, name: str) -> Change:
         """Differentiate the law of the material, or of friction, by a number of its own."""
@@ -120,7 +119,7 @@ class ForwardModel:
             return flat(laws(replace(part, **{key: value}), shape))
 
         chain = np.zeros(self.ready.long.chain_layout.size)
-        chain[self._places[section]] = slope(of_laws, getattr(part, key), order=2)
+        chain[self._field_indices[section]] = slope(of_laws, getattr(part, key), order=2)
         return Change(None, chain)
 
     def change_along(
@@ -130,7 +129,7 @@ class ForwardModel:
 
         Args:
             robot_at: The robot of a number; only its geometry and loads on its mass may vary.
-            at: The number where.
+            at: The number at which to differentiate.
             load: The loads.
             order: Order of accuracy, as for `slope`.
 
@@ -142,11 +141,11 @@ class ForwardModel:
         return Change(by_number[size:].reshape(len(load), -1), by_number[:size])
 
     def _packed(self, robot: Robot, load: LoadPath) -> Float[np.ndarray, " packed"]:
-        """The long chain and the loads of all steps as one vector."""
+        """Pack the long chain and the loads of all steps into one vector."""
         return _vector_of(self._prepared(robot), robot, load)
 
     def _moved(self, robot: Robot, load: LoadPath, flexures: FlexureOf) -> np.ndarray:
-        """The same of one of many robots that differ little, whose flexures are given."""
+        """Pack one of many robots that differ little, from given flexures."""
         chain = self.ready.chain
         ready = PreparedChain(
             assemble(
@@ -165,14 +164,12 @@ class ForwardModel:
     def _geometry(self) -> dict[tuple[str, ...], GeometrySlopes]:
         return {}
 
-    def load_change(
-        self, path: EquilibriumPath, load: LoadPath
-    ) -> Float[np.ndarray, "s make_commands"]:
-        """Difference of other loads from those of a path, packed for the long chain."""
+    def load_change(self, path: EquilibriumPath, load: LoadPath) -> Float[np.ndarray, "s command"]:
+        """Compute the difference of other loads from those of a path, packed for the long chain."""
         ready, robot = path.prepared, path.robot
-        here, _ = ready.padded_commands(path.commands)
-        there, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
-        return there - here
+        present, _ = ready.padded_commands(path.commands)
+        target, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
+        return target - present
 
     def derivatives(
         self,
@@ -191,8 +188,8 @@ class ForwardModel:
             remembers: Whether changes pass from state to state through the memory of the contacts.
 
         Returns:
-            By name, directions and then steps as leading axes, in the world. NaN from a step on
-            that did not converge, or was so hard that its derivatives are not known.
+            By name, directions and then steps as leading axes, in the world. NaN from the first
+            step that did not converge, or whose derivatives are not known.
         """
         directions = tuple(changes)
         shapes = {name: np.shape(path.quantity(name)) for name in outputs}
@@ -202,17 +199,17 @@ class ForwardModel:
             return {name: np.stack([one[name] for one in columns]) for name in outputs}
         derivatives = {name: np.empty((len(directions), *shape)) for name, shape in shapes.items()}
         for name, shape in shapes.items():
-            for place in np.ndindex(shape):
+            for index in np.ndindex(shape):
                 weight = np.zeros(shape)
-                weight[place] = 1.0
+                weight[index] = 1.0
                 by = gradient(path, {name: weight})
-                derivatives[name][:, *place] = [by.along(one) for one in directions]
+                derivatives[name][:, *index] = [by.along(one) for one in directions]
         return derivatives
 
     def takes_adjoint(
         self, path: EquilibriumPath, outputs: tuple[str, ...], directions: int
     ) -> bool:
-        """Whether derivatives along so many directions are found by the adjoint of each number."""
+        """Return whether the adjoint is cheaper for a number of directions."""
         numbers = sum(np.asarray(path.quantity(name)).size for name in outputs)
         return _ADJOINT * numbers <= directions
 
@@ -223,21 +220,21 @@ class ForwardModel:
 
     @cached_property
     def _prepared(self) -> Callable[[Robot], PreparedChain]:
-        """Arrays of the robot with some other numbers; a control loop asks for the same again."""
+        """Function that prepares a robot with other numbers; the last results are cached."""
         return lru_cache(maxsize=4)(self._varied)
 
     def _varied(self, robot: Robot) -> PreparedChain:
         present, shape = self.robot, self._shape(robot)
         if robot is present:
             return self.ready
-        # A search for constants of the material and friction varies a few numbers of the chain.
+        # Fits of material and friction constants vary a few numbers of the chain.
         if shape is self._shape(present) and robot.material.density == present.material.density:
             fields = laws(robot.material, shape) | laws(robot.friction, shape)
             return self.ready.with_fields(fields)
         return self._of_form(self._assembled(robot))
 
     def _of_form(self, ready: PreparedChain) -> PreparedChain:
-        """Raise if a robot has other arrays."""
+        """Check that a robot has arrays of the same form."""
         if ready.chain_layout is not self.ready.chain_layout:
             raise InputError.UNSUPPORTED(
                 "with these values the robot has another form; it must stay the same"
@@ -245,24 +242,24 @@ class ForwardModel:
         return ready
 
     @cached_property
-    def _places(self) -> dict[str, np.ndarray]:
-        """Where the long chain's vector holds what follows from material and friction."""
+    def _field_indices(self) -> dict[str, np.ndarray]:
+        """Indices in the long chain's vector of the fields of material and of friction."""
         shape = self._shape(self.robot)
         parts = {"material": self.robot.material, "friction": self.robot.friction}
-        return {name: self.ready.places(laws(part, shape)) for name, part in parts.items()}
+        return {name: self.ready.field_indices(laws(part, shape)) for name, part in parts.items()}
 
-    def _shape(self, robot: Robot) -> Shaped:
+    def _shape(self, robot: Robot) -> ChainTemplate:
         chain = self.ready.chain
-        return shape_of(robot, chain.level, chain.refinement)
+        return chain_template(robot, chain.level, chain.refinement)
 
 
 def _is_of_law(name: str) -> bool:
-    """Whether only the law of the material, or of friction, depends on a number."""
+    """Return whether only the law of the material, or of friction, depends on a number."""
     section, _, key = name.partition(".")
     return section in ("material", "friction") and key not in _OF_THE_CHAIN
 
 
 def _vector_of(ready: PreparedChain, robot: Robot, load: LoadPath) -> np.ndarray:
-    """The long chain and the loads of all steps as one vector."""
+    """Pack the long chain and the loads of all steps into one vector."""
     loads, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
     return np.concatenate([ready.long.vector, loads.ravel()])

@@ -14,7 +14,7 @@ from notchflex.analysis.derivatives.flexure_table import FlexureTable
 from notchflex.analysis.derivatives.sparse_slopes import SparseSlopes
 from notchflex.analysis.derivatives.tangent import Change
 from notchflex.loads import LoadPath
-from notchflex.mechanics.chain import Chain, FlexureOf, averages
+from notchflex.mechanics.chain import Chain, FlexureOf, chain_averages
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
 from notchflex.solver.programs.prepare import PreparedChain
@@ -22,11 +22,11 @@ from notchflex.solver.programs.prepare import PreparedChain
 
 @dataclass(frozen=True, eq=False)
 class GeometrySlopes:
-    """Slopes by k numbers, which are moved together where they change other parts of the chain.
+    """Slopes by k numbers; numbers that change different parts of the chain are varied together.
 
     Attributes:
         ready: Any robot of the form.
-        names: Which numbers.
+        names: Names of the numbers.
     """
 
     ready: PreparedChain
@@ -57,13 +57,13 @@ class GeometrySlopes:
             return packed(robot.with_values(changed), load, self._flexures)
 
         self._flexures.forget()
-        here = packed(robot, load, self._flexures)
-        # Where a tendon passes several notches at once, whole numbers of the chain tell.
-        found = self._slopes_of(len(here)).at(vector_of, at, here[self._whole].tobytes())
+        vector = packed(robot, load, self._flexures)
+        # Integers of the chain identify the notches that a tendon passes at once.
+        slopes = self._slopes_of(len(vector)).at(vector_of, at, vector[self._whole].tobytes())
         size = self.ready.long.chain_layout.size
         changes: list[Change] = []
-        for by_number in found:
-            by_number[self._averaged] = self._of_averages(here, by_number)
+        for by_number in slopes:
+            by_number[self._averaged] = self._of_averages(vector, by_number)
             changes.append(Change(by_number[size:].reshape(len(load), -1), by_number[:size]))
         return changes
 
@@ -76,7 +76,7 @@ class GeometrySlopes:
         return {}
 
     def _slopes_of(self, numbers: int) -> SparseSlopes:
-        """Slopes of vectors of so many numbers, loads of some steps behind those of the chain."""
+        """Return the slopes for vectors of a size: the chain, then the loads of some steps."""
         if numbers not in self._slopes:
             form = self.ready.long.chain_layout
             parts = [*form.indices, np.arange(form.size, numbers)]
@@ -85,7 +85,7 @@ class GeometrySlopes:
 
     @cached_property
     def _indices(self) -> Chain:
-        """Where the vector of the long chain holds what."""
+        """Indices of all fields in the vector of the long chain."""
         form = self.ready.long.chain_layout
         return jax.tree.unflatten(form.structure, form.indices)
 
@@ -97,19 +97,19 @@ class GeometrySlopes:
 
     @cached_property
     def _averaged(self) -> Int[np.ndarray, " a"]:
-        """Where the vector holds averages over the notches."""
+        """Indices of the averages over the notches in the vector."""
         one = np.ones(1)
-        return np.ravel([getattr(self._indices, name) for name in averages(one, one)])
+        return np.ravel([getattr(self._indices, name) for name in chain_averages(one, one)])
 
     def _of_averages(
-        self, here: Float[np.ndarray, " packed"], change: Float[np.ndarray, " packed"]
+        self, vector: Float[np.ndarray, " packed"], change: Float[np.ndarray, " packed"]
     ) -> Float[np.ndarray, " a"]:
-        """Change of the averages; differences are exact, as they are linear in each argument."""
+        """Compute the change of the averages; differences are exact for bilinear functions."""
         count, every = self.ready.chain.flexures, self._indices
-        places = every.contact_stiffness[:count], every.rods.length[:count]
+        indices = every.contact_stiffness[:count], every.rods.length[:count]
 
         def at(side: float) -> np.ndarray:
-            stiffness, length = (here[one] + side * change[one] for one in places)
-            return np.ravel(list(averages(stiffness, length.sum(axis=-1)).values()))
+            stiffness, length = (vector[one] + side * change[one] for one in indices)
+            return np.ravel(list(chain_averages(stiffness, length.sum(axis=-1)).values()))
 
         return 0.5 * (at(1.0) - at(-1.0))

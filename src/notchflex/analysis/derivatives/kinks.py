@@ -1,7 +1,7 @@
-"""Where the derivatives of a path are those of one side only.
+"""States of a path at which derivatives are one-sided.
 
-A contact about to slip and a notch just closing are switches: what the robot does on the one side
-of them differs from the other by more than curvature. A contact that slid in a step has a slip
+A contact about to slip and a notch just closing are switches: the slopes differ on their two sides.
+A contact that slid in a step has a slip
 and lies on its bound; one that stuck has neither. At the switch it lies on its bound without a
 slip, as after a step that changed nothing. A notch at the switch is closed without a force.
 """
@@ -25,16 +25,16 @@ if TYPE_CHECKING:  # for the type only: a path tells its kinks
 
 @dataclass(frozen=True)
 class Kink:
-    """A contact or a notch of a state at which derivatives are those of one side.
+    """A contact or a notch at a switch, where derivatives are one-sided.
 
     Attributes:
         step: Step of the path, from 0.
         kind: "contact" (about to slip, or to stop) or "notch" (about to close or to open).
         index: Which contact along its tendon, from 1 at the base, or which notch, from 1.
         tendon: The tendon of a contact, from 1; None for a notch.
-        distance: How far the state is from the switch: of a contact the log ratio that is left
-            to its bound, or its slip in heights of the notch; of a notch its gap, or the travel
-            that its contact force stands for, in heights.
+        distance: Distance of the state from the switch: for a contact the log ratio to its bound,
+            or its slip in heights of the notch; for a notch its gap, or its contact force over its
+            stiffness, in heights.
     """
 
     step: int
@@ -58,8 +58,8 @@ def kinks(path: EquilibriumPath, within: float = 1e-6) -> list[Kink]:
         return []
     solved, before = path.run.solved, path.prepared.state.unpack(path.run.between)
     every = [*_contacts(path.chain, solved, before, within), *_notches(path, within)]
-    good = np.asarray(path.converged)
-    return sorted((one for one in every if good[one.step]), key=lambda one: one.step)
+    converged = np.asarray(path.converged)
+    return sorted((one for one in every if converged[one.step]), key=lambda one: one.step)
 
 
 def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: float) -> list[Kink]:
@@ -92,5 +92,5 @@ def _notches(path: EquilibriumPath, within: float) -> list[Kink]:
     distance: Float[np.ndarray, "s n"] = np.maximum(np.abs(path.gap), travel) / height
     return [
         Kink(int(step), "notch", int(notch) + 1, None, float(distance[step, notch]))
-        for step, notch in np.argwhere(distance < within)  # NaN where a notch has no lips
+        for step, notch in np.argwhere(distance < within)  # NaN where a notch has no contact
     ]

@@ -1,6 +1,6 @@
-"""How arrays change with a number that plain Python turns into them, by central differences.
+"""Derivatives of arrays by numbers of a robot, by central differences.
 
-JAX cannot look into the checking of a robot and its conversion to arrays. The arrays are smooth
+JAX cannot trace the validation of a robot and its conversion to arrays. The arrays are smooth
 functions of the numbers; everything after them is differentiated exactly.
 """
 
@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from notchflex.errors import InputError
 
-# Width of a difference, of the number itself, by its order of accuracy. A formula of some twenty
-# operations is right to rounding and bears a small width; integrals and special functions do not.
+# Width of a difference relative to the number, by order of accuracy. A short formula is accurate to
+# rounding and allows a small width; integrals and special functions do not.
 _WIDTHS = {2: 5e-6, 6: 1.3e-3}
 
 
@@ -31,7 +31,7 @@ def slope(
         order: Order of accuracy: 6, or 2 with a third of the evaluations, for plain formulas.
 
     Returns:
-        The derivative, right to about 1e-10.
+        The derivative, accurate to about 1e-10.
 
     Raises:
         InputError: The number cannot be varied.
@@ -45,7 +45,7 @@ def differences(
     values: ArrayLike,
     order: int,
 ) -> Float[np.ndarray, "*m"]:
-    """Differentiate by numbers that move together, each by so many of its `width_at`.
+    """Differentiate by numbers that vary together, each in multiples of its `width_at`.
 
     Args:
         vector_of: As for `slope`.
@@ -62,24 +62,24 @@ def differences(
     for side in (0, 1, -1):
         points, weights = _stencil(order, side)
         try:
-            found = np.stack([vector_of(values + width * point) for point in points])
-        except InputError:  # beyond what a number may be
+            vectors = np.stack([vector_of(values + width * point) for point in points])
+        except InputError:  # out of range
             continue
-        found = np.where(np.isfinite(found), found, 0.0)
-        # What does not change is 0, not a rounding error.
-        return np.tensordot(weights, found - found[0], 1)
+        vectors = np.where(np.isfinite(vectors), vectors, 0.0)
+        # Constant entries give exactly 0, without rounding errors.
+        return np.tensordot(weights, vectors - vectors[0], 1)
     raise InputError.OUT_OF_RANGE(f"the number cannot be varied around {np.ravel(values)[0]:g}")
 
 
 def width_at(values: ArrayLike, order: int) -> Float[np.ndarray, "*k"]:
-    """Return the widths of differences, of the numbers themselves, and of 1 for 0."""
+    """Return the widths of differences: relative to the numbers, or to 1 for 0."""
     size = np.abs(values)
     return _WIDTHS[order] * np.where(size == 0.0, 1.0, size)
 
 
 @lru_cache
 def _stencil(order: int, side: int) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
-    """Points, in widths, and weights that give the slope at 0 of the polynomial through them."""
+    """Return points, in widths, and weights of the slope at 0 of their interpolant."""
     half = order // 2
     central = np.concatenate([np.arange(-half, 0.0), np.arange(1.0, half + 1.0)])
     points = side * np.arange(order + 1.0) if side else central

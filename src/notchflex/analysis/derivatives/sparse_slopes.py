@@ -20,11 +20,11 @@ from numpy.typing import ArrayLike
 from notchflex.analysis.derivatives.numbers import differences, slope, width_at
 from notchflex.errors import InputError
 
-# Changes that rounding makes, of the largest number of a part.
+# Rounding errors, relative to the largest number of a part.
 _ROUNDING = 1e-13
 
-# The check of slopes: by so much of a difference's width, and how far they may be off. The error of
-# a difference of two points, and an entry whose slope is that of another number, lie far apart.
+# Check of slopes: step in widths of a difference, and allowed relative error. It separates the
+# error of a two-point difference from a slope that belongs to another number.
 _CHECKED, _AGREEMENT = 0.1, 1e-2
 _GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
 
@@ -33,7 +33,7 @@ Vector = Callable[[Float[np.ndarray, " k"]], Float[np.ndarray, " m"]]
 
 @dataclass(frozen=True, eq=False)
 class SparseSlopes:
-    """Slopes by k numbers, with what is known of which entries each of them changes.
+    """Slopes by k numbers, with the observed sparsity: the entries that each of them changes.
 
     Attributes:
         order: Order of accuracy, as for `slope`.
@@ -49,7 +49,7 @@ class SparseSlopes:
     def at(
         self, vector_of: Vector, at: Float[np.ndarray, " k"], form: bytes = b""
     ) -> list[Float[np.ndarray, " m"]]:
-        """Differentiate.
+        """Differentiate a vector.
 
         Args:
             vector_of: The vector of k numbers, m finite or infinite entries.
@@ -62,29 +62,29 @@ class SparseSlopes:
         Raises:
             InputError: A number cannot be varied.
         """
-        here = vector_of(at)
+        vector = vector_of(at)
         if form not in self._changed:
-            self._changed[form] = self._observed(vector_of, at, here)
-        found = self._compressed(vector_of, at, here, self._changed[form])
-        if found is None:  # a number changes more than it did where it was observed
-            self._changed[form] |= self._observed(vector_of, at, here)
-            found = self._compressed(vector_of, at, here, self._changed[form])
-        if found is None or not self._agree(vector_of, at, found):
+            self._changed[form] = self._observed(vector_of, at, vector)
+        slopes = self._compressed(vector_of, at, vector, self._changed[form])
+        if slopes is None:  # a number changes more than it did where it was observed
+            self._changed[form] |= self._observed(vector_of, at, vector)
+            slopes = self._compressed(vector_of, at, vector, self._changed[form])
+        if slopes is None or not self._agree(vector_of, at, slopes):
             return [self._alone(vector_of, at, number) for number in range(len(at))]
-        return found
+        return slopes
 
     @cached_property
     def _changed(self) -> dict[bytes, Bool[np.ndarray, "k m"]]:
         return {}
 
     def _observed(
-        self, vector_of: Vector, at: Float[np.ndarray, " k"], here: Float[np.ndarray, " m"]
+        self, vector_of: Vector, at: Float[np.ndarray, " k"], vector: Float[np.ndarray, " m"]
     ) -> Bool[np.ndarray, "k m"]:
-        """Which entries each number changes."""
+        """Observe which entries each number changes."""
         width = width_at(at, self.order)
-        changed = np.empty((len(at), len(here)), bool)
+        changed = np.empty((len(at), len(vector)), bool)
         for number in range(len(at)):
-            moved = here
+            moved = vector
             for side in (1.0, -1.0):
                 try:
                     moved = vector_of(_with(at, number, at[number] + side * width[number]))
@@ -92,18 +92,18 @@ class SparseSlopes:
                     continue
                 break
             with np.errstate(invalid="ignore"):
-                changed[number] = self._differs(moved - here, here)
+                changed[number] = self._differs(moved - vector, vector)
         changed[:, self.derived] = False
         return changed
 
     def _differs(
         self, change: Float[np.ndarray, " m"], values: Float[np.ndarray, " m"]
     ) -> Bool[np.ndarray, " m"]:
-        """Which entries change by more than rounding; NaN, between infinite ones, does not."""
+        """Return which entries change by more than rounding; NaN, from infinite ones, does not."""
         return np.abs(change) > self._rounding(values)
 
     def _rounding(self, values: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
-        """Return the changes that rounding makes of each entry."""
+        """Return the rounding error of each entry."""
         rounding = np.full(len(values), np.inf)
         for part in self.parts:
             finite = np.abs(values[part])
@@ -114,11 +114,11 @@ class SparseSlopes:
         self,
         vector_of: Vector,
         at: Float[np.ndarray, " k"],
-        here: Float[np.ndarray, " m"],
+        vector: Float[np.ndarray, " m"],
         changed: Bool[np.ndarray, "k m"],
     ) -> list[Float[np.ndarray, " m"]] | None:
-        """Slopes of numbers that are moved together; None where something else changes too."""
-        found = [np.zeros(0)] * len(at)
+        """Compute slopes of numbers varied together; None where another entry changes too."""
+        slopes = [np.zeros(0)] * len(at)
         for group in _groups(changed):
             try:
                 together = differences(
@@ -128,37 +128,37 @@ class SparseSlopes:
                 )
             except InputError:  # one is at the lower end of its range, one perhaps at the upper
                 for number in group:
-                    found[number] = self._alone(vector_of, at, number)
+                    slopes[number] = self._alone(vector_of, at, number)
                 continue
             together[self.derived] = 0.0
-            if np.any(self._differs(together, here) & ~changed[group].any(axis=0)):
+            if np.any(self._differs(together, vector) & ~changed[group].any(axis=0)):
                 return None
             for number in group:
                 own = np.where(changed[number], together, 0.0)
-                found[number] = own / width_at(at[number], self.order)
-        return found
+                slopes[number] = own / width_at(at[number], self.order)
+        return slopes
 
     def _agree(
         self, vector_of: Vector, at: Float[np.ndarray, " k"], slopes: list[Float[np.ndarray, " m"]]
     ) -> bool:
-        """Whether slopes explain a difference in which every number moves by another amount.
+        """Return whether slopes agree with a difference in which all numbers vary by other amounts.
 
-        An entry whose change was ascribed to one number of a group, but is that of another, is seen
-        here. At a kink they do not agree either, nor where no number may move to both sides.
+        It detects an entry whose change was attributed to the wrong number of a group. They also
+        disagree at a kink, and where a number cannot vary to both sides.
         """
         if not slopes:
             return True
         amounts = 0.5 + np.arange(1, len(at) + 1) * _GOLDEN_RATIO % 1.0
         steps = _CHECKED * width_at(at, self.order) * amounts
         try:
-            behind, before = vector_of(at - steps), vector_of(at + steps)
+            lower, upper = vector_of(at - steps), vector_of(at + steps)
         except InputError:
             return False
         with np.errstate(invalid="ignore"):
-            change = 0.5 * (before - behind)
+            change = 0.5 * (upper - lower)
         change[self.derived] = 0.0
         terms = steps[:, None] * np.stack(slopes)
-        bound = _AGREEMENT * np.abs(terms).sum(axis=0) + 10.0 * self._rounding(before)
+        bound = _AGREEMENT * np.abs(terms).sum(axis=0) + 10.0 * self._rounding(upper)
         return not np.any(np.abs(change - terms.sum(axis=0)) > bound)
 
     def _alone(
@@ -170,14 +170,14 @@ class SparseSlopes:
 
 
 def _with(at: Float[np.ndarray, " k"], numbers: Any, values: ArrayLike) -> np.ndarray:
-    """Numbers of which some have other values."""
+    """Return the numbers with some replaced."""
     moved = np.array(at)
     moved[numbers] = values
     return moved
 
 
 def _groups(changed: Bool[np.ndarray, "k m"]) -> list[list[int]]:
-    """Numbers that change no entry in common, each number in one group."""
+    """Group numbers that change no entry in common."""
     groups: list[list[int]] = []
     taken: list[np.ndarray] = []
     for number, own in enumerate(changed):

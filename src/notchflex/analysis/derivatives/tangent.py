@@ -140,7 +140,7 @@ class PathTangents:
             for one in (run.states_before, run.states, run.between)
         )
         remembers = self.remembers & ~run.from_start
-        how = np.stack([run.part_before, run.parts, self.path.converged, remembers], axis=1)
+        how = np.stack([run.fraction_before, run.substeps, self.path.converged, remembers], axis=1)
         return (*states, how.astype(float))
 
 
@@ -192,7 +192,7 @@ def _tangent(
     load_change: Float[Array, " command"],
     layouts: StepLayouts,
 ) -> tuple[Float[Array, " state"], dict[str, Array]]:
-    """Change of a solved state, which is carried to the next, and of what is reported of it.
+    """Compute the change of a solved state, carried to the next, and of its reported quantities.
 
     The program for loads alone, where the chain does not vary, is a fifth shorter.
     """

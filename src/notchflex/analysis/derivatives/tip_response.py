@@ -54,11 +54,11 @@ class TipResponse(Displayed):
 
     def _summary(self) -> Summary:
         steps, _, tendons = self.jacobian.shape
-        good = np.isfinite(self.jacobian).all(axis=(1, 2))
+        finite = np.isfinite(self.jacobian).all(axis=(1, 2))
         rows = [
             ("jacobian", f"{steps} steps x 6 x {tendons} tendons: rad or mm per N or mm"),
             ("compliance", f"{steps} steps x 6 x 6: rad or mm per N mm or N"),
-            ("steps with slopes", f"{int(good.sum())} of {steps}"),
+            ("steps with slopes", f"{int(finite.sum())} of {steps}"),
         ]
         hint = ".kinks lists where slopes are those of one side; .path holds the states"
         return Summary(f"Response of the tip of {self.path.robot.name}", rows, hint)
@@ -115,7 +115,7 @@ def tip_response(
 
 
 def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"]]:
-    """Changes of the loads, packed: a unit of every drive, then of tip moment and force."""
+    """Pack unit changes of the loads: of every drive, then of tip moment and force."""
     long = path.prepared.long
     packed, form = path.prepared.padded_commands(path.commands)
     none: Command = form.unpack(np.zeros(form.size))
@@ -131,14 +131,14 @@ def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"
 def _pose_change(
     path: EquilibriumPath, changes: Mapping[str, np.ndarray]
 ) -> Float[np.ndarray, "k s 6"]:
-    """Rotation vectors and displacements of the tip, in the world."""
+    """Compute rotation vectors and displacements of the tip, in the world."""
     spin = changes["tip_rotation"] @ np.swapaxes(path.tip_rotation, -1, -2)
     turned = [spin[..., b, a] - spin[..., a, b] for a, b in ((1, 2), (2, 0), (0, 1))]
     return np.concatenate([0.5 * np.stack(turned, axis=-1), changes["tip_position"]], axis=-1)
 
 
 def _with_tip(applied: BodyLoads, wrench: Float[np.ndarray, " 6"], length: float) -> BodyLoads:
-    """Loads with a moment and a force more at the tip, dead in the base frame."""
+    """Add a moment and a force at the tip to loads, dead in the base frame."""
     moment, force = wrench[:3], wrench[3:]
     last = np.zeros(len(applied.dead_force))
     last[-1] = 1.0

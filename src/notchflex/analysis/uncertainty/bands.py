@@ -1,4 +1,4 @@
-"""Bands of a prediction: tolerances of a robot carried through a path of loads by one batch."""
+"""Bands of a prediction: tolerances of a robot propagated along a path of loads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from notchflex.robot.tolerance import Tolerance
 from notchflex.solver.newton import Settings
 
 LEVELS = (0.05, 0.50, 0.95)
-"""The parts of all draws that lie below the low end, the middle and the high end of a band."""
+"""Quantiles of the draws at the low end, the middle and the high end of a band."""
 
 DRAWS = 256
 
@@ -60,7 +60,7 @@ class Bands(Displayed, Mapping[str, Band]):
         samples: The quantities of every draw, (draws, S, ...); NaN where it did not converge.
         drawn: The numbers of the drawn robots by name, (draws,).
         converged: How many draws converged, step by step.
-        redrawn: How many draws made no valid robot and were drawn again.
+        redrawn: Number of draws that gave no valid robot and were drawn again.
         seed: Of the draws.
     """
 
@@ -74,24 +74,24 @@ class Bands(Displayed, Mapping[str, Band]):
     seed: int
 
     def __getitem__(self, name: str) -> Band:
-        """The band of a quantity."""
-        return self._found[name]
+        """Return the band of a quantity."""
+        return self._bands_by_name[name]
 
     @cached_property
-    def _found(self) -> dict[str, Band]:
+    def _bands_by_name(self) -> dict[str, Band]:
         return {name: band(samples) for name, samples in self.samples.items()}
 
     def __iter__(self) -> Iterator[str]:
-        """The names of the quantities."""
+        """Iterate over the names of the quantities."""
         return iter(self.samples)
 
     def __len__(self) -> int:
-        """How many quantities there are."""
+        """Return the number of quantities."""
         return len(self.samples)
 
     @property
     def draws(self) -> int:
-        """How many robots were drawn."""
+        """Number of drawn robots."""
         return len(next(iter(self.samples.values())))
 
     def end(self, name: str) -> EquilibriumPath:
@@ -106,21 +106,22 @@ class Bands(Displayed, Mapping[str, Band]):
         return cast("EquilibriumPath", _End(self, name))
 
     def warnings(self) -> list[str]:
-        """Return a sentence for each thing that makes the bands less than they seem."""
-        found: list[str] = []
+        """Return a sentence for each limitation of the bands."""
+        sentences: list[str] = []
         failed = np.flatnonzero(self.converged < self.draws)
         if len(failed):
-            least = int(self.converged.min())
-            found.append(
-                f"{self.draws - least} of {self.draws} draws did not converge, the first at step "
-                f"{failed[0] + 1}: from there on the bands leave them out, and may be too narrow."
+            min_converged = int(self.converged.min())
+            sentences.append(
+                f"{self.draws - min_converged} of {self.draws} draws did not converge, the first "
+                f"at step {failed[0] + 1}: from there on the bands leave them out, and may be too "
+                "narrow."
             )
         if self.redrawn:
-            found.append(
+            sentences.append(
                 f"{self.redrawn} of {self.draws} draws made no valid robot and were drawn again: "
                 "the tolerances reach beyond what the tube allows."
             )
-        return found
+        return sentences
 
     def _summary(self) -> Summary:
         rows: list[tuple[str, str]] = []
@@ -170,7 +171,7 @@ def uncertain(
     cores: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Bands:
-    """Follow loads with robots drawn within tolerances: how far the real robot may lie off.
+    """Simulate loads with robots drawn within tolerances, for bands of the real robot.
 
     Every draw follows all loads with its own friction history.
 
@@ -214,7 +215,7 @@ def uncertain(
     asked = check_outputs(USUAL if outputs is None else outputs)
     names = [name for name in asked if _has_band(name) and holds(path, QUANTITIES[name])]
     drawn = draw_robots(robot, chosen, draws, check_integer(seed, "seed"))
-    found = simulate_batch(
+    results = simulate_batch(
         drawn.robots,
         path.load,
         outputs=(*names, "converged"),
@@ -223,15 +224,15 @@ def uncertain(
         cores=cores,
         progress=progress,
     )
-    good = found["converged"]
+    converged = results["converged"]
     turn = path.base_to_world
     samples: dict[str, np.ndarray] = {}
     for name in names:
-        values = found[name] if turn is None else REGISTERED[name].turned(found[name], turn)
-        there = good.reshape(good.shape + (1,) * (values.ndim - 2))
-        samples[name] = np.where(there, values, np.nan)
+        values = results[name] if turn is None else REGISTERED[name].turned(results[name], turn)
+        mask = converged.reshape(converged.shape + (1,) * (values.ndim - 2))
+        samples[name] = np.where(mask, values, np.nan)
     return Bands(
-        path, chosen, assumed, samples, drawn.values, good.sum(axis=0), drawn.redrawn, seed
+        path, chosen, assumed, samples, drawn.values, converged.sum(axis=0), drawn.redrawn, seed
     )
 
 
@@ -241,6 +242,6 @@ def band_names(more: Iterable[str]) -> list[str]:
 
 
 def _has_band(name: str) -> bool:
-    """Whether a quantity is a number, or some, that a batch returns."""
+    """Return whether a quantity has numbers that a batch returns."""
     quantity = REGISTERED[name]
     return name in OUTPUTS and quantity.kind is float and "row" not in quantity.per

@@ -1,4 +1,4 @@
-"""How far tolerances move the closing of notches, and what 10 µm of depth do."""
+"""Effect of tolerances on the closing of notches, and of 10 µm of depth."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NEVER = 1e12
 
 
 class ClosingBands(NamedTuple):
-    """What `notchflex show` says of tolerances.
+    """Results of `notchflex show` on tolerances.
 
     Attributes:
         bands: The bands that the others were taken from.
@@ -50,11 +50,11 @@ class ClosingBands(NamedTuple):
 
 
 def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
-    """Carry the tolerances of a robot to the closing of its notches.
+    """Propagate the tolerances of a robot to the closing of its notches.
 
     Args:
         robot: The robot, n notches.
-        table: What `closing` returned of it.
+        table: Result of `closing` for it.
 
     Returns:
         The bands; None where no notch closes.
@@ -68,15 +68,15 @@ def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
     loads = np.linspace(0.0, _BEYOND * table.tension[own].max(), _STEPS)
     loads = np.sort(np.append(loads, load))
     names = ("total_angle", "notch_angle", "gap", "contact_force")
-    found = uncertain(robot, _pull(robot, tendon, loads), outputs=names, draws=_DRAWS)
-    gaps, forces = (found.samples[name][:, :, own] for name in ("gap", "contact_force"))
-    stiffness = np.asarray(found.path.chain.contact_stiffness)[own]
-    angles = found.samples["notch_angle"][:, :, own]
+    bands = uncertain(robot, _pull(robot, tendon, loads), outputs=names, draws=_DRAWS)
+    gaps, forces = (bands.samples[name][:, :, own] for name in ("gap", "contact_force"))
+    stiffness = np.asarray(bands.path.chain.contact_stiffness)[own]
+    angles = bands.samples["notch_angle"][:, :, own]
     tension, angle = _closing(loads, gaps, forces > gaps * stiffness, angles)
-    total = band(found.samples["total_angle"][:, np.searchsorted(loads, load)])
+    total = band(bands.samples["total_angle"][:, np.searchsorted(loads, load)])
     by_depth = _by_depth(robot, _pull(robot, tendon, np.array([load])))
     closing = _with_never(tension), band(angle)
-    return ClosingBands(found, own + 1, *closing, load, tendon, total, by_depth)
+    return ClosingBands(bands, own + 1, *closing, load, tendon, total, by_depth)
 
 
 def _with_never(tension: Float[np.ndarray, "d n"]) -> Band:
@@ -86,19 +86,19 @@ def _with_never(tension: Float[np.ndarray, "d n"]) -> Band:
     return Band(*(np.where(end < _NEVER, end, np.inf) for end in ends))
 
 
-def closing_document(found: ClosingBands) -> dict[str, Any]:
-    """Return what `notchflex show --json` says of tolerances, at the edge units."""
+def closing_document(closing_bands: ClosingBands) -> dict[str, Any]:
+    """Return the document of `notchflex show --json` on tolerances, in output units."""
     return {
-        "draws": found.bands.draws,
-        "tolerances": {one.value: one.written for one in found.bands.tolerances},
-        "assumed": list(found.bands.assumed),
-        "tendon": found.tendon,
-        "notches": found.notches,
-        "closing_tension_N": _ends(found.tension),
-        "closing_angle_deg": _ends(found.angle, DEGREES),
-        "load_N": found.load,
-        "total_angle_deg": _ends(found.total_angle, DEGREES),
-        "total_angle_deg_by_10um_depth": found.by_depth * DEGREES,
+        "draws": closing_bands.bands.draws,
+        "tolerances": {one.value: one.written for one in closing_bands.bands.tolerances},
+        "assumed": list(closing_bands.bands.assumed),
+        "tendon": closing_bands.tendon,
+        "notches": closing_bands.notches,
+        "closing_tension_N": _ends(closing_bands.tension),
+        "closing_angle_deg": _ends(closing_bands.angle, DEGREES),
+        "load_N": closing_bands.load,
+        "total_angle_deg": _ends(closing_bands.total_angle, DEGREES),
+        "total_angle_deg_by_10um_depth": closing_bands.by_depth * DEGREES,
     }
 
 
@@ -120,7 +120,7 @@ def _closing(
     closed: Bool[np.ndarray, "d s n"],
     angles: Float[np.ndarray, "d s n"],
 ) -> tuple[Float[np.ndarray, "d n"], Float[np.ndarray, "d n"]]:
-    """Tension and angle at which each notch of each draw closes.
+    """Compute tension and angle at which each notch of each draw closes.
 
     The gap falls almost evenly until it is closed and stands still then, so the last two open
     steps are continued.
@@ -133,13 +133,13 @@ def _closing(
     before, after = loads[np.maximum(step - 1, 0)], loads[step]
     earlier = loads[np.maximum(step - 2, 0)]
     with np.errstate(divide="ignore", invalid="ignore"):
-        onward = before + near * (before - earlier) / (far - near)
-    tension = np.where(step > 1, np.clip(onward, before, after), 0.5 * (before + after))
+        extrapolated = before + near * (before - earlier) / (far - near)
+    tension = np.where(step > 1, np.clip(extrapolated, before, after), 0.5 * (before + after))
     angle = np.take_along_axis(angles, step[:, None], axis=1)[:, 0]
-    there = closed.any(axis=1)
+    closes = closed.any(axis=1)
     failed = np.isnan(gaps).any(axis=1)
     never = np.where(failed, np.nan, np.inf)
-    return np.where(there, tension, never), np.where(there, angle, np.nan)
+    return np.where(closes, tension, never), np.where(closes, angle, np.nan)
 
 
 def _by_depth(robot: Robot, load: LoadPath) -> float:

@@ -176,22 +176,22 @@ def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[ToleranceS
         robot: The robot with the values of the drawing.
         tolerances: What deviates.
     """
-    found: list[ToleranceSource] = []
+    sources: list[ToleranceSource] = []
     alone = {one.value for one in tolerances if "[" in one.value}
     for one in tolerances:
         numbers = numbers_at(robot, one.value)
         others = {name: value for name, value in numbers.items() if name not in alone}
         if one.value not in alone and len(others) < len(numbers):
             names = [[name] for name in others] if one.per_notch else [list(others)]
-            found += [
+            sources += [
                 ToleranceSource(one, {name: others[name] for name in each})
                 for each in names
                 if each
             ]
         elif one.per_notch:
-            found += [ToleranceSource(one, {name: value}) for name, value in numbers.items()]
+            sources += [ToleranceSource(one, {name: value}) for name, value in numbers.items()]
         elif len(set(numbers.values())) == 1:  # by one name: equal notches stay a group
-            found.append(ToleranceSource(one, {one.value: number_at(robot, one.value)}))
+            sources.append(ToleranceSource(one, {one.value: number_at(robot, one.value)}))
         else:
-            found.append(ToleranceSource(one, numbers))
-    return found
+            sources.append(ToleranceSource(one, numbers))
+    return sources

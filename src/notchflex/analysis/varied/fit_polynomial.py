@@ -1,7 +1,7 @@
-"""Fit a sparse polynomial to exact values of a vector, with a measured error.
+"""Fit of a sparse polynomial to exact values of a vector, with a measured error.
 
-Along each variable Leja points are added until they change nothing; which products of powers are
-needed follows from how fast these changes fall (Gerstner and Griebel 2003, with the changes along
+Along each variable Leja points are added until they change nothing; the decay of these changes
+selects the products of powers (Gerstner and Griebel 2003, with the changes along
 one variable in place of a search). Terms whose variables never act together are left out. The
 error is measured at points that are not among the nodes.
 """
@@ -22,22 +22,22 @@ from notchflex.analysis.varied.sparse_polynomial import (
     leja_points,
 )
 
-_CUT = 1e-3  # smaller coefficients are left out, in parts of the error that is allowed
-_AIM = 0.3  # smaller terms are left out at first, likewise
-_ROUNDS = 6  # of parts that are not yet right
+_CUT = 1e-3  # cutoff of coefficients, relative to the allowed error
+_AIM = 0.3  # initial cutoff of terms, likewise
+_ROUNDS = 6  # refinements of parts that are not accurate enough
 VectorOf = Callable[[Float[np.ndarray, " d"]], Float[np.ndarray, " m"]]
 
 
 class PolynomialAccuracy(NamedTuple):
-    """How exact a polynomial should be, and what that may cost.
+    """Required accuracy of a polynomial, and the limit on its cost.
 
     Attributes:
-        tolerance: Largest error in parts of the scale.
-        most: How many exact vectors may be evaluated for it, in all.
+        tolerance: Largest error, relative to the scale.
+        max_evaluations: Largest number of exact vectors that may be evaluated.
     """
 
     tolerance: float
-    most: int
+    max_evaluations: int
 
 
 def fit_polynomial(
@@ -48,72 +48,74 @@ def fit_polynomial(
     scale_of: VectorOf,
     parts: Sequence[Int[np.ndarray, ...]],
     *,
-    wanted: Sequence[PolynomialAccuracy],
+    accuracies: Sequence[PolynomialAccuracy],
     checks: Float[np.ndarray, "k d"],
 ) -> SparsePolynomial | None:
-    """Find a polynomial that is right to a tolerance.
+    """Find a polynomial within a tolerance.
 
     Args:
         vector_of: The exact vector at numbers.
         low: Lower ends of the ranges.
         high: Upper ends, above the lower ones.
-        cliques: Places of variables that act together.
-        scale_of: From the largest size of every entry to what errors are measured in.
-        parts: Groups of entries that respond to the numbers in one way; for each it is found which
-            products of powers it needs.
-        wanted: Errors that are allowed, the largest first, which must be met. A smaller one is met
-            as far as it may cost.
+        cliques: Indices of variables that act together.
+        scale_of: Scale of errors, from the largest size of every entry.
+        parts: Groups of entries with similar dependence on the numbers; products of powers are
+            selected for each.
+        accuracies: Allowed errors, the largest first, which must be met. A smaller one is met
+            within its limit of evaluations.
         checks: Numbers at which the error is measured.
 
     Returns:
-        The polynomial; None where not even the first is met by so many evaluations.
+        The polynomial; None where the first accuracy is not met within its limit of evaluations.
     """
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    known: dict[tuple[int, ...], np.ndarray] = {}
+    exact_vectors: dict[tuple[int, ...], np.ndarray] = {}
 
     def at(index: tuple[int, ...]) -> np.ndarray:
-        if index not in known:
-            known[index] = vector_of(middle + half * leja_points()[list(index)])
-        return known[index]
+        if index not in exact_vectors:
+            exact_vectors[index] = vector_of(middle + half * leja_points()[list(index)])
+        return exact_vectors[index]
 
     count = len(middle)
     scale = scale_of(np.abs(at((0,) * count)))
 
     cliques = list(cliques)
 
-    def indices_for(aims: Float[np.ndarray, " parts"], most: int) -> list[tuple[int, ...]] | None:
-        """Find the products of powers that matter; None if they are too many."""
+    def indices_for(
+        aims: Float[np.ndarray, " parts"], max_evaluations: int
+    ) -> list[tuple[int, ...]] | None:
+        """Select products of powers; None if they are too many."""
         changes: list[np.ndarray] = []
         for variable in range(count):
-            found = _changes(at, variable, count, scale, parts, aims)
-            if found is None or len(known) > most:
+            changes_of_variable = _changes(at, variable, count, scale, parts, aims)
+            if changes_of_variable is None or len(exact_vectors) > max_evaluations:
                 return None
-            changes.append(found)
-        return _indices(changes, cliques, aims, most)
+            changes.append(changes_of_variable)
+        return _indices(changes, cliques, aims, max_evaluations)
 
     exact = np.stack([vector_of(one) for one in checks])
-    good: SparsePolynomial | None = None
-    for tolerance, most in wanted:
+    accepted: SparsePolynomial | None = None
+    for tolerance, max_evaluations in accuracies:
         aims = np.full(len(parts), _AIM * tolerance)
         for _ in range(_ROUNDS):
-            indices = indices_for(aims, most)
+            indices = indices_for(aims, max_evaluations)
             if indices is None:
-                return good
+                return accepted
             terms = Terms.of(indices)
             for index in sorted(indices):  # the last variables first: what is left stays the same
                 at(index)
             values = np.stack([at(tuple(index)) for index in terms.powers.tolist()])
-            nodes = np.stack(list(known.values()))
-            made = _solved(middle, half, terms, values, nodes, _CUT * tolerance * scale)
-            error = _errors(made, exact, checks, scale)
+            nodes = np.stack(list(exact_vectors.values()))
+            polynomial = _solved(middle, half, terms, values, nodes, _CUT * tolerance * scale)
+            error = _errors(polynomial, exact, checks, scale)
             of_parts = np.array([np.max(error[part], initial=0.0) for part in parts])
-            if of_parts.max() <= wanted[0].tolerance:
-                good = made._replace(error=float(of_parts.max()))
+            if of_parts.max() <= accuracies[0].tolerance:
+                accepted = polynomial._replace(error=float(of_parts.max()))
             wrong = of_parts > tolerance
             if not wrong.any():
                 break
             aims = np.where(wrong, 0.1 * aims, aims)
-    return good
+    return accepted
 
 
 def _changes(
@@ -124,7 +126,7 @@ def _changes(
     parts: Sequence[np.ndarray],
     aims: Float[np.ndarray, " parts"],
 ) -> Float[np.ndarray, "parts degrees"] | None:
-    """How much each further point along a variable changes each part, in parts of the scale."""
+    """Compute the change of each part by further points along a variable, over the scale."""
     points = leja_points()
     values: list[np.ndarray] = []
     sizes: list[np.ndarray] = []
@@ -149,13 +151,13 @@ def _indices(
     changes: Sequence[Float[np.ndarray, "parts degrees"]],
     cliques: Iterable[Sequence[int]],
     aims: Float[np.ndarray, " parts"],
-    most: int,
+    max_evaluations: int,
 ) -> list[tuple[int, ...]] | None:
-    """Products of powers that matter, none without those that divide it; None if too many."""
-    found: dict[tuple[int, ...], None] = {(0,) * len(changes): None}
+    """Select products of powers, each with all its divisors; None if too many."""
+    indices: dict[tuple[int, ...], None] = {(0,) * len(changes): None}
     for clique in cliques:
         for part in range(len(changes[0])):
-            partial = [(next(iter(found)), 1.0)]
+            partial = [(next(iter(indices)), 1.0)]
             for variable in clique:
                 further = changes[variable][part, 1:]
                 partial += [
@@ -164,10 +166,10 @@ def _indices(
                     for degree, own in enumerate(further, start=1)
                     if size * own >= aims[part]
                 ]
-                if len(partial) > most:
+                if len(partial) > max_evaluations:
                     return None
-            found |= dict.fromkeys(powers for powers, _ in partial)
-    return list(found) if len(found) <= most else None
+            indices |= dict.fromkeys(powers for powers, _ in partial)
+    return list(indices) if len(indices) <= max_evaluations else None
 
 
 def _solved(
@@ -176,7 +178,7 @@ def _solved(
     terms: Terms,
     values: Float[np.ndarray, "terms m"],
     nodes: Float[np.ndarray, "points m"],
-    least: Float[np.ndarray, " m"],
+    cutoff: Float[np.ndarray, " m"],
 ) -> SparsePolynomial:
     base = values[0]
     entries = np.flatnonzero((nodes != base).any(axis=0))
@@ -185,28 +187,30 @@ def _solved(
     )
     basis = terms.at(leja_points()[terms.powers])
     coefficients = np.linalg.solve(basis.T, columns).T
-    coefficients[np.abs(coefficients) < least[entries[first], None]] = 0.0
-    # Which numbers each of the unlike entries depends on.
+    coefficients[np.abs(coefficients) < cutoff[entries[first], None]] = 0.0
+    # Variables on which each of the distinct entries depends.
     of_variables = (coefficients != 0.0) @ (terms.powers > 0) > 0
     _, block_of = np.unique(of_variables, axis=0, return_inverse=True)
     block_of = block_of.ravel()
     order = np.argsort(block_of, kind="stable")
-    place = np.argsort(order)
+    position = np.argsort(order)
     blocks: list[CoefficientBlock] = []
     for block in range(block_of.max(initial=-1) + 1):
         own = coefficients[block_of == block]
         used = np.flatnonzero((own != 0.0).any(axis=0))
         blocks.append(CoefficientBlock(used, np.ascontiguousarray(own[:, used])))
-    return SparsePolynomial(middle, half, terms, blocks, entries, place[which.ravel()], base, nodes)
+    return SparsePolynomial(
+        middle, half, terms, blocks, entries, position[which.ravel()], base, nodes
+    )
 
 
 def _errors(
-    made: SparsePolynomial,
+    polynomial: SparsePolynomial,
     exact: Float[np.ndarray, "k m"],
     checks: Float[np.ndarray, "k d"],
     scale: np.ndarray,
 ) -> Float[np.ndarray, " m"]:
-    """Largest error of each entry at points that are no nodes, in parts of the scale."""
-    found = np.tile(made.base, (len(checks), 1))
-    found[:, made.entries] = made.varied(checks).T
-    return np.max(np.abs(found - exact) / scale, axis=0)
+    """Compute the largest error of each entry at points other than the nodes, over the scale."""
+    approximate = np.tile(polynomial.base, (len(checks), 1))
+    approximate[:, polynomial.entries] = polynomial.varied(checks).T
+    return np.max(np.abs(approximate - exact) / scale, axis=0)

@@ -1,6 +1,6 @@
-r"""Sparse polynomials in several variables, by Newton's form through Leja points.
+r"""Sparse polynomials in several variables, in Newton's form at Leja points.
 
-`fit_polynomial` makes them.
+`fit_polynomial` constructs them.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ DEGREE = 40
 
 @lru_cache(maxsize=1)
 def leja_points() -> Float[np.ndarray, " points"]:
-    """Return points from -1 to 1, each as far from all before it as possible; the first is 0."""
-    grid, found = np.linspace(-1.0, 1.0, 4001), [0.0]
-    while len(found) <= DEGREE + 1:
-        distance = np.prod(np.abs(grid[:, None] - np.array(found)), axis=1)
-        found.append(float(grid[np.argmax(distance)]))
-    return np.array(found)
+    """Return Leja points from -1 to 1: each maximises the product of distances; the first is 0."""
+    grid, points = np.linspace(-1.0, 1.0, 4001), [0.0]
+    while len(points) <= DEGREE + 1:
+        distance = np.prod(np.abs(grid[:, None] - np.array(points)), axis=1)
+        points.append(float(grid[np.argmax(distance)]))
+    return np.array(points)
 
 
 class Terms(NamedTuple):
@@ -44,23 +44,23 @@ class Terms(NamedTuple):
     def of(cls, indices: Iterable[tuple[int, ...]]) -> Terms:
         """Sort a set of powers that holds every power that divides another one."""
         ordered = sorted(indices, key=lambda index: (sum(index), index))
-        place = {index: number for number, index in enumerate(ordered)}
+        position = {index: number for number, index in enumerate(ordered)}
         variable = [max(np.flatnonzero(index), default=0) for index in ordered]
         before = [0]
         for index, last in zip(ordered[1:], variable[1:], strict=True):
             fewer = list(index)
             fewer[last] -= 1
-            before.append(place[tuple(fewer)])
+            before.append(position[tuple(fewer)])
         return cls(np.array(ordered), np.array(before), np.array(variable))
 
     def at(self, points: Float[np.ndarray, "rows d"]) -> Float[np.ndarray, "terms rows"]:
         """Return every term at points between -1 and 1."""
         leja = leja_points()
-        most = self.powers.max(axis=0, initial=0)
+        max_powers = self.powers.max(axis=0, initial=0)
         factors = [
             (points[:, variable] - leja[:degree, None])
             / np.array([span(leja, k) for k in range(degree)])[:, None]
-            for variable, degree in enumerate(most)
+            for variable, degree in enumerate(max_powers)
         ]
         terms = np.ones((len(self.powers), len(points)))
         for term in range(1, len(terms)):
@@ -71,7 +71,7 @@ class Terms(NamedTuple):
 
 
 def span(leja: np.ndarray, degree: int) -> float:
-    """What the factor of a degree is divided by, so that the product is 1 at the next point."""
+    """Return the divisor of the factor of a degree that makes the product 1 at the next point."""
     above = np.prod(leja[degree + 1] - leja[: degree + 1])
     below = np.prod(leja[degree] - leja[:degree]) if degree else 1.0
     return float(above / below)
@@ -81,7 +81,7 @@ class CoefficientBlock(NamedTuple):
     """Entries that depend on the same numbers.
 
     Attributes:
-        terms: Places of the terms that any of them has.
+        terms: Indices of the terms that any of them has.
         coefficients: Of these terms for every entry, (entries, terms).
     """
 
@@ -96,12 +96,12 @@ class SparsePolynomial(NamedTuple):
         middle: Middle of the range of every number.
         half: Half its range.
         terms: The products of powers.
-        blocks: Of unlike entries that depend on the same numbers.
-        entries: Places of the entries that vary in the vector.
-        which: Which of the unlike entries, block after block, each of them is.
+        blocks: Distinct entries, grouped by the numbers that they depend on.
+        entries: Indices in the vector of the entries that vary.
+        which: Index of each of these among the distinct entries, block after block.
         base: The vector in the middle.
         nodes: Exact vectors at all points that were evaluated, (points, m).
-        error: Largest error that was measured, in parts of the scale.
+        error: Largest measured error, relative to the scale.
     """
 
     middle: Float[np.ndarray, " d"]
@@ -115,11 +115,11 @@ class SparsePolynomial(NamedTuple):
     error: float = np.inf
 
     def covers(self, numbers: Float[np.ndarray, "rows d"]) -> bool:
-        """Return whether numbers lie in the range that the polynomial was made for."""
+        """Return whether numbers lie in the range of the polynomial."""
         return bool((np.abs(numbers - self.middle) <= self.half * (1.0 + 1e-12)).all())
 
     def varied(self, numbers: Float[np.ndarray, "rows d"]) -> Float[np.ndarray, "v rows"]:
         """Return the entries that vary, at rows of numbers."""
         terms = self.terms.at((numbers - self.middle) / self.half)
-        found = [one.coefficients @ terms[one.terms] for one in self.blocks]
-        return np.concatenate([np.zeros((0, len(numbers))), *found])[self.which]
+        values = [one.coefficients @ terms[one.terms] for one in self.blocks]
+        return np.concatenate([np.zeros((0, len(numbers))), *values])[self.which]

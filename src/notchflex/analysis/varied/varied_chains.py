@@ -1,9 +1,9 @@
-"""Chains of robots that differ by a few numbers, without making a robot for each.
+"""Chains of robots that differ by a few numbers, without assembling each robot.
 
 Assembling a chain in Python takes a hundred times as long as solving it. The arrays of a chain are
-smooth functions of the numbers of the robot file; so they are assembled exactly at some nodes and
-by a polynomial between them, whose error is measured (`TOLERANCES`). What is solved is exact again.
-Where no polynomial is good enough, every robot is assembled by itself.
+smooth functions of the numbers of the robot file, so they are assembled exactly at some nodes and
+interpolated by a polynomial, whose error is measured (`TOLERANCES`). The solution itself has no
+further error. Where no polynomial is accurate enough, every robot is assembled.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.programs.static_structure import StaticStructure
 
 TOLERANCES = (1e-5, 1e-9)
-"""Largest errors of an entry, in parts of its own size or, if larger, 1 % of that of its array.
+"""Allowed errors of an entry, relative to its size or, if larger, 1 % of that of its array.
 
-The second is met where it takes no more robots than a batch has, or other batches follow.
+The second is required where it takes no more robots than a batch has, or other batches follow.
 """
 
 _FLOOR = 1e-2
 _FIBRES = 1e2
-"""Errors of single fibres, nodes of a rule for sums, may be so many times larger. Results are as
-exact then: 7e-6 where the fibres of a wrist were found to 5e-4."""
+"""Factor on the allowed errors of single fibres, the nodes of a quadrature. Results stay accurate:
+7e-6 where the fibres of a wrist had an error of 5e-4."""
 
 _CHECKS = 8
-_MOST_NODES = 4000
-_LEAST_ROBOTS = 256
+_MAX_NODES = 4000
+_MIN_ROBOTS = 256
 
 
 class _Form(NamedTuple):
-    """How a chain and its commands are packed, one behind the other."""
+    """Layout of a chain and its commands in one vector."""
 
     chain: PytreeLayout
     command: PytreeLayout
@@ -55,7 +55,7 @@ class _Form(NamedTuple):
 
     @property
     def parts(self) -> list[np.ndarray]:
-        """Places of the arrays of the chain, and last of the commands."""
+        """Indices of the arrays of the chain, and last of the commands."""
         own = [part.ravel() for part in self.chain.indices if part.size]
         return [*own, self.chain.size + np.arange(self.steps * self.command.size)]
 
@@ -70,9 +70,9 @@ class VariedChains:
 
     Attributes:
         numbers: The numbers of every robot.
-        ready: The chain of the robot that the others are made of.
+        ready: The chain of the robot that is varied.
         polynomial: Chain and commands from the numbers.
-        structure: How chains are packed for programs.
+        structure: Layout of chains for programs.
         command: Layout of one load.
         steps: Loads of each robot.
     """
@@ -93,16 +93,16 @@ class VariedChains:
         in_chain = self.polynomial.entries < size
         chain, load = np.split(self.polynomial.base, [size])
         chains = np.tile(self.structure.pack(chain), (values.shape[1], 1))
-        places = self.structure.indices_of(self.polynomial.entries[in_chain])
-        moves = places < self.structure.size - 1  # else compiled in, the same for all nodes
-        chains[:, places[moves]] = values[in_chain][moves].T
+        positions = self.structure.indices_of(self.polynomial.entries[in_chain])
+        moves = positions < self.structure.size - 1  # else compiled in, the same for all nodes
+        chains[:, positions[moves]] = values[in_chain][moves].T
         commands = np.tile(load, (values.shape[1], 1))
         commands[:, self.polynomial.entries[~in_chain] - size] = values[~in_chain].T
         return chains, commands.reshape(len(chains), self.steps, self.command.size)
 
 
 def varied_chains(
-    robots: VariedRobots, load: LoadPath, refinement: int, *, known: bool = True
+    robots: VariedRobots, load: LoadPath, refinement: int, *, reuse: bool = True
 ) -> VariedChains | None:
     """Find polynomials for the chains of varied robots under one path of loads.
 
@@ -110,7 +110,7 @@ def varied_chains(
         robots: The robots, all of them valid.
         load: The loads of every robot.
         refinement: More strain modes, as for `simulate`.
-        known: Whether polynomials of earlier calls may serve; if not, the chains depend on the
+        reuse: Whether polynomials of earlier calls may be reused; if not, the chains depend on the
             arguments alone.
 
     Returns:
@@ -121,41 +121,44 @@ def varied_chains(
     commands = make_commands(load, robots.robot, ready.chain)
     form = _Form(ready.chain_layout, ready.command_layout(commands), len(load))
     key = np.concatenate([form.command.pack(commands, leading=1).ravel(), [refinement]]).tobytes()
-    earlier = _known(robots.robot, robots.names, form.chain, key) if known else []
-    wanted = _wanted(robots)
-    found = next((one for one in earlier if one.serves(table, wanted[-1])), None)
-    if found is None:
-        polynomial = _fitted(robots, load, refinement, form, wanted)
+    earlier = _cached_polynomials(robots.robot, robots.names, form.chain, key) if reuse else []
+    accuracies = _accuracies(robots)
+    result = next((one for one in earlier if one.serves(table, accuracies[-1])), None)
+    if result is None:
+        polynomial = _fitted(robots, load, refinement, form, accuracies)
         if polynomial is None:
             return None
-        found = _Known(polynomial, wanted[-1].most)
-        earlier.append(found)
-    polynomial = found.polynomial
+        result = _CachedPolynomial(polynomial, accuracies[-1].max_evaluations)
+        earlier.append(result)
+    polynomial = result.polynomial
     nodes = polynomial.nodes[:, : form.chain.size]
     structure = StaticStructure.of(form.chain, [ready.chain], nodes)
     return VariedChains(table, ready, polynomial, structure, form.command, form.steps)
 
 
-class _Known(NamedTuple):
+class _CachedPolynomial(NamedTuple):
     """A polynomial of an earlier call.
 
     Attributes:
         polynomial: The polynomial.
-        most: How many robots could be assembled for it.
+        max_evaluations: Limit of robots assembled for it.
     """
 
     polynomial: SparsePolynomial
-    most: int
+    max_evaluations: int
 
-    def serves(self, table: Float[np.ndarray, "robots d"], wanted: PolynomialAccuracy) -> bool:
-        """Return whether a new one would be no better."""
-        good = self.polynomial.error <= wanted.tolerance or self.most >= wanted.most
-        return good and self.polynomial.covers(table)
+    def serves(self, table: Float[np.ndarray, "robots d"], accuracies: PolynomialAccuracy) -> bool:
+        """Return whether it is accurate enough and covers the numbers of a table."""
+        accurate = (
+            self.polynomial.error <= accuracies.tolerance
+            or self.max_evaluations >= accuracies.max_evaluations
+        )
+        return accurate and self.polynomial.covers(table)
 
 
 @lru_cache(maxsize=8)
-def _known(*key: Any) -> list[_Known]:
-    """Polynomials that were found for a robot, names, and loads: the next draws may fit in."""
+def _cached_polynomials(*key: Any) -> list[_CachedPolynomial]:
+    """Return the cached polynomials for a robot, names and loads."""
     del key
     return []
 
@@ -165,7 +168,7 @@ def _fitted(
     load: LoadPath,
     refinement: int,
     form: _Form,
-    wanted: Sequence[PolynomialAccuracy],
+    accuracies: Sequence[PolynomialAccuracy],
 ) -> SparsePolynomial | None:
     names, table = robots.names, robots.table
 
@@ -193,41 +196,41 @@ def _fitted(
     infinite = ~np.isfinite(reference)
     weightless = np.zeros(len(reference), bool)
     if not any(one.gravity is not None for one in load.different):  # masses are of no effect
-        places: Chain = jax.tree.unflatten(form.chain.structure, form.chain.indices)
-        weightless[np.append(places.body_mass, places.body_centre)] = True
+        positions: Chain = jax.tree.unflatten(form.chain.structure, form.chain.indices)
+        weightless[np.append(positions.body_mass, positions.body_centre)] = True
     low, high = robots.box
     middle = 0.5 * (low + high)
     half = np.maximum(0.5 * (high - low), 1e-9 * np.maximum(np.abs(middle), 1e-3))
     rows = np.linspace(0, len(table) - 1, _CHECKS).astype(int)
     try:
-        found = fit_polynomial(
+        result = fit_polynomial(
             vector_of,
             middle - half,
             middle + half,
             list(robots.cliques()),
             lambda sizes: _scale(sizes, form),
             form.parts,
-            wanted=wanted,
+            accuracies=accuracies,
             checks=table[rows],
         )
     except _AnotherFormError:
         return None
-    if found is None:
+    if result is None:
         return None
     base, nodes = (
-        np.where(infinite | weightless, reference, one) for one in (found.base, found.nodes)
+        np.where(infinite | weightless, reference, one) for one in (result.base, result.nodes)
     )
-    return found._replace(base=base, nodes=nodes)
+    return result._replace(base=base, nodes=nodes)
 
 
-def _wanted(robots: VariedRobots) -> list[PolynomialAccuracy]:
-    """Nodes cost as much as robots: no more than a batch has, unless other batches follow."""
+def _accuracies(robots: VariedRobots) -> list[PolynomialAccuracy]:
+    """Return the accuracies, with at most as many nodes as robots unless other batches follow."""
     count = len(robots)
-    follows = robots.ranges is not None and count >= _LEAST_ROBOTS
+    follows = robots.ranges is not None and count >= _MIN_ROBOTS
     usual, fine = TOLERANCES
     return [
-        PolynomialAccuracy(usual, _MOST_NODES if follows else min(_MOST_NODES, count // 2)),
-        PolynomialAccuracy(fine, _MOST_NODES if follows else min(_MOST_NODES, count)),
+        PolynomialAccuracy(usual, _MAX_NODES if follows else min(_MAX_NODES, count // 2)),
+        PolynomialAccuracy(fine, _MAX_NODES if follows else min(_MAX_NODES, count)),
     ]
 
 
@@ -238,7 +241,7 @@ def _scale(sizes: Float[np.ndarray, " m"], form: _Form) -> Float[np.ndarray, " m
         own = sizes[part]
         finite = own[np.isfinite(own)]
         scale[part] = np.maximum(own, _FLOOR * max(finite.max(initial=0.0), 1e-12))
-    places: Chain = jax.tree.unflatten(form.chain.structure, form.chain.indices)
-    for part in jax.tree.leaves(places.rods.section.fibres):
+    positions: Chain = jax.tree.unflatten(form.chain.structure, form.chain.indices)
+    for part in jax.tree.leaves(positions.rods.section.fibres):
         scale[part] *= _FIBRES
     return np.where(np.isfinite(scale), scale, 1.0)

@@ -89,7 +89,7 @@ def search_drives(
     at, result = final.at, final.result
     accepted = result.converged & believable(SolvedState(chain, at.state).quantity)
     accepted = accepted & tension_is_bounded(chain, command, at.point.base_tension)
-    flags = [accepted, result.parts == 1, at.met & accepted, at.error, final.solved]
+    flags = [accepted, result.substeps == 1, at.met & accepted, at.error, final.solved]
     status = jnp.stack([jnp.asarray(one, float) for one in flags])
     return layouts.state.pack(at.state), at.values, at.slopes, at.sticks, at.drive, status
 
@@ -154,7 +154,7 @@ class _Search:
         evaluation = self._evaluate(memory, state.drive, result.solved.point, jnp.zeros((), int))
         # Where the load was cut into parts, the history of the last one depends on the drives; and
         # a notch that can snap is solved whole.
-        whole = (result.parts == 1) if self.chain.rods.section.ends is None else jnp.array(False)
+        whole = (result.substeps == 1) if self.chain.rods.section.ends is None else jnp.array(False)
         allowed = jnp.where(result.converged & whole & ~evaluation.stuck, task.corrections, 0.0)
 
         def proceed(at: SearchState) -> Bool[Array, ""]:

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from notchflex.analysis.kinematics import bodies_from_angles
 from notchflex.mechanics.chain import assemble
 from notchflex.mechanics.chain.mass import body_lengths
-from notchflex.mechanics.contact import closing_travel, free_angle
+from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.results.quantities.registry import DEGREES, QUANTITIES
 from notchflex.robot import Robot
 
@@ -53,12 +53,12 @@ def _length(robot: Robot) -> np.ndarray:
 
 def _closing_angle(robot: Robot) -> np.ndarray:
     rods = assemble(robot, flat=False).rods
-    return DEGREES * np.asarray(closing_travel(rods) + free_angle(rods))
+    return DEGREES * np.asarray(closing_angles(rods) + free_angle(rods))
 
 
 def _closed_length(robot: Robot) -> np.ndarray:
     # A closed notch bends about its lips on the outer surface, at the outer radius from the axis.
-    travel = np.asarray(closing_travel(assemble(robot, flat=False).rods))
+    travel = np.asarray(closing_angles(assemble(robot, flat=False).rods))
     bodies = body_lengths(robot.tube, robot.notches)
     return np.array([bodies.sum() + robot.tube.outer_radius * travel.sum()])
 

@@ -137,7 +137,7 @@ def _of_robots(
         [list(range(len(low)))],
         lambda _: spread,
         [np.arange(len(spread))],
-        wanted=[PolynomialAccuracy(_ERROR, len(table) // 3)],
+        accuracies=[PolynomialAccuracy(_ERROR, len(table) // 3)],
         checks=checks,
     )
     if polynomial is None:

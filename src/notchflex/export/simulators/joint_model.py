@@ -15,7 +15,7 @@ from notchflex.export.simulators.springs import HingeSpring, fit_spring
 from notchflex.export.tendon_holes import Hole, tendon_holes
 from notchflex.mechanics.chain import assemble
 from notchflex.mechanics.chain.mass import body_lengths
-from notchflex.mechanics.contact import closing_travel
+from notchflex.mechanics.contact import closing_angles
 from notchflex.robot import Robot
 
 
@@ -74,7 +74,7 @@ def joint_model(robot: Robot, largest_tension: float | None = None) -> JointMode
         top=top,
         hinges=hinges,
         springs=_springs(hinges, pulls, holes, np.asarray(chain.stiffness)[:, 0]),
-        limit=np.asarray(closing_travel(chain.rods)),
+        limit=np.asarray(closing_angles(chain.rods)),
         holes=holes,
         body_length=body_lengths(robot.tube, robot.notches),
         body_mass=np.asarray(chain.body_mass),

@@ -1,7 +1,13 @@
 """The chain: rigid bodies joined by flexures, as arrays, and how it moves."""
 
 from notchflex.mechanics.chain.arrays import Chain, flexure_states
-from notchflex.mechanics.chain.assembly import Shaped, assemble, averages, laws, shape_of
+from notchflex.mechanics.chain.assembly import (
+    ChainTemplate,
+    assemble,
+    chain_averages,
+    chain_template,
+    laws,
+)
 from notchflex.mechanics.chain.flexures import FlexureOf, flexure
 from notchflex.mechanics.chain.pad import padded
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
@@ -10,16 +16,16 @@ from notchflex.mechanics.chain.structure import structural
 
 __all__ = [
     "Chain",
+    "ChainTemplate",
     "FlexureOf",
-    "Shaped",
     "assemble",
-    "averages",
     "bending_normal",
+    "chain_averages",
+    "chain_template",
     "flexure",
     "flexure_states",
     "laws",
     "padded",
-    "shape_of",
     "sites_of",
     "structural",
     "tendons_in_plane",

@@ -1,4 +1,4 @@
-"""The chain: all that the solver needs of a robot, as one pytree of arrays."""
+"""The chain: the solver's model of a robot, as one pytree of arrays."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from notchflex.mechanics.friction import FrictionLaw
 from notchflex.mechanics.material import SectionLaw
 from notchflex.mechanics.tendon import TendonGroup
 
-# Axial stiffness of a tendon that only tells apart how much has slid over two stuck contacts of
-# one rigid piece, between which an inextensible tendon would leave the tension open: so many
-# times the force that would close a notch by its own stiffness (1e6 N for wrist A).
+# Axial stiffness of a tendon in the friction law, over the force that would close a notch by its
+# own stiffness (1e6 N for wrist A). It distinguishes the slip over two sticking contacts of one
+# rigid piece, between which an inextensible tendon would leave the tension undetermined.
 MEMORY_STIFFNESS = 4e5
 
 
@@ -36,7 +36,7 @@ class Chain(Pytree):
         law: The material.
         friction: The friction between tendons and tube.
         groups: The tendons, by the way they run.
-        contact_pairs: The lips that close notches, by their kind.
+        contact_pairs: The contacts that close notches, by kind.
         axial_stiffness: Axial stiffness of each tendon, infinite where inextensible, N.
         free_length: Length of each tendon before its first contact, from its actuator on and
             through the base, mm.
@@ -45,23 +45,23 @@ class Chain(Pytree):
         body_centre: Its centre, in its frame, mm.
         stiffness: Stiffness of each mode in the free robot, N mm; the scale of residuals.
         elastic: Stiffness of the modes of each flexure against each other, N mm, where the
-            material is linear; None where the law of the material must be asked.
-        contact_stiffness: Stiffness of each notch at its lips in the free robot, N/mm.
-        contact_flexibility: Flexibility of the lips of each closed notch, mm/N; None where all are
-            rigid.
+            material is linear; None where the law of the material gives it.
+        contact_stiffness: Stiffness of each notch at its contact in the free robot, N/mm.
+        contact_flexibility: Flexibility of the contact of each closed notch, mm/N; None where all
+            are rigid.
         closing_force: Force that would close a notch by that stiffness, mean of all, N.
-        stroke_stiffness: How fast the tension of a tendon answers its stroke, roughly, N/mm.
-        frame: Rotation from the frame in which flexures, tendons and lips are given to that of the
-            base: x and z span the plane of bending of a flat chain. None in space.
+        stroke_stiffness: Approximate tension per stroke of a tendon, N/mm.
+        frame: Rotation from the frame of flexures, tendons and contacts to that of the base: x and
+            z span the plane of bending of a flat chain. None in space.
         notch_frame: Rotation from the frame of every notch, turned by its direction, to the tube.
-        tendon_place: Where each tendon enters the base, mm.
-        contacts: For every tendon, at which edges of which gaps it meets the wall: indices into
-            (flexure, edge) flattened, -1 to fill up.
-        level: For which loads the flexures have modes enough.
+        tendon_entry: Point where each tendon enters the base, mm.
+        contacts: For every tendon, the edges of gaps that it touches: indices into (flexure, edge)
+            flattened, -1 as padding.
+        level: Loads for which the flexures have enough modes.
         loaded: Whether loads other than the tendons' act.
         follows: Whether any of them may turn with a body.
-        refinement: How many more modes the flexures have than for usual loads.
-        window: Over how many flexures a span or an opening reaches at most.
+        refinement: Number of refinements of the modes beyond those for usual loads.
+        window: Largest number of flexures that a span or an opening reaches over.
     """
 
     rods: Rod
@@ -82,7 +82,7 @@ class Chain(Pytree):
     stroke_stiffness: Float[Array, ""]
     frame: Float[Array, "3 3"] | None
     notch_frame: Float[Array, "n 3 3"]
-    tendon_place: Float[Array, "t 3"]
+    tendon_entry: Float[Array, "t 3"]
     contacts: Int[Array, "t edges"]
     level: str = static()
     loaded: bool = static()

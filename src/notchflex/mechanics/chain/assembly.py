@@ -49,12 +49,12 @@ def assemble(
     Args:
         robot: The description.
         level: For which loads: "tendons" alone, loads in the "plane" of bending, or in "space".
-            More modes of the flexures are kept the more is asked for.
+            Higher levels keep more modes.
         loaded: Whether loads other than the tendons' act.
         follows: Whether any of them may turn with a body.
-        refinement: How many times more modes than the flexures need for usual loads.
-        flat: Whether a robot that stays in a plane, under such loads, is given as one of the plane.
-        flexures: Gives the flexures of the notches in the place of `flexure`.
+        refinement: Number of refinements of the modes beyond those for usual loads.
+        flat: Whether a robot that stays in a plane under such loads gets a planar chain.
+        flexures: Replaces `flexure`, which builds the flexures of the notches.
 
     Returns:
         Its chain.
@@ -64,32 +64,33 @@ def assemble(
         >>> assemble(load_robot("pacheco2021-a")).flexures
         5
     """
-    shaped = shape_of(robot, level, refinement, flexures)
-    rods, laid, body_length = shaped.rods, shaped.laid, shaped.body_length
+    template = chain_template(robot, level, refinement, flexures)
+    rods, routed, body_length = template.rods, template.routed_tendons, template.body_length
     body_mass, body_centre = body_masses(robot, rods)
     tendons = robot.tendon
     chain = Chain(
         rods=rods,
-        groups=laid.groups,
-        contact_pairs=shaped.contact_pairs,
+        groups=routed.groups,
+        contact_pairs=template.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
-        free_length=constant(laid.base_length + [tendon.free_length for tendon in tendons]),
+        free_length=constant(routed.base_length + [tendon.free_length for tendon in tendons]),
         body_length=body_length,
         body_mass=constant(body_mass),
         body_centre=constant(body_centre),
         frame=None,
-        notch_frame=shaped.notch_frame,
-        tendon_place=laid.place,
-        contacts=_contacts(laid.groups, len(tendons)),
+        notch_frame=template.notch_frame,
+        tendon_entry=routed.place,
+        contacts=_contacts(routed.groups, len(tendons)),
         level=level,
         loaded=loaded,
         follows=loaded and follows,  # unloaded chains are of one form
         refinement=refinement,
         window=max(
-            (int(np.max(part.back)) for part in (*laid.groups, *shaped.contact_pairs)), default=1
+            (int(np.max(part.back)) for part in (*routed.groups, *template.contact_pairs)),
+            default=1,
         ),
-        **laws(robot.material, shaped),
-        **laws(robot.friction, shaped),
+        **laws(robot.material, template),
+        **laws(robot.friction, template),
     )
     normal = bending_normal(robot)
     if not flat or level == "space" or normal is None or not tendons_in_plane(robot):
@@ -97,35 +98,35 @@ def assemble(
     return _flat(chain, np.stack([np.cross(normal, _UP), normal, _UP], axis=1))
 
 
-def laws(part: Material | Friction, shaped: Shaped) -> dict[str, Any]:
+def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
     """Return the fields of a chain that follow from its material, or from its friction.
 
     Args:
         part: The material or the friction.
-        shaped: The shape of the robot.
+        template: Template of the robot's chain.
     """
     if isinstance(part, Friction):
         return {"friction": friction_law(part)}
     law = section_law(part)
-    elastic = _elastic(shaped.alike, law)[shaped.which]
+    elastic = _elastic(template.distinct_rods, law)[template.rod_index]
     stiffness = np.einsum("nmm->nm", elastic)
-    stop = shaped.rods.stop_flexibility
-    linear = law.is_linear and not shaped.alike.section.softens
-    contact_stiffness = 1.0 / np.sum(shaped.lip_slope / stiffness, axis=-1)
+    stop = template.rods.stop_flexibility
+    linear = law.is_linear and not template.distinct_rods.section.softens
+    contact_stiffness = 1.0 / np.sum(template.contact_motion / stiffness, axis=-1)
     return {
         "law": law,
         "stiffness": constant(stiffness),
         "elastic": constant(elastic) if linear else None,
         "contact_stiffness": constant(contact_stiffness),
         "contact_flexibility": None if stop is None else constant(stop / contact_stiffness),
-        **averages(contact_stiffness, shaped.height),
+        **chain_averages(contact_stiffness, template.height),
     }
 
 
-def averages(
+def chain_averages(
     contact_stiffness: Float[np.ndarray, " n"], height: Float[np.ndarray, " n"]
 ) -> dict[str, Any]:
-    """Return the fields of a chain to which every notch contributes, linear in each argument.
+    """Return the fields of a chain that are averages over the notches, linear in each argument.
 
     Args:
         contact_stiffness: Stiffness of every notch against closing, N/mm.
@@ -138,43 +139,43 @@ def averages(
     }
 
 
-class Shaped(NamedTuple):
-    """What of a chain follows from the shape of the robot alone.
+class ChainTemplate(NamedTuple):
+    """The part of a chain that depends only on the shape of the robot.
 
     Attributes:
-        alike: The flexures that differ.
-        which: Which of them each notch is.
+        distinct_rods: The flexures, without repetitions.
+        rod_index: Index of every notch's flexure among them.
         rods: All flexures.
-        laid: The tendons.
-        contact_pairs: The lips.
+        routed_tendons: The tendons.
+        contact_pairs: The contacts.
         body_length: Length of each body on the tube axis, mm.
         notch_frame: Rotation from the frame of every notch to the tube.
         height: Length of the neutral axis of every flexure, mm.
-        lip_slope: Square of the motion of each notch's lips by every mode, mm^2.
+        contact_motion: Square of the motion of each notch's contact by every mode, mm^2.
     """
 
-    alike: Rod
-    which: list[int]
+    distinct_rods: Rod
+    rod_index: list[int]
     rods: Rod
-    laid: RoutedTendons
+    routed_tendons: RoutedTendons
     contact_pairs: tuple[ContactGroup, ...]
     body_length: Array
     notch_frame: Array
     height: Float[np.ndarray, " n"]
-    lip_slope: Float[np.ndarray, "n modes"]
+    contact_motion: Float[np.ndarray, "n modes"]
 
 
-def shape_of(
+def chain_template(
     robot: Robot, level: str, refinement: int, flexures: FlexureOf | None = None
-) -> Shaped:
-    """What of a robot's chain follows from its shape alone; for the arguments see `assemble`."""
+) -> ChainTemplate:
+    """Build the template of a robot's chain; for the arguments see `assemble`."""
     chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
     sites = sites_of(robot)
-    shaped = _kept_shape if flexures is None else partial(_shaped, flexures=flexures)
-    return shaped(robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord, fibres)
+    build = _cached_template if flexures is None else partial(_build_template, flexures=flexures)
+    return build(robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord, fibres)
 
 
-def _shaped(
+def _build_template(
     tube: Tube,
     notches: tuple[Notch, ...],
     sites: tuple[Site | None, ...],
@@ -184,46 +185,46 @@ def _shaped(
     turns_with_chord: bool,
     by_fibres: bool,
     flexures: FlexureOf = flexure,
-) -> Shaped:
-    # Notches that are alike are worked out once.
-    placed = tuple(zip(notches, sites, strict=True))
-    different = dict.fromkeys(placed)
-    unlike = {each: flexures(*each, tube, level, refinement, by_fibres) for each in different}
-    own_rods, free_poses = zip(*unlike.values(), strict=True)
-    alike = stack(own_rods)
-    number = {each: index for index, each in enumerate(unlike)}
-    which = [number[each] for each in placed]
-    rods = jax.tree.map(lambda leaf: leaf[which], alike)
+) -> ChainTemplate:
+    # Equal notches are built once.
+    sited_notches = tuple(zip(notches, sites, strict=True))
+    different = dict.fromkeys(sited_notches)
+    built = {each: flexures(*each, tube, level, refinement, by_fibres) for each in different}
+    own_rods, free_poses = zip(*built.values(), strict=True)
+    distinct_rods = stack(own_rods)
+    number = {each: index for index, each in enumerate(built)}
+    rod_index = [number[each] for each in sited_notches]
+    rods = jax.tree.map(lambda leaf: leaf[rod_index], distinct_rods)
     body_length = constant(body_lengths(tube, notches))
     lead = body_length[:-1, None] * _UP
     rods = dataclasses.replace(rods, start_offset=rods.start_offset + lead)
-    free = jax.tree.map(lambda *leaves: np.stack(leaves)[which], *free_poses)
+    free = jax.tree.map(lambda *leaves: np.stack(leaves)[rod_index], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
-    ground = RoutingContext(
+    context = RoutingContext(
         notches, tube.outer_radius, rods, free, body_length, turns_with_chord=turns_with_chord
     )
     directions = {notch.direction_deg: np.empty(0) for notch in notches}
     for side in directions:
         directions[side] = np.asarray(rotation_about(constant(_UP * np.radians(side))))
-    return Shaped(
-        alike,
-        which,
+    return ChainTemplate(
+        distinct_rods,
+        rod_index,
         rods,
-        route(tendons, ground),
+        route(tendons, context),
         build_contacts(notches, tube, rods, body_length),
         body_length,
         constant(np.stack([directions[notch.direction_deg] for notch in notches])),
         np.sum(rods.length, axis=-1),
-        _lip_slope(rods, tube.outer_radius),
+        _squared_contact_motion(rods, tube.outer_radius),
     )
 
 
-# A search for constants of the material or of friction assembles one shape hundreds of times.
-_kept_shape = lru_cache(maxsize=64)(_shaped)
+# Fits of material or friction constants assemble one shape hundreds of times.
+_cached_template = lru_cache(maxsize=64)(_build_template)
 
 
 def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
-    """A chain of the plane that x and z of a frame span, from one of space that stays in it."""
+    """Reduce a spatial chain that stays in the x-z plane of a frame to that plane."""
 
     def planar(part: Any) -> Any:
         points = [name for name in ("leaves", "enters", "along", "normal") if hasattr(part, name)]
@@ -240,18 +241,18 @@ def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
 
 
 def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:
-    """Stiffness of every flexure in the free robot; 1 for modes that fill up."""
+    """Compute the stiffness of every flexure in the free robot; 1 for padding modes."""
     basis = rods.basis
-    answered = rods.length[..., None, None] * (law.stiffness(rods.section) @ basis)
-    own = np.einsum("niam,niak->nmk", basis, answered)
+    stiffness_product = rods.length[..., None, None] * (law.stiffness(rods.section) @ basis)
+    own = np.einsum("niam,niak->nmk", basis, stiffness_product)
     return own + rods.padding_mask[:, None] * np.eye(rods.modes)
 
 
-def _lip_slope(rods: Rod, outer_radius: float) -> Float[np.ndarray, "n modes"]:
-    """Square of the motion of a notch's lips by its modes: over their stiffness, its flexibility.
+def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[np.ndarray, "n modes"]:
+    """Compute the squared motion of a notch's contact by its modes; over stiffness a flexibility.
 
-    Lips opposite a spine move with their fibre; where edges meet, by their distance from the
-    tube axis times the turn of the distal body.
+    A contact opposite a spine moves with its fibre; an edge contact by its distance from the tube
+    axis times the rotation of the distal body.
     """
     fibre = np.einsum("nc,nicm,ni->nm", fibre_stretch(rods.closure), rods.basis, rods.length)
     turn = rods.start_rotation @ rods.turn[:, -1, :, 1:]
@@ -261,12 +262,14 @@ def _lip_slope(rods: Rod, outer_radius: float) -> Float[np.ndarray, "n modes"]:
 
 
 def _contacts(groups: tuple[TendonGroup, ...], tendons: int) -> Int[Array, "t edges"]:
-    """Where every tendon meets the wall, base to tip: twice as many edges as bodies visited."""
-    met: list[np.ndarray] = [np.zeros(0, int)] * tendons
+    """List the edges that every tendon touches, base to tip: two per body that it visits."""
+    contact_edges: list[np.ndarray] = [np.zeros(0, int)] * tendons
     for group in groups:
         for column, number in enumerate(group.numbers):
             flexures = np.flatnonzero(np.asarray(group.visits)[:, column])
-            met[number] = (2 * flexures[:, None] + np.arange(2)).ravel()
-    most = max(len(edges) for edges in met)
-    filled = [np.pad(edges, (0, most - len(edges)), constant_values=-1) for edges in met]
+            contact_edges[number] = (2 * flexures[:, None] + np.arange(2)).ravel()
+    max_edges = max(len(edges) for edges in contact_edges)
+    filled = [
+        np.pad(edges, (0, max_edges - len(edges)), constant_values=-1) for edges in contact_edges
+    ]
     return cast("Array", np.stack(filled))

@@ -32,19 +32,19 @@ class FlexureOf(Protocol):
 def flexure(
     notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int, by_fibres: bool
 ) -> tuple[Rod, Motion]:
-    """Make a flexure, and its pose in the free robot; the last ones are kept.
+    """Make a flexure, and its pose in the free robot; the last ones are cached.
 
     Args:
         notch: The notch.
-        site: What surrounds it, where its ends are elastic.
+        site: Its surroundings, where its ends are elastic.
         tube: The tube that it is cut into.
         level: For which loads, as for `assemble`.
         refinement: As for `assemble`.
         by_fibres: Whether the material needs the fibres of sections.
     """
-    made = with_level(rod_at(site, notch, tube, refinement), level)
-    made = with_fibres(made, notch, tube) if by_fibres else made
-    return made, free_pose(made)
+    rod = with_level(rod_at(site, notch, tube, refinement), level)
+    rod = with_fibres(rod, notch, tube) if by_fibres else rod
+    return rod, free_pose(rod)
 
 
 __all__ = ["FlexureOf", "flexure"]

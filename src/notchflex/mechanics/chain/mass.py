@@ -1,4 +1,4 @@
-"""What the pieces of a robot weigh: the uncut tube, and what the notches leave of it."""
+"""Masses of the pieces of a robot: uncut tube, and the sections that the notches leave."""
 
 from __future__ import annotations
 
@@ -18,20 +18,19 @@ _GRAMS = 1e-6
 def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[np.ndarray, " bodies"]:
     """Return the length of each rigid piece on the tube axis, base first, mm."""
     following = (*notches[1:], None)
-    behind = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
-    return np.array([tube.base_length, *behind])
+    spacings = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
+    return np.array([tube.base_length, *spacings])
 
 
 def body_masses(
     robot: Robot, rods: Rod
 ) -> tuple[Float[np.ndarray, " bodies"], Float[np.ndarray, "bodies 3"]]:
-    """Mass and centre of mass of each body, with its share of the notches.
+    """Compute mass and centre of mass of each body, with its share of the notches.
 
     A body is a piece of uncut tube: the area of the tube's wall times the body's axial length,
-    its centre halfway on the tube axis. What a notch leaves of the tube (area of its sections
-    times the length of the neutral axis) is heavy too, but only bodies carry loads: half of its
-    mass is put on the body before it where the neutral axis starts, half on the body behind it
-    where the neutral axis ends.
+    its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure (area
+    of its sections times the length of the neutral axis) is lumped: half at the start of the
+    neutral axis on the body before it, half at its end on the body after it.
 
     Args:
         robot: The robot, n notches.
@@ -58,7 +57,7 @@ def body_masses(
     centre[:, 2] = 0.5 * length * piece
     centre[:-1] += half[:, None] * start
     centre[1:] += half[:, None] * end
-    # Every body has some volume: where no tube is left between two notches, halves of those.
+    # Every body has a volume: where no tube is left between two notches, half of each flexure.
     return _GRAMS * density * volume, centre / volume[:, None]
 
 

@@ -1,4 +1,4 @@
-"""A chain made longer by flexures that do nothing, so that unlike robots share one program."""
+"""Padding of a chain with inert flexures, so that different robots share one program."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ _NOTHING = (
 
 
 def padded(chain: Chain, flexures: int, edges: int) -> Chain:
-    """Return the same robot with more flexures beyond its tip, and more places for edges met.
+    """Pad a chain with flexures beyond its tip, and with entries for contact edges.
 
-    What is added is stiff, straight and of no length, crossed by no tendon: the last body's frame
-    is then the tip, and no other number of the robot changes.
+    The added flexures are stiff, straight, of zero length and without tendons: the last body's
+    frame is then the tip, and no other number of the robot changes.
 
     Args:
         chain: The chain, as plain arrays.
-        flexures: How many flexures it is to have, as many as now or more.
-        edges: How many edges at which a tendon meets the wall it is to have places for.
+        flexures: Number of flexures of the result, at least that of the chain.
+        edges: Number of entries for the contact edges of a tendon.
     """
     more = flexures - chain.flexures
     contacts = np.pad(
@@ -88,7 +88,7 @@ def _rods(chain: Chain, changed: Any) -> Rod:
     values = {name: 0.0 for name in _NOTHING if getattr(rods, name) is not None}
     values |= {name: np.eye(getattr(rods, name).shape[-1]) for name in _ROTATIONS}
     wider: Rod = changed(rods, padding_mask=1.0, **values)
-    # The first that is added begins at the tip, at the end of the last body.
+    # The first added flexure begins at the tip, at the end of the last body.
     wider.start_offset[chain.flexures, -1] = chain.body_length[-1]  # pyright: ignore
     return wider
 

@@ -1,4 +1,4 @@
-"""Does a robot stay in one plane, under its tendons alone?"""
+"""Whether a robot stays in one plane under its tendons alone."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from jaxtyping import Float
 
 from notchflex.robot import Robot
 
-# Part of a direction that may stick out of the plane by rounding.
+# Tolerance of a direction's component out of the plane.
 _ROUNDING = 1e-12
 
 
 @lru_cache(maxsize=64)
 def bending_normal(robot: Robot) -> Float[np.ndarray, " 3"] | None:
-    """Normal of the plane in which all notches bend, in the base frame; None if there is none."""
+    """Return the normal of the plane in which all notches bend, in the base frame, or None."""
     direction = np.radians([notch.direction_deg for notch in robot.notches])
     if (np.abs(np.sin(direction - direction[0])) > _ROUNDING).any():
         return None

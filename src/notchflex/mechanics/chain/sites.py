@@ -12,10 +12,10 @@ _SAME_DIRECTION = 1e-6
 
 
 def sites_of(robot: Robot) -> tuple[Site | None, ...]:
-    """Find what surrounds every notch; None for notches that do not depend on it.
+    """Return the rings beside every notch; None for notches that do not depend on them.
 
-    The base is held by a rigid plate at its length before the first notch. The ring behind the last
-    notch is free. Where neighbours differ, each takes the ring between them as if both were its own
+    A rigid plate holds the base at its length before the first notch. The ring after the last notch
+    is free. Where neighbours differ, each models the ring between them as if both were of its own
     kind and opened to its own side.
 
     Args:
@@ -32,11 +32,11 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     ratio = robot.material.poisson_ratio
 
     def site(index: int) -> Site:
-        before, behind = lengths[index], lengths[index + 1]
+        before, after = lengths[index], lengths[index + 1]
         neighbours = notches[max(index - 1, 0)], notches[min(index + 1, last)]
         turned = [_is_turned(notches[index], one) for one in neighbours]
         proximal = Side("clamped" if index == 0 else "between", before, turned[0])
-        distal = Side("free" if index == last else "between", behind, turned[1])
+        distal = Side("free" if index == last else "between", after, turned[1])
         return Site(proximal, distal, ratio)
 
     return tuple(
@@ -59,12 +59,12 @@ def unchecked_dimensions(robot: Robot) -> list[str]:
         One sentence for each dimension, with the notches that it belongs to; none where all lie
         inside, or the ends are rigid.
     """
-    found: dict[str, list[str]] = {}
+    notches_of_sentence: dict[str, list[str]] = {}
     for number, (notch, site) in enumerate(zip(robot.notches, sites_of(robot), strict=True), 1):
         if site is not None:
             for sentence in validity_warnings(notch, robot.tube, site):
-                found.setdefault(sentence, []).append(str(number))
+                notches_of_sentence.setdefault(sentence, []).append(str(number))
     return [
         f"notch{'es' if len(notches) > 1 else ''} {', '.join(notches)}: {sentence}."
-        for sentence, notches in found.items()
+        for sentence, notches in notches_of_sentence.items()
     ]

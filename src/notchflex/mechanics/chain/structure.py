@@ -1,8 +1,8 @@
-"""Which zeros of a chain belong to how its parts are made, and not to their dimensions.
+"""Structural zeros of a chain, which do not depend on its dimensions.
 
-A mode that stretches a rod does not turn it, whatever the rod's length and width. Such zeros stay
-when any number of the robot file changes, and programs that know them leave out what they would be
-multiplied by. A rod that happens to be straight is another matter.
+A mode that stretches a rod does not rotate it, whatever the rod's length and width. Such zeros
+remain when any number of the robot file changes, so programs omit the products with them. The zeros
+of a rod that happens to be straight are not structural.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from notchflex.mechanics.chain.arrays import Chain
 
 
 def structural(chain: Chain) -> Chain:
-    """For every number of a chain whether it may be taken for known when a program is made.
+    """Mark the numbers of a chain that may be constants of a program.
 
-    Which flexures only lengthen the chain is not: chains of other lengths share the program. Known
-    are how modes strain, turn and move a rod, how they hold each other, and all that counts
-    or tells kinds apart.
+    They are the strains, rotations and displacements of a rod by its modes, the stiffness between
+    modes, counts and flags. The mask of padding flexures is not: chains of other lengths share the
+    program.
     """
 
     def counts(leaf: Any) -> Any:
@@ -53,7 +53,7 @@ def _all(leaf: Array) -> Any:
 
 
 def _of_modes(leaf: Array) -> Any:
-    """What of an array over (1, modes) is over the modes, and not of the free rod."""
+    """Mark the entries over the modes of an array over (1, modes)."""
     return np.broadcast_to(np.arange(np.shape(leaf)[-1]) > 0, np.shape(leaf))
 
 

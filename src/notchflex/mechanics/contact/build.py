@@ -1,4 +1,4 @@
-"""From the notches of a robot to the lips that may close them."""
+"""Contacts that may close the notches of a robot."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from notchflex.robot.kinds import Notch
 def build_contacts(
     notches: Sequence[Notch], tube: Tube, rods: Rod, body_length: Float[Array, " bodies"]
 ) -> tuple[ContactGroup, ...]:
-    """Lips of every kind that the notches have.
+    """Build the contacts of every kind that the notches have.
 
     Args:
         notches: Every notch, base to tip.
@@ -39,7 +39,7 @@ def build_contacts(
         angle = np.radians(sides)
         across = tube.outer_radius * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
         along = np.array([0.0, 0.0, 1.0])
-        # As many lips as close at one flexure, whichever sides they are on.
+        # Keep as many contacts as close at one flexure, on any side.
         count = int(line.on_side.sum(axis=1).max(initial=1.0))
         chosen = np.argsort(-line.on_side, axis=1, kind="stable")[:, :count]
 
@@ -61,7 +61,7 @@ def build_contacts(
 
 
 def _sides(notches: Sequence[Notch]) -> list[float]:
-    """Sides on which a notch opens the wall, where it does not leave a spine."""
+    """List the sides on which a notch without a spine opens the wall."""
     neighbours = [None, *notches, None]
     return [
         opening.side_deg

@@ -1,8 +1,8 @@
-"""Edges of two rigid pieces that meet across a slot or a triangular notch.
+"""Contact of two rigid pieces across a slot or a triangular notch.
 
 The edge of the distal piece touches the face of the proximal one, which may be several bodies
-back, as in a row of slots cut from either side in turn. The gap is the distance of the edge from
-the plane of that face, and the force stands on the plane (no friction).
+back, as in a row of slots cut alternately from both sides. The gap is the distance of the edge from
+the plane of that face, and the force is normal to the plane (no friction).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class EdgeContact(ContactGroup):
     normal: Float[Array, "*n l d"]
 
     def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
-        """Distance of the edge from the plane of the face, and a force along its normal."""
+        """Compute the distance of the edge from the face, and the wrench of a unit normal force."""
         del rod, flexure
         assert anchors is not None  # acts_on_bodies asks for it
 

@@ -1,8 +1,7 @@
-"""How the lips of a notch meet: what they leave open, and what their contact force does.
+"""Contact between the edges of a notch: gap and contact force.
 
-Like a tendon's span, an opening lies between an anchor, the body with the face that may be closed
-against, and the body whose edge comes to it. What it leaves open depends on the pose of the one
-seen from the other, or on the flexure's strains alone.
+Like a tendon's span, a contact connects an anchor, the body with the face, and the body with the
+edge. The gap depends on their relative pose, or on the flexure's strains alone.
 """
 
 from __future__ import annotations
@@ -18,13 +17,13 @@ from notchflex.mechanics.motion import Motion
 
 
 class GapResponse(NamedTuple):
-    """Lips of one kind at one flexure (mm).
+    """Contacts of one kind at one flexure (mm).
 
     Attributes:
-        gap: What is left of the opening, >= 0 in a solved state.
+        gap: Gap, >= 0 in a solved state.
         wrench: Moment and force on the distal body per unit of contact force, about and along its
-            frame; its opposite acts on the anchor. None for lips that act on the modes alone.
-        slope: Change of the gap per unit of mode; None for lips that act on bodies.
+            frame; its opposite acts on the anchor. None for contacts that act only on the modes.
+        slope: Change of the gap per unit of mode; None for contacts that act on bodies.
     """
 
     gap: Float[Array, " l"]
@@ -33,12 +32,12 @@ class GapResponse(NamedTuple):
 
 
 class ContactGroup(Pytree, ABC):
-    """Lips of one kind. Arrays carry the flexures as leading axis, then the lips.
+    """Contacts of one kind. Arrays have the flexures as leading axis, then the contacts.
 
     Attributes:
         acts_on_bodies: Whether the contact is a force on bodies.
-        has_contact: 1 where there are such lips at a flexure.
-        back: How many bodies before the distal one their anchor is.
+        has_contact: 1 where a flexure has such a contact.
+        back: Number of bodies from the distal one back to the anchor.
     """
 
     acts_on_bodies: ClassVar[bool]
@@ -52,17 +51,17 @@ class ContactGroup(Pytree, ABC):
             rods: All flexures.
 
         Returns:
-            Its place in the section; None where the force acts on bodies.
+            Its position in the section; None where the force acts on bodies.
         """
         del rods
 
     @abstractmethod
     def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
-        """Lips at one flexure (of a group without its leading axis).
+        """Compute the contacts at one flexure (of a group without its leading axis).
 
         Args:
             rod: The flexure.
             flexure: Its state.
-            anchors: Pose of the distal body seen from the anchor of each, lips as leading axis;
-                None where nothing acts on bodies.
+            anchors: Pose of the distal body seen from each anchor, contacts as leading axis; None
+                where nothing acts on bodies.
         """

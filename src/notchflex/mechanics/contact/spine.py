@@ -1,4 +1,4 @@
-"""Lips opposite a solid spine: they meet where the fibre between them has no length left.
+"""Contact opposite a solid spine: it closes where its fibre between the edges has zero length.
 
 On the concentric arc of Pacheco 2021 the gap is h - (r_o + ybar) theta.
 """
@@ -22,36 +22,36 @@ from notchflex.mechanics.motion import Motion
 
 
 class SpineContact(ContactGroup):
-    """One pair of lips at every notch that has a spine."""
+    """One contact at every notch that has a spine."""
 
     acts_on_bodies = False
 
     def fibre(self, rods: Rod) -> Float[Array, "*n 2"]:
-        """Locate the fibre between the lips, mm from the neutral axis."""
+        """Locate the fibre between the edges, mm from the neutral axis."""
         return rods.closure
 
     def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
-        """Return the length of the fibre between the lips."""
+        """Return the length of the fibre between the edges."""
         del anchors
-        to_lip = of_rod(rod, fibre_stretch(rod.closure))[None]
+        weights = of_rod(rod, fibre_stretch(rod.closure))[None]
         strain = rod.length @ (rod.reference_strain + flexure.strain)
-        return GapResponse(gap=to_lip @ strain, wrench=None, slope=fibre_slope(rod, to_lip))
+        return GapResponse(gap=weights @ strain, wrench=None, slope=fibre_slope(rod, weights))
 
 
-def closing_travel(rods: Rod) -> Float[np.ndarray, " n"]:
-    """Elastic angle at which every notch with a spine closes, rad; infinite for other notches.
+def closing_angles(rods: Rod) -> Float[np.ndarray, " n"]:
+    """Compute the elastic angle at which every notch closes, rad; infinite without a spine.
 
-    It is where the first mode, whose amplitude is that angle, leaves no length between the lips;
-    for an arc h / (r_o + ybar) less the precurvature.
+    It is the amplitude of the first mode at which the fibre between the edges has zero length: for
+    an arc h / (r_o + ybar) less the precurvature.
     """
-    lip = of_rod(rods, fibre_stretch(constant(rods.closure)))
-    free = np.einsum("nc,nic,ni->n", lip, rods.reference_strain, rods.length)
-    slope = np.einsum("nc,nic,ni->n", lip, np.asarray(rods.basis)[..., 0], rods.length)
+    weights = of_rod(rods, fibre_stretch(constant(rods.closure)))
+    free = np.einsum("nc,nic,ni->n", weights, rods.reference_strain, rods.length)
+    slope = np.einsum("nc,nic,ni->n", weights, np.asarray(rods.basis)[..., 0], rods.length)
     spine = np.asarray(rods.has_closure) > 0.0
     return np.where(spine, -free / np.where(spine, slope, 1.0), np.inf)
 
 
 def free_angle(rods: Rod) -> Float[np.ndarray, " n"]:
-    """Angle of every notch with a spine before anything pulls: its precurvature, rad."""
+    """Return the precurvature of every notch with a spine, rad."""
     bending = np.asarray(in_space(rods.reference_strain))[..., 1]
     return np.einsum("ni,ni->n", rods.length, bending)

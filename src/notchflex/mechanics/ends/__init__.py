@@ -1,4 +1,4 @@
-"""Stiffness of a notch with the rings that it ends in: end compliance, flattening, torsion."""
+"""Stiffness of a notch with the rings beside it: end compliance, flattening, torsion."""
 
 from notchflex.mechanics.ends.effective_notch import NotchStiffness as NotchStiffness
 from notchflex.mechanics.ends.effective_notch import notch_stiffness as notch_stiffness

@@ -1,4 +1,4 @@
-r"""What the ring beside a notch adds to the compliance of the notch: end compliance.
+r"""End compliance: the compliance that the ring beside a notch adds to the notch.
 
 The stress of the arc, that of a beam, acts on the edge of the ring as loads of a shell. Bending of
 the notch, bending sideways and tension are the stresses
@@ -21,7 +21,7 @@ from notchflex.mechanics.ends.side import Side
 from notchflex.mechanics.section import Section, annular_sector
 
 RELAXATION = 0.833
-"""λ, the part of the compliance of the harmonics from n = 2 that finite elements find."""
+"""λ, factor on the compliance of the harmonics from n = 2, fitted to finite elements."""
 
 
 class WallSector(NamedTuple):
@@ -59,7 +59,7 @@ def arc_of(outer: float, inner: float, section: Section) -> WallSector:
 
 
 class EndCompliance(NamedTuple):
-    """What one ring adds to the compliance of a notch.
+    """Compliance that one ring adds to a notch.
 
     Attributes:
         weak: Length δ added to that of the bending of the notch, mm.
@@ -93,7 +93,7 @@ def arc_harmonics(arc: WallSector) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     third = t**3 / 12.0
 
     def loads(constant: np.ndarray, varying: np.ndarray) -> np.ndarray:
-        """Loads of the stress `constant` + (1 + ζ/r) `varying`, both over φ in harmonics."""
+        """Compute loads of the stress `constant` + (1 + ζ/r) `varying`, in harmonics of φ."""
         force = t * (constant + varying) + third / r**2 * varying
         moment = third / r * (constant + 2.0 * varying)
         return np.stack([force, -moment], axis=-1) / _NORM[:, None]
@@ -139,7 +139,7 @@ def end_compliance(
     def energy(one: np.ndarray, other: np.ndarray) -> float:
         return arc.radius * np.einsum("n,ni,nij,nj->", weights, one, flexibility, other)
 
-    # As a beam, the ring turns by c/(E I_tube) under a moment and gives way by c/(E A_tube).
+    # As a beam, the ring has the compliances c/(E I_tube) in bending and c/(E A_tube) in tension.
     bends = ring_length / (0.25 * np.pi * (outer**4 - inner**4))
     stretches = ring_length / (np.pi * (outer**2 - inner**2))
     section, offset = arc.section, arc.section.centroid

@@ -1,4 +1,4 @@
-"""The numbers that a rod needs to stand for a notch with the rings that it ends in."""
+"""Effective stiffness of a notch with the rings beside it, as the parameters of a rod."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class NotchStiffness(NamedTuple):
         alpha: α, 1/rad: the stiffness K₀ = E I/ℓ falls to K₀/q², q = 1 + αθ/2 + βθ²/2, θ > 0
             closing.
         beta: β, 1/rad².
-        closing_factor: Angle between the rings at which the lips touch, over h/(r_o + ȳ).
-        closed_ratio: Stiffness of the closed notch, its lips in contact, over K₀.
+        closing_factor: Angle between the rings at which the edges touch, over h/(r_o + ȳ).
+        closed_ratio: Stiffness of the closed notch, its edges in contact, over K₀.
     """
 
     weak: float
@@ -83,7 +83,7 @@ def notch_stiffness(
         distal: The ring toward the tip.
 
     Returns:
-        The numbers, smooth in every number that goes in; kept for the same ones.
+        The numbers, smooth in every argument; cached.
 
     Example:
         >>> ring = Side("between", 1.2)

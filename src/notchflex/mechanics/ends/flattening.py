@@ -1,4 +1,4 @@
-r"""How a notch softens as it closes: its curved spine flattens.
+r"""Softening of a notch as it closes, by flattening of its curved spine.
 
 The moment at an angle θ is $M = K_0\theta/q^2$ with $q = 1 + \alpha\theta/2 + \beta\theta^2/2$.
 β is Brazier's flattening of an arc with free edges, α the anticlastic one (odd in θ: closing
@@ -31,12 +31,12 @@ _EDGE_OF_SPECIMEN, _BRAZIER_OF_SPECIMEN = (0.465, 1.51), 0.74
 
 
 def _imposed(factor: float, decay: float, length: float, radius: float) -> float:
-    """What a ring of some length imposes at the edge of the notch, k."""
+    """Compute the flattening k that a ring of some length imposes at the edge of the notch."""
     return -factor * np.expm1(-((length / (decay * radius)) ** 2))
 
 
 def edge_and_brazier(radius: float, sides: tuple[Side, Side]) -> tuple[float, float]:
-    """Average k over the two sides; with the factor c_b on Brazier's flattening.
+    """Compute the mean k of the two sides, and the factor c_b on Brazier's flattening.
 
     Args:
         radius: Mean radius r, mm.
@@ -59,7 +59,7 @@ def flattening_numbers(
     poisson_ratio: float,
     section: Section,
 ) -> tuple[float, float, float]:
-    """Compute what the shape of the arc does to its flattening.
+    """Compute the parameters of flattening from the shape of the arc.
 
     Args:
         outer: Outer radius, mm.

@@ -51,7 +51,7 @@ _GAUSS = np.polynomial.legendre.leggauss(_COUNT)  # exact for products of two po
 
 @cache
 def _surface() -> tuple[np.ndarray, np.ndarray]:
-    """Polynomials of the displacements in the surface, and of that outward."""
+    """Return the polynomials of in-surface and of outward displacements."""
     return _polynomials(1), _polynomials(2)
 
 
@@ -84,7 +84,7 @@ def _strains() -> np.ndarray:
 # Robots with rigid ends do without; this takes a tenth of a second.
 @cache
 def _energies() -> np.ndarray:
-    """Integrate the products of strains that the energy is made of, for r = 1.
+    """Integrate the products of strains in the energy, for r = 1.
 
     Returns:
         Array (part, power of ν, power of radius / length, power of n, row, column): the stiffness
@@ -95,31 +95,31 @@ def _energies() -> np.ndarray:
     tables = np.stack([in_surface, in_surface, outward])[:, :, 1:]
     strains = np.einsum("pdsk,kdgi->pdsgki", _strains(), tables).reshape(3, 3, 6, _COUNT, size)
     plane = np.array([np.diag([1.0, 1.0, 0.5]), [[0, 1, 0], [1, 0, 0], [0, 0, -0.5]]])
-    found = np.zeros((2, 2, 5, 5, size, size))
+    energies = np.zeros((2, 2, 5, 5, size, size))
     for part, of in enumerate((strains[:, :, :3], strains[:, :, 3:])):
         stresses = np.einsum("mst,g,pdtgj->mpdsgj", plane, 0.5 * _GAUSS[1], of)
         for p, d, q, e in np.ndindex(3, 3, 3, 3):
             product = np.einsum("sgi,msgj->mij", of[p, d], stresses[:, q, e])
-            found[part, :, d + e, p + q] += product
-    return found
+            energies[part, :, d + e, p + q] += product
+    return energies
 
 
-def _held(boundary: str) -> np.ndarray:
-    """Say which polynomials are left out of each harmonic, shape (harmonics, 3 × polynomials)."""
-    held = np.zeros((HARMONICS, 3, _COUNT), dtype=bool)
-    held[0, 1] = True  # no torsion
+def _constraints(boundary: str) -> np.ndarray:
+    """Return the constrained polynomials of each harmonic, shape (harmonics, 3 × polynomials)."""
+    constrained = np.zeros((HARMONICS, 3, _COUNT), dtype=bool)
+    constrained[0, 1] = True  # no torsion
     if boundary == "clamped":
-        held[:, :, 0] = held[:, 2, 1] = True
+        constrained[:, :, 0] = constrained[:, 2, 1] = True
     elif boundary == "between":
-        held[:, 0, 0] = held[:, 2, 1] = held[1, 1, 0] = True
+        constrained[:, 0, 0] = constrained[:, 2, 1] = constrained[1, 1, 0] = True
     else:  # free, but for the motions of a rigid ring
-        held[:2, 0, 0] = held[1, 2, 0] = True
-    return held.reshape(HARMONICS, -1)
+        constrained[:2, 0, 0] = constrained[1, 2, 0] = True
+    return constrained.reshape(HARMONICS, -1)
 
 
 @cache
 def _edge() -> np.ndarray:
-    """Axial displacement and slope at the loaded edge of every polynomial, (3 × polynomials, 2)."""
+    """Return displacement and slope of polynomials at the loaded edge, (3 × polynomials, 2)."""
     in_surface, outward = _surface()
     edge = np.zeros((3 * _COUNT, 2))
     edge[:_COUNT, 0] = in_surface[0, 0]
@@ -128,14 +128,14 @@ def _edge() -> np.ndarray:
 
 
 _POWERS = np.arange(HARMONICS, dtype=float)[:, None] ** np.arange(5)
-_HELD = {boundary: _held(boundary) for boundary in ("between", "clamped", "free")}
+_CONSTRAINTS = {boundary: _constraints(boundary) for boundary in ("between", "clamped", "free")}
 
 
 @lru_cache(maxsize=256)  # rings of one length are equal, however deep the notches beside them
 def edge_compliance(
     radius: float, wall: float, length: float, poisson_ratio: float, boundary: str
 ) -> np.ndarray:
-    """Compute how edge loads of each harmonic move the edge that they act on.
+    """Compute the compliance of an edge to its loads, for each harmonic.
 
     Args:
         radius: Mean radius r, mm.
@@ -156,17 +156,17 @@ def edge_compliance(
     material = np.stack([one, one * poisson_ratio])
     slopes = np.stack([one, ratio, ratio**2, ratio**3, ratio**4])
     factors = np.einsum("a,b,c->abc", parts, material, slopes).ravel()
-    held = _HELD[boundary]
-    free = (~held[:, :, None] & ~held[:, None, :]).astype(float)
+    constrained = _CONSTRAINTS[boundary]
+    free = (~constrained[:, :, None] & ~constrained[:, None, :]).astype(float)
     by_power = (factors @ _energies().reshape(20, -1)).reshape(5, -1)
     stiffness = (_POWERS @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
-    stiffness = free * stiffness + np.eye(3 * _COUNT) * held[:, :, None]
+    stiffness = free * stiffness + np.eye(3 * _COUNT) * constrained[:, :, None]
     edge = np.stack([_edge()[:, 0] * one, _edge()[:, 1] * ratio], axis=-1)
-    loads = np.where(held[:, :, None], 0.0, edge[None])
+    loads = np.where(constrained[:, :, None], 0.0, edge[None])
     flexibility = np.swapaxes(loads, 1, 2) @ np.linalg.solve(stiffness, loads)
     # Displacements are of order r² per N/mm over E t length; slopes have one r less.
     unit = np.stack([radius, one])
     scale = (1.0 - poisson_ratio**2) / (wall * length)
-    found = flexibility * (scale * np.outer(unit, unit)[None])
-    found.setflags(write=False)
-    return found
+    compliance = flexibility * (scale * np.outer(unit, unit)[None])
+    compliance.setflags(write=False)
+    return compliance

@@ -1,4 +1,4 @@
-r"""Shear of a notch with its ends: how far its two rings shift against each other.
+r"""Shear of a notch with its ends: relative displacement of its two rings.
 
 A force across the tube, through the middle of the notch and its centre of twist, bends the arc to
 an S and distorts the rings. Its compliance times Young's modulus is

@@ -1,4 +1,4 @@
-"""What lies beyond an edge of a notch: the uncut ring and what holds its far edge."""
+"""Uncut ring beside a notch, with the boundary condition at its far edge."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the law of a notch with its ends was checked, and how far a notch lies outside."""
+"""Checked ranges of the law of a notch with its ends, and where a notch lies outside."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def validity(
     proximal: Side,
     distal: Side,
 ) -> list[str]:
-    """List how a notch leaves the ranges that were checked against finite elements.
+    """List the checked ranges (against finite elements) that a notch leaves.
 
     Args:
         outer_radius: Outer radius of the tube, mm.
@@ -44,16 +44,16 @@ def validity(
     wall = (outer_radius - inner_radius) / radius
     depth_ratio = depth / (2.0 * outer_radius)
     between = proximal.boundary == distal.boundary == "between"
-    found: list[str] = []
+    sentences: list[str] = []
 
     def check(what: str, value: float, low: float, high: float, why: str) -> None:
         if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
             side, bound = ("below", low) if value < low else ("above", high)
-            found.append(f"{what} is {value:.3g}, {side} {bound:g}{why}")
+            sentences.append(f"{what} is {value:.3g}, {side} {bound:g}{why}")
 
     untested = ": the end compliance was not checked"
     if cut == "off-axis" and depth >= outer_radius + inner_radius:
-        found.append(
+        sentences.append(
             f"depth is {depth:.4g} mm, beyond the far side of the bore at "
             f"{outer_radius + inner_radius:.4g} mm, where a solid strip is left: end compliance "
             "found wrong by up to 23 %"
@@ -71,7 +71,7 @@ def validity(
     for name, side in (("proximal", proximal), ("distal", distal)):
         check(f"{name} ring length / mm", float(side.length), 0.6, 2.4, untested)
     turned = {side.length for side in (proximal, distal) if side.turned}
-    return found + [
+    return sentences + [
         f"a neighbour opens to another side of the tube, and the ring between them is {length:.3g} "
         f"mm long, below {_LONG_RING:g} outer diameters: both were found too stiff, 1.4 times with "
         "0.6 outer diameters and up to 2 times with 0.4"

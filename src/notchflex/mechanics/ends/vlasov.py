@@ -1,4 +1,4 @@
-r"""Torsion of a notch whose ends hold its section against warping, and its shear.
+r"""Torsion of a notch whose ends restrain warping of its section, and its shear.
 
 Vlasov's theory of thin-walled bars with an elastic spring for the warping at either end. The twist
 of a torque T is $T\ell/(GJ)$ with
@@ -40,7 +40,7 @@ def torsion_length(
     poisson_ratio: float,
     section: Section,
 ) -> float:
-    """Compute the length ℓ of free torsion that twists as much as the notch with its ends.
+    """Compute the effective length ℓ in free torsion of the notch with its ends.
 
     Args:
         arc: The arc of wall that the cut leaves.
@@ -57,8 +57,8 @@ def torsion_length(
     rate = np.sqrt(shear_over_young * section.torsion_constant / warping_constant(arc))
     width = 2.0 * a * arc.radius / diameter
     spring = 0.004 * diameter * (t / diameter) ** -1.98 * np.exp(0.16 * width)
-    held = 2.0 / (rate * (1.0 / np.tanh(0.5 * rate * height) + spring * rate))
-    return height + t * (3.11 - 1.60 * a) - held
+    warping = 2.0 / (rate * (1.0 / np.tanh(0.5 * rate * height) + spring * rate))
+    return height + t * (3.11 - 1.60 * a) - warping
 
 
 def shear_centre(arc: WallSector, height: float, section: Section) -> float:

@@ -1,7 +1,7 @@
 """Flexures: one notch becomes a short rod with a few strain modes."""
 
 from notchflex._packages import import_all
-from notchflex.mechanics.flexure.build import LEVELS, MOST_REFINEMENT, stack, with_level
+from notchflex.mechanics.flexure.build import LEVELS, MAX_REFINEMENT, stack, with_level
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
 from notchflex.mechanics.flexure.geometric_stiffness import geometric_stiffness
 from notchflex.mechanics.flexure.registry import (
@@ -12,7 +12,12 @@ from notchflex.mechanics.flexure.registry import (
     validity_warnings,
 )
 from notchflex.mechanics.flexure.rod import Rod, flattened
-from notchflex.mechanics.flexure.rod_kinematics import free_pose, relative_pose, rod_end, turn_doubt
+from notchflex.mechanics.flexure.rod_kinematics import (
+    free_pose,
+    relative_pose,
+    rod_end,
+    rotation_error_estimate,
+)
 from notchflex.mechanics.flexure.state import (
     FlexureState,
     fibre_slope,
@@ -27,7 +32,7 @@ import_all(__name__, __path__)
 
 __all__ = [
     "LEVELS",
-    "MOST_REFINEMENT",
+    "MAX_REFINEMENT",
     "Elastica",
     "FlexureState",
     "Rod",
@@ -47,9 +52,9 @@ __all__ = [
     "rod",
     "rod_at",
     "rod_end",
+    "rotation_error_estimate",
     "section_fibres",
     "stack",
-    "turn_doubt",
     "validity_warnings",
     "with_level",
 ]

@@ -1,4 +1,4 @@
-"""Fewer or more modes of a rod, and many rods as one."""
+"""Truncation and padding of the modes of a rod, and stacking of rods."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import NotchEnds
 
 LEVELS = ("tendons", "plane", "space")
-"""For which loads a chain is assembled: tendons alone, loads in the plane of bending, or any."""
+"""Loads that a chain is assembled for: tendons alone, loads in the plane of bending, or any."""
 
-MOST_REFINEMENT = 3
-"""How many times more modes than for usual loads a flexure can have."""
+MAX_REFINEMENT = 3
+"""Largest number of refinements of the modes of a flexure."""
 
 _HAT = ("turn", "step", "node_turn")
 _AT_NODES = (
     "reference_strain",
     "basis",
     "node_turn",
-    "node_place",
+    "node_index",
     "node_reach",
     "node_rotation",
     "node_offset",
@@ -32,7 +32,7 @@ _AT_NODES = (
 
 
 def with_level(rod: Rod, level: str) -> Rod:
-    """Keep the modes that a level of loads needs; strains that are constant keep one node."""
+    """Keep the modes that a level of loads needs; constant strains keep one node."""
     modes = rod.levels[LEVELS.index(level)]
     kept: dict[str, Any] = {name: getattr(rod, name)[..., : modes + 1] for name in _HAT}
     kept |= {"basis": rod.basis[..., :modes], "padding_mask": rod.padding_mask[..., :modes]}
@@ -49,7 +49,7 @@ def with_level(rod: Rod, level: str) -> Rod:
 
 
 def stack(rods: Sequence[Rod]) -> Rod:
-    """Put flexures together as leading axis, the smaller ones filled up."""
+    """Stack flexures along a leading axis, padding the smaller ones."""
     modes = max(rod.modes for rod in rods)
     nodes = max(rod.length.shape[0] for rod in rods)
     poses = max(rod.step.shape[0] for rod in rods)
@@ -68,7 +68,7 @@ def stack(rods: Sequence[Rod]) -> Rod:
 
 
 def _with_ends(rod: Rod) -> Rod:
-    """The rod with ends, rigid ones where it has none."""
+    """Return the rod with ends, rigid ones where it has none."""
     if rod.section.ends is not None:
         return rod
     ends = NotchEnds.rigid(rod.section.area)
@@ -76,12 +76,12 @@ def _with_ends(rod: Rod) -> Rod:
 
 
 def _stacked(values: np.ndarray) -> Array:
-    """Numbers as floats, but whole ones, which are places, as they are."""
+    """Convert to floats, except integers, which are indices."""
     return cast("Array", values) if values.dtype.kind == "i" else constant(values)
 
 
 def _filled(rod: Rod, modes: int, nodes: int, poses: int, levels: tuple[int, ...]) -> Rod:
-    """The rod with idle modes, nodes that stand for nothing, and steps that go nowhere."""
+    """Pad a rod with modes, nodes of weight zero, and zero steps."""
     more, further = modes - rod.modes, poses - rod.step.shape[0]
     count = rod.length.shape[0]
     if (more, further, count, levels) == (0, 0, nodes, rod.levels):
@@ -106,7 +106,7 @@ def _filled(rod: Rod, modes: int, nodes: int, poses: int, levels: tuple[int, ...
         turn_pair=pair,
         step=longer(wider(rod.step)),
         node_turn=wider(rod.node_turn)[index],
-        node_place=rod.node_place[index],
+        node_index=rod.node_index[index],
         node_reach=reach,
         node_rotation=rod.node_rotation[index],
         node_offset=rod.node_offset[index],

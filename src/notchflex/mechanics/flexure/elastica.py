@@ -3,10 +3,10 @@ r"""The cantilever at large deflection under a force at its end, in closed form.
 Liu 2022, eq. 8-19: a straight beam, clamped at one end, inextensible, under a force F on its free
 end. With ω the angle between its tangent and the direction opposite to the force, k = sin(ω₀/2)
 at the free end, k' = cos(ω₀/2) and λ² = F l²/EI, the solution ω(s) = 2 arcsin(k cd(λ s/l)) of
-EI ω'' = -F sin ω is followed from the free end, where no moment acts. The paper's differences
-of integrals at two amplitudes, K(k) - F(γ₁, k) (eq. 17, whose printed form has lost a root and a
-minus), are written by the addition theorems with the amplitude am(λ) alone, which is small where
-the load is: the slope then keeps its relative precision, and the tip 1e-15 of the length.
+EI ω'' = -F sin ω starts at the free end, where the moment is zero. The paper's differences
+of integrals at two amplitudes, K(k) - F(γ₁, k) (eq. 17, whose printed form lacks a root and a
+minus), are rewritten by the addition theorems with the amplitude am(λ) alone, which is small for
+small loads: the slope keeps its relative precision, and the tip 1e-15 of the length.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ class Elastica(NamedTuple):
     """Free end of a cantilever, in the frame of its clamp.
 
     Attributes:
-        tip_slope: Angle through which the free end turns, rad.
-        tip_along: Where the free end lies along the free beam, counted from the clamp, mm.
-        tip_across: How far it has moved across, toward the force, mm.
+        tip_slope: Rotation of the free end, rad.
+        tip_along: Position of the free end along the free beam, from the clamp, mm.
+        tip_across: Its deflection across, toward the force, mm.
         chord_angle: Angle between the free beam and the line from clamp to free end, rad.
     """
 
@@ -45,9 +45,9 @@ def elastica(
 ) -> Elastica:
     r"""Bend a cantilever by a force at its free end, exactly.
 
-    The force is held either against space (`clamp_angle`) or against the free end (`follower`);
-    without either it stays perpendicular to the free beam, `clamp_angle` π/2. All arguments may
-    be arrays that broadcast.
+    The direction of the force is constant either in space (`clamp_angle`) or relative to the free
+    end (`follower`); by default it is perpendicular to the free beam, `clamp_angle` π/2. All
+    arguments may be arrays that broadcast.
 
     Args:
         load: Force at the free end, 0 or more, N.
@@ -75,23 +75,28 @@ def elastica(
     """
     if clamp_angle is not None and follower is not None:
         raise InputError.CONFLICT("give either clamp_angle or follower, not both")
-    held = follower if follower is not None else 0.5 * np.pi if clamp_angle is None else clamp_angle
+    given_angle = (
+        follower if follower is not None else 0.5 * np.pi if clamp_angle is None else clamp_angle
+    )
     name = "clamp_angle" if follower is None else "follower"
     load, length, stiffness, angle = np.broadcast_arrays(
-        *(np.asarray(value, dtype=float) for value in (load, length, bending_stiffness, held))
+        *(
+            np.asarray(value, dtype=float)
+            for value in (load, length, bending_stiffness, given_angle)
+        )
     )
-    for word, good, allowed in (
+    for word, valid, allowed in (
         ("load", (load >= 0.0) & np.isfinite(load), "0 or more"),
         ("length", (length > 0.0) & np.isfinite(length), "greater than 0"),
         ("bending_stiffness", (stiffness > 0.0) & np.isfinite(stiffness), "greater than 0"),
         (name, (angle > 0.0) & (angle < np.pi), "between 0 and pi"),
     ):
-        if not np.all(good):
+        if not np.all(valid):
             raise InputError.NOT_FINITE(f"{word} must be {allowed} and finite")
-    from scipy import special  # takes half a second, and bending a robot does without
+    from scipy import special  # the import takes half a second; solves do not need it
 
     scaled = length * np.sqrt(load / stiffness)  # λ
-    shape = (_held if follower is None else _following)(scaled, angle)
+    shape = (_from_clamp_angle if follower is None else _from_end_angle)(scaled, angle)
     slope, clamp, modulus, complement, sn, cn, dn, amplitude = shape
     squared = modulus**2
     # Along the direction opposite to the force, and across it (eq. 18): the integrals of cos ω
@@ -121,8 +126,8 @@ class _Shape(NamedTuple):
     amplitude: np.ndarray
 
 
-def _following(scaled: np.ndarray, free: np.ndarray) -> _Shape:
-    """With ω(0) given; also beyond a quarter period, where the beam curls."""
+def _from_end_angle(scaled: np.ndarray, free: np.ndarray) -> _Shape:
+    """Solve for a given ω(0); also beyond a quarter period, where the beam curls."""
     from scipy.special import ellipj
 
     modulus, complement = np.sin(0.5 * free), np.cos(0.5 * free)
@@ -133,9 +138,9 @@ def _following(scaled: np.ndarray, free: np.ndarray) -> _Shape:
     return _Shape(slope, free - slope, modulus, complement, sn, cn, dn, amplitude)
 
 
-def _held(scaled: np.ndarray, clamp: np.ndarray) -> _Shape:
-    """With ω(L) given."""
-    # Where ω₀ is near π, k' keeps its digits from what is left to it; `ellipj` would not.
+def _from_clamp_angle(scaled: np.ndarray, clamp: np.ndarray) -> _Shape:
+    """Solve for a given ω(L)."""
+    # Near ω₀ = π, k' is computed from π - ω₀ to keep its digits; `ellipj` would lose them.
     slope, rest = _slope_for(scaled, clamp)
     modulus, complement = np.cos(0.5 * rest), np.sin(0.5 * rest)
     tangent = _tangent(slope, clamp, rest)
@@ -145,43 +150,43 @@ def _held(scaled: np.ndarray, clamp: np.ndarray) -> _Shape:
 
 
 def _tangent(slope: np.ndarray, clamp: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Tangent of am(λ): cot γ₁ / k', with sin γ₁ = sin(ω_L/2) / k (Liu 2022, eq. 17)."""
+    """Compute tan am(λ): cot γ₁ / k', with sin γ₁ = sin(ω_L/2) / k (Liu 2022, eq. 17)."""
     below = np.sin(0.5 * slope) * np.sin(clamp + 0.5 * slope)  # k² - sin²(ω_L/2)
     return np.sqrt(below) / (np.sin(0.5 * clamp) * np.sin(0.5 * rest))
 
 
 def _slope_for(scaled: np.ndarray, clamp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Slope of the free end, and what is left from its ω to π, for a given λ and ω(L).
+    """Find the slope of the free end, and π - ω there, for a given λ and ω(L).
 
-    λ = F(am(λ), k) rises with the slope from 0 to infinity. The root is sought in the logit of
-    the slope's share of what there is, so that both ends keep their relative precision.
+    λ = F(am(λ), k) rises with the slope from 0 to infinity. The unknown is the logit of the slope
+    over its range, so that both ends keep their relative precision.
     """
     from scipy.optimize import elementwise
     from scipy.special import elliprf, expit
 
     span = np.pi - clamp
     loaded = scaled > 0.0
-    wanted = np.log(np.where(loaded, scaled, 1.0))
+    log_load = np.log(np.where(loaded, scaled, 1.0))
 
-    def excess(logit: np.ndarray, wanted: np.ndarray, clamp: np.ndarray) -> np.ndarray:
+    def excess(logit: np.ndarray, log_load: np.ndarray, clamp: np.ndarray) -> np.ndarray:
         span = np.pi - clamp
         slope, rest = span * expit(logit), span * expit(-logit)
         tangent = _tangent(slope, clamp, rest)
         sine, cosine = tangent / np.hypot(1.0, tangent), 1.0 / np.hypot(1.0, tangent)
         delta = cosine**2 + (sine * np.sin(0.5 * rest)) ** 2  # 1 - k² sin², without cancelling
-        return np.log(sine * elliprf(cosine**2, delta, 1.0)) - wanted
+        return np.log(sine * elliprf(cosine**2, delta, 1.0)) - log_load
 
     # λ² is about twice the slope over sin ω_L for small loads and the logit about λ for large
-    # ones; from -80 to 80 there is every load with a slope between 1e-34 and pi - 1e-34.
+    # ones; -80 to 80 covers every load with a slope between 1e-34 and pi - 1e-34.
     low, high = np.full_like(scaled, -80.0), np.full_like(scaled, 80.0)
-    found = elementwise.find_root(
-        excess, (low, high), args=(wanted, clamp), tolerances={"xatol": 1e-15, "xrtol": 1e-15}
+    root = elementwise.find_root(
+        excess, (low, high), args=(log_load, clamp), tolerances={"xatol": 1e-15, "xrtol": 1e-15}
     )
-    if not np.all(found.success | ~loaded):
+    if not np.all(root.success | ~loaded):
         raise InputError.OUT_OF_RANGE(
             "load * length^2 / bending_stiffness must be at least 1e-30 (or 0) and below 3000"
         )
-    logit = np.where(loaded, found.x, 0.0)
+    logit = np.where(loaded, root.x, 0.0)
     return np.where(loaded, span * expit(logit), 0.0), np.where(loaded, span * expit(-logit), span)
 
 

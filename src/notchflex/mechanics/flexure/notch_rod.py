@@ -1,4 +1,4 @@
-"""The rod of a notch from four things: neutral axis, section, strain modes, closure.
+"""Rod of a notch from neutral axis, section, strain modes and closure.
 
 A new notch describes these in the frame of a notch of direction 0: x toward the side to which it
 bends, z along the tube, the origin on the tube axis at the proximal face. `build_rod` turns them
@@ -35,7 +35,7 @@ class NeutralAxis(NamedTuple):
         start: Pose of the first section; its z is along the rod, its x points to the cut side.
         end: Pose of the distal body, in the frame of the last section.
         curve: Poses along the free axis in the frame of its start, at `quadrature.every` and last
-            at its end: only motion beside it is then integrated. None integrates all motion.
+            at its end: only motion relative to it is then integrated. None integrates all motion.
         strain: Strains of the free rod at `quadrature.every`, (points, 6); None is straight.
     """
 
@@ -51,8 +51,8 @@ class StrainModes(NamedTuple):
 
     Attributes:
         basis: Strains (about x, y, z; along x, y, z) at `quadrature.every` per unit of each mode.
-        levels: How many modes, from the first, serve tendons alone, loads in the plane of bending
-            (about y), and loads in space (all).
+        levels: Numbers of modes, from the first, for tendons alone, for loads in the plane of
+            bending (about y), and for loads in space (all).
     """
 
     basis: Float[np.ndarray, "every 6 modes"]
@@ -60,12 +60,12 @@ class StrainModes(NamedTuple):
 
 
 def shifted(x: float = 0.0, z: float = 0.0) -> Motion:
-    """Make the pose of a frame that is displaced along x and z, mm, and not turned."""
+    """Make the pose of a frame displaced along x and z, mm, without rotation."""
     return Motion(constant(np.eye(3)), constant([x, 0.0, z]))
 
 
 def between(outer: Motion, inner: Motion) -> Motion:
-    """Return the inner pose, or many, as seen from the outer one."""
+    """Return the inner pose, or many, in the outer frame."""
     return Motion(outer.rotation.T @ inner.rotation, outer.point_inside(inner.translation))
 
 
@@ -88,17 +88,17 @@ def legendre_modes(
         twist: Those of the twist, about the shear centre.
         tendon_modes: Bending modes that tendons alone need; all where not given.
         shear_centre: Distance of the shear centre from the neutral axis, mm.
-        shear: How far a force across the rod shifts its end, mm, in the plane of bending and
-            sideways, where its moment has the curvature P_1/length. That shear is constant along
-            the rod and belongs to the linear mode of the bending.
+        shear: Displacement of the rod's end, mm, in the plane of bending and sideways, by a
+            force across the rod whose moment has the curvature P_1/length. That shear is constant
+            along the rod and belongs to the linear mode of bending.
 
     Returns:
         The modes; a unit of the first bends the rod by 1 rad.
     """
     length = quadrature.ends[-1]
     modes = np.zeros((len(quadrature.every), 6, bending + sideways + twist))
-    most = max(bending, sideways, twist)
-    polynomials = legvander(2.0 * quadrature.every / length - 1.0, most - 1)
+    max_count = max(bending, sideways, twist)
+    polynomials = legvander(2.0 * quadrature.every / length - 1.0, max_count - 1)
     first = 0
     for component, count in ((1, bending), (0, sideways), (2, twist)):
         modes[:, component, first : first + count] = polynomials[:, :count]
@@ -158,13 +158,13 @@ def build_rod(
     points = axis.quadrature
     nodes = len(points.at_nodes[0])
     strain = np.tile(STRAIGHT, (len(points.every), 1)) if axis.strain is None else axis.strain
-    # Written out: opposite directions then mirror each other to the last bit.
+    # Written out, so that opposite directions are exact mirror images.
     cosine, sine = np.cos(np.radians(direction_deg)), np.sin(np.radians(direction_deg))
     turned = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    curve, curve_end, beside = None, shifted(), strain
+    curve, curve_end, reference = None, shifted(), strain
     if axis.curve is not None:
         curve, curve_end = (Motion(*(part[at] for part in axis.curve)) for at in (slice(-1), -1))
-        beside = None
+        reference = None
 
     def at_nodes(values: Array, own_axes: int = 0) -> Array:
         each = np.asarray(values)
@@ -178,7 +178,7 @@ def build_rod(
         curve_offset=constant(curve_end.translation),
         end_rotation=constant(axis.end.rotation @ turned.T),
         end_offset=constant(axis.end.translation),
-        **points.fields(curve, modes.basis, beside),
+        **points.fields(curve, modes.basis, reference),
         reference_strain=constant(strain[:nodes]),
         section=dataclasses.replace(
             jax.tree.map(at_nodes, dataclasses.replace(section, fibres=None)),

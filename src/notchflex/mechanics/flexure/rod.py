@@ -1,13 +1,12 @@
-"""What one notch becomes for the solver: a short rod with a few strain modes, as arrays.
+"""Discretised flexure: a short rod along the neutral axis of a notch with a few strain modes.
 
-The rod is followed along its neutral axis and looked at in nodes. The strain of node k is
-`reference_strain[k] + basis[k] @ q`; strains are (curvature about x, y, z of the rod, shear along
-x, y, stretch along z), the stretch being 1 where nothing is strained.
+The strain of node k is `reference_strain[k] + basis[k] @ q`; strains are (curvature about x, y, z
+of the rod, shear along x, y, stretch along z), the stretch being 1 without strain.
 
-Its pose is found beside a curve r(s) that may be chosen: the free rod itself, so that only what
-the load adds is left to integrate, or a point. With the pose written as g(s) r(s), g follows the
-twist Ad_r (strain - strain of the curve). Of that twist, linear in (1, q), the turns up to Gauss's
-nodes and the steps at them are all that is kept (`rod_kinematics.py`).
+The pose is integrated relative to a reference curve r(s): the free rod itself, so that only the
+change by the load is integrated, or a point. With the pose g(s) r(s), g follows the twist
+Ad_r (strain - strain of the curve). That twist is linear in (1, q); only its rotations up to
+Gauss's nodes and its steps at them are stored (`rod_kinematics.py`).
 """
 
 from __future__ import annotations
@@ -33,37 +32,37 @@ class Rod(Pytree):
 
     Attributes:
         start_rotation: Rotation from the rod's first section to the proximal body.
-        start_offset: Where the rod starts, in the frame of the proximal body. A notch alone
-            counts it from its proximal face on the tube axis; the chain adds the body's length.
-        curve_rotation: Rotation from the end of the curve that is followed to its start.
-        curve_offset: Where that curve ends, in the frame of its start.
+        start_offset: Start of the rod, in the frame of the proximal body: for a single notch from
+            its proximal face on the tube axis; the chain adds the body's length.
+        curve_rotation: Rotation from the end of the reference curve to its start.
+        curve_offset: End of that curve, in the frame of its start.
         end_rotation: Rotation from the distal body to the rod's last section.
-        end_offset: Where the distal body's frame lies, in the frame of the rod's last section.
-        length: Length of the neutral axis that each node stands for.
+        end_offset: Origin of the distal body's frame, in the frame of the rod's last section.
+        length: Quadrature weight of each node along the neutral axis.
         reference_strain: Strain at each node of the free, cut tube.
         basis: Strain at each node for a unit of each mode.
-        turn: Turn beside the curve, summed up from the rod's start to each of Gauss's nodes and,
-            last, to its end, for (1, q): in the frame of the rod's start.
-        turn_pair: What the order of turns adds between neighbouring ones of these places, for pairs
-            of (1, q); None in the plane, where the order of turns does not matter.
-        step: Step beside the curve that each of Gauss's nodes stands for, for (1, q).
+        turn: Integral of the rotation relative to the curve, from the rod's start to each of
+            Gauss's nodes and, last, to its end, for (1, q): in the frame of the rod's start.
+        turn_pair: Second Magnus term between neighbouring ones of these points, for pairs of
+            (1, q); None in the plane, where rotations commute.
+        step: Step relative to the curve of each of Gauss's nodes, for (1, q).
         node_turn: As `turn`, to each node of the strains.
-        node_place: How many places of the turn lie up to each node of the strains.
-        node_reach: How far each step has come at each node of the strains, 0 to 1.
-        node_rotation: Rotation from the followed curve at each node to its start.
-        node_offset: Where the followed curve is at each node, in the frame of its start.
-        section: What is left of the tube at each node.
-        closure: Where a notch with a solid spine closes, across the section from the neutral axis
-            (x, y): the fibre that has no length left when the lips meet.
+        node_index: Number of points of the rotation before each node of the strains.
+        node_reach: Fraction of each step before each node of the strains, 0 to 1.
+        node_rotation: Rotation from the reference curve at each node to its start.
+        node_offset: Position of the reference curve at each node, in the frame of its start.
+        section: Cross-section at each node.
+        closure: Position (x, y) from the neutral axis of the fibre between the edges of a notch
+            with a solid spine: its length is zero when they touch.
         has_closure: 1 where there is such a fibre, 0 where the notch closes otherwise.
         stop_flexibility: Flexibility of the closed notch over that of the open one; 0 is a rigid
             stop, None where all are rigid.
         linear_kinematics: 1 where displacements are proportional to the strains (small deflection);
-            None where no flexure of a chain asks for it, so that nothing is computed for it.
-        chord: 1 where the angle of the chord from start to end is of interest (Liu 2022); None
+            None where no flexure of a chain uses it.
+        chord: 1 where the angle of the chord from start to end is computed (Liu 2022); None
             likewise.
-        padding_mask: 1 for modes that only fill up the arrays, because another notch has more.
-        levels: How many modes serve tendons alone, loads in the plane of bending, and space.
+        padding_mask: 1 for modes that only pad the arrays, because another notch has more.
+        levels: Numbers of modes for tendons alone, loads in the plane of bending, and in space.
     """
 
     start_rotation: Float[Array, "*n d d"]
@@ -79,7 +78,7 @@ class Rod(Pytree):
     turn_pair: Float[Array, "*n places 3 hat hat"] | None
     step: Float[Array, "*n gauss d hat"]
     node_turn: Float[Array, "*n nodes a hat"]
-    node_place: Int[Array, "*n nodes"]
+    node_index: Int[Array, "*n nodes"]
     node_reach: Float[Array, "*n nodes gauss"]
     node_rotation: Float[Array, "*n nodes d d"]
     node_offset: Float[Array, "*n nodes d"]
@@ -99,7 +98,7 @@ class Rod(Pytree):
 
 
 def flattened(rods: Rod, frame: Float[np.ndarray, "3 3"]) -> Rod:
-    """Rods of space as rods of the plane that their robot stays in.
+    """Reduce spatial rods to the plane that their robot stays in.
 
     Args:
         rods: All flexures of a chain, with no modes that leave the plane.
@@ -131,5 +130,5 @@ def planar_points(points: Float[Array, "*shape 3"]) -> Float[Array, "*shape 2"]:
 
 
 def planar_rotations(rotations: Float[Array, "*shape 3 3"]) -> Float[Array, "*shape 2 2"]:
-    """Return what rotations do in the plane."""
+    """Return the components of rotations in the plane."""
     return constant(np.asarray(rotations)[..., IN_PLANE, :][..., IN_PLANE])

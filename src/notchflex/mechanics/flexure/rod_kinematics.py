@@ -1,13 +1,12 @@
-"""From the strains of a rod to its pose, and how the pose answers the strains.
+"""Kinematics of a rod: pose from strains, and derivatives of the pose by the modes.
 
-Beside the followed curve a rod turns and steps. The turn up to each of Gauss's nodes is an integral
-of the strains, so it is linear in the modes q, exactly in the plane; in space, where the order of
-turns matters, it goes from node to node by Magnus's series (second term included: Blanes, Casas,
-Oteo and Ros 2009, eq. 42). The end is the sum of all steps, each turned by where its node is.
+Relative to the reference curve a rod rotates and steps. The rotation up to each of Gauss's nodes is
+an integral of the strains, exactly linear in the modes q in the plane; in space it is integrated
+from node to node by the Magnus series (up to its second term: Blanes, Casas, Oteo and Ros 2009,
+eq. 42). The end is the sum of all steps, each rotated by the rotation at its node.
 
-Whatever is asked of the pose is asked of these turns and steps: its slope by the modes, and the
-slope of that, are written out. (Differentiated by JAX they cost ten times as much, to run and to
-compile.)
+First and second derivatives of the pose by the modes are written out: derived by JAX they cost ten
+times as much, to run and to compile.
 """
 
 from __future__ import annotations
@@ -31,15 +30,16 @@ from notchflex.mechanics.motion import (
 
 
 class RodConfiguration(NamedTuple):
-    """A rod beside its curve; places are the nodes of the pose and then the end.
+    """A rod relative to its curve; "places" are the nodes of the pose and then the end.
 
     Attributes:
         rotation: Rotation at every place.
-        turn: Turn at every place per unit of mode, along the axes of the start.
-        step: The turned steps at the nodes.
-        stepped: The turned steps per unit of mode.
-        from_place: Rotation vectors from place to place, their slopes by the modes, and what these
-            make of the turn, along the axes of the start; None in the plane, where turns add up.
+        turn: Change of that rotation per unit of mode, along the axes of the start.
+        step: The rotated steps at the nodes.
+        stepped: The rotated steps per unit of mode.
+        from_place: Rotation vectors from place to place, their slopes by the modes, and the change
+            of rotation by these, along the axes of the start; None in the plane, where rotations
+            commute.
     """
 
     rotation: Float[Array, "places d d"]
@@ -55,7 +55,7 @@ class RodConfiguration(NamedTuple):
 
 
 def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
-    """Return the turns and steps of a rod under given modes."""
+    """Integrate the rotations and steps of a rod for given modes."""
     xp = array_module(modes)
     hat = xp.concatenate([np.ones(1), modes])
     from_place = None
@@ -63,7 +63,7 @@ def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
         rotation, turn = _in_plane(rod.turn[:, 0] @ hat), rod.turn[..., 1:]
     else:
         turns, slope = _turns(rod, hat)
-        rotation = _products(_about(turns))
+        rotation = _products(_rotations(turns))
         turning = rotations_before(rotation) @ left_slopes(turns) @ slope
         from_place, turn = (turns, slope, turning), xp.cumsum(turning, axis=0)
     stepped = _stepped(rod, rotation)
@@ -71,19 +71,19 @@ def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
 
 
 def free_pose(rod: Rod) -> Motion:
-    """Return the pose of the distal body from the proximal one, of a free rod in space.
+    """Return the pose of the distal body in the proximal frame, of a free rod in space.
 
-    The same as `relative_pose` without modes, and without what only its slopes need.
+    It equals `relative_pose` without modes, and omits terms that only the derivatives need.
     """
     assert rod.turn_pair is not None
     turns = np.diff(rod.turn[..., 0], axis=0, prepend=0.0) + rod.turn_pair[..., 0, 0]
-    rotation = _products(_about(constant(turns)))
+    rotation = _products(_rotations(constant(turns)))
     end = Motion(rotation[-1], _stepped(rod, rotation)[..., 0].sum(axis=0))
     return Motion(rod.start_rotation, rod.start_offset).then(end).then(tail_pose(rod))
 
 
 def _stepped(rod: Rod, rotation: Float[Array, "places d d"]) -> Float[Array, "gauss d hat"]:
-    """Steps at the nodes, turned, for (1, q)."""
+    """Rotate the steps at the nodes, for (1, q)."""
     return (rotation[:-1, ..., None] * rod.step[:, None]).sum(axis=-2)
 
 
@@ -96,7 +96,7 @@ def _in_plane(angle: Float[Array, " places"]) -> Float[Array, "places 2 2"]:
 def _turns(
     rod: Rod, hat: Float[Array, " hat"]
 ) -> tuple[Float[Array, "places 3"], Float[Array, "places 3 modes"]]:
-    """Rotation vectors from place to place, and their slopes by the modes."""
+    """Compute the rotation vectors from place to place, and their slopes by the modes."""
     xp = array_module(hat)
     parts = xp.concatenate([rod.turn[:1], rod.turn[1:] - rod.turn[:-1]])
     by_pair = _by_pair(rod, hat)
@@ -104,16 +104,16 @@ def _turns(
 
 
 def _by_pair(rod: Rod, hat: Float[Array, " hat"]) -> Float[Array, "places 3 hat"]:
-    """What the order of turns adds from place to place, per unit of (1, modes)."""
+    """Compute the second Magnus term from place to place, per unit of (1, modes)."""
     return array_module(hat).einsum("kcab,b->kca", rod.turn_pair, hat)
 
 
-def turn_doubt(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, ""]:
-    """About how far the end of a rod may be turned otherwise than computed, rad; 0 in the plane.
+def rotation_error_estimate(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, ""]:
+    """Estimate the error of the rotation of a rod's end, rad; 0 in the plane.
 
-    Magnus's series is cut off behind its second term. What comes next is of the size of the turns
-    from place to place times their second terms, of whose sum a twentieth was missing where a notch
-    was bent by 105 degrees, twisted and sideways (against more places).
+    The Magnus series is truncated after its second term. The next term is of the size of the
+    rotations from place to place times their second terms; a twentieth of the sum of these was the
+    error for a notch bent by 105 degrees, twisted and sideways (against more places).
     """
     if rod.turn_pair is None:
         return jnp.zeros(())
@@ -123,32 +123,32 @@ def turn_doubt(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, ""]:
     return 0.05 * jnp.sum(jnp.linalg.norm(turns, axis=-1) * jnp.linalg.norm(second, axis=-1))
 
 
-def _about(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
+def _rotations(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
     if array_module(turns) is np:
         return rotation_about(turns)
     return jax.vmap(rotation_about)(turns)
 
 
 def left_slopes(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
-    """Return the slopes of the exponential by turns, seen from before each."""
+    """Return the left Jacobians of the exponential at rotation vectors."""
     if array_module(turns) is np:
         return left_slope(turns)
     return jax.vmap(left_slope)(turns)
 
 
 def _products(parts: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
-    """Products of all rotations up to each."""
+    """Multiply all rotations up to each."""
     xp = array_module(parts)
     return xp.stack(list(accumulate(parts, xp.matmul)))
 
 
 def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
-    """Return the rotation at the place before each; none before the first."""
+    """Return the rotation at the place before each; the identity before the first."""
     return array_module(values).concatenate([np.eye(3)[None], values[:-1]])
 
 
 def _small_motion(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
-    """Rotation by the sum of the curvatures; the rod's end is displaced in proportion to them."""
+    """Compute the end motion of small deflection: displacements proportional to the strains."""
     xp = array_module(modes)
     hat = xp.concatenate([np.ones(1), modes])
     turn, moved = rod.turn[-1] @ hat, rod.step.sum(axis=0) @ hat
@@ -156,8 +156,8 @@ def _small_motion(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
     return Motion(rotation, end + cross(turn, end) + moved - rotation @ end)
 
 
-def _beside(rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration) -> Motion:
-    """Motion from where the followed curve would end to where the rod ends."""
+def _end_motion(rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration) -> Motion:
+    """Compute the motion from the end of the reference curve to that of the rod."""
     if rod.linear_kinematics is None:
         return own.end
     xp, is_small = array_module(modes), rod.linear_kinematics > 0.0
@@ -166,14 +166,14 @@ def _beside(rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration) -> M
 
 
 def rod_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
-    """Return the pose of the rod's last section as seen from its first."""
-    return _beside(rod, modes, integrate_rod(rod, modes)).then(
+    """Return the pose of the rod's last section in the frame of its first."""
+    return _end_motion(rod, modes, integrate_rod(rod, modes)).then(
         Motion(rod.curve_rotation, rod.curve_offset)
     )
 
 
 def tail_pose(rod: Rod) -> Motion:
-    """Return the distal body as seen from where the motion beside the curve ends."""
+    """Return the pose of the distal body in the frame of the motion relative to the curve."""
     return Motion(rod.curve_rotation, rod.curve_offset).then(
         Motion(rod.end_rotation, rod.end_offset)
     )
@@ -182,9 +182,9 @@ def tail_pose(rod: Rod) -> Motion:
 def relative_pose(
     rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration | None = None
 ) -> Motion:
-    """Return the pose of the distal body as seen from the proximal one."""
-    beside = _beside(rod, modes, integrate_rod(rod, modes) if own is None else own)
-    return Motion(rod.start_rotation, rod.start_offset).then(beside).then(tail_pose(rod))
+    """Return the pose of the distal body in the proximal frame."""
+    end_motion = _end_motion(rod, modes, integrate_rod(rod, modes) if own is None else own)
+    return Motion(rod.start_rotation, rod.start_offset).then(end_motion).then(tail_pose(rod))
 
 
 def twist_slope(
@@ -205,7 +205,7 @@ def end_displacement(own: RodConfiguration) -> Float[Array, "d modes"]:
 
 
 def _crossed(turn: Array, vector: Array) -> Array:
-    """Cross products of turns (places, a, modes) and vectors (places, d, 1 or modes)."""
+    """Cross rotations (places, a, modes) with vectors (places, d, 1 or modes)."""
     if turn.shape[1] == 1:
         return jnp.concatenate([turn * vector[:, 1:], -turn * vector[:, :1]], axis=1)
     return jnp.cross(turn, jnp.broadcast_to(vector, turn.shape), axis=1)
@@ -223,20 +223,22 @@ def small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w mode
 def node_poses(
     rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration | None = None
 ) -> Motion:
-    """Return poses of the sections at the nodes of the strains, in the frame of the proximal body.
+    """Return the poses of the sections at the nodes of the strains, in the proximal frame.
 
-    Between the places of the turn its order is left out, and steps are summed up by the polynomials
-    through their nodes: enough to judge a result by, not to compute it.
+    Between the nodes of the rotation the Magnus terms are omitted, and polynomials interpolate the
+    steps: accurate enough for error estimates, not for the solution.
     """
     own = integrate_rod(rod, modes) if own is None else own
     start = Motion(rod.start_rotation, rod.start_offset)
     turns = jnp.concatenate([jnp.zeros_like(rod.turn[:1]), rod.turn])
-    onward = (rod.node_turn - turns[rod.node_place]) @ jnp.concatenate([jnp.ones(1), modes])
+    rotation_vectors = (rod.node_turn - turns[rod.node_index]) @ jnp.concatenate(
+        [jnp.ones(1), modes]
+    )
     unturned = jnp.eye(len(own.rotation[0]))[None]
-    before = jnp.concatenate([unturned, own.rotation])[rod.node_place]
+    before = jnp.concatenate([unturned, own.rotation])[rod.node_index]
 
     def at_node(turned: Array, turn: Array, moved: Array, free: Motion) -> Motion:
         return start.then(Motion(turned @ rotation_about(turn), moved)).then(free)
 
     free = Motion(rod.node_rotation, rod.node_offset)
-    return jax.vmap(at_node)(before, onward, rod.node_reach @ own.step, free)
+    return jax.vmap(at_node)(before, rotation_vectors, rod.node_reach @ own.step, free)

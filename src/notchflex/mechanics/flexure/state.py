@@ -1,4 +1,4 @@
-"""From the modes of one flexure to its pose, its resultants and its chord."""
+"""State of one flexure from its modes: pose, resultants and chord."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ class FlexureState(Pytree):
     """One flexure under given modes (mm, N, rad), in the frame of its proximal body.
 
     Attributes:
-        configuration: Turns and steps of the rod; None where nobody asked for its pose.
-        pose: From the proximal body to the distal one; None where nobody asked.
+        configuration: Rotations and steps of the rod; None without pose.
+        pose: From the proximal body to the distal one; None where it is not computed.
         twist: Twist (angular, linear) of the distal body, in its own frame, per unit of mode;
-            None where nobody asked.
+            None without pose.
         resultants: Internal moments and forces of each interval, in the rod's frame.
         strain: Strain of each interval beyond that of the free tube.
         memory: Memory of the material at every node, after these strains.
-        slope: Change of the moment about y with the curvature at every node, where the law knows
-            it (`SectionResponse.slope`).
+        slope: Change of the moment about y with the curvature at every node, where the law
+            provides it (`SectionResponse.slope`).
         internal: Generalised internal force of each mode, N mm per unit of mode.
         bend: Bending of the whole rod about x and y of its frame, of a plane about y, rad.
         chord_turn: Rotation, in the proximal body's frame, by which the chord from the rod's
-            start to its end has turned in the plane of bending; None where nobody asked.
-        chord_angle: Its angle, rad; None where nobody asked.
+            start to its end has turned in the plane of bending; None where it is not computed.
+        chord_angle: Its angle, rad; None likewise.
     """
 
     configuration: RodConfiguration | None
@@ -55,11 +55,11 @@ class FlexureState(Pytree):
 
 
 def fibre_stretch(across: Float[Array, "*shape 2"]) -> Float[Array, "*shape 6"]:
-    """What the strains are weighted with to give the length of a fibre per length of the rod.
+    """Return the weights of the strains that give the length of a fibre per length of the rod.
 
-    A fibre at (x, y) from the neutral axis has the length of the rod's stretch plus its
-    curvatures times their levers, v_z + u_x y - u_y x. This is both the concentric wall arc
-    of Pacheco's tendon (its l = h - theta (r_i + ybar)) and the edge of a notch.
+    The length of a fibre at (x, y) from the neutral axis is the rod's stretch plus its curvatures
+    times their lever arms, v_z + u_x y - u_y x. This holds for the concentric wall arc of Pacheco's
+    tendon (its l = h - theta (r_i + ybar)) and for the edge of a notch.
     """
     weights = across @ _ACROSS
     return weights + np.broadcast_to(_ALONG, weights.shape)
@@ -70,17 +70,17 @@ _ACROSS = np.array([[0.0, -1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0
 
 
 def of_rod(rod: Rod, values: Float[Array, "*shape 6"]) -> Float[Array, "*shape w"]:
-    """Those of six components, last axis, that a rod of space or of a plane has."""
+    """Select the components (last axis) that a rod of space or of a plane has."""
     return values if rod.basis.shape[-2] == 6 else values[..., PLANE]
 
 
 def in_space(values: Float[Array, "*shape w"]) -> Float[Array, "*shape 6"]:
-    """Return all six components, last axis, of what may be of a plane."""
+    """Expand components (last axis) of a plane to all six of space."""
     return values if values.shape[-1] == 6 else values @ np.eye(6)[PLANE]
 
 
 def fibre_slope(rod: Rod, weights: Float[Array, "t w"]) -> Float[Array, "t modes"]:
-    """Return change of the length of fibres, by their weights on the strains, per unit of mode."""
+    """Compute the change of the length of fibres, from their weights, per unit of mode."""
     return weights @ jnp.einsum("icm,i->cm", rod.basis, rod.length)
 
 
@@ -93,16 +93,16 @@ def flexure_state(
     *,
     with_pose: bool,
 ) -> FlexureState:
-    """Everything a flexure's modes decide.
+    """Compute the state of a flexure from its modes.
 
     Args:
         rod: The flexure.
         law: Its material.
         memory: Memory of the material at every node.
         modes: Amplitude of each strain mode.
-        response: What the law answers at every node, where it is known.
-        with_pose: Whether pose and twist are wanted; where no force acts on a body they do not
-            enter the balance.
+        response: Response of the law at every node, where it is known.
+        with_pose: Whether to compute pose and twist; without forces on bodies they do not enter the
+            equilibrium.
 
     Returns:
         Its state.
@@ -115,7 +115,7 @@ def flexure_state(
     if response is None:
         response = law.respond_all(in_space(elastic), rod.section, memory)
     resultants = of_rod(rod, response.resultants)
-    # A mode that only fills up the arrays is held by a stiffness of 1.
+    # Padding modes have a stiffness of 1.
     internal = jnp.einsum("i,ic,icm->m", rod.length, resultants, rod.basis)
     has_chord = with_pose and rod.chord is not None
     chord_turn, chord_angle = chord(rod, modes) if has_chord else (None, None)
@@ -140,7 +140,7 @@ def flexure_state(
 def material_tangent(
     rod: Rod, law: SectionLaw, memory: Any, state: FlexureState
 ) -> Float[Array, "modes modes"]:
-    """Return the change of what the strains do to each mode (`internal`), per unit of mode.
+    """Differentiate the internal forces of the modes (`internal`) by the modes.
 
     Args:
         rod: The flexure.
@@ -149,7 +149,7 @@ def material_tangent(
         state: Its state there.
     """
 
-    def answered(
+    def resultant_slope(
         strain: Array, section: Any, at_node: Any, slope: Array | None, columns: Array
     ) -> Array:
         if slope is not None:
@@ -165,13 +165,13 @@ def material_tangent(
             lambda column: jax.jvp(resultants, (strain,), (column,))[1], in_axes=1, out_axes=1
         )(columns)
 
-    answers = jax.vmap(answered)(state.strain, rod.section, memory, state.slope, rod.basis)
-    weighed = rod.length[:, None, None] * rod.basis
-    return jnp.einsum("icm,ick->mk", weighed, answers) + jnp.diag(rod.padding_mask)
+    slopes = jax.vmap(resultant_slope)(state.strain, rod.section, memory, state.slope, rod.basis)
+    weighted = rod.length[:, None, None] * rod.basis
+    return jnp.einsum("icm,ick->mk", weighted, slopes) + jnp.diag(rod.padding_mask)
 
 
 def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "d d"], Float[Array, ""]]:
-    """Return how far the chord of a rod has turned in its plane of bending (Liu 2022, eq. 19).
+    """Compute the rotation of the chord of a rod in its plane of bending (Liu 2022, eq. 19).
 
     The chord is the straight line from the rod's start to its end; for a strip this is the angle
     that the paper calls bending angle, about two thirds of the slope at the end.

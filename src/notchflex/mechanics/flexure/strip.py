@@ -1,13 +1,13 @@
 """The strip of a triangular-notched robot: a straight beam across the tube (Liu 2022).
 
 Two opposite notches leave a strip of the tube's two walls across its axis. It is clamped at one
-wall, in the proximal body, and at the opposite wall, where the pulled cable passes, its free end
+wall, in the proximal body; at the opposite wall, where the pulled cable passes, its free end
 carries the distal body. In the plane of bending it neither stretches nor shears, as in the paper
 (eq. 8-18); the curvature is a polynomial along it. Sideways it bends about its strong axis and
-twists, with its ends held against warping.
+twists, with warping prevented at its ends.
 
-Shear is left out sideways too. There two walls that the lumen parts give way like a frame, so that
-this strip is too stiff against sideways forces, though not against sideways moments and torques.
+Shear is omitted sideways too. The two walls deform there like a frame, so this strip is too stiff
+against sideways forces, though not against sideways moments and torques.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from notchflex.robot import StripNotch, Tube
 
 # Polynomials of the sideways curvature and of the twist.
 _SIDEWAYS, _TWIST = 3, 2
-# Rod frame on the notch's: z along the strip toward the bend, x toward the base, y as it is.
+# Rod frame in the notch's frame: z along the strip toward the bend, x toward the base, same y.
 _LYING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 

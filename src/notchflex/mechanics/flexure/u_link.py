@@ -38,8 +38,8 @@ from notchflex.mechanics.section import clamped_torsion_constant, two_walls
 from notchflex.mechanics.section.fibres import FibresAt, two_walls_fibres
 from notchflex.robot import Tube, ULink
 
-# Poisson's ratio of a robot file that names none. It only gives the modes their shape and tells
-# how much of the torsion is held back; the stiffness is the material's own.
+# Poisson's ratio of a robot file without one. It only affects the shape of the modes and the
+# restraint of warping; the stiffness is that of the material.
 POISSON_RATIO = 0.33
 
 
@@ -88,9 +88,9 @@ def u_link_rod(
     ends = (0.0, 0.5 * curved, link.length - 0.5 * curved, link.length)
     counts = (nodes[0], nodes[1], nodes[0])
     # One node less moves the tip of 27 links by 4e-8 mm, modes left out by 1e-5 mm.
-    places = rod_quadrature(ends, counts, tuple(count - 1 for count in counts))
-    place = places.every
-    course = link.course_at((*place.tolist(), 0.0, link.length))
+    quadrature = rod_quadrature(ends, counts, tuple(count - 1 for count in counts))
+    position = quadrature.every
+    course = link.course_at((*position.tolist(), 0.0, link.length))
     section = _section(link, tube, Course(*(values[:-2] for values in course)), poisson_ratio)
     # A slot cut from the side away from the bend leaves the wall on the bend's side, where the
     # link then begins; over the slot that follows stands its mirror image.
@@ -99,37 +99,37 @@ def u_link_rod(
     middle = np.array([0.0, 0.0, 2.0 * notch.slot_radius + 0.5 * notch.strip_thickness])
     every = _poses(course, middle, hand)
     poses, start, end = (Motion(*(part[at] for part in every)) for at in (slice(-2), -2, -1))
-    free = np.tile(STRAIGHT, (len(place), 1))
+    free = np.tile(STRAIGHT, (len(position), 1))
     free[:, 1] = hand * course.curvature[:-2]
     basis = wrench_modes(
         poses,
-        2.0 * place / link.length - 1.0,
-        places.weight,
+        2.0 * position / link.length - 1.0,
+        quadrature.weight,
         section,
         middle,
         moment_modes,
         force_modes,
         poisson_ratio,
     )
-    onward = Motion(*(constant(np.delete(part, -2, axis=0)) for part in every))
+    poses_to_end = Motion(*(constant(np.delete(part, -2, axis=0)) for part in every))
     # The distal body's frame: level with the strip's lower edge, on the tube axis.
     distal = between(end, shifted(z=2.0 * notch.slot_radius))
-    axis = NeutralAxis(places, start, distal, between(start, onward), free)
+    axis = NeutralAxis(quadrature, start, distal, between(start, poses_to_end), free)
     in_plane = moment_modes + 2 * force_modes
     modes = StrainModes(basis, (in_plane, in_plane, basis.shape[-1]))
     return build_rod(axis, section, modes, direction_deg=notch.direction_deg)
 
 
 def _poses(course: Course, middle: np.ndarray, hand: float) -> Motion:
-    """Poses of the free middle line, z along it, y out of the plane, in the notch's frame."""
-    place = np.stack([-hand * course.along, 0.0 * course.along, course.above], axis=-1)
+    """Compute the poses of the free middle line: z along it, y out of the plane."""
+    position = np.stack([-hand * course.along, 0.0 * course.along, course.above], axis=-1)
     about_y = hand * (course.heading - 0.5 * np.pi)
     turns = rotation_about(constant(about_y[:, None] * np.array([0.0, 1.0, 0.0])))
-    return Motion(turns, constant(middle + place))
+    return Motion(turns, constant(middle + position))
 
 
 def _section(link: Link, tube: Tube, course: Course, poisson_ratio: float) -> FibreSection:
-    """Two walls as wide as the tube's wall there, which are one where the lumen ends."""
+    """Compute the sections: two walls as wide as the tube's wall there, joined beyond the lumen."""
     outer = np.sqrt(tube.outer_radius**2 - course.along**2)
     inner = np.sqrt(np.maximum(tube.inner_radius**2 - course.along**2, 0.0))
     middle = 0.5 * (outer + inner)

@@ -106,16 +106,16 @@ class CurvedEnd:
         return 0.5 * t * (self._speed(0.5 * t[..., None] * (1.0 + _NODES)) @ _WEIGHTS)
 
     def _speed(self, t: np.ndarray) -> np.ndarray:
-        """|C'|, written out: it is asked for at some thousand places per link."""
+        """Compute |C'|, written out: it is evaluated at some thousand points per link."""
         inner, outer = 0.5 * np.pi * self.slot_radius, self.outer_length + self.slot_radius
         return 0.5 * np.sqrt(inner**2 + outer**2 + 2.0 * inner * outer * np.sin(0.5 * np.pi * t))
 
     def at_length(self, length: ArrayLike) -> np.ndarray:
         """Find the parameter t where the middle line has a given length from its beginning."""
-        wanted = np.asarray(length, dtype=float)
-        t = wanted / self.length()
+        target = np.asarray(length, dtype=float)
+        t = target / self.length()
         for _ in range(8):  # Newton; the speed varies by a few tenths, so half do
-            step = (self.length(t) - wanted) / self._speed(t)
+            step = (self.length(t) - target) / self._speed(t)
             t = t - step
             if np.max(np.abs(step), initial=0.0) < _EXACT:
                 break
@@ -123,7 +123,7 @@ class CurvedEnd:
 
 
 class Course(NamedTuple):
-    """The middle line at some places.
+    """The middle line at some positions.
 
     Attributes:
         along: Its points, along the strip from the middle of the straight part, mm.
@@ -144,8 +144,8 @@ class Course(NamedTuple):
 class Link:
     """The whole link: S1, the straight part S2, and S3, which is S1 turned by half a turn.
 
-    Places are lengths along the middle line from its beginning; points (along, above) are counted
-    from the middle of the straight part.
+    Positions are lengths along the middle line from its start; points (along, above) are relative
+    to the middle of the straight part.
 
     Args:
         slot_radius: Radius of the slots' round ends, mm.
@@ -173,16 +173,16 @@ class Link:
         """Length of the middle line, mm."""
         return 2.0 * float(self.end.length()) + self.strip_length
 
-    def course_at(self, places: tuple[float, ...]) -> Course:
-        """Follow the middle line to some places; kept, as both hands of a link ask for them."""
-        return _course(self, places)
+    def course_at(self, positions: tuple[float, ...]) -> Course:
+        """Evaluate the middle line at some positions; cached, as both hands of a link need them."""
+        return _course(self, positions)
 
-    def course(self, place: ArrayLike) -> Course:
-        """Follow the middle line to some places."""
-        place = np.asarray(place, dtype=float)
-        end, nearer = self.end, np.minimum(place, self.length - place)
+    def course(self, position: ArrayLike) -> Course:
+        """Evaluate the middle line at some positions."""
+        position = np.asarray(position, dtype=float)
+        end, nearer = self.end, np.minimum(position, self.length - position)
         of_end = end.length()
-        curved, half = nearer < of_end, np.where(place <= 0.5 * self.length, 1.0, -1.0)
+        curved, half = nearer < of_end, np.where(position <= 0.5 * self.length, 1.0, -1.0)
         t = np.ones_like(nearer)
         t[curved] = end.at_length(nearer[curved])
         points = end.middle(t)
@@ -198,8 +198,8 @@ class Link:
 
 
 @lru_cache(maxsize=16)
-def _course(link: Link, places: tuple[float, ...]) -> Course:
-    found = link.course(places)
-    for values in found:
+def _course(link: Link, positions: tuple[float, ...]) -> Course:
+    course = link.course(positions)
+    for values in course:
         values.setflags(write=False)
-    return found
+    return course

@@ -1,10 +1,10 @@
-"""Strain modes of a curved rod: what forces and moments on its end do to it.
+"""Strain modes of a curved rod: strains by forces and moments on its end.
 
-A moment m and a force n on the end of a rod act at a place of it as the force n and the moment
-m + lever x n. While displacements are small the strains of these, by the stiffness there, are
-exact with a constant for each component of m and n; only the change of the levers is missing,
-which is of second order. Stretch and shear in particular go together by the direction of n (Gao
-2017, eq. 1-5): with polynomials of their own they are far less accurate.
+A moment m and a force n on the end of a rod act on a section as the force n and the moment
+m + lever x n. For small displacements the strains by these resultants are exact, with one constant
+for each component of m and n; only the change of the levers is missing, which is of second order.
+The direction of n couples stretch and shear (Gao 2017, eq. 1-5): independent polynomials for them
+are far less accurate.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ def wrench_modes(
 
     Args:
         poses: Pose of the free rod at every node, base to tip, as leading axis.
-        part: Place of every node along the rod, from -1 to 1.
-        length: Length that each node stands for, mm; 0 where it does not count.
+        part: Position of every node along the rod, from -1 to 1.
+        length: Quadrature weight of each node, mm.
         section: Its section at every node, with the shear centre in the centroid.
         middle: Point from which levers are counted, mm.
         moment_modes: Modes of the moment in the plane, 3 or more.
@@ -85,7 +85,7 @@ def wrench_modes(
 def _strains(
     section: FibreSection, poisson_ratio: float, resultants: Float[np.ndarray, "nodes modes 6"]
 ) -> Float[np.ndarray, "nodes modes 6"]:
-    """Strains by resultants, times Young's modulus."""
+    """Compute strains by resultants, times Young's modulus."""
     compliance = _compliance(section, poisson_ratio)[:, None]
     strain = compliance * resultants
     if section.ends is None or not np.any(section.ends.oblique):
@@ -101,7 +101,7 @@ def _strains(
 
 
 def _compliance(section: FibreSection, poisson_ratio: float) -> Float[np.ndarray, "nodes 6"]:
-    """Strains per resultant, times Young's modulus."""
+    """Compute strains per resultant, times Young's modulus."""
     ratio = 2.0 * (1.0 + poisson_ratio)  # E / G
     stiffness = [
         section.second_moment_strong,

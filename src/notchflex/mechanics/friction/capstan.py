@@ -27,7 +27,7 @@ class CapstanLaw(FrictionLaw):
     def bounds(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
-        """Coefficient times turning at each edge."""
+        """Return coefficient times turning at each edge."""
         moved = self.moved_to_exit * entry_turning
         return (
             self.coefficient * (exit_turning + moved),
@@ -37,7 +37,7 @@ class CapstanLaw(FrictionLaw):
     def constant_loss(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]] | None:
-        """State the same loss at every edge."""
+        """Return the same loss at every edge."""
         if self.loss is None:
             return None
         return self.loss + 0.0 * exit_turning, self.loss + 0.0 * entry_turning

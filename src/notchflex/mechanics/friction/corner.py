@@ -8,9 +8,9 @@ from notchflex._jax import constant, jnp
 from notchflex.mechanics.friction.registry import FrictionLaw, friction_law
 from notchflex.robot import Corner
 
-# mu tan(beta/2) = 1 lets a corner hold any tension; just below, the bound is 21 in the logarithm,
-# a ratio of 1e9, and it and its derivative are still finite.
-LARGEST = 1.0 - 1e-9
+# At mu tan(beta/2) = 1 a corner holds any tension. Just below, the logarithm of the ratio is
+# bounded by 21 (a ratio of 1e9), and its derivative is finite.
+MAX_SLOPE = 1.0 - 1e-9
 
 
 class CornerLaw(FrictionLaw):
@@ -25,7 +25,7 @@ class CornerLaw(FrictionLaw):
     def bounds(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
-        """Twice the inverse hyperbolic tangent of coefficient times tangent of half the turning.
+        """Return 2 artanh(coefficient * tan(turning / 2)) at each edge.
 
         It is ln((cos b + mu sin b) / (cos b - mu sin b)) with b = half the turning.
         """
@@ -34,14 +34,14 @@ class CornerLaw(FrictionLaw):
     def valid(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
     ) -> Bool[Array, "*t"]:
-        """Tell where coefficient times tangent of half the turning is below 1 at both edges."""
-        return (self._slope(exit_turning) < LARGEST) & (self._slope(entry_turning) < LARGEST)
+        """Return where coefficient times tangent of half the turning is below 1 at both edges."""
+        return (self._slope(exit_turning) < MAX_SLOPE) & (self._slope(entry_turning) < MAX_SLOPE)
 
     def _slope(self, turning: Float[Array, "*t"]) -> Float[Array, "*t"]:
         return self.coefficient * jnp.tan(0.5 * turning)
 
     def _bound(self, turning: Float[Array, "*t"]) -> Float[Array, "*t"]:
-        return 2.0 * jnp.arctanh(jnp.minimum(self._slope(turning), LARGEST))
+        return 2.0 * jnp.arctanh(jnp.minimum(self._slope(turning), MAX_SLOPE))
 
 
 @friction_law.register

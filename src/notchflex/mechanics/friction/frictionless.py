@@ -10,14 +10,14 @@ from notchflex.robot import Frictionless
 
 
 class FrictionlessLaw(FrictionLaw):
-    """Contacts that hold nothing."""
+    """Contacts without friction."""
 
     remembers = False
 
     def bounds(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
-        """Zero at both edges."""
+        """Return zero at both edges."""
         return jnp.zeros_like(exit_turning), jnp.zeros_like(entry_turning)
 
 

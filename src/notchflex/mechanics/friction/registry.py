@@ -1,7 +1,7 @@
-"""From the description of friction to its law: how far tension can fall over a contact.
+"""Friction laws and their registry: limits of the tension ratio over a contact.
 
-A law lives in a file of its own in this folder and registers itself for its description; the
-package imports every file of the folder, so no list is kept.
+Each law is a file in this folder that registers itself for its description; the package imports
+every file of the folder.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from notchflex._jax import jnp
 from notchflex._pytree import Pytree
 from notchflex.mechanics.registration import unregistered
 
-LEAST_RATIO = 1e-12
-"""Part of a constant loss that stands for no tension: a contact below its loss holds 1e12 to 1."""
+MIN_TENSION_RATIO = 1e-12
+"""Smallest tension, as a fraction of a constant loss; below its loss a contact holds 1e12 to 1."""
 
-_LEAST_LOSS = 1e-100  # N; a loss that vanishes leaves its formulas finite
+_MIN_LOSS = 1e-100  # N; keeps the formulas finite where the loss is zero
 
 
 class FrictionLaw(Pytree, ABC):
@@ -39,7 +39,7 @@ class FrictionLaw(Pytree, ABC):
     def bounds(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
-        """Return largest |ln(tension on the base side / tension on the tip side)| at both edges.
+        """Return the largest |ln(base-side tension / tip-side tension)| at both edges.
 
         Args:
             exit_turning: Angle by which the tendon turns where it leaves the proximal body, rad.
@@ -54,8 +54,8 @@ class FrictionLaw(Pytree, ABC):
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]] | None:
         """State the tension that sliding costs beside the ratio of `bounds`, N.
 
-        A loss proportional to the turning vanishes with the tension. Such a law leaves the
-        tensions undetermined where tendons are let go to 0 N: let them go to a small tension.
+        With a loss proportional to the turning, tensions are undetermined where a tendon is
+        released to 0 N: release it to a small tension.
 
         Args:
             exit_turning: As for `bounds`.
@@ -66,16 +66,16 @@ class FrictionLaw(Pytree, ABC):
         """
         del exit_turning, entry_turning
 
-    def least_taut(
+    def minimum_tension(
         self,
         tension: Float[Array, " t"],
         exit_turning: Float[Array, "n t"],
         entry_turning: Float[Array, "n t"],
     ) -> Float[Array, " t"]:
-        """Keep base tensions positive where contacts hold a loss, N.
+        """Bound base tensions from below where contacts have a constant loss, N.
 
-        What friction locks in beyond a tendon let go to 0 N has no finite ratio to it: such a
-        tendon, and one that was never pulled, has 1e-12 of the largest loss.
+        Tension that friction locks in beyond a released tendon has no finite ratio to 0 N: released
+        tendons count as having 1e-12 of the largest loss.
 
         Args:
             tension: Base tensions, N.
@@ -85,7 +85,7 @@ class FrictionLaw(Pytree, ABC):
         losses = self.constant_loss(exit_turning, entry_turning)
         if losses is None:
             return tension
-        return jnp.maximum(tension, LEAST_RATIO * jnp.max(jnp.maximum(*losses), axis=0))
+        return jnp.maximum(tension, MIN_TENSION_RATIO * jnp.max(jnp.maximum(*losses), axis=0))
 
     def limits(
         self,
@@ -96,15 +96,15 @@ class FrictionLaw(Pytree, ABC):
     ) -> Float[Array, "*t 2"]:
         """Compute the largest |ln(tension ratio)| at both edges, constant losses included.
 
-        With the tension T on the base side and T' on the tip side the limit of pulling,
-        T = e^b T' + F, is ln(T/T') = b - ln(1 - F/T), and that of letting go, T' = e^b T + F, is
+        With the tension T on the base side and T' on the tip side the limit of loading,
+        T = e^b T' + F, is ln(T/T') = b - ln(1 - F/T), and that of unloading, T' = e^b T + F, is
         ln(T'/T) = ln(e^b + F/T). Where T <= F the contact holds a ratio of 1e12.
 
         Args:
             exit_turning: As for `bounds`.
             entry_turning: As for `bounds`.
             tension: Tension on the base side of the exit edge and of the entry edge, N.
-            log_ratio: ln(T/T') there, whose sign tells which way the contact would slide.
+            log_ratio: ln(T/T') there; its sign is the direction in which the contact would slide.
 
         Returns:
             The limits, as last axis the edges.
@@ -114,15 +114,15 @@ class FrictionLaw(Pytree, ABC):
         if losses is None:
             return ratio
         loss, before = jnp.stack(losses, axis=-1), jnp.stack(tension, axis=-1)
-        part = loss / jnp.maximum(before, LEAST_RATIO * jnp.maximum(loss, _LEAST_LOSS))
-        pulling = ratio - jnp.log(jnp.maximum(1.0 - part, LEAST_RATIO))
-        letting_go = jnp.log(jnp.exp(ratio) + part)
-        return jnp.where(log_ratio >= 0.0, pulling, letting_go)
+        relative_loss = loss / jnp.maximum(before, MIN_TENSION_RATIO * jnp.maximum(loss, _MIN_LOSS))
+        loading = ratio - jnp.log(jnp.maximum(1.0 - relative_loss, MIN_TENSION_RATIO))
+        unloading = jnp.log(jnp.exp(ratio) + relative_loss)
+        return jnp.where(log_ratio >= 0.0, loading, unloading)
 
     def valid(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
     ) -> Bool[Array, "*t"]:
-        """Tell where the law holds; beyond, `bounds` is finite but means nothing.
+        """Return where the law is valid; elsewhere `bounds` is finite but meaningless.
 
         Args:
             exit_turning: As for `bounds`.
@@ -133,7 +133,7 @@ class FrictionLaw(Pytree, ABC):
 
 @singledispatch
 def friction_law(friction: Any) -> FrictionLaw:
-    """Law of the friction of a robot file.
+    """Return the friction law of a description.
 
     Args:
         friction: A friction description, such as `notchflex.Capstan(0.13)`.

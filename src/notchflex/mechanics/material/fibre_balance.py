@@ -1,7 +1,7 @@
 """Balance of the fibres of a section: strain of the neutral axis, and curvature between its ends.
 
-Both follow together: the forces of the fibres vanish in sum, and section and ends (`law.py`) bend
-by s between them.
+Both are unknowns of two equations: the axial force vanishes, and section and ends (`law.py`) bend
+by s in total.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from jaxtyping import Array
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.material.fibre_section import Fibres
 
-# Newton's method ends at this imbalance, as a part of the strain of bending, or after many tries.
-_BALANCED, _MOST_TRIES = 1e-13, 16
+# Newton's method stops at this imbalance relative to the bending strain, or at this iteration.
+_BALANCED, _MAX_ITERATIONS = 1e-13, 16
 
 
 class FibreSums(NamedTuple):
@@ -81,25 +81,25 @@ def _settle(
 ) -> tuple[Array, Array, FibreSums]:
     """Find strain of the neutral axis, curvature and sums of all sections, from a curvature.
 
-    All together, so that one condition stops the search; the sections may have leading axes.
+    One condition stops the iteration of all sections; they may have leading axes.
     """
 
     def proceed(search: tuple[Array, ...]) -> Array:
-        *_, least, tries = search
-        return jnp.any(least > _BALANCED * scale[0] * jnp.abs(joint.reduced)) & (
-            tries < _MOST_TRIES
+        *_, imbalance, iterations = search
+        return jnp.any(imbalance > _BALANCED * scale[0] * jnp.abs(joint.reduced)) & (
+            iterations < _MAX_ITERATIONS
         )
 
     def improve(search: tuple[Any, ...]) -> tuple[Any, ...]:
-        """Try a step: the next one where the imbalance falls, half of it where not."""
-        strain, curvature, by_strain, by_curvature, sums, least, tries = search
+        """Try a step: take it where the imbalance falls, halve it elsewhere."""
+        strain, curvature, by_strain, by_curvature, sums, imbalance, iterations = search
         trial = strain + by_strain, curvature + by_curvature
-        found = law.sum_fibres(fibres, memory, *trial)
-        size = joint.size(trial[1], found, scale)
-        falls = size < least
-        new = *trial, *joint.step(trial[1], found, found), found, size
-        old = strain, curvature, 0.5 * by_strain, 0.5 * by_curvature, sums, least
-        return *jax.tree.map(lambda *pair: jnp.where(falls, *pair), new, old), tries + 1
+        trial_sums = law.sum_fibres(fibres, memory, *trial)
+        size = joint.size(trial[1], trial_sums, scale)
+        falls = size < imbalance
+        new = *trial, *joint.step(trial[1], trial_sums, trial_sums), trial_sums, size
+        old = strain, curvature, 0.5 * by_strain, 0.5 * by_curvature, sums, imbalance
+        return *jax.tree.map(lambda *pair: jnp.where(falls, *pair), new, old), iterations + 1
 
     none, far = jnp.zeros_like(start), jnp.full_like(start, jnp.inf)
     sums = FibreSums(*(none for _ in FibreSums._fields))
@@ -127,9 +127,9 @@ def _(size: int, batched: Any, law: SumsFibres, *sections: Any) -> tuple[Any, An
 
 @jax.custom_jvp
 def same_sums(sums: FibreSums, *of: Any) -> FibreSums:
-    """Return sums over fibres that are known, with the derivatives of summing up again.
+    """Return known sums over fibres, with the derivatives of the summation.
 
-    Nothing is summed up, or traced, where nothing is differentiated.
+    Without differentiation nothing is summed or traced.
     """
     del of
     return sums
@@ -138,20 +138,20 @@ def same_sums(sums: FibreSums, *of: Any) -> FibreSums:
 def _change_of_sums(
     primals: tuple[Any, ...], tangents: tuple[Any, ...]
 ) -> tuple[FibreSums, FibreSums]:
-    """Derivatives along what varies alone."""
+    """Differentiate with respect to the varying arguments only."""
     (sums, *of), (_, *moved) = primals, tangents
     leaves, tree = jax.tree.flatten(of)
     by = jax.tree.leaves(moved, is_leaf=_is_still)
-    varies = [place for place, one in enumerate(by) if not _is_still(one)]
+    varies = [index for index, one in enumerate(by) if not _is_still(one)]
 
     def again(*varied: Array) -> FibreSums:
         every = list(leaves)
-        for place, one in zip(varies, varied, strict=True):
-            every[place] = one
+        for index, one in zip(varies, varied, strict=True):
+            every[index] = one
         law, *rest = jax.tree.unflatten(tree, every)
         return law.sum_fibres(*rest)
 
-    at, along = [leaves[place] for place in varies], [by[place] for place in varies]
+    at, along = [leaves[index] for index in varies], [by[index] for index in varies]
     return sums, jax.jvp(again, at, along)[1]
 
 

@@ -1,13 +1,13 @@
-"""Law of fibres: the stress of each follows its own strain, and may remember.
+"""Law of fibres: the stress of each depends on its strain and its history.
 
 A fibre carries sigma = E (eps - e), with the transformed strain e between two curves over its
-strain: one that it does not fall below while the strain grows, and one that it does not exceed
-while it shrinks. Between them e stays and the fibre is elastic: a play operator, independent of
-rate, whose loops close (return-point memory). One number a fibre remembers the past, since
-unloading ends before the stress is gone. Without hysteresis the two curves are one.
+strain: a lower bound while the strain grows, and an upper bound while it shrinks. Between them e is
+constant and the fibre is elastic: a rate-independent play operator with return-point memory. One
+number per fibre is its memory, since unloading ends before the stress is zero. Without hysteresis
+the two curves coincide.
 
-The curvature k of the section and the strain of its neutral axis follow together: the forces of
-the fibres vanish in sum, and section and ends (`law.py`) bend by s between them.
+The curvature k of the section and the strain of its neutral axis solve two equations: the axial
+force vanishes, and section and ends (`law.py`) bend by s in total.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from notchflex.mechanics.material.fibre_balance import (
 from notchflex.mechanics.material.fibre_section import Fibres, FibreSection
 from notchflex.mechanics.material.law import Bending, SectionLaw, SectionResponse
 
-# So many fibres at once: programs get longer with more, and slower with fewer.
+# Fibres per loop iteration: more lengthen programs, fewer slow them down.
 _AT_ONCE = 5
-# A transformed strain this near to a curve goes on along it.
+# A transformed strain this close to a curve follows it.
 _ON_CURVE = 1e-12
 
 
 class _Curve(NamedTuple):
-    """Transformed strain over strain: where each kink lies, and by how much the slope changes."""
+    """Transformed strain over strain: positions of the kinks, and changes of slope there."""
 
     low: list[Array]
     high: list[Array]
@@ -47,7 +47,7 @@ class _Curve(NamedTuple):
         return cls(*([part[kink] for kink in range(len(change))] for part in (low, high, change)))
 
     def at(self, strain: Array) -> tuple[Array, Array]:
-        """Transformed strain, and its slope."""
+        """Evaluate the transformed strain and its slope."""
         transformed, slope = jnp.zeros_like(strain), jnp.zeros_like(strain)
         for low, high, change in zip(*self, strict=True):
             beyond = strain - jnp.clip(strain, low, high)
@@ -79,7 +79,7 @@ class FibreLaw(SectionLaw):
         return self.low.shape[0] == 2
 
     def rest(self, section: FibreSection) -> Any:
-        """No fibre is transformed."""
+        """Return untransformed fibres."""
         assert section.fibres is not None
         return constant(np.zeros(np.shape(section.fibres.arm))) if self.remembers else ()
 
@@ -90,11 +90,11 @@ class FibreLaw(SectionLaw):
     def respond_all(
         self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
     ) -> SectionResponse:
-        """Respond for all sections at once: tracing them one by one takes three times as long."""
+        """Compute all sections at once: tracing them one by one takes three times as long."""
         return self.respond(strain, section, memory)
 
     def bent(self, reduced: Float[Array, "*shape"], section: FibreSection, memory: Any) -> Bending:
-        """Bend sections between their ends; the last of Newton's steps is differentiated."""
+        """Bend sections between their ends; only the last Newton step is differentiated."""
         fibres, ends = section.fibres, section.ends
         assert fibres is not None
         none = jnp.zeros_like(reduced)
@@ -104,14 +104,14 @@ class FibreLaw(SectionLaw):
         start = reduced / (1.0 + weak)
         scale = section.edge_near, self.elastic_modulus * section.area
         everything = self, fibres, memory, joint, scale, start
-        still = jax.tree.map(jax.lax.stop_gradient, everything)
-        strain, curvature, slopes = settle_fibres(*still)
-        _, held, _, fixed, *_ = still
+        fixed_arguments = jax.tree.map(jax.lax.stop_gradient, everything)
+        strain, curvature, slopes = settle_fibres(*fixed_arguments)
+        _, fixed_fibres, _, fixed, *_ = fixed_arguments
         sums = same_sums(slopes, self, fibres, memory, strain, curvature)
         by_strain, by_curvature = joint.step(curvature, sums, slopes)
         if not isinstance(memory, tuple):
             moves = strain, curvature, by_strain, by_curvature
-            memory = self._remember(fibres, memory, held.arm, moves)
+            memory = self._remember(fibres, memory, fixed_fibres.arm, moves)
         return Bending(
             curvature=curvature + by_curvature,
             moment=sums.moment + slopes.mixed * by_strain + slopes.bending * by_curvature,
@@ -121,7 +121,7 @@ class FibreLaw(SectionLaw):
         )
 
     def sum_fibres(self, fibres: Fibres, memory: Any, strain: Array, curvature: Array) -> FibreSums:
-        """Sums over the fibres of a section, or of many."""
+        """Sum over the fibres of a section, or of many."""
         curves = self._curves(memory)
 
         def add(total: FibreSums, some: tuple[Array, Array, Any]) -> tuple[FibreSums, None]:
@@ -140,9 +140,9 @@ class FibreLaw(SectionLaw):
         return jax.tree.map(lambda total: self.elastic_modulus * total, sums)
 
     def _remember(
-        self, fibres: Fibres, memory: Array, held: Array, moves: tuple[Array, ...]
+        self, fibres: Fibres, memory: Array, fixed_arm: Array, moves: tuple[Array, ...]
     ) -> Array:
-        """Memory after the strains of the last step but one and what the last one adds."""
+        """Compute the memory after the last step, linearised about the iterate before it."""
         curves = self._curves(memory)
         strain, curvature, by_strain, by_curvature = moves
 
@@ -152,51 +152,51 @@ class FibreLaw(SectionLaw):
             moved = _along(by_strain, by_curvature, still)
             return none, transformed + jax.lax.stop_gradient(slope) * moved
 
-        every = jax.tree.map(_in_parts, (fibres.arm, held, memory))
-        found = jnp.moveaxis(jax.lax.scan(some, None, every)[1], 0, -2)
-        return jnp.reshape(found, memory.shape)
+        every = jax.tree.map(_in_parts, (fibres.arm, fixed_arm, memory))
+        transformed = jnp.moveaxis(jax.lax.scan(some, None, every)[1], 0, -2)
+        return jnp.reshape(transformed, memory.shape)
 
     def _transformed(self, strain: Array, past: Any, curves: list[_Curve]) -> tuple[Array, Array]:
-        """Transformed strain of fibres after a strain, and its change with that strain."""
+        """Compute the transformed strain of fibres after a strain, and its slope."""
         if isinstance(past, tuple):
             return curves[0].at(strain)
         (lower, by_lower), (upper, by_upper) = (curve.at(strain) for curve in curves)
-        # One condition for value and slope: a fibre that rests on a curve, as where friction holds
-        # its notch, must be differentiated as what its slope says.
+        # One condition for value and slope: the derivative of a fibre on a curve, as where friction
+        # holds its notch, must be consistent with its slope.
         on_upper, on_lower = past >= upper - _ON_CURVE, past <= lower + _ON_CURVE
         transformed = jnp.where(on_lower, lower, jnp.where(on_upper, upper, past))
         return transformed, jnp.where(on_lower, by_lower, jnp.where(on_upper, by_upper, 0.0))
 
     def _curves(self, memory: Any) -> list[_Curve]:
-        """The lower and the upper curve; of fibres without memory the one halfway."""
+        """Return the lower and the upper curve; for fibres without memory the mean curve."""
         if isinstance(memory, tuple):
             return [_Curve.of(*self._halfway(), self.change)]
         return [_Curve.of(*kinks, self.change) for kinks in zip(self.low, self.high, strict=True)]
 
     def _halfway(self) -> tuple[Array, Array]:
-        """Kinks of the curve halfway between loading and unloading."""
+        """Return the kinks of the mean curve of loading and unloading."""
         return jnp.mean(self.low, axis=0), jnp.mean(self.high, axis=0)
 
     def bending_energy(
         self, curvature: Float[Array, ""], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Return the energy of fibres: with hysteresis that of the curve halfway, and elastic."""
+        """Return the energy of fibres; with hysteresis that of the mean curve, plus elastic."""
         fibres, plain = section.fibres, dataclasses.replace(section, ends=None)
         assert fibres is not None
         bent = self.bent(curvature, plain, memory)
         strain = bent.strain + bent.curvature * fibres.arm
         if isinstance(memory, tuple):
             return fibres.area @ self._area_under(strain)
-        # Where the curve halfway has the same transformed strain.
+        # Strain at which the mean curve has the same transformed strain.
         (low, *_), (high, *_) = self._halfway()
         transformed = bent.memory
         onset = jnp.where(transformed > 0.0, high, jnp.where(transformed < 0.0, low, 0.0))
-        there = onset + transformed / self.change[0]
-        elastic = (strain - transformed) ** 2 - (there - transformed) ** 2
-        return fibres.area @ (self._area_under(there) + 0.5 * self.elastic_modulus * elastic)
+        curve_strain = onset + transformed / self.change[0]
+        elastic = (strain - transformed) ** 2 - (curve_strain - transformed) ** 2
+        return fibres.area @ (self._area_under(curve_strain) + 0.5 * self.elastic_modulus * elastic)
 
     def _area_under(self, strain: Array) -> Array:
-        """Area under the stress of the curve halfway up to a strain, N mm/mm^3."""
+        """Integrate the stress of the mean curve up to a strain, N mm/mm^3."""
         square = strain**2
         for change, low, high in zip(self.change, *self._halfway(), strict=True):
             square = square - change * (strain - jnp.clip(strain, low, high)) ** 2
@@ -216,11 +216,11 @@ class FibreLaw(SectionLaw):
 
 
 def _in_parts(array: Array) -> Array:
-    """Values of fibres in parts, which become the leading axis."""
+    """Split the values of fibres into parts, as leading axis."""
     parts = jnp.reshape(array, (*array.shape[:-1], -1, _AT_ONCE))
     return jnp.moveaxis(parts, -2, 0)
 
 
 def _along(strain: Array, curvature: Array, arm: Array) -> Array:
-    """Strain of fibres by that of the neutral axis and the curvature."""
+    """Compute the strain of fibres from that of the neutral axis and the curvature."""
     return strain[..., None] + curvature[..., None] * arm

@@ -1,4 +1,4 @@
-"""A cross-section of a flexure as a material law sees it."""
+"""Properties of a cross-section of a flexure that material laws need."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from notchflex._pytree import Pytree
 
 
 class NotchEnds(Pytree):
-    """How the rings that a notch ends in add to the compliance of its section.
+    """Compliance of the rings beside a notch, added to that of its section.
 
-    Compliances are parts of that of the section along the length of the flexure: a stiffness is
-    that of the section over 1 + part. A part may be negative, above -1, where the ends stiffen.
+    Compliances are fractions of that of the section along the length of the flexure: a stiffness is
+    that of the section over 1 + fraction. A fraction may be negative, above -1, for stiff ends.
 
     Attributes:
-        weak: Part added in the bending of the notch.
+        weak: Fraction added in the bending of the notch.
         strong: In sideways bending.
         axial: In stretch.
         torsion: In torsion.
@@ -43,20 +43,20 @@ class NotchEnds(Pytree):
 
     @classmethod
     def rigid(cls, like: Float[Array, "*shape"]) -> NotchEnds:
-        """Return ends that add nothing, in the shape of an array."""
+        """Return rigid ends, in the shape of an array."""
         return cls(*(np.zeros(np.shape(like)) for _ in range(10)))  # pyright: ignore
 
     def flattening(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
-        """By how much the distances of the fibres shrink at a curvature: q."""
+        """Compute the factor q by which the distances of the fibres shrink at a curvature."""
         return 1.0 + curvature * (self.odd + curvature * self.even)
 
     def slope_factor(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
-        """Tangent of an elastic notch over its stiffness at rest, times q^3; 0 at limit points."""
+        """Compute the relative tangent stiffness of an elastic notch, times q^3."""
         return 1.0 - curvature * (self.odd + 3.0 * curvature * self.even)
 
 
 class Fibres(Pytree):
-    """Fibres of a section, for laws that sum up their stresses.
+    """Fibres of a section, for laws that sum their stresses.
 
     Attributes:
         arm: Distance of each fibre from the neutral axis, positive toward the spine, mm.
@@ -68,7 +68,7 @@ class Fibres(Pytree):
 
 
 class FibreSection(Pytree):
-    """What a law needs of a cross-section, about its neutral axis. Units mm.
+    """Properties of a cross-section about its neutral axis. Units mm.
 
     The section's x points to the cut side, z along the rod. Leading axes are allowed.
 
@@ -81,7 +81,7 @@ class FibreSection(Pytree):
         edge_spine: Distance of the outer fibre on the spine from the neutral axis, mm.
         edge_near: Distance of the farthest fibre on the cut side, mm.
         ends: Compliance of the ends of the notch; None where no flexure of a chain has any.
-        fibres: Its fibres; None where the material does not ask for them.
+        fibres: Its fibres; None where the material does not use them.
     """
 
     area: Float[Array, "*shape"]
@@ -96,5 +96,5 @@ class FibreSection(Pytree):
 
     @property
     def softens(self) -> bool:
-        """Whether any flattens as it bends; for plain arrays."""
+        """Whether any section flattens as it bends; for plain arrays."""
         return self.ends is not None and bool(np.any(self.ends.odd) or np.any(self.ends.even))

@@ -1,9 +1,9 @@
-r"""Energy of the flattening of a notch, its transformation held.
+r"""Energy of the flattening of a notch at constant transformation.
 
-The moment M = Phi(s) / q with s = kappa / q does more work than fibres and ends take up: the rest,
-Phi dX with dX = kappa q' / q^2 dkappa, flattens the notch. While the fibres keep their
-transformed strains the section is elastic, Phi = K (s - e), with one number e for the
-transformation of all fibres. The energy of flattening is then, with Y the integral of s dX,
+The moment M = Phi(s) / q with s = kappa / q does more work than fibres and ends absorb: the rest,
+Phi dX with dX = kappa q' / q^2 dkappa, flattens the notch. At constant transformed strains of the
+fibres the section is elastic, Phi = K (s - e), with one number e for the transformation of all
+fibres. The energy of flattening is then, with Y the integral of s dX,
 
     psi(kappa, e) = K (Y(kappa) - e X(kappa)) + H(e),    d psi / d kappa = Phi X'.
 
@@ -12,7 +12,7 @@ H'(e) = K X(kappa_m) where loading has transformed as much by halfway stresses, 
 
     H(e) = K * integral of (e - e_m) dX over 0 ... kappa_m.
 
-So a change of e turns (K X(kappa) - H'(e)) de to heat, nothing where there is no hysteresis.
+A change of e thus dissipates (K X(kappa) - H'(e)) de, which is zero without hysteresis.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ _POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
 NODES, WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
 """Gauss's rule on 0 ... 1."""
 _RULE = np.stack([NODES, WEIGHTS], axis=-1)
-# Of a section that does not flatten, 1/mm^2: small enough to add nothing, above 0.
-_LEAST_EVEN = 1e-12
-# Where s changes the transformation less than this, it is elastic.
-_LEAST_SLOPE = 1e-9
+# Lower bound of `even`, 1/mm^2, for sections that do not flatten: negligible, but above 0.
+_MIN_EVEN = 1e-12
+# With a smaller change of the transformation with s a section counts as elastic.
+_MIN_SLOPE = 1e-9
 
 
-class Bends(Protocol):
-    """A material that bends a section between its ends, see `SectionLaw.bent`."""
+class SectionBending(Protocol):
+    """Bending of a section between its ends, see `SectionLaw.bent`."""
 
     @property
     def elastic_modulus(self) -> Array:
@@ -66,18 +66,20 @@ class Flattening(NamedTuple):
 
     @classmethod
     def none(cls, like: Array) -> Flattening:
-        """Return that of a section that does not flatten."""
+        """Return zero flattening."""
         return cls(*(jnp.zeros_like(like) for _ in cls._fields))
 
 
-def flattening(law: Bends, curvature: Array, section: FibreSection, memory: Any) -> Flattening:
-    """Flatten a section by a curvature.
+def flattening(
+    law: SectionBending, curvature: Array, section: FibreSection, memory: Any
+) -> Flattening:
+    """Compute the flattening of a section at a curvature.
 
     Args:
         law: Its material.
         curvature: Curvature kappa of the notch, 1/mm.
         section: The section; its notch has ends.
-        memory: Memory of the material; () where nothing is remembered.
+        memory: Memory of the material; () for laws without memory.
 
     Returns:
         Path, transformation and energy of the flattening.
@@ -119,34 +121,36 @@ def _along(ends: NotchEnds, curvature: Array, node: Array) -> tuple[Array, Array
     return at / q, node[1] * curvature * at * slope / q**2
 
 
-def _middle(law: Bends, section: FibreSection, start: Array, own: Array, stiffness: Array) -> Array:
-    """Curvature where loading by halfway stresses has transformed a section as much.
+def _middle(
+    law: SectionBending, section: FibreSection, start: Array, own: Array, stiffness: Array
+) -> Array:
+    """Find the curvature where loading by halfway stresses has transformed a section as much.
 
-    The last of Newton's steps is differentiated.
+    Only the last Newton step is differentiated.
     """
     ends = section.ends
     assert ends is not None
 
     def beyond(
-        law: Bends, section: FibreSection, own: Array, stiffness: Array, reduced: Array
+        law: SectionBending, section: FibreSection, own: Array, stiffness: Array, reduced: Array
     ) -> tuple[Array, Array]:
         bent = law.bent(reduced, section, ())
         return reduced - bent.moment / stiffness - own, 1.0 - bent.slope / stiffness
 
-    # s is largest where kappa^2 = 1 / even, and transformation takes a part of it.
-    root = jnp.sqrt(jnp.maximum(ends.even, _LEAST_EVEN))
+    # s is largest at kappa^2 = 1 / even; the transformation is a fraction of it.
+    root = jnp.sqrt(jnp.maximum(ends.even, _MIN_EVEN))
     side = jnp.where(own < 0.0, -1.0, 1.0)
-    far = side / (2.0 * root + side * ends.odd)
-    least, most = jnp.minimum(own, far), jnp.maximum(own, far)
+    extreme = side / (2.0 * root + side * ends.odd)
+    low, high = jnp.minimum(own, extreme), jnp.maximum(own, extreme)
     varied = law, section, own, stiffness
-    bounds = jnp.clip(start, least, most), least, most
-    still, held = jax.tree.map(jax.lax.stop_gradient, (varied, bounds))
-    reduced = bracketed_root(partial(beyond, *still), *held)
+    bounds = jnp.clip(start, low, high), low, high
+    fixed, fixed_bounds = jax.tree.map(jax.lax.stop_gradient, (varied, bounds))
+    reduced = bracketed_root(partial(beyond, *fixed), *fixed_bounds)
     missing, slope = beyond(*varied, reduced)
     slope = jax.lax.stop_gradient(slope)
-    transforms = slope > _LEAST_SLOPE
+    transforms = slope > _MIN_SLOPE
     step = jnp.where(transforms, missing / jnp.where(transforms, slope, 1.0), 0.0)
-    reduced = jnp.clip(reduced - step, *held[1:])
+    reduced = jnp.clip(reduced - step, *fixed_bounds[1:])
     # The solution of s = kappa / q before that largest one.
     linear = 1.0 - ends.odd * reduced
     square = jnp.maximum(linear**2 - 4.0 * ends.even * reduced**2, 0.0)

@@ -1,11 +1,11 @@
-"""The law of a cross-section: strains and memory in, resultants out.
+"""Section laws: resultants of a cross-section from strains and memory.
 
-A law lives in a file of its own in this folder and registers itself for its description by
-`section_law.register`; the package imports every file of the folder, so no list is kept.
+Each law is a file in this folder that registers itself for its description by
+`section_law.register`; the package imports every file of the folder.
 
-Every material answers the same question for one cross-section of a flexure, so the chain never
-asks which material it is. A law says how the bending moment follows the curvature; the rest is
-linear, and the ends of the notch are added here, for all laws:
+All materials have the same interface for a cross-section of a flexure, so the chain does not depend
+on the material. A law gives the bending moment over the curvature; the rest is linear, and the ends
+of the notch are added here, for all laws:
 
     s = kappa / q,   (1 + c w) k + (1 - c) w Phi(k) / (E I) = s,   M = Phi(k) / q
 
@@ -32,13 +32,13 @@ from notchflex.mechanics.registration import unregistered
 
 
 class SectionResponse(NamedTuple):
-    """Answer of a section law.
+    """Response of a section law.
 
     Attributes:
         resultants: Moments about x, y, z (N mm) and forces along x, y, z (N).
         memory: The memory after these strains.
-        slope: Change of the moment about y with the curvature about y, where the law knows it:
-            all else is elastic. None to differentiate.
+        slope: Change of the moment about y with the curvature about y, where the law provides it
+            and all else is elastic; None to differentiate.
     """
 
     resultants: Float[Array, " 6"]
@@ -53,7 +53,7 @@ class Bending(NamedTuple):
         curvature: Curvature of the section itself, beyond that of the free tube, 1/mm.
         moment: Its moment, N mm.
         memory: The memory after it.
-        slope: Change of the moment with s, where the law knows it; None to differentiate.
+        slope: Change of the moment with s, where the law provides it; None to differentiate.
         strain: Strain of the neutral axis, for laws of fibres.
     """
 
@@ -64,12 +64,12 @@ class Bending(NamedTuple):
     strain: Array | float = 0.0
 
 
-# Of all strains and resultants those of weak-axis bending.
+# Mask of weak-axis bending among strains and resultants.
 _WEAK = np.arange(6) == 1
 
 
 class SectionLaw(Pytree, ABC):
-    """A material as the chain sees it. Tangents come from the resultants by differentiation.
+    """Section law of a material. Tangents are derivatives of the resultants.
 
     Attributes:
         is_linear: Whether the moment of a section is proportional to its curvature.
@@ -87,7 +87,7 @@ class SectionLaw(Pytree, ABC):
         return False
 
     def rest(self, section: FibreSection) -> Any:
-        """Return the memory of a free section, or of many; () where nothing is remembered."""
+        """Return the memory of a free section, or of many; () for laws without memory."""
         del section
         return ()
 
@@ -104,7 +104,7 @@ class SectionLaw(Pytree, ABC):
     def bending_energy(
         self, curvature: Float[Array, ""], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Return energy that a section without ends holds per length at a curvature, N mm/mm."""
+        """Return the energy per length of a section without ends at a curvature, N mm/mm."""
 
     def bent(self, reduced: Float[Array, ""], section: FibreSection, memory: Any) -> Bending:
         """Bend a section between its ends by s = kappa / q; for laws without memory."""
@@ -119,7 +119,7 @@ class SectionLaw(Pytree, ABC):
     def respond_all(
         self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
     ) -> SectionResponse:
-        """Resultants of many cross-sections."""
+        """Compute the resultants of many cross-sections."""
         respond = self.respond
         for _ in strain.shape[:-1]:
             respond = jax.vmap(respond)
@@ -128,9 +128,9 @@ class SectionLaw(Pytree, ABC):
     def respond(
         self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
     ) -> SectionResponse:
-        """Resultants of a cross-section under given strains (beyond those of the free tube).
+        """Compute the resultants of a cross-section from its strains beyond those of the free tube.
 
-        Of many where the law bends many at once.
+        Laws that bend many sections at once accept many.
         """
         elastic = self.elastic(jnp.moveaxis(strain, -1, 0), section)
         ends, curvature = section.ends, strain[..., 1]
@@ -152,36 +152,37 @@ class SectionLaw(Pytree, ABC):
     ) -> Float[Array, ""]:
         """Return the energy stored per length under given strains, N mm/mm.
 
-        The area under the moment over the curvature, and the elastic rest. Of a law with
-        hysteresis it is what fibres, ends and flattening hold; the rest of the area is dissipated.
+        It is the area under the moment over the curvature, and the elastic energy of the other
+        strains. With hysteresis it is the energy of fibres, ends and flattening; the rest of the
+        area is dissipated.
         """
-        return self.held(strain, section, memory)[0]
+        return self.stored_energy_density(strain, section, memory)[0]
 
-    def held(
+    def stored_energy_density(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
     ) -> tuple[Float[Array, ""], Flattening]:
-        """Energy stored per length, and the flattening whose change with the memory costs work."""
+        """Compute the stored energy per length, and the flattening, which depends on the memory."""
         others = 0.5 * jnp.where(_WEAK, 0.0, self.elastic(strain, section)) @ strain
         ends, curvature = section.ends, strain[1]
         if ends is None:
             own = self.bending_energy(curvature, section, memory)
             return others + own, Flattening.none(curvature)
         bending = self.bent(curvature / ends.flattening(curvature), section, memory)
-        held = (1.0 + ends.material_share * ends.weak) * self.bending_energy(
+        stored = (1.0 + ends.material_share * ends.weak) * self.bending_energy(
             bending.curvature, section, memory
         )
         rigidity = self.elastic_modulus * section.second_moment_weak
-        held += 0.5 * (1.0 - ends.material_share) * ends.weak * bending.moment**2 / rigidity
+        stored += 0.5 * (1.0 - ends.material_share) * ends.weak * bending.moment**2 / rigidity
         flat = flattening(self, curvature, section, memory)
-        return others + held + flat.energy, flat
+        return others + stored + flat.energy, flat
 
     def elastic(self, strain: Float[Array, " 6"], section: FibreSection) -> Float[Array, " 6"]:
-        """Resultants by the moduli of the free robot."""
+        """Compute the resultants with the moduli of the free robot."""
         plain = dataclasses.replace(section, fibres=None)
         return elastic_resultants(self.elastic_modulus, self.shear_modulus, plain, strain)
 
     def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
-        """Resultants per strain in the free robot, of a section or of many."""
+        """Compute the stiffness in the free robot, of a section or of many."""
         return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
 
     def tangent(
@@ -192,7 +193,7 @@ class SectionLaw(Pytree, ABC):
 
 
 def _imbalance(law: SectionLaw, section: FibreSection, reduced: Array, curvature: Array) -> Array:
-    """What a section of a curvature and its ends bend beyond s together."""
+    """Compute the bending of a section with its ends at a curvature, beyond s."""
     ends = section.ends
     assert ends is not None
     elastic = law.moment(curvature, section) / (law.elastic_modulus * section.second_moment_weak)
@@ -201,21 +202,21 @@ def _imbalance(law: SectionLaw, section: FibreSection, reduced: Array, curvature
 
 
 def _between_ends(law: SectionLaw, section: FibreSection, reduced: Array) -> Float[Array, ""]:
-    """Curvature of a section between its ends: Newton's method within bounds that close in.
+    """Find the curvature of a section between its ends.
 
-    The last step alone is differentiated, from a point that is held still.
+    Only the last Newton step is differentiated, from a constant point.
     """
-    still = jax.tree.map(jax.lax.stop_gradient, (law, section, reduced))
-    ends, aim = still[1].ends, still[2]
+    fixed = jax.tree.map(jax.lax.stop_gradient, (law, section, reduced))
+    ends, aim = fixed[1].ends, fixed[2]
 
     def at(curvature: Array) -> tuple[Array, Array]:
-        return jax.jvp(partial(_imbalance, *still), (curvature,), (jnp.ones_like(curvature),))
+        return jax.jvp(partial(_imbalance, *fixed), (curvature,), (jnp.ones_like(curvature),))
 
-    # A section that carries nothing leaves the whole curvature to the part that follows it.
-    far = aim / (1.0 + ends.material_share * ends.weak)
-    least, most = jnp.minimum(far, 0.0), jnp.maximum(far, 0.0)
-    found = bracketed_root(at, aim / (1.0 + ends.weak), least, most)
-    return found - _imbalance(law, section, reduced, found) / at(found)[1]
+    # Bound: a section without resistance, where only the compliance that follows it limits it.
+    soft_limit = aim / (1.0 + ends.material_share * ends.weak)
+    low, high = jnp.minimum(soft_limit, 0.0), jnp.maximum(soft_limit, 0.0)
+    root = bracketed_root(at, aim / (1.0 + ends.weak), low, high)
+    return root - _imbalance(law, section, reduced, root) / at(root)[1]
 
 
 def elastic_resultants(
@@ -224,7 +225,7 @@ def elastic_resultants(
     section: FibreSection,
     strain: Float[Array, " 6"],
 ) -> Float[Array, "*shape 6"]:
-    """Resultants of a linear elastic section about its neutral axis, with its ends.
+    """Compute the resultants of a linear elastic section about its neutral axis, with its ends.
 
     The axes through the centroid are principal, so bending and stretch do not couple. Shear
     along y acts at the shear centre, `shear_centre` on the spine's side, where the section's
@@ -241,7 +242,9 @@ def elastic_resultants(
         Resultants, in the order of the strains.
     """
     xp = array_module(*jax.tree.leaves((elastic_modulus, shear_modulus, section)), strain)
-    about_x, about_y, twist, along_x, along_y, stretch = (strain[place] for place in range(6))
+    about_x, about_y, twist, along_x, along_y, stretch = (
+        strain[component] for component in range(6)
+    )
     if (ends := section.ends) is not None:
         about_x, about_y = about_x / (1.0 + ends.strong), about_y / (1.0 + ends.weak)
         stretch = stretch / (1.0 + ends.axial)
@@ -270,7 +273,7 @@ def elastic_resultants(
 def elastic_stiffness(
     elastic_modulus: float | Array, shear_modulus: float | Array, section: FibreSection
 ) -> Float[Array, "*shape 6 6"]:
-    """Resultants per strain of a linear elastic section, or of many; see `elastic_resultants`."""
+    """Compute the stiffness of a linear elastic section, or of many; see `elastic_resultants`."""
     xp = array_module(*jax.tree.leaves(section))
     plain = dataclasses.replace(section, fibres=None)
     every = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], plain)
@@ -280,7 +283,7 @@ def elastic_stiffness(
 
 @singledispatch
 def section_law(material: Any) -> SectionLaw:
-    """Section law of a material of a robot file.
+    """Return the section law of a material description.
 
     Args:
         material: A material description, such as `notchflex.Linear(60000.0)`.

@@ -13,7 +13,7 @@ from notchflex.robot import Linear
 
 
 class LinearLaw(SectionLaw):
-    """Hooke's law."""
+    """Linear elastic law."""
 
     is_linear = True
 
@@ -24,7 +24,7 @@ class LinearLaw(SectionLaw):
     def bending_energy(
         self, curvature: Float[Array, ""], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Half the product of moment and curvature."""
+        """Return half the product of moment and curvature."""
         del memory
         return 0.5 * curvature * self.moment(curvature, section)
 

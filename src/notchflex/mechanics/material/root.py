@@ -1,4 +1,4 @@
-"""The root of a function that grows, between two bounds."""
+"""Bracketed root of an increasing function."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ _ITERATIONS = 20
 
 
 def bracketed_root(
-    at: Callable[[Array], tuple[Array, Array]], start: Array, least: Array, most: Array
+    function: Callable[[Array], tuple[Array, Array]], start: Array, low: Array, high: Array
 ) -> Array:
-    """Find the root by Newton's method within bounds that close in; not differentiable.
+    """Find the root by Newton's method with bisection in a bracket; not differentiable.
 
     Args:
-        at: The function, which does not fall, and its slope.
-        start: Where to start.
-        least: Lower bound of the root.
-        most: Upper bound of the root; the nearer bound is approached where there is no root.
+        function: Value and slope of a function that does not decrease.
+        start: Initial guess.
+        low: Lower bound of the root.
+        high: Upper bound of the root; without a root the nearer bound is approached.
 
     Returns:
         The root.
     """
 
     def improve(_: int, search: tuple[Array, ...]) -> tuple[Array, ...]:
-        found, least, most, last = search
-        beyond, slope = at(found)
-        least = jnp.where(beyond <= 0.0, found, least)
-        most = jnp.where(beyond >= 0.0, found, most)
-        step = -beyond / slope
-        new = found + step
-        good = (new >= least) & (new <= most) & (jnp.abs(step) <= 0.5 * last)
-        new = jnp.where(good, new, 0.5 * (least + most))
-        return new, least, most, jnp.abs(new - found)
+        root, low, high, last_step = search
+        value, slope = function(root)
+        low = jnp.where(value <= 0.0, root, low)
+        high = jnp.where(value >= 0.0, root, high)
+        step = -value / slope
+        new = root + step
+        newton_step = (new >= low) & (new <= high) & (jnp.abs(step) <= 0.5 * last_step)
+        new = jnp.where(newton_step, new, 0.5 * (low + high))
+        return new, low, high, jnp.abs(new - root)
 
-    search = start, least, most, 2.0 * (most - least)
+    search = start, low, high, 2.0 * (high - low)
     return jax.lax.fori_loop(0, _ITERATIONS, improve, search)[0]

@@ -37,7 +37,7 @@ def _(material: StressStrain) -> FibreLaw:
 def _kinks(
     strain: Sequence[float], stress: Sequence[float], modulus: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the slope of a curve changes, and by what part of Young's modulus it falls there."""
+    """List the kinks of a curve, and the fall of slope there over Young's modulus."""
     slope = np.diff(stress, prepend=0.0) / np.diff(strain, prepend=0.0) / modulus
     at, change = np.append(0.0, strain[:-1]), -np.diff(slope, prepend=1.0)
     turns = np.abs(change) > 1e-12  # at zero only where compression begins with another slope

@@ -33,7 +33,7 @@ class SuperelasticLaw(SectionLaw):
     plastic_exponent: Float[Array, ""]
 
     def _branches(self, strain: Float[Array, ""]) -> tuple[Array, Array, Array]:
-        """A strain split into its parts on the three branches, each with the strain's sign."""
+        """Split a strain into its parts on the three branches, each with the strain's sign."""
         linear = jnp.clip(strain, -self.transition_strain, self.transition_strain)
         before_plastic = jnp.clip(strain, -self.plastic_strain, self.plastic_strain)
         return linear, before_plastic - linear, strain - before_plastic

@@ -74,7 +74,7 @@ def cancelling_sum(terms: Sequence[Term]) -> Callable[[jax.Array], jax.Array]:
 
 
 def half_angle(radius: jax.Array, above: jax.Array, below: jax.Array) -> jax.Array:
-    """Half of the angle of a circle that lies beyond a chord, arccos(d / r), clipped.
+    """Compute half of the angle of a circle beyond a chord, arccos(d / r), clipped.
 
     Args:
         radius: Radius r of the circle, mm.

@@ -1,8 +1,8 @@
 """Fibres of a section: arms from the neutral axis and areas, by Gauss's rule.
 
-The rule is that of the section's own width over its height, found from many fine strips. Area,
-centroid and second moment are those of the section to rounding: the arms are moved and scaled by
-what the strips leave, about 1e-7 of them. Used when a robot is put together, in NumPy.
+The rule is that of the section's width over its height, computed from many fine strips. Area,
+centroid and second moment equal those of the section to rounding: the arms are shifted and scaled
+by the error of the strips, about 1e-7. Used when a robot is assembled, in NumPy.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ def cut_fibres(cut: str, outer: float, inner: float, depth: float) -> Points:
 
 
 def rectangle_fibres(near: float, spine: float) -> Points:
-    """Pieces of a wall of constant width between two distances from the neutral axis, mm."""
+    """Divide a wall of constant width between two distances from the neutral axis, mm."""
     points, weights = leggauss(_STRIPS)
     return 0.5 * (spine - near) + 0.5 * (spine + near) * points, weights
 
 
 def sector_fibres(outer: float, inner: float, depth: float) -> Points:
-    """Pieces of an annular sector (`annular_sector`), each standing for both halves."""
+    """Divide an annular sector (`annular_sector`); each piece stands for both halves."""
     numbers = outer, 2.0 * outer - depth, depth
     half = float(half_angle(*(constant(number) for number in numbers)))
     angles, of_angles = _between(0.0, half, _ANGLES)
@@ -58,7 +58,7 @@ def sector_fibres(outer: float, inner: float, depth: float) -> Points:
 
 
 def segment_fibres(outer: float, inner: float, depth: float) -> Points:
-    """Pieces of an annular segment (`annular_segment`): strips across, outside and beside the bore.
+    """Divide an annular segment (`annular_segment`) into strips across, outside and at the bore.
 
     The heights of strips are cosines, so that the chords of both circles are smooth over them.
     """
@@ -90,12 +90,12 @@ def _between(first: float, last: float, count: int) -> tuple[np.ndarray, np.ndar
 
 
 def reduced(points: Points) -> Points:
-    """Few fibres that stand for many."""
+    """Reduce many fibres to an equivalent few."""
     return gauss_rule(*points, FIBRES)
 
 
 def fitted(points: Points, area: float, second_moment: float) -> Points:
-    """Fibres about their centroid, of a given area (mm^2) and second moment (mm^4)."""
+    """Shift fibres to their centroid; scale to a given area (mm^2) and second moment (mm^4)."""
     arm, areas = points
     areas = areas * (area / np.sum(areas))
     arm = arm - areas @ arm / area
@@ -103,18 +103,26 @@ def fitted(points: Points, area: float, second_moment: float) -> Points:
 
 
 def gauss_rule(points: Strips, weights: Strips, count: int) -> Points:
-    """Few points that integrate all polynomials as many do, up to degree 2 count - 1.
+    """Compute the Gauss rule of a discrete measure, exact up to degree 2 count - 1.
 
     They are the eigenvalues of the recurrence of the polynomials orthogonal over the points.
     """
-    total, last, here = np.sum(weights), np.zeros_like(points), np.ones_like(points)
-    centre, beside = np.zeros(count), np.zeros(count + 1)
-    here = here / np.sqrt(total)
+    total, last_polynomial, polynomial = (
+        np.sum(weights),
+        np.zeros_like(points),
+        np.ones_like(points),
+    )
+    diagonal, off_diagonal = np.zeros(count), np.zeros(count + 1)
+    polynomial = polynomial / np.sqrt(total)
     for degree in range(count):
-        centre[degree] = weights @ (points * here**2)
-        following = (points - centre[degree]) * here - beside[degree] * last
-        beside[degree + 1] = np.sqrt(weights @ following**2)
-        last, here = here, following / beside[degree + 1]
-    beside = beside[1:-1]
-    found, vectors = np.linalg.eigh(np.diag(centre) + np.diag(beside, 1) + np.diag(beside, -1))
-    return found, total * vectors[0] ** 2
+        diagonal[degree] = weights @ (points * polynomial**2)
+        next_polynomial = (points - diagonal[degree]) * polynomial - off_diagonal[
+            degree
+        ] * last_polynomial
+        off_diagonal[degree + 1] = np.sqrt(weights @ next_polynomial**2)
+        last_polynomial, polynomial = polynomial, next_polynomial / off_diagonal[degree + 1]
+    off_diagonal = off_diagonal[1:-1]
+    nodes, vectors = np.linalg.eigh(
+        np.diag(diagonal) + np.diag(off_diagonal, 1) + np.diag(off_diagonal, -1)
+    )
+    return nodes, total * vectors[0] ** 2

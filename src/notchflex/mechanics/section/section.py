@@ -59,10 +59,10 @@ def plain_or_compiled(
     """
     compiled = jax.jit(properties)
 
-    @lru_cache(maxsize=1024)  # the notches of a tube, and their sites, ask for the same section
+    @lru_cache(maxsize=1024)  # notches of a tube, and their sites, share sections
     def of_numbers(outer: float, inner: float, depth: float) -> Section:
-        found = properties(constant(outer), constant(inner), constant(depth))
-        return Section(*(_fixed(value) for value in found))
+        properties_of_cut = properties(constant(outer), constant(inner), constant(depth))
+        return Section(*(_fixed(value) for value in properties_of_cut))
 
     def section(outer: ArrayLike, inner: ArrayLike, depth: ArrayLike) -> Section:
         if isinstance(outer, float) and isinstance(inner, float) and isinstance(depth, float):
@@ -77,7 +77,7 @@ def plain_or_compiled(
 
 
 def _fixed(value: jax.Array) -> jax.Array:
-    """Return a number as an array that nobody can change: it is kept for others."""
+    """Return a number as a read-only array, since results are cached."""
     array = np.array(value)
     array.setflags(write=False)
     return array  # pyright: ignore[reportReturnType]

@@ -23,14 +23,14 @@ Goodier, Theory of Elasticity, §109); checked against `sectionproperties` in th
 import numpy as np
 
 from notchflex._jax import array_module, jax
-from notchflex.mechanics.section.terms import beside
+from notchflex.mechanics.section.terms import broadcast_terms
 
 _SUMMED = 24  # terms added one by one; even, so that odd and even terms pair up
 _TAIL_NODES = 12
 
 
 def _series_nodes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Index, parity and weight of the terms, the tail being integrated instead of summed.
+    """Return index, parity and weight of the terms; the tail is integrated, not summed.
 
     Terms of one parity are smooth in n, and their sum beyond N is half of the integral from N
     (odd) or N + 1 (even) by the midpoint rule; the substitution n = N / u makes it a Gauss
@@ -63,7 +63,7 @@ def sector_torsion_constant(outer: jax.Array, inner: jax.Array, angle: jax.Array
         Torsion constant, mm⁴. At a = π that of the slit tube.
     """
     xp = array_module(outer)
-    n, parity, weight = (beside(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
+    n, parity, weight = (broadcast_terms(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
     outer, inner, angle = outer[None], inner[None], angle[None]
     length = xp.log(outer / inner)
     rate = n * xp.pi / length
@@ -89,7 +89,7 @@ def sector_shear_centre(
         the material, up to two mean radii from the axis.
     """
     xp = array_module(outer)
-    n, parity, weight = (beside(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
+    n, parity, weight = (broadcast_terms(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
     outer_, inner_, angle_ = outer[None], inner[None], angle[None]
     length = xp.log(outer_ / inner_)
     rate = n * xp.pi / length

@@ -24,7 +24,7 @@ from notchflex.mechanics.section.segment_estimates import (
     open_estimate,
     solid_estimate,
 )
-from notchflex.mechanics.section.terms import beside
+from notchflex.mechanics.section.terms import broadcast_terms
 
 # Where the factors were computed; benchmarks/segment_table.py reads these.
 RATIO_RANGE = (0.2, 0.98)  # r_i / r_o
@@ -49,12 +49,12 @@ def _read_table() -> dict[tuple[str, str], np.ndarray]:
 
 
 def _chebyshev(count: int, value: jax.Array, low: float, high: float) -> jax.Array:
-    """Values (count, …) of the first Chebyshev polynomials, constant outside low … high."""
+    """Evaluate the first Chebyshev polynomials (count, …), constant outside low … high."""
     xp = array_module(value)
     # The ends are moved in by 1e-12, because the arccosine has no derivative there.
     x = (2.0 * value - low - high) / (high - low)
     x = xp.clip(x, -1.0 + 1e-12, 1.0 - 1e-12)
-    return xp.cos(beside(np.arange(count, dtype=float), x) * xp.arccos(x)[None])
+    return xp.cos(broadcast_terms(np.arange(count, dtype=float), x) * xp.arccos(x)[None])
 
 
 def chord_angle(shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array) -> jax.Array:

@@ -1,11 +1,11 @@
-"""Series over arrays of any shape: the terms get an axis of their own, in front."""
+"""Series over arrays of any shape, with the terms as leading axis."""
 
 import numpy as np
 
 from notchflex._jax import array_module, jax
 
 
-def beside(constants: np.ndarray, like: jax.Array) -> jax.Array:
+def broadcast_terms(constants: np.ndarray, like: jax.Array) -> jax.Array:
     """Shape one constant for each term so that it combines with `like[None]`.
 
     Args:

@@ -2,10 +2,10 @@ r"""Two parallel rectangular walls: the section of a strip that two opposite cut
 
 A strip runs across the tube, and the lumen parts it into two walls, each b wide across the strip
 and h thick in the direction in which the strip bends, with their middles at ±c. Both ends of the
-strip are clamped in rigid pieces of the tube, which hold its section against warping; how much
-that stiffens its torsion is Vlasov's theory of thin-walled bars.
+strip are clamped in rigid pieces of the tube, which prevent warping of its section; Vlasov's theory
+of thin-walled bars gives how much that stiffens its torsion.
 
-Used when a robot is put together, so plain NumPy.
+Used when a robot is assembled, so plain NumPy.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def rectangle_torsion_constant(width: ArrayLike, thickness: ArrayLike) -> np.nda
 def clamped_torsion_constant(
     section: Section, middle: ArrayLike, length: float, poisson_ratio: float = 0.33
 ) -> np.ndarray:
-    r"""Compute the torsion constant that stands for two walls clamped at both ends.
+    r"""Compute the equivalent torsion constant of two walls clamped at both ends.
 
     Where the strip turns about its own axis, its walls are bent one up, one down. With the
     warping constant $I_\omega = 2\,(bh^3/12)\,c^2$ the torque that turns the whole length L by
@@ -118,7 +118,7 @@ def clamped_torsion_constant(
 
 
 def _beyond_tanh(u: np.ndarray) -> np.ndarray:
-    """1 - tanh(u)/u, which is u²/3 for small u, without cancellation."""
+    """Compute 1 - tanh(u)/u, which is u²/3 for small u, without cancellation."""
     small = u < 0.1
     square = np.where(small, u, 0.0) ** 2
     # The series of tanh; the first term left out is below 1e-14 of the sum.

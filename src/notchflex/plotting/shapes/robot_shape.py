@@ -97,7 +97,7 @@ class RobotShape:
             np.asarray(values)[:, column] for values in (group.present, group.visits)
         )
         walls = self.walls(self.robot.tendon[number].direction_deg)
-        position = np.asarray(self.chain.tendon_place)[number]
+        position = np.asarray(self.chain.tendon_entry)[number]
         if radius is not None:
             position = _radial(radius, self.robot.tendon[number].direction_deg)
         for body in range(len(self.position)):

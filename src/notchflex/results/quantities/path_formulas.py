@@ -14,7 +14,7 @@ if TYPE_CHECKING:  # for the type only: a path evaluates these
     from notchflex.results.path import EquilibriumPath
 
 # Log ratios this close to their bound are on it.
-_NEAR_BOUND = 1e-9
+_BOUND_TOLERANCE = 1e-9
 
 
 @Quantity("path", "commanded tension", "T", "N", key="load.tension_N", per=("tendon",), after="")
@@ -188,16 +188,16 @@ def friction_front(
     Returns:
         m and eta of every tendon; see `EquilibriumPath.front`.
     """
-    there = ~np.isnan(ratio)
-    rubs = there & (bound > 0.0)
+    exists = ~np.isnan(ratio)
+    rubs = exists & (bound > 0.0)
     # A contact without friction (a law may lay it all on one edge of a gap) is passed over, and
     # one that hardly turns its tendon. Where none does more, all have gone the same way.
-    counts = rubs & (bound > _NEAR_BOUND)
-    turned = (ratio < 0.0) & (ratio <= _NEAR_BOUND - bound)
+    counts = rubs & (bound > _BOUND_TOLERANCE)
+    turned = (ratio < 0.0) & (ratio <= _BOUND_TOLERANCE - bound)
     let_go = np.nansum(ratio, axis=-1, keepdims=True) < 0.0
     nothing = ~counts.any(axis=-1, keepdims=True)
     waits = np.where(nothing, rubs & ~let_go, counts & ~turned)
-    every = np.where(rubs.any(axis=-1), there.sum(axis=-1), 0)
+    every = np.where(rubs.any(axis=-1), exists.sum(axis=-1), 0)
     count = np.where(waits.any(axis=-1), waits.argmax(axis=-1), every)
     at_front = np.minimum(count, ratio.shape[-1] - 1)[..., None]
     at_contact, largest = (

@@ -10,7 +10,7 @@ from notchflex.robot.kinds import Material
 from notchflex.robot.part import MOST_STRAIN, Float, ProblemError, part, quantity
 
 # On a plateau flatter than this part of Young's modulus the sums over fibres have jumps.
-_LEAST_SLOPE = 0.01
+_MIN_RELATIVE_SLOPE = 0.01
 
 
 @part
@@ -70,17 +70,17 @@ class Nitinol(Material):
 
     @model_validator(mode="after")
     def _in_order(self) -> "Nitinol":
-        if found := list(self._out_of_order()):
-            raise ProblemError(found)
+        if problems := list(self._out_of_order()):
+            raise ProblemError(problems)
         return self
 
     def _out_of_order(self) -> Iterator[tuple[str, str]]:
-        least = _LEAST_SLOPE * self.elastic_modulus
-        if not least <= self.plateau_modulus < self.elastic_modulus:
+        min_slope = _MIN_RELATIVE_SLOPE * self.elastic_modulus
+        if not min_slope <= self.plateau_modulus < self.elastic_modulus:
             yield (
                 "plateau_modulus",
                 f"is {self.plateau_modulus} MPa; it must be less than Young's modulus, "
-                f"{self.elastic_modulus} MPa, and at least a hundredth of it, {least:g} MPa.",
+                f"{self.elastic_modulus} MPa, and at least a hundredth of it, {min_slope:g} MPa.",
             )
         if self.unloading_stress is not None and self.unloading_stress >= self.plateau_stress:
             yield (

@@ -10,17 +10,17 @@ from pydantic import Field, model_validator
 from notchflex.robot.kinds import Material
 from notchflex.robot.part import MOST_STRAIN, Float, ProblemError, part, quantity
 
-_LEAST, _MOST = 2, 40
+_MIN_POINTS, _MAX_POINTS = 2, 40
 # Where a curve is flatter than this part of Young's modulus the sums over fibres have jumps.
-_LEAST_SLOPE = 0.01
+_MIN_RELATIVE_SLOPE = 0.01
 
 Strains = Annotated[
     tuple[Annotated[Float, quantity("", "strain", above=0, at_most=MOST_STRAIN)], ...],
-    Field(min_length=_LEAST, max_length=_MOST),
+    Field(min_length=_MIN_POINTS, max_length=_MAX_POINTS),
 ]
 Stresses = Annotated[
     tuple[Annotated[Float, quantity("MPa", "stress", above=0)], ...],
-    Field(min_length=_LEAST, max_length=_MOST),
+    Field(min_length=_MIN_POINTS, max_length=_MAX_POINTS),
 ]
 
 
@@ -76,20 +76,20 @@ class StressStrain(Material):
 
     @model_validator(mode="after")
     def _curves_rise(self) -> "StressStrain":
-        found = list(self._problems(self.strain, self.stress, ""))
+        problems = list(self._problems(self.strain, self.stress, ""))
         strain, stress = self.compression_strain, self.compression_stress
         if strain is not None and stress is not None:
-            found += self._problems(strain, stress, "compression_")
+            problems += self._problems(strain, stress, "compression_")
         elif strain is not None or stress is not None:
             missing = "stress" if stress is None else "strain"
-            found.append(
+            problems.append(
                 (
                     f"compression_{missing}",
                     "is missing; give strains and stresses in compression, or neither.",
                 )
             )
-        if found:
-            raise ProblemError(found)
+        if problems:
+            raise ProblemError(problems)
         return self
 
     def _problems(
@@ -102,21 +102,21 @@ class StressStrain(Material):
                 "each strain.",
             )
             return
-        least = _LEAST_SLOPE * self.elastic_modulus
-        for number, ((here, low), (there, high)) in enumerate(
+        min_slope = _MIN_RELATIVE_SLOPE * self.elastic_modulus
+        for number, ((first, low), (second, high)) in enumerate(
             pairwise(zip((0.0, *strain), (0.0, *stress), strict=True)), start=1
         ):
-            if there <= here:
+            if second <= first:
                 yield (
                     f"{of}strain",
-                    f"has {there:g} behind {here:g} (number {number}); strains must rise.",
+                    f"has {second:g} behind {first:g} (number {number}); strains must rise.",
                 )
                 return
-            if not (high - low) / (there - here) >= least:
+            if not (high - low) / (second - first) >= min_slope:
                 yield (
                     f"{of}stress",
                     f"rises from {low:g} to {high:g} MPa (number {number}) over the strains "
-                    f"{here:g} to {there:g}; it must rise by at least a hundredth of Young's "
-                    f"modulus, {least:g} MPa per strain.",
+                    f"{first:g} to {second:g}; it must rise by at least a hundredth of Young's "
+                    f"modulus, {min_slope:g} MPa per strain.",
                 )
                 return

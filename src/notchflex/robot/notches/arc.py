@@ -25,16 +25,16 @@ class ArcNotch(Notch):
         height: Height of the notch along the tube [mm].
         uncut_length: Uncut length behind the notch, toward the tip [mm].
         ends: "rigid" (beam theory of the arc between rigid rings, as in the papers) or "shell"
-            (the rings beside the notch yield and the arc flattens; checked against finite
+            (the rings beside the notch deform and the arc flattens; checked against finite
             elements).
         depth_at: Where the depth of an "on-axis" cut was read, which decides the angle of its
             radial edges: "outer", "mid-wall" or "inner" surface.
-        closing: "rigid" (the lips meet at height / (r_o + centroid), as in the papers, and do not
-            yield) or "elastic" (the angle and the stiffness of the closed notch from finite
+        closing: "rigid" (the edges touch at height / (r_o + centroid), as in the papers, without
+            compliance) or "elastic" (the angle and the stiffness of the closed notch from finite
             elements).
         direction_deg: Side toward which the notch bends [deg].
-        precurvature_deg: Angle of the notch when nothing pulls [deg].
-        repeat: How many equal notches follow one another.
+        precurvature_deg: Angle of the notch without loads [deg].
+        repeat: Number of equal notches in a row.
 
     Raises:
         InputError: A value is negative, not finite, of a wrong type or not known.
@@ -139,16 +139,16 @@ class ArcNotch(Notch):
             )
 
     def _open(self, tube: Tube) -> bool:
-        """Whether the lips are apart when nothing pulls."""
+        """Return whether the notch is open without loads."""
         free = math.radians(self.precurvature_deg)
-        # The neutral axis lies between the tube axis and the spine: for most notches this tells,
-        # and no section need be worked out to make a robot.
+        # The neutral axis lies between the tube axis and the spine: this bound decides for most
+        # notches without computing a section.
         if free < 0.5 * self.height / tube.outer_radius:
             return True
         return free < self.closing_angle(tube)
 
     def closing_angle(self, tube: Tube) -> float:
-        """Return the angle at which the lips meet, from the straight notch [rad].
+        """Return the angle at which the edges touch, from the straight notch [rad].
 
         Pacheco 2021: h / (r_o + centroid).
         """

@@ -1,21 +1,21 @@
-"""Where a tendon leaves one body and enters the next: an opening that a notch has in the wall."""
+"""Openings of the wall at a notch, through which a tendon passes from body to body."""
 
 import math
 from typing import NamedTuple
 
 
 class Opening(NamedTuple):
-    """An opening of the wall through which a tendon enters the body behind a notch.
+    """An opening of the wall through which a tendon enters the body beyond a notch.
 
-    A tendon may pass a body by: where its side of the wall is not cut, the wall piece beside it
-    belongs to a body nearer the base or nearer the tip.
+    A tendon may bypass a body: where its side of the wall is not cut, the wall there belongs to a
+    body nearer the base or nearer the tip.
 
     Attributes:
         side_deg: Side of the tube that is open [deg]; None is open all round.
         leaves: How far beyond its nominal distal face the last body that the tendon was in has its
             edge here [mm]; the nominal face is `Notch.spacing` beyond the body's origin, and
             `Tube.base_length` for the base.
-        enters: How far beyond its origin the body behind the notch has its edge here [mm].
+        enters: Distance of the edge of the body beyond the notch from its origin [mm].
         leaves_rise: How much farther the first of these edges lies for each mm that it lies inside
             the outer surface, across the tube: the edge of a triangular notch leans.
         enters_rise: The same of the second edge.
@@ -32,13 +32,13 @@ class Opening(NamedTuple):
     enters_rise: float = 0.0
 
     def admits(self, direction_deg: float) -> bool:
-        """Tell whether a tendon on this side of the tube [deg] comes through."""
+        """Return whether a tendon on this side of the tube [deg] passes through."""
         if self.side_deg is None:
             return True
         return math.cos(math.radians(direction_deg - self.side_deg)) > 0.0
 
     def inside(self, direction_deg: float, outer_radius: float, radius: float) -> float:
-        """Return how far inside the outer surface a line lies, across the tube [mm].
+        """Return the depth of a line below the outer surface, across the tube [mm].
 
         Args:
             direction_deg: Side of the tube on which the line runs [deg].
@@ -50,7 +50,7 @@ class Opening(NamedTuple):
         return outer_radius - radius * math.cos(math.radians(direction_deg - self.side_deg))
 
     def faces(self, direction_deg: float) -> bool:
-        """Tell whether this side of the tube [deg] is the middle of the opening."""
+        """Return whether this side of the tube [deg] is the middle of the opening."""
         if self.side_deg is None:
             return False
         return math.cos(math.radians(direction_deg - self.side_deg)) > 1.0 - 1e-9

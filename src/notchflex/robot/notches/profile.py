@@ -48,25 +48,25 @@ def pieces(corners: Sequence[Point], radii: Sequence[float]) -> list[Line | Arc]
     Raises:
         InputError: A radius is too large for the lines beside it.
     """
-    found: list[Line | Arc] = []
+    outline: list[Line | Arc] = []
     used = 0.0  # length of the line before a corner that the corner before it takes
     last = corners[0]
     for before, corner, after, radius in zip(
         corners[:-2], corners[1:-1], corners[2:], radii[1:-1], strict=True
     ):
         tangent, arc = _fillet(before, corner, after, radius)
-        beside = min(math.dist(before, corner) - used, math.dist(corner, after))
-        if tangent > beside + _ROUNDING:
+        available = min(math.dist(before, corner) - used, math.dist(corner, after))
+        if tangent > available + _ROUNDING:
             raise InputError.OUT_OF_RANGE(
                 f"a corner radius of {radius:.6g} mm does not fit the cut: its arc takes "
-                f"{tangent:.6g} mm of a line of {beside:.6g} mm; give a smaller radius."
+                f"{tangent:.6g} mm of a line of {available:.6g} mm; give a smaller radius."
             )
         start, end = (corner, corner) if arc is None else (arc.at(0.0), arc.at(1.0))
-        found += [Line(last, start)] if math.dist(last, start) > _ROUNDING else []
-        found += [] if arc is None else [arc]
+        outline += [Line(last, start)] if math.dist(last, start) > _ROUNDING else []
+        outline += [] if arc is None else [arc]
         last, used = end, tangent
-    found.append(Line(last, corners[-1]))
-    return found
+    outline.append(Line(last, corners[-1]))
+    return outline
 
 
 def _fillet(before: Point, corner: Point, after: Point, radius: float) -> tuple[float, Arc | None]:

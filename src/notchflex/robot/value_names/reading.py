@@ -13,7 +13,7 @@ from notchflex.robot.value_names.paths import EXAMPLES, class_of, parse_path, ta
 
 
 class Described(NamedTuple):
-    """A number of a robot: its unit ("" for none) and between what it must lie."""
+    """A number of a robot: its unit ("" for none) and its limits."""
 
     unit: str
     lower: float
@@ -21,36 +21,36 @@ class Described(NamedTuple):
 
 
 def number_at(robot: Robot, path: str) -> float:
-    """Return the number of a robot that has a name, in the units of the robot file.
+    """Return a number of a robot by its name, in the units of the robot file.
 
     Args:
         robot: The robot.
         path: Its name, as for `Robot.with_value`.
 
     Raises:
-        InputError: There is no such value, it is not a number that may change little by little, or
-            several notches have unlike ones.
+        InputError: There is no such value, it is not a number that can vary continuously, or
+            notches have different ones.
     """
     if not isinstance(path, str):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InputError.UNKNOWN_NAME(f"{path!r} is not the name of a value; {EXAMPLES}.")
     target = parse_path(path)
-    found: set[object] = set()
+    numbers: set[object] = set()
     allowed: dict[str, None] = {}
     for one in tables_at(to_table(robot), target) if target.section != "name" else ():
         keys = fields_of(class_of(target.section, one))
         allowed |= dict.fromkeys(keys)
         if target.key in keys:
-            found.add(one.get(target.key, keys[target.key].default))
-    if not found:
+            numbers.add(one.get(target.key, keys[target.key].default))
+    if not numbers:
         near = nearest(target.key, allowed)
         raise InputError.UNKNOWN_NAME(
             f"`{path}` is not the name of a number of this robot{near}; {EXAMPLES}."
         )
-    if len(found) > 1:
+    if len(numbers) > 1:
         raise InputError.UNSUPPORTED(
             f"`{path}` has unlike values in this robot; name one, such as [1]."
         )
-    value = found.pop()
+    value = numbers.pop()
     if not isinstance(value, float) or not math.isfinite(value):
         raise InputError.UNSUPPORTED(
             f"`{path}` is {value!r} in this robot, and no number that changes smoothly."
@@ -59,7 +59,7 @@ def number_at(robot: Robot, path: str) -> float:
 
 
 def numbers_at(robot: Robot, path: str) -> dict[str, float]:
-    """Return every number that a path means, each by its own name.
+    """Return every number that a path refers to, each by its own name.
 
     Args:
         robot: The robot.
@@ -77,18 +77,18 @@ def numbers_at(robot: Robot, path: str) -> dict[str, float]:
     counts = {"notch": robot.number_of_notches, "tendon": robot.number_of_tendons}
     if target.section not in counts or target.number is not None:
         return {path: number_at(robot, path)}
-    found: dict[str, float] = {}
+    numbers: dict[str, float] = {}
     for number in range(1, counts[target.section] + 1):
         name = f"{target.section}[{number}].{target.key}"
         try:
-            found[name] = number_at(robot, name)
+            numbers[name] = number_at(robot, name)
         except InputError:  # a notch of another kind
             continue
-    return found or {path: number_at(robot, path)}
+    return numbers or {path: number_at(robot, path)}
 
 
 def described_at(robot: Robot, path: str) -> Described:
-    """Return unit and limits of the number of a robot that has a name.
+    """Return unit and limits of a number of a robot by its name.
 
     Args:
         robot: The robot.

@@ -32,7 +32,7 @@ class Changed(NamedTuple):
 def set_values(
     robot: Robot, values: Mapping[str, object] | Iterable[tuple[str, object]]
 ) -> Changed:
-    """Change values of a robot by their names; all are set before any is checked.
+    """Set values of a robot by their names; all are set before any is checked.
 
     Kinds are changed first, then the values of all notches or tendons, then those of single ones,
     so that the order of `values` does not matter.
@@ -125,7 +125,7 @@ def _set_key(table: dict[str, Any], target: ValuePath, value: object) -> None:
 
 
 def _set_kind(table: dict[str, Any], target: ValuePath, value: object) -> list[str]:
-    """Change a kind: keep the keys that both kinds share, and return the paths of the others."""
+    """Replace a kind: keep the keys that both kinds share, and return the paths of the others."""
     base = SECTIONS[target.section]
     if target.section in ("tube", "tendon"):
         raise InputError.UNKNOWN_NAME(unknown_key(target.path, "kind", fields_of(base)))

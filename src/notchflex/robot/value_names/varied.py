@@ -17,7 +17,7 @@ from notchflex.robot.robot import Robot
 from notchflex.robot.value_names import number_at
 
 _OF_NOTCH = re.compile(r"notch\[(\d+)\]")
-_MOST_CORNERS = 1024
+_MAX_CORNERS = 1024
 
 
 class VariedRobots(Sequence[Robot]):
@@ -85,11 +85,11 @@ class VariedRobots(Sequence[Robot]):
     @property
     def notch_of(self) -> list[int | None]:
         """For each name the notch that it is about, from 1; None for what is not of one notch."""
-        found = [_OF_NOTCH.match(name) for name in self.values]
-        return [None if one is None else int(one[1]) for one in found]
+        matches = [_OF_NOTCH.match(name) for name in self.values]
+        return [None if one is None else int(one[1]) for one in matches]
 
     def __len__(self) -> int:
-        """How many robots there are."""
+        """Return the number of robots."""
         return len(next(iter(self.values.values())))
 
     @overload
@@ -134,9 +134,9 @@ class VariedRobots(Sequence[Robot]):
 
     def cliques(self) -> Iterator[list[int]]:
         """Yield places of numbers that belong together: of one notch, and of none in particular."""
-        of, places = self.notch_of, range(len(self.values))
+        of, positions = self.notch_of, range(len(self.values))
         for notch in dict.fromkeys(one for one in of if one is not None) or {None: None}:
-            yield [place for place in places if of[place] in (None, notch)]
+            yield [position for position in positions if of[position] in (None, notch)]
 
     def _cliques(self) -> Iterator[tuple[int, ...]]:
         return map(tuple, self.cliques())
@@ -154,7 +154,7 @@ def _corners_are_valid(
     ends = np.array([low, high])
     middle = 0.5 * (ends[0] + ends[1])
     for clique in cliques:
-        if 2 ** len(clique) > _MOST_CORNERS:
+        if 2 ** len(clique) > _MAX_CORNERS:
             return False
         for corner in itertools.product(*ends[:, list(clique)].T):
             numbers = middle.copy()

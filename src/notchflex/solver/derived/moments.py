@@ -1,7 +1,7 @@
-"""How well the internal moment of the modes meets the moment that the loads ask for.
+"""Error of the internal moment of the strain modes against the moment required by the loads.
 
-The modes hold the balance only on average along a flexure. What is left between, the largest
-|M_internal - M_required| over the largest |M|, tells whether there are modes enough.
+The modes satisfy equilibrium only in a weighted mean along a flexure. The largest local error,
+|M_internal - M_required| over the largest |M|, shows whether there are enough modes.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from notchflex.mechanics.motion import Motion
 from notchflex.solver.element import Unknowns
 from notchflex.solver.residual import Evaluation
 
-# Moments below this part of the stiffest mode's stiffness (per rad).
-_NOTHING = 1e-12
+# Smaller moments do not count, as a fraction of the largest stiffness of a mode (per rad).
+_MIN_RELATIVE_MOMENT = 1e-12
 
 
 def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, ""]:
@@ -31,25 +31,25 @@ def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Arra
         required = required + jax.vmap(_required)(
             chain.rods, unknowns.modes, at.flexure, at.wrenches.resultant
         )
-    robots = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
-    counts = (robots[:, None] & (chain.rods.length > 0.0))[..., None]
+    real = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
+    has_length = (real[:, None] & (chain.rods.length > 0.0))[..., None]
     carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
-    error = jnp.max(jnp.abs(internal - required[..., bending]) * counts * carried)
-    largest = jnp.max(jnp.abs(required[..., bending]) * counts)
-    # Moments that bend nothing are rounding.
-    counts = largest > _NOTHING * jnp.max(chain.stiffness)
-    return jnp.where(counts, error / jnp.where(counts, largest, 1.0), 0.0)
+    error = jnp.max(jnp.abs(internal - required[..., bending]) * has_length * carried)
+    largest = jnp.max(jnp.abs(required[..., bending]) * has_length)
+    # Smaller moments are rounding errors.
+    bends = largest > _MIN_RELATIVE_MOMENT * jnp.max(chain.stiffness)
+    return jnp.where(bends, error / jnp.where(bends, largest, 1.0), 0.0)
 
 
 def _required(
     rod: Rod, modes: Float[Array, " modes"], flexure: FlexureState, wrench: Float[Array, " w"]
 ) -> Float[Array, "nodes w"]:
-    """Wrench on all that is beyond each node, about the node, along its section's axes."""
+    """Compute the wrench on all bodies beyond each node, about the node, in its section's axes."""
     assert flexure.pose is not None  # wrenches act on bodies
     assert flexure.configuration is not None
     body, nodes = flexure.pose, node_poses(rod, modes, flexure.configuration)
     if rod.linear_kinematics is not None:
-        # A linear beam takes its moments on the free shape, under forces as the body has them.
+        # Moments of a linear beam are taken on the free shape, under forces in the body's frame.
         is_small = rod.linear_kinematics > 0.0
         shapes = (body, nodes), (_about_free_end(rod, modes), _free_nodes(rod))
         body, nodes = jax.tree.map(lambda large, small: jnp.where(is_small, small, large), *shapes)
@@ -63,20 +63,20 @@ def _required(
 
 
 def _about_free_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
-    """Pose of the distal body, turned by the modes but not displaced with the rod's end."""
+    """Compute the pose of the distal body, rotated by the modes but not displaced."""
     end = Motion(rod_end(rod, modes).rotation, rod.curve_offset)
     start = Motion(rod.start_rotation, rod.start_offset)
     return start.then(end).then(Motion(rod.end_rotation, rod.end_offset))
 
 
 def _free_nodes(rod: Rod) -> Motion:
-    """Poses of the sections at the nodes of the free rod, in the frame of the proximal body."""
+    """Compute the section poses at the nodes of the free rod, in the proximal frame."""
     start = Motion(rod.start_rotation, rod.start_offset)
     return jax.vmap(start.then)(Motion(rod.node_rotation, rod.node_offset))
 
 
 def _along_wall(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, "n nodes w"]:
-    """What tendons and lips that act along the wall ask of every section."""
+    """Compute the resultants required by tendons and contacts that act along the wall."""
     acting = jnp.zeros((chain.flexures, chain.rods.basis.shape[-2]))
     for group, span in zip(chain.groups, at.spans, strict=True):
         if group.fibre is not None:

@@ -7,7 +7,7 @@ from jaxtyping import Array
 
 from notchflex._jax import jax, jnp
 from notchflex._quantity import Quantity
-from notchflex.mechanics.flexure import in_space, turn_doubt
+from notchflex.mechanics.flexure import in_space, rotation_error_estimate
 from notchflex.solver.derived.moments import moment_error as error_of_modes
 from notchflex.solver.derived.solved_state import (
     SolvedState,
@@ -20,13 +20,13 @@ from notchflex.solver.derived.solved_state import (
 )
 from notchflex.solver.element import bound_side
 
-# A state whose moments are off by this part of the largest is none.
-MODES_FAIL = 0.35
-# Part of the end compliance of a notch that lies beyond its faces: by finite elements, middle
-# notches of wrists A and B at every load (3.0 % and 4.1 % of the angle).
+# States with a larger moment error count as not converged.
+MAX_MOMENT_ERROR = 0.35
+# Fraction of the end compliance of a notch beyond its faces: from finite elements, middle notches
+# of wrists A and B at every load (3.0 % and 4.1 % of the angle).
 _BEYOND_FACES = 0.086
-# A state whose turns are known worse is none, rad.
-_DOUBT = 2e-6
+# States with a larger error of rotation count as not converged, rad.
+_MAX_ROTATION_ERROR = 2e-6
 
 
 @Quantity("solve", "tendon tension", "T", "N", key="tendon_tension_N",
@@ -260,9 +260,9 @@ def bend_possible(state: SolvedState) -> Array:
     that the order of its turns is not known well.
     """
     chain, modes = state.chain, state.solved.point.unknowns.modes
-    turn = jnp.sum(state.at.flexure.bend**2, axis=-1) < np.pi**2
-    known = jax.vmap(turn_doubt)(chain.rods, modes) < _DOUBT
-    return jnp.all(turn & known) & jnp.all(state.fibre_strain < 1.0)
+    below_half_turn = jnp.sum(state.at.flexure.bend**2, axis=-1) < np.pi**2
+    accurate = jax.vmap(rotation_error_estimate)(chain.rods, modes) < _MAX_ROTATION_ERROR
+    return jnp.all(below_half_turn & accurate) & jnp.all(state.fibre_strain < 1.0)
 
 
 @Quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",
@@ -270,16 +270,16 @@ def bend_possible(state: SolvedState) -> Array:
 def stored_energy(state: SolvedState) -> Array:
     """Elastic energy held by flexures, lips that press and stretched tendons."""
     chain, base_tension = state.chain, state.solved.point.base_tension
-    density, _ = state.held
-    in_gap, beside_body = state.tensions
+    density, _ = state.stored_energy_density
+    in_gap, in_body = state.tensions
     in_tendons = in_gap**2 * state.by_tendon("natural_gap")
-    in_tendons = in_tendons + beside_body**2 * state.by_tendon("body_length")
-    in_lips = jnp.zeros(())
+    in_tendons = in_tendons + in_body**2 * state.by_tendon("body_length")
+    in_contacts = jnp.zeros(())
     if chain.contact_flexibility is not None:
         squares = [jnp.sum(one**2, axis=-1) for one in state.solved.point.unknowns.contact_force]
-        in_lips = 0.5 * jnp.sum(chain.contact_flexibility[None] * jnp.stack(squares))
+        in_contacts = 0.5 * jnp.sum(chain.contact_flexibility[None] * jnp.stack(squares))
     return (
-        in_lips
+        in_contacts
         + jnp.sum(chain.rods.length * density)
         + 0.5 * jnp.sum(in_tendons * state.by_tendon("visits") * state.compliance)
         + 0.5 * jnp.sum(base_tension**2 * chain.free_length / chain.axial_stiffness)
@@ -296,5 +296,5 @@ def flattening(state: SolvedState) -> Array:
     length = chain.rods.length
     if isinstance(memory, tuple) or chain.rods.section.ends is None:
         return jnp.zeros((len(length), 3, 1))
-    _, at = state.held
+    _, at = state.stored_energy_density
     return jnp.stack([at.path, length * at.transformed, length * at.by_transformation], axis=1)

@@ -1,4 +1,4 @@
-"""What the programs report of a solved state, and how it is packed."""
+"""Quantities that the programs report of a solved state, and their layout."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jaxtyping import Array
 
 from notchflex._quantity import REGISTERED
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.derived.quantities import MODES_FAIL  # and registers all formulas
+from notchflex.solver.derived.quantities import MAX_MOMENT_ERROR  # and registers all formulas
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.solver_state import SolverState
@@ -22,17 +22,17 @@ def _reported(source: str) -> tuple[str, ...]:
 
 
 STATE = _reported("state")
-"""Names of what a second program finds of a solved state."""
+"""Names of the quantities that a second program computes for a solved state."""
 
 
 class Shape(namedtuple("Shape", _reported("solve"))):  # pyright: ignore[reportUntypedNamedTuple]
-    """What the program of a solve reports of a state, or of many along a leading axis."""
+    """Quantities that the program of a solve reports, of one state or many (leading axis)."""
 
     __slots__ = ()
 
     @staticmethod
     def form(flexures: int, tendons: int) -> PytreeLayout:
-        """Return how it is packed for a robot of so many flexures and tendons."""
+        """Return its layout for a number of flexures and tendons."""
         sizes = {"tendon": tendons, "notch": flexures, "body": flexures + 1, "row": 3, "axis": 3}
         own = (REGISTERED[name] for name in Shape._fields)
         return PytreeLayout.of(
@@ -41,33 +41,37 @@ class Shape(namedtuple("Shape", _reported("solve"))):  # pyright: ignore[reportU
 
 
 def shape(chain: Chain, solved: SolverState) -> Shape:
-    """Return what the program of a solve reports of a solved state."""
+    """Compute the quantities that the program of a solve reports."""
     state = SolvedState(chain, solved)
     return Shape(*(state.quantity(name) for name in Shape._fields))
 
 
 def quantities(chain: Chain, solved: SolverState) -> dict[str, Array]:
-    """Everything else that is reported of a solved state, in the frame of the base."""
+    """Compute all other reported quantities of a solved state, in the frame of the base."""
     state = SolvedState(chain, solved)
     return {name: state.quantity(name) for name in STATE}
 
 
 def believable(value: Callable[[str], Any]) -> Any:
-    """Return whether states lie within what friction law, modes and geometry are for.
+    """Return whether states lie within the range of friction law, modes and geometry.
 
     Args:
         value: Gives the values of a quantity by its name.
     """
-    return value("friction_holds") & (value("moment_error") < MODES_FAIL) & value("bend_possible")
+    return (
+        value("friction_holds")
+        & (value("moment_error") < MAX_MOMENT_ERROR)
+        & value("bend_possible")
+    )
 
 
 def unpad_quantity(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
-    """Return a quantity of a chain whose contacts are all edges of all gaps as that of its own.
+    """Select the values of a chain from those of its padded chain with contacts at all edges.
 
     Args:
-        chain: The own chain.
+        chain: The chain.
         name: Name of the quantity.
-        values: Its values with any leading axes, of a chain that may have more flexures.
+        values: Values of the padded chain, with any leading axes.
     """
     per = REGISTERED[name].per
     if per[:1] in (("notch",), ("body",)):
@@ -75,9 +79,11 @@ def unpad_quantity(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
         return values[(..., own, *(slice(None),) * (len(per) - 1))]
     if per[1:] not in (("span",), ("contact",)):
         return values
-    met = np.asarray(chain.contacts)
+    contacts = np.asarray(chain.contacts)
     first = int(per[1] == "span")  # the proximal span comes before the first edge
-    tendons = np.arange(len(met))[:, None]
+    tendons = np.arange(len(contacts))[:, None]
     beyond = 0 if REGISTERED[name].kind is int else np.nan
-    found = np.where(met[:, 1:] >= 0, values[..., tendons, met[:, :-1] + first], beyond)
-    return np.concatenate([values[..., :first], found], axis=-1)
+    own_values = np.where(
+        contacts[:, 1:] >= 0, values[..., tendons, contacts[:, :-1] + first], beyond
+    )
+    return np.concatenate([values[..., :first], own_values], axis=-1)

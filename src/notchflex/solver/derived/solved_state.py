@@ -1,4 +1,4 @@
-"""A solved state in the frame of the base, and what the formulas of quantities need of it."""
+"""A solved state in the frame of the base, with intermediate results for the quantities."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from notchflex.solver.residual import Evaluation, evaluate
 from notchflex.solver.solver_state import SolverState
 from notchflex.solver.tendon_spans import in_tendon_order
 
-# Of the cosine between the directions of two notches, less than 0.3 degrees.
+# Tolerance of the cosine between the directions of two notches: less than 0.3 degrees.
 _IN_PLANE = 1e-5
 
 
 class SolvedState:
-    """A solved state in the frame of the base, and what several formulas need of it.
+    """A solved state in the frame of the base, with results that several formulas share.
 
     Slid lengths, stroke and energy use the robot file's axial stiffness of the tendon; the finite
-    one of the memory only decides what sticks.
+    stiffness of the memory only decides which contacts stick.
     """
 
     def __init__(self, chain: Chain, solved: SolverState) -> None:
@@ -51,9 +51,9 @@ class SolvedState:
     @cached_property
     def relative(self) -> Motion:
         """Pose of every body against the one before."""
-        known = self.at.flexure.pose  # None where the balance did not ask for it
+        pose = self.at.flexure.pose  # None where the balance did not ask for it
         modes = self.solved.point.unknowns.modes
-        return jax.vmap(relative_pose)(self.chain.rods, modes) if known is None else known
+        return jax.vmap(relative_pose)(self.chain.rods, modes) if pose is None else pose
 
     @cached_property
     def bodies(self) -> Motion:
@@ -73,10 +73,12 @@ class SolvedState:
         return in_space(self.at.flexure.strain)[..., 1]
 
     @cached_property
-    def held(self) -> tuple[Float[Array, "n nodes"], Flattening]:
-        """Energy per length and flattening at every node of every notch."""
+    def stored_energy_density(self) -> tuple[Float[Array, "n nodes"], Flattening]:
+        """Energy stored per length, and flattening, at every node of every notch."""
         strain, memory = in_space(self.at.flexure.strain), self.solved.memory.material
-        return jax.vmap(jax.vmap(self.chain.law.held))(strain, self.chain.rods.section, memory)
+        return jax.vmap(jax.vmap(self.chain.law.stored_energy_density))(
+            strain, self.chain.rods.section, memory
+        )
 
     @cached_property
     def turning(self) -> tuple[Array, Array]:
@@ -95,7 +97,7 @@ class SolvedState:
     @cached_property
     def contact_pairs(self) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
         """Contact force and gap of every notch."""
-        return notch_lips(self.chain, self.solved.point.unknowns, self.at)
+        return notch_contact(self.chain, self.solved.point.unknowns, self.at)
 
     @cached_property
     def base(self) -> Float[Array, " 6"]:
@@ -109,7 +111,7 @@ class SolvedState:
         return jnp.broadcast_to(1.0 / self.chain.axial_stiffness, self.tensions[0].shape)
 
     def by_tendon(self, name: str) -> Float[Array, "n t"]:
-        """Return what the chain knows of every gap and tendon."""
+        """Return a field of the tendon groups, for every gap and tendon of the robot."""
         return in_tendon_order(
             self.chain, tuple(getattr(group, name) for group in self.chain.groups)
         )
@@ -120,7 +122,7 @@ def bending_angle(
     notch_angle: Float[Array, "*s n"],
     tip_rotation: Float[Array, "*s 3 3"],
 ) -> Float[Array, "*s"]:
-    """Bending angle of a whole robot, rad.
+    """Compute the bending angle of a whole robot, rad.
 
     Where all notches bend in one plane, the sum of their angles, toward the first one's bend
     positive; otherwise the angle between the axes of base and tip.
@@ -134,10 +136,10 @@ def bending_angle(
     return jnp.where(in_plane, notch_angle @ jnp.sign(along), between)
 
 
-def notch_lips(
+def notch_contact(
     chain: Chain, unknowns: Unknowns, at: Evaluation
 ) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
-    """Contact force and what is left of the narrowest opening of every notch (N, mm)."""
+    """Compute contact force (N) and smallest gap (mm) of every notch."""
     force = jnp.zeros(chain.flexures)
     gap = jnp.full(chain.flexures, jnp.inf)
     for group, own, contact in zip(
@@ -151,7 +153,7 @@ def notch_lips(
 
 
 def largest_moment(flexure: FlexureState) -> Float[Array, " n"]:
-    """Bending moment in the plane of each notch, the largest along it, with its sign."""
+    """Return the bending moment in the plane of each notch, largest along it, with its sign."""
     moment = in_space(flexure.resultants)[..., 1]
     where = jnp.argmax(jnp.abs(moment), axis=-1)
     return jnp.take_along_axis(moment, where[:, None], axis=-1)[:, 0]
@@ -160,9 +162,9 @@ def largest_moment(flexure: FlexureState) -> Float[Array, " n"]:
 def base_wrench(
     chain: Chain, base_tension: Float[Array, " t"], at: Evaluation, applied: BodyLoads | None
 ) -> Float[Array, " 6"]:
-    """Return what the holder does to the tube: moment about the base's origin, and force.
+    """Compute the reaction at the base: moment about the base's origin, and force.
 
-    It balances the loads, and the drives' pull on the tendons where they enter the base.
+    It balances the loads, and the tendon tensions where the tendons enter the base.
     """
     acting = jnp.zeros(6)
     if applied is not None and at.base.external is not None:
@@ -172,13 +174,12 @@ def base_wrench(
         )
         if chain.frame is not None:
             acting = (chain.frame @ acting.reshape(2, 3, 1)).reshape(6)
-    # What the drives pull on the tendons with.
-    pulled = base_tension[:, None] * jnp.array([[0.0, 0.0, -1.0]])
-    return -acting - jnp.sum(jax.vmap(wrench_at)(chain.tendon_place, pulled), axis=0)
+    tendon_force = base_tension[:, None] * jnp.array([[0.0, 0.0, -1.0]])
+    return -acting - jnp.sum(jax.vmap(wrench_at)(chain.tendon_entry, tendon_force), axis=0)
 
 
 def notch_angles(chain: Chain, relative: Float[Array, "n d d"]) -> Float[Array, " n"]:
-    """Return rotation of every body against the one before, about the axis of bending of its notch.
+    """Compute the rotation of every body against the previous one, about its notch's bending axis.
 
     The axis is y of the notch's frame, turned by the notch's direction about the tube; angles of
     up to half a turn are distinguished.
@@ -191,13 +192,13 @@ def notch_angles(chain: Chain, relative: Float[Array, "n d d"]) -> Float[Array, 
 
 
 def paired(chain: Chain, pairs: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Pairs of values per group, each of the two in the order of the robot's tendons."""
+    """Return both values of pairs per group, each in the order of the robot's tendons."""
     first, second = zip(*pairs, strict=True)
     return in_tendon_order(chain, first), in_tendon_order(chain, second)
 
 
 def _in_space(chain: Chain, poses: Motion) -> Motion:
-    """Poses in the frame of the base, of a chain that may be flat."""
+    """Transform poses of a chain, which may be planar, to the frame of the base."""
     if chain.frame is None:
         return poses
     frame = chain.frame

@@ -3,15 +3,15 @@
 Linearised, an element couples only to its neighbours:
 
     residual + A du + B dcarried + C dbeyond = 0
-    dcarried_out = Yu du + Yc dcarried,   dbehind = Zu du + Zc dcarried + Zb dbeyond
+    dnext = Yu du + Yc dcarried,   dprevious = Zu du + Zc dcarried + Zb dbeyond
 
 All elements eliminate their own unknowns at once, which leaves
 
-    dcarried_out = y + Y1 dcarried + Y2 dbeyond,   dbehind = z + Z1 dcarried + Z2 dbeyond
+    dnext = y + Y1 dcarried + Y2 dbeyond,   dprevious = z + Z1 dcarried + Z2 dbeyond
 
-`_condense` eliminates dbeyond of one element after the other from the tip, until at the base only
-the tensions are left to find; `_back_substitute` then goes from the base to the tip. It is the
-elimination of a block-tridiagonal matrix, as two loops: the program does not grow with the chain.
+`_condense` eliminates dbeyond of one element after the other from the tip, until only the tensions
+at the base are unknown; `_back_substitute` then goes from the base to the tip. This is the
+elimination of a block-tridiagonal matrix, in two loops: the program does not grow with the chain.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ from notchflex.solver.linear_step.linearisation import linearise
 from notchflex.solver.linear_step.row_layout import RowLayout, row_layout
 from notchflex.solver.residual import Evaluation
 
-_HELD, _TIED = 1e-9, 1e-7
+# Slopes of a stroke below the second count as zero; the first is added to their pivots.
+_PIVOT_SHIFT, _ZERO_SLOPE = 1e-9, 1e-7
 
 
 class Iterate(NamedTuple):
@@ -50,11 +51,11 @@ class _Condensed(NamedTuple):
     """Blocks of every element after condensation, as rows over (1, carried to it).
 
     Attributes:
-        onward: What it carries on.
-        returned: What comes back to it from beyond.
+        to_next: What it carries to the next element.
+        returned: What it receives from the next element.
     """
 
-    onward: Float[Array, "n c 1+c"]
+    to_next: Float[Array, "n c 1+c"]
     returned: Float[Array, "n b 1+c"]
 
 
@@ -83,8 +84,8 @@ def linear_step(
         The step.
     """
     form = row_layout(chain, by_stroke=command.by_stroke is not None)
-    here = (chain, unknowns, memory, command.applied, at)
-    rows = linearise(*jax.tree.map(jax.lax.stop_gradient, here), form=form)
+    state = (chain, unknowns, memory, command.applied, at)
+    rows = linearise(*jax.tree.map(jax.lax.stop_gradient, state), form=form)
     residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.residual)
     size = form.unknowns
     # Own unknowns as functions of 1, carried and beyond: du = response @ (1, c, b).
@@ -96,13 +97,13 @@ def linear_step(
         return rest + row[..., :size] @ response
 
     at_base = _tensions_carried(chain, form)
-    condensed, back = _condense(insert(rows.onward), insert(rows.behind), form)
+    condensed, back = _condense(insert(rows.to_next), insert(rows.to_previous), form)
     tension_step = command.target - base_tension
     if command.by_stroke is not None:
         by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ at_base], axis=1)
         tension_step = _tension_step(chain, command, base_tension, at, by_tension)
-    around = _back_substitute(condensed, jnp.asarray(at_base) @ tension_step)
-    steps = jnp.einsum("nuz,nz->nu", response, around)
+    surroundings = _back_substitute(condensed, jnp.asarray(at_base) @ tension_step)
+    steps = jnp.einsum("nuz,nz->nu", response, surroundings)
     _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
     return Iterate(jax.vmap(unknowns_of)(steps), tension_step)
 
@@ -114,26 +115,26 @@ def _tension_step(
     at: Evaluation,
     back: Float[Array, "b 1+t"],
 ) -> Float[Array, " t"]:
-    """Step of the base tensions to the commanded strokes, from the rows of the whole chain."""
+    """Solve for the step of the base tensions to the commanded strokes."""
     assert command.by_stroke is not None
     slopes = command_slopes(chain, command, base_tension, at.base)
     order = chain.tendon_order
     back = back[len(back) - 2 * len(order) :].reshape(2, len(order), -1)
     # Rows in the order of the robot's tendons.
-    released_length, tension_length = jnp.stack(
-        [back[:, place] for place in np.argsort(order)], axis=1
-    )
+    released_length, tension_length = jnp.stack([back[:, row] for row in np.argsort(order)], axis=1)
     by_base = slopes[1] @ released_length + slopes[2] @ tension_length
     matrix = slopes[0] + by_base[:, 1:]
-    # Where every contact counts as stuck by a tie, the stroke does not depend on the tension; a
-    # small entry keeps such a step finite.
-    tied = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _TIED)
+    # Where every contact sticks, the stroke does not depend on the tension; a small pivot keeps the
+    # step finite.
+    undetermined = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _ZERO_SLOPE)
     missing = command_residual(chain, command, base_tension, at.base) + by_base[:, 0]
-    return -gauss_jordan(matrix + _HELD * jnp.diag(tied.astype(float)), missing[:, None])[:, 0]
+    return -gauss_jordan(
+        matrix + _PIVOT_SHIFT * jnp.diag(undetermined.astype(float)), missing[:, None]
+    )[:, 0]
 
 
 def _tensions_carried(chain: Chain, form: RowLayout) -> Float[np.ndarray, "c t"]:
-    """What is carried to the first flexure, per unit of base tension: the tension itself."""
+    """Return what is carried to the first flexure per unit of base tension: the tension itself."""
     order, carried = chain.tendon_order, form.carried
     at_base = np.zeros((carried, chain.tendons))
     at_base[carried - len(order) + np.arange(len(order)), order] = 1.0
@@ -141,45 +142,42 @@ def _tensions_carried(chain: Chain, form: RowLayout) -> Float[np.ndarray, "c t"]
 
 
 def _condense(
-    onward: Float[Array, "n c z"], behind: Float[Array, "n b z"], form: RowLayout
+    to_next: Float[Array, "n c z"], to_previous: Float[Array, "n b z"], form: RowLayout
 ) -> tuple[_Condensed, Float[Array, "b 1+c"]]:
-    """Eliminate from the tip what passes between neighbours; nothing lies beyond the tip.
+    """Eliminate the couplings between neighbours, from the tip.
 
-    Args:
-        onward: What each element carries on, as rows over (1, carried, from beyond).
-        behind: What each hands back toward the base, likewise.
-        form: Layout of the rows.
-
-    Returns:
-        The condensed blocks, and what the first element hands back.
+    Both arguments are rows over (1, carried, from beyond). Returns the condensed blocks, and the
+    rows that the first element passes to the base.
     """
     size = 1 + form.carried
     one = constant(np.eye(form.carried))
 
     def join(back: Array, item: tuple[Array, Array]) -> tuple[Array, _Condensed]:
-        onward, behind = item
-        by_back = onward[:, size:]
-        right = _add_constant(onward[:, :size], by_back @ back[:, 0])
+        to_next, to_previous = item
+        by_back = to_next[:, size:]
+        right = _add_constant(to_next[:, :size], by_back @ back[:, 0])
         carried_on = gauss_jordan(one - by_back @ back[:, 1:], right)
         returned = _add_constant(back[:, 1:] @ carried_on, back[:, 0])
-        return behind[:, :size] + behind[:, size:] @ returned, _Condensed(carried_on, returned)
+        return to_previous[:, :size] + to_previous[:, size:] @ returned, _Condensed(
+            carried_on, returned
+        )
 
     at_tip = jnp.zeros((form.beyond, size))
-    back, condensed = jax.lax.scan(join, at_tip, (onward, behind), reverse=True)
+    back, condensed = jax.lax.scan(join, at_tip, (to_next, to_previous), reverse=True)
     return condensed, back
 
 
 def _add_constant(rows: Float[Array, "k z"], by: Float[Array, " k"]) -> Float[Array, "k z"]:
-    """Rows with something added to their first column, that of 1."""
+    """Add constants to the first column of rows, that of 1."""
     return jnp.concatenate([rows[:, :1] + by[:, None], rows[:, 1:]], axis=1)
 
 
 def _back_substitute(condensed: _Condensed, carried: Float[Array, " c"]) -> Float[Array, "n z"]:
-    """(1, carried, from beyond) of every element, from what is carried to the first."""
+    """Return (1, carried, from beyond) of every element, from what is carried to the first."""
 
     def follow(carried: Array, blocks: _Condensed) -> tuple[Array, Array]:
-        known = jnp.concatenate([jnp.ones(1), carried])
-        return blocks.onward @ known, jnp.concatenate([known, blocks.returned @ known])
+        own = jnp.concatenate([jnp.ones(1), carried])
+        return blocks.to_next @ own, jnp.concatenate([own, blocks.returned @ own])
 
     return jax.lax.scan(follow, carried, condensed)[1]
 
@@ -189,10 +187,9 @@ def gauss_jordan(
 ) -> Float[Array, "*n u r"]:
     """Solve small systems by Gauss-Jordan elimination without pivoting.
 
-    Modes come first, whose stiffness makes their pivots safe, then what they give way under. A step
-    leaves out the column that it has cleared. The barrier keeps the compiler from computing earlier
-    steps again for every later one; as a loop they take twice as long, and many small
-    factorisations by LAPACK, one after the other, two to seven times.
+    Modes come first: their stiffness makes their pivots safe. A step drops the column that it has
+    cleared. The barrier keeps the compiler from recomputing earlier steps for every later one; a
+    loop takes twice as long, and many small factorisations by LAPACK two to seven times.
     """
     size = matrix.shape[-1]
     table = jnp.concatenate([matrix, right], axis=-1)
@@ -200,7 +197,7 @@ def gauss_jordan(
         is_pivot = (np.arange(size) == number)[:, None]
         row = table[..., number : number + 1, :]
         pivot = row[..., 1:] * (1.0 / row[..., :1])  # one division costs as much as ten products
-        # The pivot's row is put in, not reached by a difference, which would cost its digits.
+        # The pivot's row is inserted, since a difference would lose its digits.
         table = jnp.where(is_pivot, pivot, table[..., 1:] - table[..., :1] * pivot)
         table = jax.lax.optimization_barrier(table)
     return table

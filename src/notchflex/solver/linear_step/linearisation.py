@@ -1,4 +1,4 @@
-"""Linearisation of every flexure's residual, as rows over what changes around it.
+"""Linearisation of every flexure's residual, as rows over all that it depends on.
 
 The columns are the unknowns of the flexure, what is carried to it from the base side, and what
 comes from the tip side. Motions of bodies are relative to the body before, forces act along the
@@ -27,7 +27,7 @@ from notchflex.loads.applied import BodyLoads
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import geometric_stiffness, material_tangent
 from notchflex.solver.element import (
-    RATE,
+    AUGMENTATION,
     Memory,
     Unknowns,
     is_active,
@@ -49,13 +49,13 @@ class LinearisedRows(NamedTuple):
 
     Attributes:
         residual: Of the residual.
-        onward: Of what is carried on to the next flexure.
-        behind: Of what is handed back to the flexure before.
+        to_next: Of what is passed to the next flexure.
+        to_previous: Of what is passed to the previous flexure.
     """
 
     residual: Float[Array, "n u z"]
-    onward: Float[Array, "n c z"]
-    behind: Float[Array, "n b z"]
+    to_next: Float[Array, "n c z"]
+    to_previous: Float[Array, "n b z"]
 
 
 def linearise(
@@ -80,50 +80,50 @@ def linearise(
         The rows.
     """
     unit = form.unit_rows()
-    here = state_jacobians(chain, unknowns, memory, applied, at, unit)
-    motion, tendons = here.motion, here.tendons
-    balance, behind = _balance_rows(here)
-    residual = [balance / chain.stiffness[..., None], *_contact_rows(here)]
-    residual += [_friction_rows(here, k) for k in range(len(tendons))]
-    onward = [-unit.spread(motion.relative[number]) for number in range(form.older)]
-    onward += [] if motion.turn is None else [motion.turn]
-    onward += [tendon.carried for tendon in tendons]
-    behind += [tendon.released_length for tendon in tendons]
-    behind += [one.tension_length for one in tendons if one.tension_length is not None]
-    return LinearisedRows(*(_stack(chain, rows, form) for rows in (residual, onward, behind)))
+    jacobians = state_jacobians(chain, unknowns, memory, applied, at, unit)
+    motion, tendons = jacobians.motion, jacobians.tendons
+    balance, to_previous = _balance_rows(jacobians)
+    residual = [balance / chain.stiffness[..., None], *_contact_rows(jacobians)]
+    residual += [_friction_rows(jacobians, k) for k in range(len(tendons))]
+    to_next = [-unit.spread(motion.relative[number]) for number in range(form.older)]
+    to_next += [] if motion.turn is None else [motion.turn]
+    to_next += [tendon.carried for tendon in tendons]
+    to_previous += [tendon.released_length for tendon in tendons]
+    to_previous += [one.tension_length for one in tendons if one.tension_length is not None]
+    return LinearisedRows(*(_stack(chain, rows, form) for rows in (residual, to_next, to_previous)))
 
 
 def _stack(chain: Chain, rows: list[Array], form: RowLayout) -> Float[Array, "n k z"]:
-    """Rows below each other; none where there are no rows."""
+    """Stack rows; of an empty list, return none."""
     if not rows:
         return jnp.zeros((chain.flexures, 0, form.unknowns + form.carried + form.beyond))
     return jnp.concatenate(rows, axis=1)
 
 
-def _balance_rows(here: StateJacobians) -> tuple[Float[Array, "n m z"], list[Array]]:
-    """Rows of the balance of modes, and of the wrenches handed back."""
-    chain, at, unit = here.chain, here.at, here.unit
+def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], list[Array]]:
+    """Compute the rows of equilibrium of the modes, and of the wrenches to the previous body."""
+    chain, at, unit = jacobians.chain, jacobians.at, jacobians.unit
     elastic = chain.elastic
     if elastic is None:
         elastic = jax.vmap(material_tangent, in_axes=(0, None, 0, 0))(
-            chain.rods, chain.law, here.memory.material, at.flexure
+            chain.rods, chain.law, jacobians.memory.material, at.flexure
         )
-        elastic = _never_singular(chain, elastic)
-        if here.memory.drag is not None:
-            elastic = elastic + here.memory.drag[0] * jax.vmap(jnp.diag)(chain.stiffness)
-    behind: list[Array] = []
+        elastic = _regularise_pivots(chain, elastic)
+        if jacobians.memory.damping is not None:
+            elastic = elastic + jacobians.memory.damping[0] * jax.vmap(jnp.diag)(chain.stiffness)
+    to_previous: list[Array] = []
     if at.wrenches is None:
         balance = unit.spread(unit.of_modes(elastic))
     else:
         assert at.flexure.configuration is not None
         elastic = elastic - jax.vmap(geometric_stiffness)(
-            chain.rods, here.unknowns.modes, at.flexure.configuration, at.wrenches.resultant
+            chain.rods, jacobians.unknowns.modes, at.flexure.configuration, at.wrenches.resultant
         )
-        resultant, behind = wrench_rows(here)
+        resultant, to_previous = wrench_rows(jacobians)
         balance = unit.spread(unit.of_modes(elastic)) - jnp.einsum(
             "nwm,nwz->nmz", at.flexure.twist, resultant
         )
-    for tendon, span in zip(here.tendons, at.spans, strict=True):
+    for tendon, span in zip(jacobians.tendons, at.spans, strict=True):
         if span.crossing.slope is not None:
             balance = balance + jnp.einsum("ntm,ntz->nmz", span.crossing.slope, tendon.gap_tension)
     for group, response, force in zip(
@@ -132,74 +132,82 @@ def _balance_rows(here: StateJacobians) -> tuple[Float[Array, "n m z"], list[Arr
         if response.slope is not None:
             closing = group.has_contact[..., None] * response.slope
             balance = balance - jnp.einsum("nlm,lz->nmz", closing, force)
-    return balance, behind
+    return balance, to_previous
 
 
-# A mode that resists by less than this part of its stiffness at rest is taken to resist so much:
-# the root of the rounding error, so that neither the change nor what it cancels with is felt.
-_LEAST_SLOPE = 1e-8
+# Smallest slope of a mode, as a fraction of its stiffness at rest: the root of the rounding error,
+# so that neither the shift nor the cancelled digits matter.
+_MIN_RELATIVE_SLOPE = 1e-8
 
 
-def _never_singular(chain: Chain, elastic: Float[Array, "n m m"]) -> Float[Array, "n m m"]:
-    """Keep a plateau of the material law from leaving a mode without a pivot.
+def _regularise_pivots(chain: Chain, elastic: Float[Array, "n m m"]) -> Float[Array, "n m m"]:
+    """Shift pivots that vanish on a plateau of the material law.
 
     Just beyond the strain where plastic hardening begins (exp(b / x) at x = 0) the law is flat to
-    the last digit. The modes are eliminated first, so their pivots must not vanish there, though
-    friction makes the whole system regular; without friction the step becomes long but finite, and
-    the limits of a step apply to it.
+    the last digit. The modes are eliminated first, so their pivots must not vanish, though friction
+    makes the whole system regular. Without friction the step becomes long but finite, and the
+    limits of a step apply to it.
     """
     diagonal = jnp.diagonal(elastic, axis1=1, axis2=2)
-    least = _LEAST_SLOPE * chain.stiffness
-    missing = jnp.where(jnp.abs(diagonal) < least, least, 0.0)
+    min_slope = _MIN_RELATIVE_SLOPE * chain.stiffness
+    missing = jnp.where(jnp.abs(diagonal) < min_slope, min_slope, 0.0)
     return elastic + jax.vmap(jnp.diag)(missing)
 
 
-def _contact_rows(here: StateJacobians) -> list[Array]:
-    """Rows of Signorini's condition, for every kind of contacts."""
-    chain, rows = here.chain, list[Array]()
+def _contact_rows(jacobians: StateJacobians) -> list[Array]:
+    """Compute the rows of Signorini's condition, for every kind of contacts."""
+    chain, rows = jacobians.chain, list[Array]()
     height = notch_heights(chain)[:, None, None]
     stiffness = chain.contact_stiffness[:, None, None]
     for group, response, force, unit_force, contact in zip(
         chain.contact_pairs,
-        here.at.contacts,
-        here.unknowns.contact_force,
-        here.unit.contact_pairs,
-        here.contacts,
+        jacobians.at.contacts,
+        jacobians.unknowns.contact_force,
+        jacobians.unit.contact_pairs,
+        jacobians.contacts,
         strict=True,
     ):
         active = is_active(chain.contact_stiffness, group.has_contact, force, response.gap)[
             ..., None
         ]
-        closing = here.unit.spread(contact.gap)
+        closing = jacobians.unit.spread(contact.gap)
         if chain.contact_flexibility is not None:
             closing = closing + chain.contact_flexibility[:, None, None] * unit_force[None]
         rows.append(jnp.where(active, closing / height, unit_force[None] / (stiffness * height)))
     return rows
 
 
-def _friction_rows(here: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
-    """Rows of the friction law of both edges, of the k-th group."""
-    chain, span, tendon = here.chain, here.at.spans[k], here.tendons[k]
-    log_ratio, group = here.unknowns.log_ratio[k], here.chain.groups[k]
-    crossing, ahead = span.crossing, span.gap_tension / span.tension_ratio[..., 0]
-    turning, tension = (crossing.exit_turning, crossing.entry_turning), (ahead, span.gap_tension)
-    none, one = jnp.zeros_like(ahead), jnp.ones_like(ahead)
+def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
+    """Compute the rows of the friction law at both edges, for the k-th group."""
+    chain, span, tendon = jacobians.chain, jacobians.at.spans[k], jacobians.tendons[k]
+    log_ratio, group = jacobians.unknowns.log_ratio[k], jacobians.chain.groups[k]
+    crossing, tension_before = span.crossing, span.gap_tension / span.tension_ratio[..., 0]
+    turning, tension = (
+        (crossing.exit_turning, crossing.entry_turning),
+        (tension_before, span.gap_tension),
+    )
+    zero, one = jnp.zeros_like(tension_before), jnp.ones_like(tension_before)
 
-    def slope(turns: tuple[Array, Array], pulls: tuple[Array, Array]) -> Array:
+    def slope(turning_change: tuple[Array, Array], tension_change: tuple[Array, Array]) -> Array:
         """Differentiate the limits by turning angles and tensions, where contacts can slide."""
         limits = partial(chain.friction.limits, log_ratio=log_ratio)
-        return slip_mask(group) * jax.jvp(limits, (*turning, tension), (*turns, pulls))[1]
+        return (
+            slip_mask(group)
+            * jax.jvp(limits, (*turning, tension), (*turning_change, tension_change))[1]
+        )
 
     # Edges, then the turning angles that they depend on.
-    by_turning = jnp.stack([slope(way, (none, none)) for way in ((one, none), (none, one))], -1)
-    limit = here.unit.spread(jnp.einsum("ntes,nstz->ntez", by_turning, tendon.turning))
+    by_turning = jnp.stack([slope(unit, (zero, zero)) for unit in ((one, zero), (zero, one))], -1)
+    limit = jacobians.unit.spread(jnp.einsum("ntes,nstz->ntez", by_turning, tendon.turning))
     if chain.friction.constant_loss(*turning) is not None:
-        before = jnp.broadcast_to(here.unit.tension[k][None], tendon.gap_tension.shape)
+        before = jnp.broadcast_to(jacobians.unit.tension[k][None], tendon.gap_tension.shape)
         rows = jnp.stack([before, tendon.gap_tension], axis=2)
-        limit = limit + slope((none, none), (one, one))[..., None] * rows
+        limit = limit + slope((zero, zero), (one, one))[..., None] * rows
     height = notch_heights(chain)[:, None, None, None]
-    stuck = -RATE * (tendon.at_edges / height - here.memory.give * tendon.log_ratio[None])
-    value, bound = trial_log_ratio(chain, log_ratio, span.slid, here.memory, k), span.bound
+    stuck = -AUGMENTATION * (
+        tendon.at_edges / height - jacobians.memory.slip_per_log_ratio * tendon.log_ratio[None]
+    )
+    value, bound = trial_log_ratio(chain, log_ratio, span.slid, jacobians.memory, k), span.bound
     upper, lower = (value >= bound)[..., None], (value <= -bound)[..., None]
     slides = tendon.log_ratio[None] - jnp.where(upper, limit, -limit)
     rows = jnp.where(upper | lower, slides, stuck)

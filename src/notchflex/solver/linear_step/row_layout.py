@@ -1,4 +1,4 @@
-"""Columns of the linearised rows of one flexure: what may change there, in order."""
+"""Layout of the columns of a flexure's linearised rows."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from notchflex.mechanics.chain import Chain
 
 
 class UnitRows(NamedTuple):
-    """Unit rows for every number that may change, in the order of the columns.
+    """Unit rows of all columns, in order.
 
-    Motions of bodies depend on few of them: their rows are short, over the modes and the motions of
-    bodies further back alone, until `spread` puts them among the others.
+    Motions of bodies depend on few columns: their rows are short, over the modes and the motions of
+    earlier bodies only, until `spread` inserts the others.
     """
 
     modes: Array
@@ -42,7 +42,7 @@ class UnitRows(NamedTuple):
         return _pad(rows, sum(len(motion) for motion in self.older))
 
     def spread(self, rows: Array) -> Array:
-        """Short rows over all columns."""
+        """Return short rows as rows over all columns."""
         modes, columns = self.modes.shape
         between = sum(len(rows) for rows in (*self.contact_pairs, *self.log_ratio))
         beyond = columns - rows.shape[-1] - between
@@ -59,8 +59,8 @@ def _pad(rows: Array, columns: int) -> Array:
 class RowLayout:
     """Sizes of the parts of a row: own unknowns, then carried from the base, then from the tip.
 
-    From the tip of a tendon come its released length and its tension times length. Slip over a
-    contact depends on one sum of the two alone; only that is kept where no stroke is commanded.
+    A tendon passes its released length and its tension times length from the tip. Slip over a
+    contact depends only on a sum of the two, which suffices where no stroke is commanded.
     """
 
     modes: int
@@ -92,8 +92,8 @@ class RowLayout:
     def external(self) -> int:
         """Number of columns of the external loads beyond.
 
-        Forces of constant direction change with the turn of the body in whose frame they are
-        given; only their moment comes from the tip.
+        Dead forces change with the rotation of the body in whose frame they are given; only their
+        moment comes from the tip.
         """
         return self.wrench if self.turn and self.follows else self.turn
 

@@ -93,7 +93,7 @@ def relative_motion_jacobian(
 def _by_relative_motion(
     chain: Chain, at: Evaluation, group: TendonGroup | ContactGroup, response: Callable[..., Any]
 ) -> Any:
-    """Slopes of a crossing or contact by the motion relative to the anchor, as last axis."""
+    """Differentiate a crossing or contact by the motion relative to the anchor (last axis)."""
     size = chain.rods.basis.shape[-2]
     anchors = select_anchors(at.anchors, group.back)
     assert anchors is not None  # acts_on_bodies asks for them
@@ -110,7 +110,7 @@ def _by_relative_motion(
 
 
 def _by_modes(chain: Chain, at: Evaluation, group: TendonGroup, modes: Array) -> Any:
-    """Slopes of a crossing by the modes of the flexure where the anchor stays, as last axis."""
+    """Differentiate a crossing by the modes of the flexure, anchor fixed (last axis)."""
     with_pose = at.anchors is not None and group.acts_on_bodies
     anchors = select_anchors(at.anchors, group.back) if with_pose else None
 
@@ -146,15 +146,15 @@ def tendon_jacobian(
     )
     in_body = body_tension * group.body_length[..., None]
     stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None, :, None]
-    here = gap_tension * group.natural_gap[..., None] + in_body
+    own_tension_length = gap_tension * group.natural_gap[..., None] + in_body
     beyond = unit.released_length[k][None]
     released_length = beyond - runs * unit.spread(length)
     if not unit.tension_length:
         tension_length = None
-        at_exit = released_length = released_length + here / stiffness
+        at_exit = released_length = released_length + own_tension_length / stiffness
         at_entry = beyond + in_body / stiffness
     else:
-        tension_length = unit.tension_length[k][None] + here
+        tension_length = unit.tension_length[k][None] + own_tension_length
         at_exit = released_length + tension_length / stiffness
         at_entry = beyond + (unit.tension_length[k][None] + in_body) / stiffness
     return TendonJacobian(
@@ -177,7 +177,7 @@ def _crossing_rows(
     unit: UnitRows,
     motion: RelativeMotionJacobian,
 ) -> tuple[Array, Array, Array | None]:
-    """Short rows of span length, turning angles at both edges and wrench of the k-th group."""
+    """Compute short rows of span length, turning angles and wrench of the k-th group."""
     group, crossing = chain.groups[k], at.spans[k].crossing
     length, turning, wrench = [], [], None
     if group.acts_on_bodies:

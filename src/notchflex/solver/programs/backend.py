@@ -48,7 +48,7 @@ def _chosen(variable: str) -> str:
 
 
 def warn_of_xla(function: str, error: UnsupportedPrimitiveError, stacklevel: int = 2) -> None:
-    """Warn that XLA compiles a function; once for each primitive that lanewise does not support.
+    """Warn once for each unsupported primitive that XLA compiles a function.
 
     Args:
         function: Name of the function.

@@ -1,8 +1,8 @@
 """Numbers of flexures that programs are compiled for, and padding to them.
 
-A program runs for all chains of up to so many flexures; a shorter chain is padded with flexures
-that do nothing. With the body at the base they fill the processor's vectors: within a vector the
-added flexures cost nothing.
+A program serves all chains of up to its number of flexures; a shorter chain is padded with inert
+flexures. With the base body they fill the processor's vectors: within a vector the added flexures
+cost nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from lanewise import WIDTH
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 
-# From so many bodies on (left) numbers of bodies are multiples of so many (right).
+# Above a number of bodies (left), numbers of bodies are multiples of the right number.
 _STEPS = ((0, WIDTH), (2 * WIDTH, 2 * WIDTH), (16 * WIDTH, 4 * WIDTH), (32 * WIDTH, 8 * WIDTH))
 
 
@@ -23,14 +23,14 @@ def capacity(flexures: int) -> int:
     """Return the number of flexures that a program for some flexures is compiled for.
 
     Args:
-        flexures: How many the chain has.
+        flexures: Number of flexures of the chain.
 
     Example:
         >>> [capacity(flexures) for flexures in (1, 5, 8, 27, 40, 100)]
         [7, 7, 15, 31, 47, 111]
     """
     bodies = flexures + 1
-    step = max(own for least, own in _STEPS if bodies > least)
+    step = max(multiple for start, multiple in _STEPS if bodies > start)
     return -(-bodies // step) * step - 1
 
 

@@ -20,49 +20,48 @@ from notchflex._jax import jax, jit, jnp
 from notchflex.solver.programs import shipped, store
 from notchflex.solver.programs.backend import backend, optimisation_level, warn_of_xla
 
-# Rows that XLA's programs are made for; more are cut up, fewer filled up.
-_PIECES = (64, 256, 1024)
-# Programs that a process holds at once; those not used for longest are made or read again.
-_MOST = 96
-# JAX remembers what it traced; it forgets that after so many programs.
-_TRACES = 4
-_making = threading.RLock()
+# Batch sizes of XLA's programs; larger batches are split, smaller ones padded.
+_BATCH_SIZES = (64, 256, 1024)
+# Largest number of programs in memory; the least recently used is dropped.
+_MAX_PROGRAMS = 96
+# JAX's tracing caches are cleared after this number of programs.
+_TRACES_KEPT = 4
+_lock = threading.RLock()
 
 
 class CompiledFunction:
     """A program, and the structure of what it returns.
 
     Args:
-        content: What `_content` returned, with machine code; plain data, nothing that is run when
-            it is read.
+        content: Result of `_content`, with machine code; plain data, reading it executes nothing.
     """
 
     def __init__(self, content: bytes) -> None:
-        """Read it."""
+        """Read the program."""
         head, code = _parts(content)
         *sizes, self._structure = head
         self._program = Program(code, *sizes)
 
     def __call__(self, vectors: Sequence[np.ndarray]) -> Any:
-        """Return what the function returns, in NumPy's arrays."""
+        """Call the program; return NumPy arrays."""
         flat = self._program(vectors)
         rows = () if self._program.by_row is None else flat[0].shape[:1]
         return _rebuild(self._structure, iter(flat), rows)
 
 
 def _content(head: Sequence[Any], body: bytes) -> bytes:
-    """A program as bytes: what it takes and returns, and its text or machine code."""
+    """Serialise a program: signature, and its text or machine code."""
     return json.dumps(head).encode() + b"\n" + body
 
 
 def _parts(content: bytes) -> tuple[list[Any], bytes]:
-    """The head and the body of what `_content` returned."""
+    """Return head and body of a serialised program."""
     head, _, body = content.partition(b"\n")
     return json.loads(head), body
 
 
 def _structure(tree: Any) -> Any:
-    """Structure of a tree of arrays (tuples and dictionaries) as plain data."""
+    """Return the structure of a tree of arrays (tuples and dictionaries) as plain data."""
     if isinstance(tree, dict):
         return {name: _structure(tree[name]) for name in sorted(tree)}
     if isinstance(tree, tuple):
@@ -73,7 +72,7 @@ def _structure(tree: Any) -> Any:
 
 
 def _rebuild(structure: Any, flat: Iterator[np.ndarray], rows: tuple[int, ...]) -> Any:
-    """The tree of a structure, from its arrays in order."""
+    """Rebuild the tree of a structure from its arrays in order."""
     if isinstance(structure, dict):
         return {name: _rebuild(one, flat, rows) for name, one in structure.items()}
     if structure[0] == "tuple":
@@ -93,55 +92,55 @@ class Native:
         lanes: From the other arguments, sizes of axes that rows are laid out along.
     """
 
-    made: ClassVar[OrderedDict[Any, CompiledFunction | None]] = OrderedDict()
+    programs: ClassVar[OrderedDict[Any, CompiledFunction | None]] = OrderedDict()
     compiled: ClassVar[int] = 0
-    """How many programs this process has compiled, not read from disk."""
+    """Number of programs that this process has compiled, not read from disk."""
     traced: ClassVar[int] = 0
-    """How many of them it has traced, not found in the package."""
+    """Number of them that it has traced, not found in the package."""
 
     def __init__(
         self, function: Callable[..., Any], vectors: int, lanes: Callable[..., Sequence[int]]
     ) -> None:
-        """Compile nothing yet."""
+        """Store the function; programs are compiled when called."""
         self._function, self._vectors, self._lanes = function, vectors, lanes
         self._name = f"{function.__module__}.{function.__qualname__}"
         self._jitted: dict[Any, Callable[..., Any]] = {}
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Return the function of some vectors."""
+        """Evaluate the function of single vectors."""
         return self._run("once", None, arguments)
 
     def along(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
-        """Return the function of rows one after the other, with a vector carried from row to row.
+        """Evaluate the function row after row, with a vector carried from row to row.
 
         Args:
             by_row: Which of the vectors are tables, a row for each step.
             arguments: As the function takes them; the first vector is the one carried into the
-                first step. The function returns the vector carried on, and what the step gives.
+                first step. The function returns the vector for the next step, and the results.
 
         Returns:
-            What the steps give, steps as leading axis of all.
+            The results, steps as leading axis of all.
         """
         return self._run("along", by_row, arguments)
 
     def rows(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
-        """Return the function of every row of a batch.
+        """Evaluate the function of every row of a batch.
 
         Args:
             by_row: Which of the vectors are tables, a row for each row of the batch.
             arguments: As the function takes them.
 
         Returns:
-            What the function returns, rows as leading axis of all.
+            The results, rows as leading axis of all.
         """
         on_cpu = jax.default_backend() == "cpu"
-        program = self._made("rows", by_row, arguments) if on_cpu else None
+        program = self._program("rows", by_row, arguments) if on_cpu else None
         if program is not None:
             return program(arguments[: self._vectors])
         tables = arguments[: self._vectors]
         count = max(len(one) for one, rows in zip(tables, by_row, strict=True) if rows)
-        piece = next((size for size in _PIECES if size >= count), _PIECES[-1])
+        piece = next((size for size in _BATCH_SIZES if size >= count), _BATCH_SIZES[-1])
         results: list[Any] = []
         for start in range(0, count, piece):
             index = np.minimum(np.arange(start, start + piece), count - 1)
@@ -150,19 +149,19 @@ class Native:
         return jax.tree.map(lambda *leaves: np.concatenate(leaves)[:count], *results)
 
     def count(self) -> int:
-        """Return how many programs there are of it."""
-        return sum(key[0] is self for key in Native.made)
+        """Return the number of programs of this function in memory."""
+        return sum(key[0] is self for key in Native.programs)
 
     def _run(self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]) -> Any:
-        program = self._made(how, by_row, arguments)
+        program = self._program(how, by_row, arguments)
         if program is None:
             return self._by_xla(how, by_row, arguments)
         return program(arguments[: self._vectors])
 
-    def _made(
+    def _program(
         self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]
     ) -> CompiledFunction | None:
-        """The program for these arguments; None where XLA must make it."""
+        """Return the program for these arguments; None where XLA must compile it."""
         if getattr(jax.config, "jax_disable_jit"):  # noqa: B009
             return None
         vectors, others = arguments[: self._vectors], arguments[self._vectors :]
@@ -170,17 +169,17 @@ class Native:
         shapes = tuple([one.shape[rows:] for one, rows in zip(vectors, per_row, strict=True)])
         key = (self, how, by_row, shapes, others)
         try:
-            program = Native.made[key]
-            Native.made.move_to_end(key)
+            program = Native.programs[key]
+            Native.programs.move_to_end(key)
             return program
         except KeyError:
             pass
-        with _making:  # threads that ask for the same program wait for the one at work
-            if key not in Native.made:
-                Native.made[key] = self._load(how, by_row, shapes, others)
-                while len(Native.made) > _MOST:
-                    Native.made.popitem(last=False)
-            return Native.made[key]
+        with _lock:  # other threads wait while one compiles the same program
+            if key not in Native.programs:
+                Native.programs[key] = self._load(how, by_row, shapes, others)
+                while len(Native.programs) > _MAX_PROGRAMS:
+                    Native.programs.popitem(last=False)
+            return Native.programs[key]
 
     def _load(
         self,
@@ -189,7 +188,7 @@ class Native:
         shapes: Sequence[Any],
         others: tuple[Any, ...],
     ) -> CompiledFunction | None:
-        """The program, from disk or compiled and put there; None where XLA must make it."""
+        """Read the program from disk, or compile and store it; None where XLA must compile it."""
         if backend() == "xla":
             return None
         key = repr((self._name, how, by_row, shapes, others))
@@ -214,19 +213,21 @@ class Native:
         shapes: Sequence[Any],
         others: tuple[Any, ...],
     ) -> bytes | None:
-        """The program as text, traced now; None where XLA must make it."""
+        """Trace the program to text; None where XLA must compile it."""
         function, zeros = partial(self._with, others), [np.zeros(shape) for shape in shapes]
         try:
-            made, tree = lower(
+            program, tree = lower(
                 function, zeros, self._lanes(*others), by_row, carries=how == "along"
             )
         except UnsupportedPrimitiveError as error:
             warn_of_xla(self._name, error)
             return None
         Native.traced += 1
-        if Native.traced % _TRACES == 0:
+        if Native.traced % _TRACES_KEPT == 0:
             jax.clear_caches()
-        content = _content([made.sizes, made.memory, by_row, _structure(tree)], made.text.encode())
+        content = _content(
+            [program.sizes, program.memory, by_row, _structure(tree)], program.text.encode()
+        )
         shipped.record(key, content)
         return content
 
@@ -234,7 +235,7 @@ class Native:
         return self._function(*vectors, *others)
 
     def _by_xla(self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]) -> Any:
-        """The same by a program of XLA."""
+        """Evaluate the function by a program of XLA."""
         others = arguments[self._vectors :]
         key = (how, by_row, others)
         if key not in self._jitted:
@@ -249,7 +250,7 @@ class Native:
 
 
 def _scan(function: Callable[..., Any], by_row: tuple[bool, ...], *vectors: Any) -> Any:
-    """Results of a function of rows one after the other, with the first vector carried."""
+    """Evaluate a function row after row, with the first vector carried."""
     tables = [one if rows else None for one, rows in zip(vectors, by_row, strict=True)]
 
     def step(carry: Any, row: list[Any]) -> Any:
@@ -262,7 +263,7 @@ def _scan(function: Callable[..., Any], by_row: tuple[bool, ...], *vectors: Any)
 def native(
     vectors: int, lanes: Callable[..., Sequence[int]]
 ) -> Callable[[Callable[..., Any]], Native]:
-    """Make a function a compiled one; see `Native`."""
+    """Decorate a function to be compiled; see `Native`."""
     return lambda function: Native(function, vectors, lanes)
 
 

@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from notchflex.loads.command import Command
 from notchflex.solver.continuation import solve_load_step
-from notchflex.solver.derived.solved_state import notch_lips
+from notchflex.solver.derived.solved_state import notch_contact
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.capacity import pad_rows
 from notchflex.solver.programs.compiled import native
@@ -50,10 +50,10 @@ def _solve_contacts(
     command_layout: PytreeLayout,
     state_layout: PytreeLayout,
 ) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Contact forces and gaps of one load, and whether it converged; nothing is carried on."""
+    """Compute contact forces and gaps of one load, and whether it converged."""
     chain, settings = chain_layout.unpack(vector), Settings.of(numbers)
     command, last = command_layout.unpack(load), state_layout.unpack(start)
     result = solve_load_step(chain, command, last, settings)
     (unknowns, base_tension), memory, _, applied = result.solved
     at = evaluate(chain, unknowns, memory, base_tension, applied)
-    return carried, (*notch_lips(chain, unknowns, at), result.converged)
+    return carried, (*notch_contact(chain, unknowns, at), result.converged)

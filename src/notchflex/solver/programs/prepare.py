@@ -1,4 +1,4 @@
-"""A robot prepared to be solved again and again: its chain, as arrays and as one vector."""
+"""A robot prepared for repeated solves: its chain, as arrays and as one vector."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from notchflex.solver.solver_state import SolverState, at_rest, unloaded
 
 @dataclass(frozen=True, eq=False)
 class PreparedChain:
-    """A chain, and how it and what belongs to it are packed.
+    """A chain, with the layouts of chain, states and commands.
 
     Attributes:
         chain: The chain, as plain arrays.
@@ -54,42 +54,42 @@ class PreparedChain:
 
     @cached_property
     def long(self) -> PreparedChain:
-        """The robot padded to as many flexures as programs are compiled for.
+        """The robot padded to the number of flexures that programs are compiled for.
 
-        Its tendons are taken to touch the wall at every edge of every gap; where they do depends on
-        the own chain (`run.SolverRun`), so that it is not a part of a program.
+        Its tendons have contacts at every edge of every gap; those of the own chain are selected
+        afterwards (`run.SolverRun`), so that a program does not depend on them.
         """
         chain = self.chain
         more = padded(chain, capacity(chain.flexures), chain.contacts.shape[1])
         edges = np.tile(np.arange(2 * more.flexures), (chain.tendons, 1))
         return PreparedChain(dataclasses.replace(more, contacts=edges))
 
-    def places(self, fields: Mapping[str, Any]) -> Int[np.ndarray, " m"]:
-        """Return where the vector of the long chain holds some fields of the chain, flattened.
+    def field_indices(self, fields: Mapping[str, Any]) -> Int[np.ndarray, " m"]:
+        """Return the indices of some fields of the chain in the vector of the long chain.
 
         Args:
             fields: As `chain.laws` returns them.
         """
-        if (key := tuple(fields)) not in self._places:
+        if (key := tuple(fields)) not in self._field_indices:
             form = self.long.chain_layout
             every: Chain = jax.tree.unflatten(form.structure, form.indices)
             long = {name: getattr(every, name) for name in fields}
             own = jax.tree.map(lambda at, leaf: at[tuple(map(slice, leaf.shape))], long, fields)
-            self._places[key] = flat(own)
-        return self._places[key]
+            self._field_indices[key] = flat(own)
+        return self._field_indices[key]
 
     @cached_property
-    def _places(self) -> dict[Any, Int[np.ndarray, " m"]]:
+    def _field_indices(self) -> dict[Any, Int[np.ndarray, " m"]]:
         return {}
 
     def with_fields(self, fields: Mapping[str, Any]) -> PreparedChain:
-        """Return a robot of the same shape with other laws of material and friction.
+        """Return a robot of the same shape with other laws of material or friction.
 
         Args:
             fields: Those of the chain that change, as `chain.laws` returns them.
         """
         vector = self.long.vector.copy()
-        vector[self.places(fields)] = flat(fields)
+        vector[self.field_indices(fields)] = flat(fields)
         other = PreparedChain(dataclasses.replace(self.chain, **fields))
         long = PreparedChain(self.long.chain_layout.unpack(vector))
         for new, old in ((other, self), (long, self.long)):
@@ -115,7 +115,7 @@ class PreparedChain:
 
     @cached_property
     def rest_carried(self) -> np.ndarray:
-        """The same, and that nothing has failed yet: the beginning of a path."""
+        """The free robot as a vector, with the flag that no load has failed: start of a path."""
         return np.append(self.rest_vector, 1.0)
 
     @cached_property
@@ -124,7 +124,7 @@ class PreparedChain:
         return Shape.form(self.chain.flexures, self.chain.tendons)
 
     def command_layout(self, commands: Command) -> PytreeLayout:
-        """Return the layout of one of some loads: by tensions alone, or some by stroke."""
+        """Return the layout of one load: tensions alone, or some strokes."""
         return self._stroke_layout if commands.by_stroke is not None else self._tension_layout
 
     @cached_property
@@ -145,7 +145,7 @@ class PreparedChain:
         return pad_rows(own.pack(commands, leading=1), own, long), long
 
 
-# What robots of one shape share.
+# Cached properties that robots of one shape share.
 _OF_SHAPE = (
     *("chain_layout", "rest", "rest_vector", "rest_carried", "state", "shape"),
     *("_tension_layout", "_stroke_layout"),
@@ -153,7 +153,7 @@ _OF_SHAPE = (
 
 
 def flat(tree: Any) -> np.ndarray:
-    """Return all numbers of a tree, perhaps none, as one vector."""
+    """Return all numbers of a tree as one vector; it may be empty."""
     leaves = [np.ravel(leaf) for leaf in jax.tree.leaves(tree)]
     return np.concatenate([np.zeros(0, int), *leaves])
 
@@ -170,7 +170,7 @@ def prepare(
 ) -> PreparedChain:
     """Prepare a robot; for the arguments see `notchflex.mechanics.chain.assemble`.
 
-    The last robots are remembered: a control loop solves the same one again and again.
+    The last robots are cached: a control loop solves the same one repeatedly.
     """
     return PreparedChain(
         assemble(robot, level, loaded=loaded, follows=follows, refinement=refinement, flat=flat)
@@ -178,7 +178,7 @@ def prepare(
 
 
 def pad_prepared(ready: PreparedChain, flexures: int, edges: int) -> PreparedChain:
-    """Pad a robot to be solved beside longer ones; for the arguments see `chain.padded`."""
+    """Pad a robot to the size of longer ones; for the arguments see `chain.padded`."""
     chain = ready.chain
     if (chain.flexures, chain.contacts.shape[1]) == (flexures, edges):
         return ready

@@ -1,7 +1,7 @@
 """Layout of many arrays as one vector: arguments and results of compiled programs.
 
-A chain has some sixty arrays. Handed over one by one they take longer than the solution of a small
-robot; as one vector they cost nothing, and a batch of robots is a table of vectors.
+A chain has some sixty arrays. Passing them one by one takes longer than solving a small robot; one
+vector costs nothing, and a batch of robots is a table of vectors.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from notchflex._jax import array_module, jax
 
 
 class PytreeLayout:
-    """How a tree of arrays is laid out in a vector of floats, leaf after leaf.
+    """Layout of a tree of arrays in a vector of floats, leaf after leaf.
 
-    Layouts are kept: trees of the same structure have the same object, so that compiled programs
+    Layouts are cached: trees of the same structure share one object, so that compiled programs
     distinguish them by identity.
     """
 
@@ -37,7 +37,7 @@ class PytreeLayout:
         return [part.reshape(shape) for part, shape in zip(parts, self.shapes, strict=True)]
 
     def __repr__(self) -> str:
-        """Return all of it: kept programs are found by this."""
+        """Return the full content: the key of stored programs."""
         return f"PytreeLayout({self.structure}, {self.shapes}, {self.kinds})"
 
     @classmethod
@@ -52,9 +52,9 @@ class PytreeLayout:
         return cls._known[key]
 
     def pack(self, tree: Any, leading: int = 0) -> Any:
-        """Return the leaves of a tree as one vector, with so many leading axes.
+        """Return the leaves of a tree as one vector, with a number of leading axes.
 
-        A vector of NumPy where all leaves are plain.
+        It is a NumPy vector where all leaves are NumPy arrays.
         """
         leaves = self.structure.flatten_up_to(tree)
         xp = array_module(*leaves)
@@ -65,7 +65,7 @@ class PytreeLayout:
         return xp.concatenate(flat, axis=-1, dtype=float)
 
     def unpack(self, vector: Any) -> Any:
-        """Return the tree of a vector (NumPy's or JAX's), with the vector's leading axes."""
+        """Return the tree of a vector (NumPy or JAX), with the vector's leading axes."""
         leaves = [self.leaf(vector, number) for number in range(len(self.shapes))]
         return jax.tree.unflatten(self.structure, leaves)
 

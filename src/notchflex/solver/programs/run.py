@@ -1,9 +1,9 @@
 """The compiled programs: a path of loads with history, or many loads each from rest.
 
-Compiled once for a form (kinds of flexures, modes, tendons and laws); a new load or a new robot of
-the same form runs the same program. The number of loads is known only when a program is called, and
-chains are padded to one of few numbers of flexures (`capacity.py`). Derived quantities of the
-states are another program, run when they are asked for.
+A program is compiled once for a form (kinds of flexures, modes, tendons and laws); a new load or a
+new robot of the same form runs the same program. The number of loads is an argument, and chains are
+padded to one of few numbers of flexures (`capacity.py`). Another program computes derived
+quantities of the states on demand.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _STATUS = 7
 
 
 def _column(number: int, kind: type = float) -> Any:
-    """A property with a column of the status of every load."""
+    """Make a property that returns a column of the status of every load."""
 
     def values(run: SolverRun) -> np.ndarray:
         return run.table[:, number - _STATUS].astype(kind, copy=False)
@@ -54,8 +54,8 @@ class SolverRun:
         converged: Whether the load was reached.
         tried: Whether it was tried at all; after a failure the rest of a path is not.
         reached: Fraction of the load step that was reached.
-        parts: Number of substeps that converged.
-        part_before: Fraction of the load step at which the last of them began.
+        substeps: Number of substeps that converged.
+        fraction_before: Fraction of the load step at which the last of them began.
     """
 
     residual: Float[np.ndarray, " s"] = _column(0)
@@ -63,8 +63,8 @@ class SolverRun:
     converged: Bool[np.ndarray, " s"] = _column(2, bool)
     tried: Bool[np.ndarray, " s"] = _column(3, bool)
     reached: Float[np.ndarray, " s"] = _column(4)
-    parts: Int[np.ndarray, " s"] = _column(5, int)
-    part_before: Float[np.ndarray, " s"] = _column(6)
+    substeps: Int[np.ndarray, " s"] = _column(5, int)
+    fraction_before: Float[np.ndarray, " s"] = _column(6)
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class SolverRun:
         table: np.ndarray,
         from_start: Bool[np.ndarray, " s"],
     ) -> None:
-        """Take what the program returned."""
+        """Store the table that the program returned."""
         self._prepared, self.first, self.table = prepared, first, table
         self.from_start = from_start
 
@@ -128,7 +128,7 @@ class SolverRun:
     def before(self, name: str) -> np.ndarray:
         """Return a quantity of the state before the first load.
 
-        Of its shape tension and stroke are known; "material" is the memory of the material.
+        Of the reported shape only tension and stroke exist; "material" is the material's memory.
         """
         if name not in ("tension", "stroke", "material"):
             return self._derived[name][0]
@@ -156,7 +156,7 @@ class SolverRun:
         return stability(self._prepared, commands, self.solved)
 
     def stable(self, commands: Command) -> Bool[np.ndarray, " s"]:
-        """Return whether each state is stable: what the two say, found at less cost."""
+        """Return whether each state is stable, at less cost than `stability`."""
         return stable(self._prepared, commands, self.solved)
 
 
@@ -168,7 +168,7 @@ def run(
     *,
     each_from_start: bool | Bool[np.ndarray, " s"],
 ) -> SolverRun:
-    """Follow loads, each from the state before or each from the same one.
+    """Solve loads in sequence, each from the state before or each from the same one.
 
     Args:
         prepared: The robot.
@@ -198,7 +198,7 @@ def run(
 
 @lru_cache(maxsize=64)
 def _numbers(settings: Settings) -> Float[np.ndarray, " settings"]:
-    """The settings as an array, kept for the next time."""
+    """Return the settings as an array."""
     return np.array(settings.numbers)
 
 
@@ -214,9 +214,9 @@ def _follow(
     command_layout: PytreeLayout,
     state_layout: PytreeLayout,
 ) -> tuple[Float[Array, " state+1"], Float[Array, " row"]]:
-    """The two states of a load, their shape, and how the load was reached.
+    """Solve one load; return both its states, their reported shape and the solver's status.
 
-    Carried from load to load is the last solved state, and whether all loads since the start
+    The last solved state is carried from load to load, with a flag that all loads since the start
     converged.
     """
     chain: Chain = chain_layout.unpack(vector)
@@ -242,9 +242,9 @@ def _follow(
 
 
 def _status(result: LoadStepResult) -> Float[Array, " status"]:
-    """How a load was reached, in the order of the columns of `SolverRun`."""
+    """Return the solver's status, in the order of the columns of `SolverRun`."""
     status = [result.residual, result.iterations, result.converged, True, result.reached]
-    status += [result.parts, result.part_before]
+    status += [result.substeps, result.fraction_before]
     return jnp.stack([jnp.asarray(value, float) for value in status])
 
 
@@ -256,7 +256,7 @@ def _quantities(
     chain_layout: StaticStructure,
     state_layout: PytreeLayout,
 ) -> tuple[Array, dict[str, Array]]:
-    """Derived quantities of a state beyond its shape, by name; nothing is carried on."""
+    """Compute derived quantities of a state beyond its reported shape, by name."""
     return carried, quantities(chain_layout.unpack(vector), state_layout.unpack(state))
 
 
@@ -269,6 +269,6 @@ def _snapped(
     chain_layout: StaticStructure,
     state_layout: PytreeLayout,
 ) -> tuple[Array, Array]:
-    """Notches that snapped between two states; nothing is carried on."""
+    """Find the notches that snapped between two states."""
     states = (state_layout.unpack(state) for state in (before, after))
     return carried, snapped_notches(chain_layout.unpack(vector), *states)

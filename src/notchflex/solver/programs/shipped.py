@@ -21,7 +21,7 @@ FOLDER = store.PACKAGE / "shipped_programs"
 
 
 def read(key: str) -> bytes | None:
-    """Return what was recorded under a key; None where nothing is, or it is damaged."""
+    """Return the content recorded under a key; None where it is missing or damaged."""
     try:
         return lzma.decompress((FOLDER / _name(key)).read_bytes())
     except (OSError, EOFError, lzma.LZMAError):
@@ -29,14 +29,14 @@ def read(key: str) -> bytes | None:
 
 
 def record(key: str, content: bytes) -> None:
-    """Keep content under a key where a wheel is being built."""
+    """Record content under a key while a wheel is built."""
     folder = os.environ.get(RECORD)
     if folder:
         (Path(folder) / _name(key)).write_bytes(lzma.compress(content, preset=2))
 
 
 def count() -> int:
-    """Return how many programs the package carries."""
+    """Return the number of programs in the package."""
     return sum(1 for _ in FOLDER.glob("*.xz"))
 
 

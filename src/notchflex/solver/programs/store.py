@@ -23,14 +23,14 @@ PACKAGE = Path(__file__).parents[2]
 """Folder of notchflex."""
 
 VARIABLE = "JAX_COMPILATION_CACHE_DIR"
-"""Environment variable: the folder to keep programs in; empty for none."""
+"""Environment variable: the folder of stored programs; empty for none."""
 
-MOST_BYTES = 256 * 2**20
-"""Programs that were not used for longest are removed beyond this."""
+MAX_BYTES = 256 * 2**20
+"""Size beyond which the least recently used programs are removed."""
 
 _DIGEST = 32  # bytes
 _PREFIX = "program-"
-# Folders of notchflex whose code no program is made from. All of `lanewise` makes programs.
+# Folders of notchflex that no program depends on. Programs depend on all of `lanewise`.
 _NOT_COMPILED = {"bench", "cli", "comparison", "fit", "plotting", "viewer"}
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL
@@ -38,14 +38,14 @@ _POSIX = hasattr(os, "geteuid") and os.open in os.supports_dir_fd
 
 
 class Usage(NamedTuple):
-    """What a folder of programs holds."""
+    """Number and size of the programs of a folder."""
 
     programs: int
     size: int
 
 
 def chosen_folder() -> Path | None:
-    """Return where compiled code of the user is kept; None where it is not kept.
+    """Return the folder of the user's compiled code; None where it is not stored.
 
     `JAX_COMPILATION_CACHE_DIR` chooses another folder than the user's cache folder. Its value may
     be the address of a store that JAX can write to and this library cannot.
@@ -60,13 +60,13 @@ def chosen_folder() -> Path | None:
 
 
 def program_folder() -> Path | None:
-    """Return the folder of programs for this kind of processor, made if need be and checked."""
+    """Return the folder of programs for this kind of processor, created if needed and checked."""
     root = chosen_folder()
     return None if root is None else _checked(root / f"programs-{_machine()}")
 
 
 def read(key: str) -> bytes | None:
-    """Return what is kept under a key; None where there is nothing that is whole and private."""
+    """Return the content stored under a key; None where none is complete and private."""
     root = program_folder()
     if root is None:
         return None
@@ -84,7 +84,7 @@ def read(key: str) -> bytes | None:
 
 
 def write(key: str, content: bytes) -> None:
-    """Keep content under a key, whole or not at all; nothing happens where it cannot be kept."""
+    """Store content under a key atomically; do nothing where it cannot be stored."""
     root = program_folder()
     if root is None:
         return
@@ -102,14 +102,14 @@ def write(key: str, content: bytes) -> None:
 
 
 def usage() -> Usage:
-    """Return how many programs are kept for this processor, and their size in bytes."""
+    """Return number and size (bytes) of the stored programs for this processor."""
     folder = program_folder()
     files = [] if folder is None else _files(folder)
     return Usage(len(files), sum(size for _, size, _ in files))
 
 
 def clear() -> Usage:
-    """Remove all kept programs of this processor; return what was there."""
+    """Remove all stored programs of this processor; return their number and size."""
     before, folder = usage(), program_folder()
     for _, _, name in [] if folder is None else _files(folder):
         with suppress(OSError):
@@ -119,7 +119,7 @@ def clear() -> Usage:
 
 @cache
 def code_digest() -> str:
-    """Return a digest of the code that programs are made from."""
+    """Return a digest of the code that programs depend on."""
     compiler = find_spec("lanewise")
     assert compiler is not None
     assert compiler.submodule_search_locations is not None
@@ -136,7 +136,7 @@ def code_digest() -> str:
 
 @cache
 def made_from() -> str:
-    """Return a digest of what programs are made from beside their arguments: code and versions."""
+    """Return a digest of code and versions, which programs depend on besides their arguments."""
     from importlib.metadata import version
 
     versions = [version(name) for name in ("jax", "jaxlib", "llvmlite")]
@@ -150,7 +150,7 @@ def _name(key: str) -> str:
 
 @lru_cache(maxsize=16)
 def _checked(folder: Path) -> Path | None:
-    """Return a folder if it may be trusted; checked again whenever it is opened."""
+    """Return a folder if it is private; it is checked again whenever it is opened."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         folder.mkdir(mode=0o700, exist_ok=True)
@@ -165,7 +165,7 @@ def _checked(folder: Path) -> Path | None:
 
 
 class _Opened(NamedTuple):
-    """A folder that was checked; with a descriptor, the very one that was."""
+    """A checked folder, with its descriptor where the system has one."""
 
     folder: Path
     descriptor: int | None
@@ -182,7 +182,7 @@ class _Opened(NamedTuple):
 
 @contextmanager
 def _opened(folder: Path) -> Generator[_Opened]:
-    """Open the folder, so that the one that was checked is the one that is used."""
+    """Open a folder and check it through its descriptor, so that no other can replace it."""
     if not _POSIX:
         yield _Opened(folder, None)
         return
@@ -199,28 +199,28 @@ def _opened(folder: Path) -> Generator[_Opened]:
 
 
 def _private(status: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
-    """Whether a file or folder is the user's own and nobody else can write to it."""
+    """Return whether a file or folder belongs to the user and nobody else can write to it."""
     own = not _POSIX or (status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE)
     return is_kind(status.st_mode) and own
 
 
 def _files(folder: Path) -> list[tuple[float, int, str]]:
-    """Time of the last use, size and name of every program."""
-    found: list[tuple[float, int, str]] = []
+    """Return time of the last use, size and name of every program."""
+    files: list[tuple[float, int, str]] = []
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
             if entry.is_file(follow_symlinks=False):  # those of JAX too
                 about = entry.stat(follow_symlinks=False)
-                found.append((about.st_mtime, about.st_size, entry.name))
-    return found
+                files.append((about.st_mtime, about.st_size, entry.name))
+    return files
 
 
 def _shrink(folder: Path) -> None:
-    """Remove what was not used for longest until the rest is small enough."""
+    """Remove the least recently used programs until the rest is small enough."""
     files = sorted(_files(folder))
     left = sum(size for _, size, _ in files)
     for _, size, name in files:
-        if left <= MOST_BYTES:
+        if left <= MAX_BYTES:
             return
         with suppress(OSError):
             (folder / name).unlink()
@@ -252,5 +252,5 @@ def _machine() -> str:
     return hashlib.sha256("\n".join(facts).encode()).hexdigest()[:12]
 
 
-__all__ = ["MOST_BYTES", "PACKAGE", "VARIABLE", "Usage", "chosen_folder", "clear", "code_digest"]
+__all__ = ["MAX_BYTES", "PACKAGE", "VARIABLE", "Usage", "chosen_folder", "clear", "code_digest"]
 __all__ += ["made_from", "program_folder", "read", "usage", "write"]

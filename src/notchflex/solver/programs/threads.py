@@ -1,4 +1,4 @@
-"""Threads that work on the pieces of a table, started once: each keeps its memory for the next."""
+"""A pool of threads for the pieces of a table, started once: each reuses its memory."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import TypeVar
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
 
-# So many pieces wait for each thread, so that none is idle while results are put together.
+# Number of pieces queued per thread, so that none is idle while results are collected.
 _AHEAD = 4
 
 
 def number_of_cores() -> int:
-    """Return the number of threads where the user sets none."""
+    """Return the default number of threads."""
     return os.cpu_count() or 1
 
 
@@ -34,10 +34,10 @@ if hasattr(os, "register_at_fork"):
 def on_cores(
     work: Callable[[Piece], Result], pieces: Iterable[Piece], cores: int | None = None
 ) -> Generator[Result]:
-    """Work on pieces in several threads; yield the results in the order of the pieces.
+    """Process pieces in several threads; yield the results in the order of the pieces.
 
-    Only a few pieces are begun ahead, so that other callers have their turn. Closed early
-    (`contextlib.closing`), no more of them are begun, and those at work are waited for.
+    Only a few pieces are queued, so that other callers can run. After an early close
+    (`contextlib.closing`) no more pieces start, and the function waits for those that run.
 
     Args:
         work: Function of a piece.

@@ -106,7 +106,7 @@ def examination() -> dict[str, Any]:
             "folder": None if folder is None else str(folder),
             "programs": kept.programs,
             "bytes": kept.size,
-            "most_bytes": store.MOST_BYTES,
+            "most_bytes": store.MAX_BYTES,
             "shipped": shipped.count(),
         },
     }

@@ -1,4 +1,4 @@
-"""Strips between slots with the walls that they turn into: their rods, and where these hold."""
+"""Strips between slots with their roots in the walls: rods, and ranges of validity."""
 
 from notchflex.mechanics.flexure.roots.rooted_strip import RootedStrip as RootedStrip
 from notchflex.mechanics.flexure.roots.rooted_strip import round_strip as round_strip

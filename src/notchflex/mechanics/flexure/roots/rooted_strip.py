@@ -1,9 +1,9 @@
 r"""The strip between two slots with the walls that it turns into, from the drawing.
 
-A strip does not end at the tips of its slots: there it turns into the wall of a rigid piece, which
-yields. Its rod goes on a little beyond the tip, turns at a right angle and runs along the wall.
-That is the root rotation of a strip on an elastic body, proportional to $M / (E b t^2)$, at the
-place where finite elements have it. The two walls of the strip are curved bars:
+A strip does not end at the tips of its slots: there it passes into the wall of a rigid piece, which
+deforms. Its rod continues slightly beyond the tip, turns at a right angle and runs along the wall.
+This models the root rotation of a strip on an elastic body, proportional to $M / (E b t^2)$, at the
+position found by finite elements. The two walls of the strip are curved bars:
 
 * at the angle φ from its middle a wall is twisted by $M\sin\varphi$ where it is bent by
   $M\cos\varphi$, which makes the strip more flexible by $\tan^2\varphi\,E I/(G J)$ of the wall, and
@@ -15,7 +15,7 @@ place where finite elements have it. The two walls of the strip are curved bars:
 
 The shear areas of strip and root are 5/6 of the whole. The constants were fitted, all at once, to
 the cells of finite elements in `tests/reference/fem_strip_cells.csv` and `fem_u_link_cells.csv`
-(`benchmarks/fe`); `validity_warnings` of a notch tells how far they hold.
+(`benchmarks/fe`); `validity_warnings` of a notch lists dimensions outside their range.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from notchflex.mechanics.flexure.roots.sideways import (
 )
 from notchflex.robot import StripNotch, Tube, ULink
 
-# How far a strip goes on beyond the tip of the slot, over its size (`_size`).
+# Length of a strip beyond the tip of the slot, over its size (`_size`).
 _BEYOND = 0.267
 # The same for the run along the wall, at sharp and at round tips; and over the slot's radius.
 _ALONG_SHARP, _ALONG_ROUND, _ALONG_RADIUS = 1.208, 1.016, 0.544
-# How far a strip reaches round the end of a slot on each side, over the radius of the slot.
+# Length of a strip round the end of a slot on each side, over the radius of the slot.
 _ROUND_END = 0.662
 # Second moment of a root over that of the strip at the tip, sharp or round.
 _BENDING_SHARP, _BENDING_ROUND = 2.098, 2.695
@@ -49,8 +49,8 @@ class RootedStrip(NamedTuple):
     Attributes:
         thickness: Thickness t along the tube, mm.
         free_length: Length between the tips of the slots, mm.
-        beyond: How far it goes on beyond the tips, mm.
-        along: How far it then runs along the wall, mm.
+        beyond: Length beyond the tips, mm.
+        along: Length along the wall, mm.
         bending: Second moment of the root over that of the strip at the tip.
         sheared: Length of a tube that shears like the wall there, mm.
         middle: Height of its middle above the proximal face, mm.
@@ -72,7 +72,7 @@ class RootedStrip(NamedTuple):
 
 
 def sharp_strip(notch: StripNotch, tube: Tube) -> RootedStrip:
-    """Strip between triangular notches."""
+    """Describe the strip between triangular notches."""
     factor = notch.wall_width_in(tube) / (tube.outer_diameter - tube.inner_diameter)
     size = _size(notch.strip_thickness, tube, factor)
     return RootedStrip(
@@ -90,7 +90,7 @@ def sharp_strip(notch: StripNotch, tube: Tube) -> RootedStrip:
 
 
 def round_strip(notch: ULink, tube: Tube) -> RootedStrip:
-    """Strip between slots with round ends."""
+    """Describe the strip between slots with round ends."""
     size = _size(notch.strip_thickness, tube)
     return RootedStrip(
         thickness=notch.strip_thickness,
@@ -106,6 +106,6 @@ def round_strip(notch: ULink, tube: Tube) -> RootedStrip:
 
 
 def _size(thickness: float, tube: Tube, width_factor: float = 1.0) -> float:
-    """Thickness to which the lengths of a root are proportional, mm."""
+    """Compute the thickness to which the lengths of a root are proportional, mm."""
     wall = width_factor * (tube.outer_radius - tube.inner_radius)
     return thickness * (thickness / wall) ** _POWER

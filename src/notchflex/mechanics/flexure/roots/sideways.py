@@ -1,4 +1,4 @@
-r"""How a strip with its roots answers loads out of its plane, from how it answers those in it.
+r"""Compliance of a strip with its roots out of its plane, from its compliance in the plane.
 
 Turned about the strip's axis or the tube's, the strip's two walls, the distance c from the tube
 axis, move in the plane against each other: one up and one down, or one to each side. By their
@@ -51,7 +51,7 @@ SHARP = Sideways(0.9841, 1.1015, (0.6014, 0.8737), 0.6053)
 # Shares of the compliances to moments about the strip and the tube that lie in the walls.
 _ON_WALLS = (0.5, 0.5)
 # Most of the coupling, over the root of the product of what it couples.
-_MOST = 0.49
+_MAX_COUPLING = 0.49
 
 
 class Walls(NamedTuple):
@@ -119,8 +119,8 @@ def turned_compliance(
     twisted = rule.twist * torsion / (2.0 * (1.0 + poisson_ratio)) / walls.length
     strip = 1.0 / (rule.against * arm / plane[1, 1] + twisted)
     tube = (rule.across[0] + rule.across[1] * walls.inner / walls.outer) * plane[0, 0] / arm
-    most = _MOST * float(np.sqrt(strip * tube))
-    return strip, tube, float(np.clip(-rule.coupling * plane[0, 1] / arm, -most, most))
+    limit = _MAX_COUPLING * float(np.sqrt(strip * tube))
+    return strip, tube, float(np.clip(-rule.coupling * plane[0, 1] / arm, -limit, limit))
 
 
 def with_sideways(

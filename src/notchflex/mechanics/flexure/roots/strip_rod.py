@@ -1,4 +1,4 @@
-"""The rod of a strip with its roots, from the proximal wall to the distal one."""
+"""Rod of a strip with its roots, from the proximal wall to the distal one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from notchflex.robot import Tube
 
 
 def _walls(strip: RootedStrip, tube: Tube) -> Walls:
-    """The strip's two walls."""
+    """Return the strip's two walls."""
     return Walls(
         outer=tube.outer_radius,
         inner=tube.inner_radius,
@@ -70,8 +70,8 @@ def rooted_strip_rod(
     more = refinement
     counts = (3 + more, 2 + more, 6 + 3 * more, 2 + more, 3 + more)
     points = RodQuadrature(ends, counts, counts)
-    place = points.every
-    course = _course(place, ends)
+    position = points.every
+    course = _course(position, ends)
     section = strip_sections(strip, tube, *course[:2], ends[-1], poisson_ratio)
     middle = np.array([0.0, 0.0, strip.middle])
     start, end = (_poses(strip, *_course(np.array([at]), ends)) for at in (0.0, ends[-1]))
@@ -83,7 +83,7 @@ def rooted_strip_rod(
     moments, forces = 3 + 3 * refinement, 1 + 2 * refinement
     basis = wrench_modes(
         poses,
-        2.0 * place / ends[-1] - 1.0,
+        2.0 * position / ends[-1] - 1.0,
         points.weight,
         section,
         middle,
@@ -91,7 +91,7 @@ def rooted_strip_rod(
         forces,
         poisson_ratio,
     )
-    onward = Motion(
+    poses_to_end = Motion(
         constant(np.concatenate([poses.rotation, end.rotation[None]])),
         constant(np.concatenate([poses.translation, end.translation[None]])),
     )
@@ -99,8 +99,8 @@ def rooted_strip_rod(
         points,
         start,
         between(end, shifted(z=distal)),
-        between(start, onward),
-        np.tile(STRAIGHT, (len(place), 1)),
+        between(start, poses_to_end),
+        np.tile(STRAIGHT, (len(position), 1)),
     )
     in_plane = moments + 2 * forces
     return build_rod(
@@ -113,19 +113,19 @@ def rooted_strip_rod(
 
 
 def _course(
-    place: Float[np.ndarray, " k"], ends: tuple[float, ...]
+    position: Float[np.ndarray, " k"], ends: tuple[float, ...]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places along the strip and above its middle, mm, and whether they lie on the wall."""
+    """Return positions along the strip and above its middle, mm, and a mask of the walls."""
     half = 0.5 * ends[-1]
-    beside = np.clip(place - half, ends[1] - half, half - ends[1])
-    above = place - half - beside
-    return beside, above, above != 0.0
+    along = np.clip(position - half, ends[1] - half, half - ends[1])
+    above = position - half - along
+    return along, above, above != 0.0
 
 
-def _poses(strip: RootedStrip, beside: ArrayLike, above: ArrayLike, on_wall: ArrayLike) -> Motion:
-    """Poses along the free rod, z along it, y out of the plane, in the notch's frame."""
-    x = -strip.hand * np.asarray(beside)
-    place = np.stack([x, np.zeros_like(x), strip.middle + np.asarray(above)], axis=-1)
+def _poses(strip: RootedStrip, along: ArrayLike, above: ArrayLike, on_wall: ArrayLike) -> Motion:
+    """Compute poses along the free rod: z along it, y out of the plane."""
+    x = -strip.hand * np.asarray(along)
+    position = np.stack([x, np.zeros_like(x), strip.middle + np.asarray(above)], axis=-1)
     about_y = np.where(on_wall, 0.0, -0.5 * np.pi * strip.hand)
     turns = rotation_about(constant(about_y[:, None] * np.array([0.0, 1.0, 0.0])))
-    return Motion(turns, constant(place))
+    return Motion(turns, constant(position))

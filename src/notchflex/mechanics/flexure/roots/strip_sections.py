@@ -17,25 +17,25 @@ from notchflex.robot import Tube
 
 # Twisting c of a root.
 _TWIST = 2.243
-# How far beyond the tips walls are clamped, over the root of the thicknesses of strip and wall.
+# Distance beyond the tips at which walls are clamped, over the root of both thicknesses.
 _CLAMP, _CLAMP_SIDEWAYS = 0.818, 0.97
 _SHEAR_AREA = 5.0 / 6.0
-_STEEPEST = 0.95  # sin² of the angle at which a wall is at most met
+_STEEPEST = 0.95  # largest sin² of the angle to a wall
 _RIGID = 1e6  # area of a root that does not shear, over that of the strip
 
 
 def strip_sections(
     strip: RootedStrip,
     tube: Tube,
-    beside: np.ndarray,
+    along: np.ndarray,
     above: np.ndarray,
     length: float,
     poisson_ratio: float,
 ) -> FibreSection:
-    """Return the sections of the strip, its walls as wide as the tube's there, and of its roots."""
-    # Beyond the tips of the slots the walls keep the width that they have there.
+    """Compute the sections of the strip (as wide as the tube's walls) and of its roots."""
+    # Beyond the tips of the slots the width of the walls is constant.
     tip = 0.5 * strip.free_length
-    at = np.minimum(np.abs(beside), tip)
+    at = np.minimum(np.abs(along), tip)
     outer = np.sqrt(tube.outer_radius**2 - at**2)
     inner = np.sqrt(np.maximum(tube.inner_radius**2 - at**2, 0.0))
     middle, width = 0.5 * (outer + inner), strip.width_factor * (outer - inner)
@@ -48,7 +48,7 @@ def strip_sections(
     bar = two_walls(wall, strip.thickness, 0.0)
     twisting = ratio * float(bar.second_moment_weak / bar.torsion_constant)
     area = np.asarray(walls.area)
-    along_wall, root = above != 0.0, (above != 0.0) | (np.abs(beside) > tip)
+    along_wall, root = above != 0.0, (above != 0.0) | (np.abs(along) > tip)
     in_root = (1.0 + _TWIST * oblique * strip.thickness / wall) / strip.bending - 1.0
     arch = _arch(strip.thickness, wall, radius, tip) * area / strip.free_length
     frame = _frame(strip, wall, width) * area / ratio
@@ -75,7 +75,7 @@ def strip_sections(
 
 
 def _arch(thickness: float, wall: float, radius: float, tip: float) -> float:
-    """Stretch of two walls by straightening as arches, times E over the force, 1/mm."""
+    """Compute the stretch of two walls that straighten as arches, times E over force, 1/mm."""
     angle = (
         np.arcsin(min(tip / radius, np.sqrt(_STEEPEST)))
         + _CLAMP * np.sqrt(thickness * wall) / radius
@@ -85,6 +85,6 @@ def _arch(thickness: float, wall: float, radius: float, tip: float) -> float:
 
 
 def _frame(strip: RootedStrip, wall: float, width: np.ndarray) -> np.ndarray:
-    """Sway of two walls as the posts of a frame, times E over force and free length, 1/mm²."""
+    """Compute the sway of two walls as posts of a frame, times E over force and length, 1/mm²."""
     length = strip.free_length + 2.0 * _CLAMP_SIDEWAYS * np.sqrt(strip.thickness * wall)
     return length**3 / (12.0 * 2.0 * strip.thickness * width**3 / 12.0) / strip.free_length

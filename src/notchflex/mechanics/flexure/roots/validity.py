@@ -1,4 +1,4 @@
-"""Where the law of a notch was checked: ranges of its dimensions, and which of them it leaves."""
+"""Checked ranges of the dimensions of a notch, and those that it leaves."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ _THIN = ": bending was found up to 5 % off, shear across the strip up to 18 %"
 
 
 class CheckedRange(NamedTuple):
-    """A dimension of a notch, and between what it was checked against finite elements.
+    """A dimension of a notch, with its range checked against finite elements.
 
     Attributes:
-        dimension: What it is.
-        value: What the notch has.
+        dimension: Name of the dimension.
+        value: Its value.
         low: Smallest value that was checked.
         high: Largest value that was checked.
-        beyond: What is known outside, the end of a sentence.
+        beyond: Note on values outside, the end of a sentence.
     """
 
     dimension: str
