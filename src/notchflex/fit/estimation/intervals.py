@@ -40,11 +40,6 @@ class Interval:
     profile: Float[np.ndarray, "m 2"]
     reason: str = ""
 
-    @property
-    def is_closed(self) -> bool:
-        """Whether the data set both ends."""
-        return self.lower is not None and self.upper is not None
-
 
 def allowed_rise(freedom: int | None, level: float = LEVEL) -> float:
     """Return the rise of twice the misfit that chance allows.
