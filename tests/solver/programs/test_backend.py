@@ -67,7 +67,7 @@ def test_one_warning_for_each_primitive():
 @pytest.mark.parametrize("name", ["pacheco2021-a", "gao2017", "liu2022", "two-axis-wrist"])
 def test_ready_robots_are_native(name, monkeypatch):
     """Warnings are errors here, too: a program that XLA compiles fails."""
-    monkeypatch.setattr(Native, "made", OrderedDict())
+    monkeypatch.setattr(Native, "programs", OrderedDict())
     state = nf.solve(nf.load_robot(name), nf.Load(tension=0.1))
     assert state.converged
     assert np.isfinite(state.span_tension).all()

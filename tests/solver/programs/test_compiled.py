@@ -79,7 +79,7 @@ def test_rows_in_order_carry_a_vector(rows):
 
 
 def test_programs_not_used_for_longest_are_let_go(monkeypatch):
-    monkeypatch.setattr(Native, "made", OrderedDict())
+    monkeypatch.setattr(Native, "programs", OrderedDict())
     monkeypatch.setattr("notchflex.solver.programs.compiled._MAX_PROGRAMS", 2)
     functions = [Native(lambda values, own=k: own * values, 1, lambda *_: ()) for k in range(3)]
     for one in (*functions, functions[1]):
@@ -89,7 +89,7 @@ def test_programs_not_used_for_longest_are_let_go(monkeypatch):
 
 def test_programs_are_kept_and_what_is_no_program_is_not_taken(tmp_path, monkeypatch):
     monkeypatch.setenv(store.VARIABLE, str(tmp_path))
-    monkeypatch.setattr(Native, "made", OrderedDict())
+    monkeypatch.setattr(Native, "programs", OrderedDict())
     traced = []
 
     def doubled(values):

@@ -1,4 +1,4 @@
-"""Contact: the lips of a notch that close it."""
+"""Contact between the edges of a notch that close it."""
 
 from notchflex.mechanics.contact.build import build_contacts
 from notchflex.mechanics.contact.pairs import ContactGroup, GapResponse
