@@ -9,8 +9,7 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual
-from notchflex.solver.element import Memory, bound_side
-from notchflex.solver.linear_step.block_elimination import Iterate
+from notchflex.solver.element import Iterate, Memory, bound_side
 from notchflex.solver.residual import evaluate
 from notchflex.solver.solver_state import SolverState
 
@@ -45,7 +44,7 @@ def held_stiffness(
     point = solved.point
     modes = point.unknowns.modes.size
     flat, point_of = ravel_pytree(point)
-    here = evaluate(chain, point.unknowns, solved.memory, point.base_tension, solved.applied)
+    here = evaluate(chain, point, solved.memory, solved.applied)
     slid = tuple(
         span.slid - _SLIP * bound_side(ratio, span.bound)
         for span, ratio in zip(here.spans, point.unknowns.log_ratio, strict=True)
@@ -54,8 +53,8 @@ def held_stiffness(
 
     def imbalance(flat: Array) -> Array:
         varied: Iterate = point_of(flat)
-        at = evaluate(chain, varied.unknowns, memory, varied.base_tension, solved.applied)
-        demand = command_residual(chain, command, varied.base_tension, at.base)
+        at = evaluate(chain, varied, memory, solved.applied)
+        demand = command_residual(chain, command, at.base)
         residual = at.residual
         residual = residual._replace(modes=residual.modes * chain.stiffness)
         return ravel_pytree((residual, demand))[0]

@@ -150,11 +150,10 @@ def test_a_missed_stroke_is_an_imbalance_beside_any_tension() -> None:
     """A difference of tensions and strokes would round the stroke away."""
     chain = assemble(_notch("straight", "wall-arc", nf.Frictionless()))
     command = Command(np.array([0.05, 0.0]), np.array([True, True]), None)
-    base = BaseReaction(
-        released_length=np.array([0.05 - 1e-6, -1e-6]), tension_length=np.zeros(2), external=None
-    )
+    released = np.array([0.05 - 1e-6, -1e-6])
     for tension in (1.0, 1e8, 1e16):
-        missed = command_residual(chain, command, np.full(2, tension), base)
+        base = BaseReaction(np.full(2, tension), released, np.zeros(2), external=None)
+        missed = command_residual(chain, command, base)
         np.testing.assert_allclose(missed, -1e-6, rtol=1e-9)
 
 

@@ -12,7 +12,8 @@ from notchflex.analysis.solve import prepare_for
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import load_path
 from notchflex.solver.actuation import command_residual
-from notchflex.solver.linear_step.block_elimination import Iterate, linear_step
+from notchflex.solver.element import Iterate
+from notchflex.solver.linear_step.block_elimination import linear_step
 from notchflex.solver.residual import evaluate
 
 TIP = {"tip_force": (0.02, 0.0, -0.01), "tip_moment": (0.0, 0.05, 0.0)}
@@ -55,21 +56,14 @@ def test_it_is_the_dense_step(case: str, margin) -> None:
     def imbalance(varied: jax.Array) -> tuple[jax.Array, jax.Array]:
         """The imbalance, twice: `jacfwd` differentiates one and hands on the other."""
         point: Iterate = point_of(varied)
-        found = evaluate(
-            ready.chain, point.unknowns, rest.memory, point.base_tension, wanted.applied
-        )
-        demand = command_residual(ready.chain, wanted, point.base_tension, found.base)
+        found = evaluate(ready.chain, point, rest.memory, wanted.applied)
+        demand = command_residual(ready.chain, wanted, found.base)
         left = ravel_pytree((found.residual, demand))[0]
         return left, left
 
     def condensed(point: Iterate) -> jax.Array:
-        found = evaluate(
-            ready.chain, point.unknowns, rest.memory, point.base_tension, wanted.applied
-        )
-        step = linear_step(
-            ready.chain, wanted, point.unknowns, rest.memory, point.base_tension, found
-        )
-        return ravel_pytree(Iterate(step.unknowns, step.base_tension))[0]
+        found = evaluate(ready.chain, point, rest.memory, wanted.applied)
+        return ravel_pytree(linear_step(ready.chain, wanted, point, rest.memory, found))[0]
 
     matrix, left = jax.jit(jax.jacfwd(imbalance, has_aux=True))(where)
     dense = np.linalg.solve(matrix, -left)

@@ -10,12 +10,13 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.contact import closing_angles
 from notchflex.mechanics.flexure import fibre_stretch, of_rod
+from notchflex.solver.element import Iterate
 from notchflex.solver.residual import BaseReaction
 
 
-def stroke(chain: Chain, base_tension: Float[Array, " t"], base: BaseReaction) -> Array:
+def stroke(chain: Chain, base: BaseReaction) -> Float[Array, " t"]:
     """Compute the stroke from the free robot (mm), with the tendon stiffness of the file."""
-    tension_length = base.tension_length + base_tension * chain.free_length
+    tension_length = base.tension_length + base.base_tension * chain.free_length
     return base.released_length + tension_length / chain.axial_stiffness
 
 
@@ -41,16 +42,14 @@ def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
     return closing
 
 
-def command_residual(
-    chain: Chain, command: Command, base_tension: Float[Array, " t"], base: BaseReaction
-) -> Float[Array, " t"]:
+def command_residual(chain: Chain, command: Command, base: BaseReaction) -> Float[Array, " t"]:
     """Compute the deviation of the tendons from their command, scaled like angles.
 
     A tendon driven by stroke is slack where the robot has released more than is drawn:
     tension >= 0, stroke released >= stroke commanded, product 0.
     """
-    scale = chain.stroke_stiffness
-    missing = stroke(chain, base_tension, base) - command.target
+    scale, base_tension = chain.stroke_stiffness, base.base_tension
+    missing = stroke(chain, base) - command.target
     # Switching keeps the digits that a difference with a large tension would lose.
     by_stroke = jnp.where(base_tension >= scale * missing, missing, base_tension / scale)
     by_tension = (base_tension - command.target) / scale
@@ -58,15 +57,15 @@ def command_residual(
 
 
 def command_slopes(
-    chain: Chain, command: Command, base_tension: Float[Array, " t"], base: BaseReaction
+    chain: Chain, command: Command, base: BaseReaction
 ) -> tuple[Float[Array, "t t"], Float[Array, "t t"], Float[Array, "t t"]]:
     """Differentiate `command_residual` by base tension, released length, tension times length."""
 
-    def residual(tension: Array, released_length: Array, tension_length: Array) -> Array:
-        moved = BaseReaction(released_length, tension_length, base.external)
-        return command_residual(chain, command, tension, moved)
+    def residual(tension: Array, released: Array, tension_length: Array) -> Array:
+        moved = BaseReaction(tension, released, tension_length, base.external)
+        return command_residual(chain, command, moved)
 
-    at = (base_tension, base.released_length, base.tension_length)
+    at = (base.base_tension, base.released_length, base.tension_length)
     return jax.jacfwd(residual, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, at))
 
 
@@ -74,9 +73,7 @@ def command_slopes(
 _MAX_CLOSING_FORCES = 1e5
 
 
-def tension_is_bounded(
-    chain: Chain, command: Command, base_tension: Float[Array, " t"]
-) -> Bool[Array, ""] | bool:
+def tension_is_bounded(chain: Chain, command: Command, point: Iterate) -> Bool[Array, ""] | bool:
     """Return whether the tensions of tendons driven by stroke are bounded.
 
     Once the shape is rigid, an inextensible tendon cannot be drawn further; rounding would then
@@ -86,4 +83,4 @@ def tension_is_bounded(
         return True
     limit = _MAX_CLOSING_FORCES * chain.closing_force
     limit = jnp.where(chain.axial_stiffness < jnp.inf, jnp.inf, limit)
-    return jnp.all(jnp.where(command.by_stroke, base_tension, 0.0) <= limit)
+    return jnp.all(jnp.where(command.by_stroke, point.base_tension, 0.0) <= limit)

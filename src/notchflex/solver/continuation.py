@@ -11,9 +11,8 @@ from notchflex._jax import jax, jnp
 from notchflex._pytree import choose
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.element import Memory
+from notchflex.solver.element import Iterate, Memory
 from notchflex.solver.friction_predictor import predict_log_ratios
-from notchflex.solver.linear_step.block_elimination import Iterate
 from notchflex.solver.newton import NewtonProblem, NewtonResult, Settings, newton
 from notchflex.solver.solver_state import SolverState
 

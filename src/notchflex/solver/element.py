@@ -35,6 +35,18 @@ class Unknowns(NamedTuple):
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
 
 
+class Iterate(NamedTuple):
+    """A point of Newton's method, or a step between two.
+
+    Attributes:
+        unknowns: The unknowns of all flexures.
+        base_tension: The base tensions, N.
+    """
+
+    unknowns: Unknowns
+    base_tension: Float[Array, " t"]
+
+
 class Memory(NamedTuple):
     """History of the friction contacts and of the material, as of the last solved state.
 

@@ -19,8 +19,7 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.friction.registry import MIN_TENSION_RATIO
-from notchflex.solver.element import Memory
-from notchflex.solver.linear_step.block_elimination import Iterate
+from notchflex.solver.element import Iterate, Memory
 from notchflex.solver.tendon_spans import slip_mask
 
 MAX_LOG_RATIO_STEP = 1.0

@@ -99,8 +99,8 @@ def _rows(
     solved: SolverState = state_layout.unpack(state)
     chain: Chain = chain_layout.unpack(vector)
     command: Command = command_layout.unpack(load)
-    unknowns, tension = solved.point
-    at = evaluate(chain, unknowns, solved.memory, tension, solved.applied)
+    unknowns = solved.point.unknowns
+    at = evaluate(chain, solved.point, solved.memory, solved.applied)
     slid = tuple(
         span.slid - _SLIP * bound_side(ratio, span.bound)
         for span, ratio in zip(at.spans, unknowns.log_ratio, strict=True)
@@ -109,7 +109,7 @@ def _rows(
     memory = Memory(unknowns.log_ratio, slid, bound, solved.memory.material)
     form = row_layout(chain, by_stroke=command.by_stroke is not None)
     rows = linearise(chain, unknowns, memory, solved.applied, at, form)
-    return carried, (*rows, jnp.stack(command_slopes(chain, command, tension, at.base)))
+    return carried, (*rows, jnp.stack(command_slopes(chain, command, at.base)))
 
 
 def _assemble(

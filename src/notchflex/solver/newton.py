@@ -15,9 +15,9 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.flexure import in_space
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
-from notchflex.solver.element import Memory
+from notchflex.solver.element import Iterate, Memory
 from notchflex.solver.friction_predictor import MAX_LOG_RATIO_STEP, limit_slack, predict_contacts
-from notchflex.solver.linear_step.block_elimination import Iterate, linear_step
+from notchflex.solver.linear_step.block_elimination import linear_step
 from notchflex.solver.residual import Evaluation, evaluate
 from notchflex.solver.step_limits import limit_closing
 
@@ -158,8 +158,8 @@ def newton(
     def iterate(search: _Iteration) -> _Iteration:
         best = search.best
         trial = jax.tree.map(lambda x, dx: x + search.fraction * dx, best.point, search.step)
-        evaluation = evaluate(chain, trial.unknowns, memory, trial.base_tension, command.applied)
-        demand = command_residual(chain, command, trial.base_tension, evaluation.base)
+        evaluation = evaluate(chain, trial, memory, command.applied)
+        demand = command_residual(chain, command, evaluation.base)
         scaled_residual = ravel_pytree((evaluation.residual, demand))[0]
         largest, size = jnp.max(jnp.abs(scaled_residual)), jnp.linalg.norm(scaled_residual)
         unguarded = (best.iterations < _UNGUARDED_STEPS) & (best.residual >= _ROUNDING * tolerance)
@@ -243,11 +243,11 @@ def _result(
         slid=tuple(span.slid for span in evaluation.spans),
         bound=tuple(span.bound for span in evaluation.spans),
         material=(),
-        stroke=stroke(chain, point.base_tension, evaluation.base),
+        stroke=stroke(chain, evaluation.base),
         residual=residual,
         iterations=iterations,
         converged=within
-        & tension_is_bounded(chain, command, point.base_tension)
+        & tension_is_bounded(chain, command, point)
         & _is_possible(chain, evaluation),
     )
 
@@ -267,7 +267,7 @@ def _next_step(
     """Return the step from an accepted point, and the fraction of it to try first."""
     chain, command, memory, last_tension, predicts = problem
     point = new.point
-    step = linear_step(chain, command, point.unknowns, memory, point.base_tension, evaluation)
+    step = linear_step(chain, command, point, memory, evaluation)
     step = limit_slack(chain, point, step)
     # Where strokes are commanded, contacts that reverse must not be limited on the way.
     by_tension = command.by_stroke is None

@@ -24,7 +24,14 @@ from notchflex.solver.body_poses import (
     select_anchors,
     shift_from_base,
 )
-from notchflex.solver.element import Memory, Unknowns, clip_symmetric, signorini, trial_log_ratio
+from notchflex.solver.element import (
+    Iterate,
+    Memory,
+    Unknowns,
+    clip_symmetric,
+    signorini,
+    trial_log_ratio,
+)
 from notchflex.solver.tendon_spans import (
     TendonSpans,
     crossings,
@@ -52,14 +59,16 @@ class BodyWrenches(NamedTuple):
 
 
 class BaseReaction(NamedTuple):
-    """Sums over the whole chain, at the base.
+    """Tensions and sums over the whole chain, at the base.
 
     Attributes:
+        base_tension: Tension of every tendon, N.
         released_length: Length of every tendon released by the shape, mm.
         tension_length: Sum of tension times length of every tendon, N mm.
         external: External loads on all bodies, about and along the base; None if there are none.
     """
 
+    base_tension: Float[Array, " t"]
     released_length: Float[Array, " t"]
     tension_length: Float[Array, " t"]
     external: Float[Array, " w"] | None
@@ -92,9 +101,8 @@ class Evaluation(NamedTuple):
 
 def evaluate(
     chain: Chain,
-    unknowns: Unknowns,
+    point: Iterate,
     memory: Memory,
-    base_tension: Float[Array, " t"],
     applied: BodyLoads | None,
 ) -> Evaluation:
     """Evaluate the residual of the chain, with its terms.
@@ -104,14 +112,14 @@ def evaluate(
 
     Args:
         chain: The chain.
-        unknowns: Its unknowns, flexures as leading axis.
+        point: Its unknowns, flexures as leading axis, and base tensions.
         memory: History of its contacts and its material.
-        base_tension: Tension of every tendon at the base, N.
         applied: External loads on the bodies; None for a chain assembled for tendons alone.
 
     Returns:
         The evaluation.
     """
+    unknowns, base_tension = point
     on_bodies = chain.forces_on_bodies
     flexure = flexure_states(chain, unknowns.modes, memory.material, with_pose=on_bodies)
     anchors = anchor_poses(chain, flexure.pose)
@@ -150,6 +158,7 @@ def evaluate(
     )
     residual = Unknowns(balance / chain.stiffness, contact_force, log_ratio)
     base = BaseReaction(
+        base_tension,
         in_tendon_order(chain, tuple(span.released_length[0] for span in spans)),
         in_tendon_order(chain, tuple(span.tension_length[0] for span in spans)),
         at_base,

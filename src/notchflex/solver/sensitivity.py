@@ -17,7 +17,7 @@ from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import stroke
 from notchflex.solver.continuation import interpolate_command
 from notchflex.solver.element import Memory
-from notchflex.solver.linear_step.block_elimination import Iterate, linear_step
+from notchflex.solver.linear_step.block_elimination import linear_step
 from notchflex.solver.residual import evaluate
 from notchflex.solver.solver_state import SolverState
 
@@ -91,18 +91,17 @@ def _attach_to_substep(
 ) -> SolverState:
     """Attach the derivatives to the solution of one substep."""
     point = _stop_gradient(solved.point)
-    evaluation = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
-    step = linear_step(chain, command, point.unknowns, last.memory, point.base_tension, evaluation)
-    moved = Iterate(step.unknowns, step.base_tension)
-    point = jax.tree.map(lambda value, by: value + by, point, moved)
-    evaluation = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
+    evaluation = evaluate(chain, point, last.memory, command.applied)
+    step = linear_step(chain, command, point, last.memory, evaluation)
+    point = jax.tree.map(lambda value, by: value + by, point, step)
+    evaluation = evaluate(chain, point, last.memory, command.applied)
     memory = Memory(
         log_ratio=point.unknowns.log_ratio,
         slid=tuple(span.slid for span in evaluation.spans),
         bound=tuple(span.bound for span in evaluation.spans),
         material=evaluation.flexure.memory,
     )
-    drawn = stroke(chain, point.base_tension, evaluation.base)
+    drawn = stroke(chain, evaluation.base)
     varied_state = SolverState(point, memory, drawn, command.applied)
     return jax.tree.map(
         lambda value, varied: _with_tangent_of(value, varied, reached),

@@ -10,8 +10,7 @@ from jaxtyping import Array, Float
 from notchflex._jax import constant
 from notchflex.loads.applied import BodyLoads
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.element import Memory, Unknowns
-from notchflex.solver.linear_step.block_elimination import Iterate
+from notchflex.solver.element import Iterate, Memory, Unknowns
 
 
 class SolverState(NamedTuple):

@@ -6,8 +6,7 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jnp
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.element import Unknowns, is_active, notch_heights
-from notchflex.solver.linear_step.block_elimination import Iterate
+from notchflex.solver.element import Iterate, Unknowns, is_active, notch_heights
 from notchflex.solver.residual import Evaluation
 
 # A limited step goes slightly beyond the gap, so that the contact counts as closed: by these parts

@@ -36,9 +36,9 @@ from notchflex.solver.actuation import command_residual, stroke, tension_is_boun
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
 from notchflex.solver.derived.reported import believable
 from notchflex.solver.derived.solved_state import SolvedState
-from notchflex.solver.element import Memory
+from notchflex.solver.element import Iterate, Memory
 from notchflex.solver.friction_predictor import limit_slack
-from notchflex.solver.linear_step.block_elimination import Iterate, linear_step
+from notchflex.solver.linear_step.block_elimination import linear_step
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.pytree_layout import lane_sizes
@@ -88,7 +88,7 @@ def search_drives(
     final = jax.lax.while_loop(search.goes_on, search.solve, search.begin())
     at, result = final.at, final.result
     accepted = result.converged & believable(SolvedState(chain, at.state).quantity)
-    accepted = accepted & tension_is_bounded(chain, command, at.point.base_tension)
+    accepted = accepted & tension_is_bounded(chain, command, at.point)
     flags = [accepted, result.substeps == 1, at.met & accepted, at.error, final.solved]
     status = jnp.stack([jnp.asarray(one, float) for one in flags])
     return layouts.state.pack(at.state), at.values, at.slopes, at.sticks, at.drive, status
@@ -207,14 +207,14 @@ class _Search:
     def _values(self, memory: Memory, point: Iterate) -> tuple[Array, tuple[Evaluation, Any]]:
         """Quantities of a point in the world, its residual, and the state with its history."""
         chain, applied, outputs = self.chain, self.command.applied, self.layouts.outputs
-        at = evaluate(chain, point.unknowns, memory, point.base_tension, applied)
+        at = evaluate(chain, point, memory, applied)
         history = Memory(
             log_ratio=point.unknowns.log_ratio,
             slid=tuple(span.slid for span in at.spans),
             bound=tuple(span.bound for span in at.spans),
             material=at.flexure.memory,
         )
-        drawn = stroke(chain, point.base_tension, at.base)
+        drawn = stroke(chain, at.base)
         state = SolverState(point, history, drawn, applied)
         quantities = report_quantities(chain, state, outputs)
         turned = [REGISTERED[name].turned(quantities[name], self.task.turn) for name in outputs]
@@ -222,16 +222,16 @@ class _Search:
 
     def _moves(self, memory: Memory, drive: Array, point: Iterate) -> LinearResponse:
         """Linear response of a point to a step to the balance, and to a unit of every drive."""
-        chain, command, (unknowns, tension) = self.chain, self.command, point
+        chain, command = self.chain, self.command
         values, by_point, (at, state) = jax.linearize(
             partial(self._values, memory), point, has_aux=True
         )
-        demand = command_residual(chain, command._replace(target=drive), tension, at.base)
+        demand = command_residual(chain, command._replace(target=drive), at.base)
         residual = jnp.max(jnp.abs(ravel_pytree((at.residual, demand))[0]))
 
         def step_to(target: Array) -> Iterate:
             towards = command._replace(target=target)
-            return linear_step(chain, towards, unknowns, memory, tension, at)
+            return linear_step(chain, towards, point, memory, at)
 
         step, by_drive = jax.linearize(step_to, drive)
         step = limit_slack(chain, point, step)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from jaxtyping import Array, Bool, Int
 
 from notchflex.solver.continuation import LoadStepResult
-from notchflex.solver.linear_step.block_elimination import Iterate
+from notchflex.solver.element import Iterate
 from notchflex.solver.solver_state import SolverState
 
 

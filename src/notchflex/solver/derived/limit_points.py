@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jax, jnp
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.element import Unknowns
+from notchflex.solver.element import Iterate, Unknowns
 from notchflex.solver.residual import Evaluation, evaluate
 from notchflex.solver.solver_state import SolverState
 
@@ -46,8 +46,8 @@ def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Fl
 
     def balance_at(part: Array) -> tuple[Array, Array, Array]:
         """Compute resistance, drive and 1 where the edges are apart, at a fraction of the way."""
-        shape = unknowns._replace(modes=first + part * change)
-        at = evaluate(chain, shape, before.memory, tension, after.applied)
+        point = Iterate(unknowns._replace(modes=first + part * change), tension)
+        at = evaluate(chain, point, before.memory, after.applied)
         resistance = jnp.sum(at.flexure.internal * change, axis=-1)
         missing = jnp.sum(at.residual.modes * chain.stiffness * change, axis=-1)
         drive = _own_friction(at, unknowns, slid) * (resistance - missing)

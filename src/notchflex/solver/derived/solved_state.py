@@ -15,7 +15,7 @@ from notchflex.mechanics.material import Flattening
 from notchflex.mechanics.motion import IN_PLANE, Motion, wrench_at
 from notchflex.solver.body_poses import body_poses
 from notchflex.solver.element import Unknowns
-from notchflex.solver.residual import Evaluation, evaluate
+from notchflex.solver.residual import BaseReaction, Evaluation, evaluate
 from notchflex.solver.solver_state import SolverState
 from notchflex.solver.tendon_spans import in_tendon_order
 
@@ -44,9 +44,8 @@ class SolvedState:
     @cached_property
     def at(self) -> Evaluation:
         """The balance of the state."""
-        point = self.solved.point
-        tension, applied = point.base_tension, self.solved.applied
-        return evaluate(self.chain, point.unknowns, self.solved.memory, tension, applied)
+        solved = self.solved
+        return evaluate(self.chain, solved.point, solved.memory, solved.applied)
 
     @cached_property
     def relative(self) -> Motion:
@@ -102,8 +101,7 @@ class SolvedState:
     @cached_property
     def base(self) -> Float[Array, " 6"]:
         """Moment and force of the holder on the base."""
-        tension = self.solved.point.base_tension
-        return base_wrench(self.chain, tension, self.at, self.solved.applied)
+        return base_wrench(self.chain, self.at.base, self.solved.applied)
 
     @cached_property
     def compliance(self) -> Float[Array, "n t"]:
@@ -159,22 +157,20 @@ def largest_moment(flexure: FlexureState) -> Float[Array, " n"]:
     return jnp.take_along_axis(moment, where[:, None], axis=-1)[:, 0]
 
 
-def base_wrench(
-    chain: Chain, base_tension: Float[Array, " t"], at: Evaluation, applied: BodyLoads | None
-) -> Float[Array, " 6"]:
+def base_wrench(chain: Chain, base: BaseReaction, applied: BodyLoads | None) -> Float[Array, " 6"]:
     """Compute the reaction at the base: moment about the base's origin, and force.
 
     It balances the loads, and the tendon tensions where the tendons enter the base.
     """
     acting = jnp.zeros(6)
-    if applied is not None and at.base.external is not None:
+    if applied is not None and base.external is not None:
         on_base = jax.tree.map(lambda leaf: leaf[0], applied)
         acting = in_space(
-            at.base.external + body_wrench(jnp.eye(on_base.dead_force.shape[-1]), on_base)
+            base.external + body_wrench(jnp.eye(on_base.dead_force.shape[-1]), on_base)
         )
         if chain.frame is not None:
             acting = (chain.frame @ acting.reshape(2, 3, 1)).reshape(6)
-    tendon_force = base_tension[:, None] * jnp.array([[0.0, 0.0, -1.0]])
+    tendon_force = base.base_tension[:, None] * jnp.array([[0.0, 0.0, -1.0]])
     return -acting - jnp.sum(jax.vmap(wrench_at)(chain.tendon_entry, tendon_force), axis=0)
 
 

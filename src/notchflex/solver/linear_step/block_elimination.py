@@ -26,25 +26,13 @@ from notchflex._jax import constant, jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual, command_slopes
-from notchflex.solver.element import Memory, Unknowns
+from notchflex.solver.element import Iterate, Memory
 from notchflex.solver.linear_step.linearisation import linearise
 from notchflex.solver.linear_step.row_layout import RowLayout, row_layout
-from notchflex.solver.residual import Evaluation
+from notchflex.solver.residual import BaseReaction, Evaluation
 
 # Slopes of a stroke below the second count as zero; the first is added to their pivots.
 _PIVOT_SHIFT, _ZERO_SLOPE = 1e-9, 1e-7
-
-
-class Iterate(NamedTuple):
-    """A point of Newton's method, or a step between two.
-
-    Attributes:
-        unknowns: The unknowns of all flexures.
-        base_tension: The base tensions, N.
-    """
-
-    unknowns: Unknowns
-    base_tension: Float[Array, " t"]
 
 
 class _Condensed(NamedTuple):
@@ -62,9 +50,8 @@ class _Condensed(NamedTuple):
 def linear_step(
     chain: Chain,
     command: Command,
-    unknowns: Unknowns,
+    point: Iterate,
     memory: Memory,
-    base_tension: Float[Array, " t"],
     at: Evaluation,
 ) -> Iterate:
     """Solve the linearised balance for the step to equilibrium.
@@ -75,15 +62,15 @@ def linear_step(
     Args:
         chain: The chain.
         command: Tensions and strokes commanded, external loads.
-        unknowns: The unknowns to step from.
+        point: The point to step from.
         memory: History of the contacts.
-        base_tension: The base tensions to step from, N.
         at: Evaluation there.
 
     Returns:
         The step.
     """
     form = row_layout(chain, by_stroke=command.by_stroke is not None)
+    unknowns = point.unknowns
     state = (chain, unknowns, memory, command.applied, at)
     rows = linearise(*jax.tree.map(jax.lax.stop_gradient, state), form=form)
     residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.residual)
@@ -98,10 +85,10 @@ def linear_step(
 
     at_base = _tensions_carried(chain, form)
     condensed, back = _condense(insert(rows.to_next), insert(rows.to_previous), form)
-    tension_step = command.target - base_tension
+    tension_step = command.target - point.base_tension
     if command.by_stroke is not None:
         by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ at_base], axis=1)
-        tension_step = _tension_step(chain, command, base_tension, at, by_tension)
+        tension_step = _tension_step(chain, command, at.base, by_tension)
     surroundings = _back_substitute(condensed, jnp.asarray(at_base) @ tension_step)
     steps = jnp.einsum("nuz,nz->nu", response, surroundings)
     _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
@@ -111,13 +98,12 @@ def linear_step(
 def _tension_step(
     chain: Chain,
     command: Command,
-    base_tension: Float[Array, " t"],
-    at: Evaluation,
+    base: BaseReaction,
     back: Float[Array, "b 1+t"],
 ) -> Float[Array, " t"]:
     """Solve for the step of the base tensions to the commanded strokes."""
     assert command.by_stroke is not None
-    slopes = command_slopes(chain, command, base_tension, at.base)
+    slopes = command_slopes(chain, command, base)
     order = chain.tendon_order
     back = back[len(back) - 2 * len(order) :].reshape(2, len(order), -1)
     # Rows in the order of the robot's tendons.
@@ -127,7 +113,7 @@ def _tension_step(
     # Where every contact sticks, the stroke does not depend on the tension; a small pivot keeps the
     # step finite.
     undetermined = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _ZERO_SLOPE)
-    missing = command_residual(chain, command, base_tension, at.base) + by_base[:, 0]
+    missing = command_residual(chain, command, base) + by_base[:, 0]
     return -gauss_jordan(
         matrix + _PIVOT_SHIFT * jnp.diag(undetermined.astype(float)), missing[:, None]
     )[:, 0]

@@ -54,6 +54,6 @@ def _solve_contacts(
     chain, settings = chain_layout.unpack(vector), Settings.of(numbers)
     command, last = command_layout.unpack(load), state_layout.unpack(start)
     result = solve_load_step(chain, command, last, settings)
-    (unknowns, base_tension), memory, _, applied = result.solved
-    at = evaluate(chain, unknowns, memory, base_tension, applied)
-    return carried, (*notch_contact(chain, unknowns, at), result.converged)
+    point, memory, _, applied = result.solved
+    at = evaluate(chain, point, memory, applied)
+    return carried, (*notch_contact(chain, point.unknowns, at), result.converged)
