@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
@@ -35,6 +35,7 @@ from notchflex.errors import InputError
 from notchflex.results.files.writing import BROWSER, MOVING, PAPER
 
 if TYPE_CHECKING:
+    from notchflex.analysis import Bands
     from notchflex.loads import LoadPath
     from notchflex.results import EquilibriumPath, SavedState
     from notchflex.robot import Robot
@@ -208,17 +209,28 @@ def simulate(
     if bands is not None:
         for sentence in bands.warnings():
             terminal.warn(sentence)
-    if outputs.prints_tables and bands is not None:
-        from notchflex.cli.tables.path_table import print_bands
-
-        print_bands(bands, title, columns=shown, every_row=every_row)
-    elif outputs.prints_tables:
-        from notchflex.cli.tables.path_table import print_beside, print_path
-
-        print_path(next(iter(paths.values())), title, columns=shown, every_row=every_row)
-        if beside:
-            print_beside(paths, columns=shown, every_row=every_row)
+    if outputs.prints_tables:
+        _print(paths, bands, title, columns=shown, every_row=every_row)
     return max(_report(path, label if beside else "") for label, path in paths.items())
+
+
+def _print(
+    paths: Mapping[str, EquilibriumPath],
+    bands: Bands | None,
+    title: str,
+    *,
+    columns: Sequence[str],
+    every_row: bool,
+) -> None:
+    """Print the table of the bands, or of the first path and then of all beside each other."""
+    from notchflex.cli.tables.path_table import print_bands, print_beside, print_path
+
+    if bands is not None:
+        print_bands(bands, title, columns=columns, every_row=every_row)
+        return
+    print_path(next(iter(paths.values())), title, columns=columns, every_row=every_row)
+    if len(paths) > 1:
+        print_beside(paths, columns=columns, every_row=every_row)
 
 
 def _solve(
