@@ -154,6 +154,7 @@ def simulate(
     import numpy as np
 
     from notchflex.cli.tables.path_columns import parse_columns
+    from notchflex.loads import LoadPath
 
     terminal.be_quiet(quiet)
     shown = () if columns is None else parse_columns(columns)
@@ -184,8 +185,6 @@ def simulate(
             f"--plot {plot}: one step cannot be animated; write a .png, .svg or .pdf."
         )
     with terminal.counting(f"solving {len(tensions)} steps of {chosen.name}") as counted:
-        from notchflex.loads import LoadPath
-
         terminal.use_compile_cache()
         start = None if from_state is None else _start(from_state)
         turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
