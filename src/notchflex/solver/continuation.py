@@ -242,9 +242,9 @@ def _solve_substep(
     The history is that of the last solved state, not of unconverged shapes.
     """
     solved, iterate = search.result.solved, search.start_iterate
-    memory, last_tension = solved.memory, solved.point.base_tension
-    base_tension = command.either(last_tension, command.target)
-    log_ratio = predict_log_ratios(chain, last_tension, base_tension, memory)
+    memory, before = solved.memory, solved.point.base_tension
+    base_tension = command.either(before, command.target)
+    log_ratio = predict_log_ratios(chain, before, base_tension, memory)
     start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), base_tension)
     residual_target = jnp.minimum(_SUBSTEP_TOLERANCE * settings.tolerance, _SUBSTEP_RESIDUAL)
     residual_target = jnp.where(end < 1.0, residual_target, 0.0)
@@ -263,7 +263,7 @@ def _solve_substep(
     memory = memory._replace(stick_compliance=search.stick_compliance)
     if can_snap:
         memory = memory._replace(damping=(search.viscosity, iterate.unknowns.modes))
-    problem = NewtonProblem(chain, command, memory, last_tension, predicts)
+    problem = NewtonProblem(chain, command, memory, solved.point, predicts)
     return newton(problem, start, settings, residual_target)
 
 

@@ -33,13 +33,13 @@ _MIN_TENSION = 1e-100
 
 
 def predict_log_ratios(
-    chain: Chain, last_tension: Float[Array, " t"], base_tension: Float[Array, " t"], memory: Memory
+    chain: Chain, before: Float[Array, " t"], base_tension: Float[Array, " t"], memory: Memory
 ) -> tuple[Float[Array, "n t 2"], ...]:
     """Predict the log ratios of all contacts for new base tensions.
 
     Args:
         chain: The chain.
-        last_tension: Base tensions of the last solved state, N.
+        before: Base tensions of the last solved state, N.
         base_tension: The new ones, N.
         memory: History of the contacts, as of that state.
 
@@ -50,7 +50,7 @@ def predict_log_ratios(
     for group, old_ratio, bound in zip(chain.groups, memory.log_ratio, memory.bound, strict=True):
         numbers = jnp.array(group.numbers)
         old, new = (
-            jnp.maximum(tension[numbers], _MIN_TENSION) for tension in (last_tension, base_tension)
+            jnp.maximum(tension[numbers], _MIN_TENSION) for tension in (before, base_tension)
         )
         zero = jnp.zeros_like(group.natural_gap)  # the loss at rest suffices for a prediction
         losses = chain.friction.constant_loss(zero, zero)
@@ -100,7 +100,7 @@ def predict_contacts(
     chain: Chain,
     command: Command,
     memory: Memory,
-    last_tension: Float[Array, " t"],
+    last: Iterate,
     point: Iterate,
     step: Iterate,
     linear_fraction: Float[Array, ""],
@@ -110,8 +110,8 @@ def predict_contacts(
 
     For tendons driven by stroke, whose tensions are unknown. Sticking contacts make a tendon very
     stiff, so the change of its tension is limited. `fraction` of the returned step is to be taken;
-    of the linear step it would be `linear_fraction`. `last_tension` are the base tensions (N) of
-    the last solved state.
+    of the linear step it would be `linear_fraction`. `last` is the last
+    solved point.
     """
     assert command.by_stroke is not None
     tension = point.base_tension + linear_fraction * step.base_tension
@@ -119,7 +119,7 @@ def predict_contacts(
         tension, 0.5 * point.base_tension, 2.0 * point.base_tension + chain.closing_force
     )
     tension = command.either(moderate, tension)
-    predicted = predict_log_ratios(chain, last_tension, tension, memory)
+    predicted = predict_log_ratios(chain, last.base_tension, tension, memory)
     logs = []
     for group, new, present, change in zip(
         chain.groups, predicted, point.unknowns.log_ratio, step.unknowns.log_ratio, strict=True

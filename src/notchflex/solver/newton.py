@@ -18,7 +18,7 @@ from notchflex.solver.actuation import command_residual, stroke, tension_is_boun
 from notchflex.solver.element import Iterate, Memory
 from notchflex.solver.friction_predictor import MAX_LOG_RATIO_STEP, limit_slack, predict_contacts
 from notchflex.solver.linear_step.block_elimination import linear_step
-from notchflex.solver.residual import Evaluation, evaluate
+from notchflex.solver.residual import Evaluation, evaluate, rounding_growth
 from notchflex.solver.step_limits import limit_closing
 
 
@@ -104,7 +104,7 @@ class NewtonProblem(NamedTuple):
         chain: The chain.
         command: Tensions and strokes commanded, external loads.
         memory: History of contacts and material, as of the last solved state.
-        last_tension: Base tensions of that state, N.
+        last: Point of that state.
         predicts: Whether contacts are predicted where a stroke is commanded. The predictor assumes
             that the tension rises with the stroke, which is false where a notch softens.
     """
@@ -112,7 +112,7 @@ class NewtonProblem(NamedTuple):
     chain: Chain
     command: Command
     memory: Memory
-    last_tension: Float[Array, " t"]
+    last: Iterate
     predicts: Bool[Array, ""] | bool = True
 
 
@@ -128,7 +128,6 @@ _PREDICTOR_STEPS = 15
 _PREDICTOR_MIN_RESIDUAL = 1e-4
 # A residual below this multiple of the tolerance that no longer falls is rounding error.
 _ROUNDING = 100.0
-_MAX_TOLERANCE_GROWTH = 1e4
 
 
 def newton(
@@ -149,7 +148,7 @@ def newton(
         The result; `converged` is false after a failure.
     """
     chain, command, memory, *_ = problem
-    tolerance = _tolerance(chain, start, settings)
+    tolerance = settings.tolerance * rounding_growth(chain, start)
     target = jnp.maximum(tolerance, residual_target)
 
     def proceed(search: _Iteration) -> Bool[Array, ""]:
@@ -218,16 +217,6 @@ def _begin(problem: NewtonProblem, start: Iterate) -> _Iteration:
     )
 
 
-def _tolerance(chain: Chain, start: Iterate, settings: Settings) -> Float[Array, ""]:
-    """Scale the tolerance with the tensions: rounding grows with the moments in balance."""
-    height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
-    softest = jnp.min(jnp.where(chain.rods.padding_mask > 0.0, jnp.inf, chain.stiffness))
-    turn_per_newton = height / softest
-    largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
-    growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _MAX_TOLERANCE_GROWTH)
-    return settings.tolerance * growth
-
-
 def _result(
     chain: Chain,
     command: Command,
@@ -265,7 +254,7 @@ def _next_step(
     problem: NewtonProblem, new: NewtonResult, evaluation: Evaluation, iterations: Int[Array, ""]
 ) -> tuple[Iterate, Float[Array, ""]]:
     """Return the step from an accepted point, and the fraction of it to try first."""
-    chain, command, memory, last_tension, predicts = problem
+    chain, command, memory, last, predicts = problem
     point = new.point
     step = linear_step(chain, command, point, memory, evaluation)
     step = limit_slack(chain, point, step)
@@ -287,7 +276,7 @@ def _next_step(
     def predicted() -> Iterate:
         limits = memory._replace(bound=new.bound)
         fractions = linear_fraction, max_fraction
-        return predict_contacts(chain, command, limits, last_tension, point, step, *fractions)
+        return predict_contacts(chain, command, limits, last, point, step, *fractions)
 
     chosen = jax.lax.cond(early, predicted, lambda: step)
     fraction = jnp.where(early, max_fraction, linear_fraction)

@@ -40,6 +40,8 @@ from notchflex.solver.tendon_spans import (
     slip_mask,
 )
 
+_MAX_ROUNDING_GROWTH = 1e4
+
 
 class BodyWrenches(NamedTuple):
     """Wrenches (moment, force) on the bodies, about and along the frame of body j.
@@ -164,6 +166,14 @@ def evaluate(
         at_base,
     )
     return Evaluation(flexure, anchors, rotation, spans, contacts, wrenches, base, residual)
+
+
+def rounding_growth(chain: Chain, point: Iterate) -> Float[Array, ""]:
+    """Return the growth of rounding in the residual: with the moments that tensions balance."""
+    height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
+    softest = jnp.min(jnp.where(chain.rods.padding_mask > 0.0, jnp.inf, chain.stiffness))
+    largest_tension = jnp.max(jnp.maximum(point.base_tension, 0.0), initial=0.0)
+    return jnp.minimum(1.0 + largest_tension * (height / softest), _MAX_ROUNDING_GROWTH)
 
 
 def _with_contact_compliance(
