@@ -103,15 +103,15 @@ def guarded_norm(
     Args:
         vector: The vectors.
         slope: Derivative of the length by a vector that is 0; 0 where not given.
-        rounding: Lengths up to this count as 0.
+        rounding: Up to this length a vector has the stated derivative.
     """
     squared = jnp.sum(vector * vector, axis=-1)
-    zero = squared <= rounding**2
+    zero = squared == 0.0
     length = jnp.where(zero, 0.0, jnp.sqrt(jnp.where(zero, 1.0, squared)))
     if slope is None:
         return length
-    along = jnp.sum(vector * slope, axis=-1)
-    return jnp.where(zero, along - jax.lax.stop_gradient(along), length)
+    along, stop = jnp.sum(vector * slope, axis=-1), jax.lax.stop_gradient
+    return jnp.where(squared <= rounding**2, stop(length) + (along - stop(along)), length)
 
 
 def direction(vector: Float[Array, "*s d"]) -> Float[Array, "*s d"]:
