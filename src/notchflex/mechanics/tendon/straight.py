@@ -65,24 +65,24 @@ class Straight(TendonGroup):
                 onward = jnp.where(chord > 0.0, self._onward(flexure, before), channel)
             pulled = {"gap": gap, "dead": before, "follower": channel}[self.pulls]
             # A pull turns the distal body toward the tendon's side.
-            pulls = direction(moment_of(channel, enters))
-            turns = turning(before, gap, pulls), turning(gap, onward, pulls)
+            axis = direction(moment_of(channel, enters))
+            turns = turning(before, gap, axis), turning(gap, onward, axis)
             return length, *turns, wrench_at(enters, pulled)
 
         found = jax.vmap(one)(anchors, self.leaves, self.enters, self.along)
         return Crossing(*found, slope=None)
 
-    def _onward(self, flexure: FlexureState, direction: Float[Array, " d"]) -> Float[Array, " d"]:
+    def _onward(self, flexure: FlexureState, channel: Float[Array, " d"]) -> Float[Array, " d"]:
         """Direction in which the tendon goes on by the chord's turn, in the distal body's frame."""
         pose, turn = flexure.pose, flexure.chord_turn
         assert pose is not None
         assert turn is not None
-        before = pose.rotation @ direction
+        before = pose.rotation @ channel
         return (turn @ before) @ pose.rotation
 
 
 def turning(
-    before: Float[Array, " d"], after: Float[Array, " d"], pulls: Float[Array, " a"]
+    before: Float[Array, " d"], after: Float[Array, " d"], axis: Float[Array, " a"]
 ) -> Float[Array, ""]:
     """Return the angle between two unit directions, exact for small angles.
 
@@ -93,9 +93,9 @@ def turning(
     Args:
         before: The one direction.
         after: The other.
-        pulls: Unit axis about which a pull turns the distal body; 0 where it turns nothing.
+        axis: Unit axis about which a pull turns the distal body; 0 where it turns nothing.
     """
     across, cosine = moment_of(before, after), jnp.sum(before * after)
     nowhere = jnp.all(across == 0.0) & (cosine == 0.0)
-    sine = guarded_norm(across, jnp.where(nowhere, 0.0, pulls), _ROUNDING)
+    sine = guarded_norm(across, jnp.where(nowhere, 0.0, axis), _ROUNDING)
     return jnp.atan2(sine, jnp.where(nowhere, 1.0, cosine))
