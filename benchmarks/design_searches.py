@@ -22,10 +22,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import notchflex as nf
 from design_wishes import tip_first, wide_wrist
-from notchflex.designing.forms import problems_of
+from notchflex.designing.design_robot import problems_of
 from notchflex.designing.search.local import search_from
 from notchflex.designing.search.problem import DesignProblem
-from notchflex.designing.specification.reading import spec_from_table
+from notchflex.designing.specification import spec_from_table
 from notchflex.robot.value_names.varied import VariedRobots
 
 # What a limit missed by its size adds to the sum, in sizes of the sum.

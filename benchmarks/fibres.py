@@ -23,13 +23,8 @@ class Curve:
             tension = _plateau(material, 1.0)
             compression = _plateau(material, material.compression_ratio)
         else:
-            tension = list(material.strain), list(material.stress)
-            compression = tension
-            if material.compression_strain is not None:
-                compression = (
-                    list(material.compression_strain),
-                    list(material.compression_stress or ()),
-                )
+            tension = material.in_tension
+            compression = material.in_compression or tension
         self.strain = np.array([*(-np.array(compression[0][::-1])), 0.0, *tension[0]])
         self.stress = np.array([*(-np.array(compression[1][::-1])), 0.0, *tension[1]])
 

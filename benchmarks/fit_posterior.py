@@ -42,7 +42,7 @@ def main() -> None:
             f"{name}: profile {interval.lower:.5g} to {interval.upper:.5g}, "
             f"NUTS {lower:.5g} to {upper:.5g}; mean {drawn.means[name]:.5g} +- {error:.2g}, "
             f"estimate {found.values[name]:.5g}; worth {drawn.effective[name]:.0f} draws, "
-            f"R-hat {drawn.unlike[name]:.3f}"
+            f"R-hat {drawn.r_hat[name]:.3f}"
         )
 
 

@@ -17,9 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import notchflex as nf
 from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.cut.measure_cut import combined
-from notchflex.photographs.cut.measured_cut import LENGTHS, MeasuredCut
-from notchflex.photographs.cut.straight import fit_straight
+from notchflex.photographs.cut.measure_cut import LENGTHS, MeasuredCut, combined, fit_straight
 from photographs.renderer import Scene, render
 
 TURN = 20.0  # deg

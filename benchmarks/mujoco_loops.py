@@ -39,7 +39,7 @@ def inner_error(model: JointModel, text: str) -> float:
     levels = np.concatenate([np.linspace(a, b, 9) for a, b in pairwise(ends)])
     path = nf.simulate(model.robot, [nf.Load(tension=float(level)) for level in levels])
     known = (path.notch_angle - path.notch_angle[0]).sum(axis=1)
-    found = run_mujoco(text, 0, levels, len(model.springs)).angle.sum(axis=1)
+    found = run_mujoco(text, 0, levels, len(model.springs))[0].sum(axis=1)
     return float(np.abs(found - known).max() / np.ptp(model.pulls[0].angle.sum(axis=1)))
 
 

@@ -36,11 +36,6 @@ from judge import plain, wrong
 from shapes import DRAWN, SHAPES, Shape
 
 import notchflex as nf
-from notchflex.analysis.solve import prepare_for
-from notchflex.loads.load_path import load_path
-from notchflex.mechanics.chain import Chain
-from notchflex.solver.programs.pytree_layout import PytreeLayout
-from notchflex.solver.programs.static_structure import StaticStructure
 
 # What a solved state must tell as finite numbers; gap and contact tables have NaN where nothing is.
 FINITE = (
@@ -114,21 +109,6 @@ def follow(one: Draw) -> Iterator[Outcome]:
         state = path.state
 
 
-def share_programs(every: list[Draw]) -> None:
-    """Let robots of a shape share programs, by constants that all of them have.
-
-    Otherwise the programs would know that a robot has no precurvature, or no base, and another
-    robot would need a program of its own.
-    """
-    chains: dict[PytreeLayout, list[Chain]] = {}
-    for one in every:
-        path = load_path(one.loads, one.robot.number_of_tendons)
-        long = prepare_for(one.robot, path).long
-        chains.setdefault(long.chain_layout, []).append(long.chain)
-    for layout, alike in chains.items():
-        StaticStructure.of(layout, alike, np.stack([layout.pack(chain) for chain in alike]))
-
-
 def warm(one: Draw) -> float:
     """Compile the program of a draw's shape; its time, s."""
     start = time.perf_counter()
@@ -179,7 +159,6 @@ def show(rows: Iterable[dict]) -> None:
 
 def judged(every: list[Draw], shape: Shape) -> tuple[list[Outcome], float]:
     """Follow all draws of a shape; what came of them, and the time to compile, s."""
-    share_programs(every)
     compiled = warm(every[0])
     outcomes = []
     for one in every:

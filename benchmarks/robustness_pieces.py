@@ -16,13 +16,11 @@ from typing import Any, NamedTuple
 import polars
 from draw import Draw, draw
 from judge import plain
-from robustness import Outcome, follow, share_programs
+from robustness import Outcome, follow
 from shapes import DRAWN, SHAPES
 
-from notchflex.pieces.folder import finished_head
-from notchflex.pieces.manifest import Manifest
-from notchflex.pieces.options import PieceFolder
-from notchflex.pieces.piece import Piece, Recipe, piece_file
+from notchflex.pieces.folder import Manifest, Piece, Recipe, finished_head, piece_file
+from notchflex.pieces.run import PieceFolder
 from notchflex.solver.programs.store import code_digest
 
 KIND = "robustness"
@@ -83,7 +81,6 @@ class DrawsTask:
         rows: list[dict[str, Any]] = []
         codes = [0, 0, 0, 0]
         for alike in self._draws(number):
-            share_programs(alike)
             for one in alike:
                 found = list(follow(one))
                 bad = any(state.silent or state.wrong for state in found)

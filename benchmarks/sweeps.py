@@ -30,7 +30,7 @@ from typing import Any
 
 import notchflex as nf
 from notchflex.robot.value_names.varied import VariedRobots
-from notchflex.sweeping.points import Points
+from notchflex.sweeping.rows import Points
 
 OUTPUTS = ("total_angle", "tip_position", "converged")
 CHUNK = 1_000_000

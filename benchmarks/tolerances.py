@@ -11,8 +11,8 @@ import time
 import numpy as np
 
 import notchflex as nf
-from notchflex.tolerancing.criteria import criteria_of
 from notchflex.tolerancing.linear import linear_effects
+from notchflex.tolerancing.spec import criteria_of
 from notchflex.tolerancing.study import Study
 from notchflex.tolerancing.yields import replicates, yield_interval
 

@@ -14,8 +14,8 @@ for strength in (0.4, 0.8, 1.2):  # N
         loads.append(nf.Load(tension=np.maximum(toward, 0.0).round(12).tolist()))
 
 # All at once, over all cores; each from rest.
-found = nf.solve_batch(wrist, loads, outputs=("tip_position", "total_angle", "converged"))
-tip, angle = found["tip_position"], np.degrees(found["total_angle"])
+found = nf.solve_batch(wrist, loads, outputs=("tip_position", "tip_axis_angle", "converged"))
+tip, angle = found["tip_position"], np.degrees(found["tip_axis_angle"])
 aside = np.hypot(tip[:, 0], tip[:, 1])
 
 print(f"{found['converged'].sum()} of {len(loads)} loads solved")

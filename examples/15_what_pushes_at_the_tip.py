@@ -10,7 +10,7 @@ wrist = nf.load_robot("pacheco2021-a")
 tension = np.array([[0.2], [0.4], [0.6], [0.8], [0.784], [0.7]])  # N
 push = [0.0, 0.0, 0.01, 0.02, 0.02, 0.02]  # N, along x
 touching = tuple(nf.Load(tip_force=(one, 0.0, 0.0)).external for one in push)
-read = nf.simulate(wrist, nf.LoadPath(tension, np.full_like(tension, np.nan), external=touching))
+read = nf.simulate(wrist, nf.LoadPath(tension, external=touching))
 
 # What tension and stroke tell, with sensors good to 1 mN and 1 µm.
 sensors = nf.SensorNoise(tension=0.001, stroke=0.001)

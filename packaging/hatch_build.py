@@ -26,7 +26,6 @@ class RecordPrograms(BuildHookInterface):
         settings = {
             "PYTHONPATH": os.pathsep.join(paths),
             "NOTCHFLEX_RECORD_PROGRAMS": self.folder.name,
-            "NOTCHFLEX_OPTIMISATION": "0",
             "JAX_COMPILATION_CACHE_DIR": "",
             "JAX_PLATFORMS": "cpu",
             # A program that lanewise cannot compile would not be shipped: that must be seen.

@@ -24,14 +24,11 @@ settings.load_profile("ci" if os.environ.get("CI") else "here")
 
 def pytest_configure(config: pytest.Config) -> None:
     """Set JAX up by its environment variables: it need not be imported, and subprocesses follow."""
-    os.environ["JAX_ENABLE_X64"] = "1"
     # A shape that does not fit must not be stretched in silence.
     os.environ["JAX_NUMPY_RANK_PROMOTION"] = "raise"
     if "jax" in sys.modules:  # a plugin of pytest may have imported it before
         sys.modules["jax"].config.update("jax_numpy_rank_promotion", "raise")
-    # Most of the time goes into compiling programs that are run a few times. Unoptimised code is
-    # compiled in a third of the time; that the optimised code of users finds the same numbers is
-    # a test of its own (tests/solver/test_as_users_run_it.py).
+    # Functions of the tests' own that JAX compiles run a few times.
     flags = os.environ.get("XLA_FLAGS", "")
     options = ["--xla_backend_optimization_level=0"]
     # The library's own programs go without these emitters (_jax.py); functions that users
@@ -39,7 +36,6 @@ def pytest_configure(config: pytest.Config) -> None:
     if version("jax").split(".")[:2] < ["0", "11"]:
         options.append("--xla_cpu_use_fusion_emitters=false")
     os.environ["XLA_FLAGS"] = " ".join([flags, *options]).strip()
-    os.environ["NOTCHFLEX_OPTIMISATION"] = "0"
     # Tracing makes many objects that stay: looking for garbage that often costs 5 % of the time.
     gc.set_threshold(100_000, 20, 100)
     # Compiled code is kept beside pytest's own cache, for the other process of `-n 2` and later.

@@ -82,6 +82,7 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
         "commanded_stroke": np.full((count, 1), np.nan),
         "notch_angle": angle,
         "total_angle": angle.sum(axis=1),
+        "tip_axis_angle": np.arccos(np.cos(angle.sum(axis=1))),
         "tip_position": np.array([p[-1] + r[-1] @ [0, 0, 1.2] for p, r in pose]),
         "tip_rotation": np.array([r[-1] for _, r in pose]),
         "body_position": np.array([p for p, _ in pose]),

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from notchflex.export.finite_elements.deck import ring_layers
-from notchflex.export.finite_elements.tube_mesh import TubeMesh
+from notchflex.export.finite_elements.meshes import TubeMesh
 
 
 class RingMotion(NamedTuple):

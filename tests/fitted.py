@@ -27,4 +27,4 @@ def measured(seed: int = 1) -> Measurements:
 @functools.cache
 def fitted() -> Calibration:
     """The fit of two constants to them."""
-    return calibrate(nf.load_robot(ROBOT), measured(), NAMES, starts=1)
+    return calibrate(nf.load_robot(ROBOT), measured(), NAMES, starts=1, priors=False)

@@ -133,3 +133,15 @@ def test_a_tendon_without_free_length_is_named():
     path = nf.simulate(robot, [nf.Load(tension=600.0), nf.Load(tension=3000.0)])
     assert path.reason_code == ["", "TENDON_EDGES_MEET"]
     assert "tendon 1's channel meet in notch 1" in path.reason[1]
+
+
+def test_a_stroke_across_slack_names_the_constant_loss():
+    robot = nf.load_robot("pacheco2021-a").replace(friction=nf.Capstan(0.13, constant_loss=15.0))
+    pulled = nf.simulate(robot, [nf.Load(tension=pull) for pull in (18.0, 60.0, 172.5)])
+    assert pulled.converged.all()
+    for stroke in (1.0, 2.0):
+        assert pulled.stroke[0, 0] < stroke < pulled.stroke[2, 0]  # a tension reaches it
+        path = nf.simulate(robot, [nf.Load(stroke=stroke)])
+        assert path.reason_code == ["LOSS_LEAVES_SLACK"]
+        assert "135 N over all edges of tendon 1" in path.reason[0]  # 9 edges
+        assert "command a tension" in path.reason[0]

@@ -69,9 +69,11 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("results.equilibrium", "results.path"): _TYPE,
     ("results.reason", "results.path"): _TYPE,
     ("results.quantities.path_formulas", "results.path"): _TYPE,
-    ("fit.estimation.calibration", "fit.summary"): _SHOWN,
-    ("designing.result", "designing.files"): "a design writes its files by a method",
-    ("designing.files", "designing.front"): _TYPE,
+    ("fit.estimation.calibration", "fit.documents"): _SHOWN,
+    ("fit.estimation.calibration", "fit.assessment.residual_tests"): (
+        "a fit tests its residuals when it is asked whether to trust it"
+    ),
+    ("designing.result", "designing.front"): _TYPE,
     ("comparison.comparison", "comparison.tables"): _SHOWN,
     ("viewer.viewer", "viewer.page.page"): "the viewer makes its page; the page acts on the viewer",
 }

@@ -17,10 +17,12 @@ FOLDER = Path(nf.__file__).parent
 # fmt: off
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
+    "Drawing",
     "Linear", "Superelastic", "Nitinol", "StressStrain", "Frictionless", "Capstan", "Load",
     "LoadPath", "pull", "solve",
     "simulate", "Equilibrium", "EquilibriumPath", "State", "tip_from_angles", "equal_stroke",
-    "closing", "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError",
+    "closing", "annular_sector", "annular_segment", "Section", "InputError",
+    "InputWarning", "RobotFileError",
     "plot", "stroke_path", "solve_each", "Batch", "solve_batch", "simulate_batch",
     "uncertain", "Bands", "Band",
     "Differentiable", "differentiable", "TipResponse", "tip_response",
@@ -70,6 +72,18 @@ def test_names():
 def test_only_public_names_are_listed():
     assert {name for name in dir(nf) if not name.startswith("__")} == set(NAMES)
     assert "import_module" not in vars(nf)
+
+
+@pytest.mark.parametrize("first", ["jax, notchflex as nf", "notchflex as nf, jax"])
+def test_jax_computes_alike_before_and_after_the_first_use(first):
+    code = f"""
+import {first}
+before = jax.random.uniform(jax.random.key(0))
+nf.solve(nf.load_robot("pacheco2021-a"), nf.Load(tension=0.1))
+assert before == jax.random.uniform(jax.random.key(0))
+print(before.dtype)
+"""
+    assert python(code) == "float64"
 
 
 @pytest.mark.parametrize(("old", "new"), [("Path", "EquilibriumPath"), ("draw", "stroke_path")])

@@ -19,7 +19,7 @@ import numpy as np
 
 import notchflex as nf
 from notchflex.export.finite_elements.meshes import mesh_of
-from notchflex.export.finite_elements.options import DeckOptions
+from notchflex.export.formats import DeckOptions
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from fem_rings import RingMotion, read_rings

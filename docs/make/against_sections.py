@@ -6,7 +6,7 @@ import numpy as np
 from differences import Difference, difference, table_of
 
 import notchflex as nf
-from notchflex.mechanics.flexure.u_link_geometry import CurvedEnd
+from notchflex.mechanics.flexure.u_link import CurvedEnd
 from reference_data import CUTS, choose, reference
 
 SECTIONS = {"on-axis": nf.annular_sector, "off-axis": nf.annular_segment}

@@ -1,6 +1,7 @@
 """Checks the built pages (site/): nothing is fetched from elsewhere, every local file is there.
 
-Every formula must have become MathML: no `$...$` is left in the text, no placeholder in a formula.
+The search works from the disk too, and no line of code is cut off. Every formula must have become
+MathML: no `$...$` is left in the text, no placeholder in a formula.
 The reference describes functions and classes, never a module of the same name.
 
 `zensical build --strict && python docs/make/check_site.py`.
@@ -15,6 +16,8 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 SITE = Path(__file__).resolve().parents[2] / "site"
+WORKER = "iframe-worker.js"  # without it browsers refuse the search to a page from the disk
+WRAPPED = re.compile(r"pre > code \{[^}]*white-space: pre-wrap;")
 FETCHING = {"script": "src", "img": "src", "link": "href", "iframe": "src", "source": "src"}
 
 
@@ -61,10 +64,16 @@ def problems(site: Path) -> list[str]:
     pages = sorted(site.rglob("*.html"))
     if len(pages) < 15:
         found.append(f"{site} has {len(pages)} pages; build them first")
+    if not (site / "search.js").exists():
+        found.append("the search has no index that a page from the disk can read")
+    if not WRAPPED.search((site / "style.css").read_text(encoding="utf-8")):
+        found.append("style.css cuts off long lines of code")
     for page in pages:
         name, reader = page.relative_to(site), Fetched()
         reader.feed(page.read_text(encoding="utf-8"))
         found += [f"{name} fetches {one}" for one in reader.fetched if urlsplit(one).netloc]
+        if not any(one.endswith(WORKER) for one in reader.fetched):
+            found.append(f"{name} has no {WORKER}")
         left = re.findall(r"\$[^$\n]+\$", " ".join(reader.words))
         found += [f"{name} has a formula that was not read: {one}" for one in left]
         if reader.modules:

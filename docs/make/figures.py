@@ -231,7 +231,7 @@ def simulators() -> None:
         way = np.concatenate([np.linspace(a, b, 25) for a, b in pairwise(ends)])
         path = nf.simulate(wrist, [nf.Load(tension=float(one)) for one in way])
         found = run_mujoco(text, 0, way, 5)
-        known, ran = np.degrees(path.notch_angle), np.degrees(found.angle)
+        known, ran = np.degrees(path.notch_angle), np.degrees(found[0])
         if axes is left:
             known, ran = known.sum(axis=1)[:, None], ran.sum(axis=1)[:, None]
             axes.set_ylabel("total bending angle [deg]")

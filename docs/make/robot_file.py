@@ -14,7 +14,7 @@ import notchflex as nf
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = "../robot_file.md"  # from the folder of page.py
-SINGLE = ("Tube", "Tendon")
+SINGLE = ("Tube", "Tendon", "Drawing")
 LISTS = {"notch": "notch", "material": "material", "friction": "friction"}
 
 
@@ -51,6 +51,7 @@ MEANING = {
     "material": "the material of the tube",
     "friction": "the friction between tendon and tube",
     "tolerance": "how far values may lie from these, by name: see below",
+    "drawing": "what the title block of a drawing says",
 }
 
 

@@ -75,12 +75,16 @@ def forces() -> dict[str, str]:
     end = force_for_bent(ours)
     bent = pulled(ours, np.linspace(end / STEPS, end, STEPS))[-1]
     tension = bent.span_tension[0]
+    ready = pulled(
+        robot(0.2, **{"friction.turning": "slope"}), np.linspace(end / STEPS, end, STEPS)
+    )
     return {
         "readings": table(("pull on the strip", "N for 58°, no friction"), rows),
         "free58": rows[0][1],
         "rubbed58": f"{end:.4f}",
         "widths": table(("width of both walls", "I, mm⁴", "N for 58°, μ 0.15"), by_width),
         "slope58": f"{np.degrees(bent.total_angle):.1f}",
+        "by_slope": f"{np.degrees(ready.total_chord_angle[-1]):.2f}",
         "last_part": f"{tension[13] / tension[0]:.3f}",
         "first_deg": f"{np.degrees(bent.chord_angle[0]):.2f}",
         "last_deg": f"{np.degrees(bent.chord_angle[-1]):.2f}",

@@ -2,15 +2,30 @@
 
 Units in Python are mm, N, MPa and rad; robot files are in mm, N, MPa and degrees.
 Names are loaded when first used (PEP 562), so that importing the package costs nothing and does
-not import JAX.  The first use of a computing name imports JAX and switches it to 64-bit floats.
+not import JAX.  It switches JAX to 64-bit floats, also for its other users in the process.
 """
 
+import os as _os
+import sys as _sys
+
 __version__ = "0.1.0"
+
+# Here and not at the first use: a key of `jax.random` gives the same numbers before and after it.
+_os.environ["JAX_ENABLE_X64"] = "1"
+if "jax" in _sys.modules:
+    _sys.modules["jax"].config.update("jax_enable_x64", True)
 
 # Public name -> where it is exported. `__init__.pyi` lists the same names for type checkers.
 _HOME = {
     **dict.fromkeys(
-        ("ConvergenceError", "ErrorCode", "Failure", "InputError", "RobotFileError"),
+        (
+            "ConvergenceError",
+            "ErrorCode",
+            "Failure",
+            "InputError",
+            "InputWarning",
+            "RobotFileError",
+        ),
         "notchflex.errors",
     ),
     **dict.fromkeys(
@@ -18,6 +33,7 @@ _HOME = {
             "ArcNotch",
             "Capstan",
             "Corner",
+            "Drawing",
             "Frictionless",
             "Linear",
             "Nitinol",

@@ -42,6 +42,7 @@ from notchflex.errors import ConvergenceError as ConvergenceError
 from notchflex.errors import ErrorCode as ErrorCode
 from notchflex.errors import Failure as Failure
 from notchflex.errors import InputError as InputError
+from notchflex.errors import InputWarning as InputWarning
 from notchflex.errors import RobotFileError as RobotFileError
 from notchflex.export import DeckOptions as DeckOptions
 from notchflex.export import Exported as Exported
@@ -96,6 +97,7 @@ from notchflex.results import save_path as save_path
 from notchflex.robot import ArcNotch as ArcNotch
 from notchflex.robot import Capstan as Capstan
 from notchflex.robot import Corner as Corner
+from notchflex.robot import Drawing as Drawing
 from notchflex.robot import Frictionless as Frictionless
 from notchflex.robot import Linear as Linear
 from notchflex.robot import Nitinol as Nitinol

@@ -59,6 +59,3 @@ def plot(
     if x is None and y is None and ax is None:
         return picture(thing)
     return plot_on_axes(thing, x, y, ax)
-
-
-__all__ = ["plot"]

@@ -45,6 +45,3 @@ class Pytree:
 def choose(condition: Any, new: Tree, old: Tree) -> Tree:
     """Return the new tree of arrays where a condition holds, the old one where not."""
     return jax.tree.map(lambda one, other: jnp.where(condition, one, other), new, old)
-
-
-__all__ = ["Pytree", "choose", "static"]

@@ -57,6 +57,8 @@ class Quantity:
             are turned into the world.
         optional: Whether it is left out of files where no entry of a path holds a number.
         kind: What an entry is: `float`, `bool`, `int` or `str`.
+        work_of: Names of the force and the length that it is the work of, if it is one; batches
+            integrate them too.
         note: More sentences for the documentation of the Python property.
     """
 
@@ -72,6 +74,7 @@ class Quantity:
     in_world: bool = False
     optional: bool = False
     kind: type = float
+    work_of: tuple[str, ...] = ()
     note: str = ""
 
     def __call__(self, formula: _Formula) -> _Formula:
@@ -90,11 +93,13 @@ class Quantity:
     def turned(self, values: Any, rotation: Any) -> Any:
         """Return values of it, or changes of them, turned by a rotation; numbers stay.
 
+        Everything that returns results in the world uses it: paths, batches, derivatives, control.
+
         Args:
             values: Vectors, or rotation matrices, with any leading axes, or other values.
-            rotation: Rotation matrix, such as that from the frame of the base to the world.
+            rotation: Rotation matrix, such as `LoadPath.base_to_world`; None for the identity.
         """
-        if not self.in_world:
+        if rotation is None or not self.in_world:
             return values
         return rotation @ values if "row" in self.per else values @ rotation.T
 

@@ -1,7 +1,9 @@
 """Files replaced whole.
 
 A file is first written beside its destination under a temporary name and then renamed over it, so
-that whoever reads it sees the old file or the new one and never half of either.
+that whoever reads it sees the old file or the new one and never half of either. What a killed
+process left is removed when a file is next written in that folder: the temporary file of a process
+that lives is locked.
 """
 
 from __future__ import annotations
@@ -9,11 +11,16 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
+import sys
 import tempfile
 from collections.abc import Generator
 from pathlib import Path
 
 from notchflex.errors import InputError
+
+_PREFIX = ".notchflex-"
+_swept: set[Path] = set()
+"""Folders in which this process has looked for what others left."""
 
 
 @contextlib.contextmanager
@@ -42,15 +49,20 @@ def replacing(target: str | os.PathLike[str]) -> Generator[Path]:
         return
     try:
         destination = Path(os.path.realpath(target))
+        _sweep(destination.parent)
         handle, name = tempfile.mkstemp(
-            dir=destination.parent, prefix=f".{destination.stem}-", suffix=destination.suffix
+            dir=destination.parent,
+            prefix=f"{_PREFIX}{destination.stem}-",
+            suffix=destination.suffix,
         )
-        os.close(handle)
     except (OSError, ValueError) as problem:  # ValueError: a null character in the name
         words = getattr(problem, "strerror", None) or problem
         raise InputError.FILE_UNWRITABLE(f"{target} cannot be written: {words}.") from None
     temporary = Path(name)
     try:
+        if not _lock(handle):
+            os.close(handle)
+            handle = -1
         yield temporary
         temporary.chmod(_mode_for(destination))
         os.replace(temporary, destination)
@@ -59,7 +71,37 @@ def replacing(target: str | os.PathLike[str]) -> Generator[Path]:
             f"{target} cannot be written: {problem.strerror or problem}."
         ) from None
     finally:
+        if handle >= 0:
+            os.close(handle)
         temporary.unlink(missing_ok=True)
+
+
+def _lock(handle: int) -> bool:
+    """Lock a file until it is closed; False where another process has locked it, or none can."""
+    if sys.platform == "win32":
+        return False
+    import fcntl
+
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _sweep(folder: Path) -> None:
+    """Remove temporary files of processes that were killed, once for a folder."""
+    if folder in _swept:
+        return
+    _swept.add(folder)
+    for file in folder.glob(f"{_PREFIX}*"):
+        with contextlib.suppress(OSError):
+            handle = os.open(file, os.O_RDWR)
+            try:
+                if _lock(handle):
+                    file.unlink()
+            finally:
+                os.close(handle)
 
 
 def is_replaceable(path: Path) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
+from math import floor, log10
 
 _TURNS = 6
 """A series with more turning points than this is described by its range."""
@@ -51,6 +52,17 @@ class Summary:
         return (
             f"<div><strong>{escape(self.title)}</strong></div><table>{''.join(rows)}</table>{hint}"
         )
+
+
+def round_number(most: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, not above a positive number.
+
+    Example:
+        >>> round_number(29.8), round_number(0.2)
+        (20.0, 0.2)
+    """
+    power = 10.0 ** floor(log10(most))
+    return max(one * power for one in (1.0, 2.0, 5.0) if one * power <= most * (1.0 + 1e-9))
 
 
 class Displayed:
@@ -128,6 +140,3 @@ def course(values: Iterable[float], digits: int | None = None) -> str:
     if len(ends) > _TURNS:
         return f"between {shown(min(series))} and {shown(max(series))}"
     return " to ".join(map(shown, ends))
-
-
-__all__ = ["Displayed", "Summary", "course", "short", "vector"]

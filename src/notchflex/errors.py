@@ -60,10 +60,21 @@ class Failure(_Coded):
         "tendons be drawn so far at once, so they fix no tension",
         "command other strokes, or a tension, or give the tendons a finite axial_stiffness",
     )
+    INDETERMINATE_TENSIONS = (
+        "the strokes of inextensible tendons depend on each other, so that many tensions, and "
+        "shapes, answer them; a change of a stroke by a micrometre selects others",
+        "give the tendons a finite axial_stiffness, or command a tension of one of them",
+    )
     TENDON_EDGES_MEET = (
         "the edges of tendon {tendon}'s channel meet in notch {notch}: the tendon has no free "
         "length left there, and the model does not go farther",
         "take smaller loads, or a tendon nearer to the axis",
+    )
+    LOSS_LEAVES_SLACK = (
+        "the constant loss of friction is {loss:.4g} N over all edges of tendon {tendon}: below "
+        "that tension, or somewhat more, it is slack behind some of them, and a stroke hardly "
+        "fixes its tension",
+        "command a tension, or a smaller constant_loss",
     )
     NO_EQUILIBRIUM = (
         "no equilibrium found beyond {percent:.3g} % of the way from the state before (imbalance "
@@ -71,16 +82,16 @@ class Failure(_Coded):
         "take smaller steps, or the robot has no equilibrium there",
     )
     TARGET_OUT_OF_REACH = (
-        "the target is out of reach; the nearest that was found misses it by {error:.3g}",
+        "the target is out of reach; the nearest that was found misses it by {error}",
         "choose a target nearer to what the robot can do, or leave some of its entries free",
     )
     LIMITS_PREVENT = (
-        "the limits do not allow the target; the nearest within them misses it by {error:.3g}",
+        "the limits do not allow the target; the nearest within them misses it by {error}",
         "widen the limits, or choose another target",
     )
     SEARCH_STOPPED = (
         "the search for the target stopped before its end; the best that was found misses it by "
-        "{error:.3g}",
+        "{error}",
         "take smaller steps between targets, or allow more solves",
     )
 
@@ -188,6 +199,23 @@ class InputError(ValueError):
         MISSING_PACKAGE, NOT_CONVERGED, PROCESS_FAILED, NO_CONNECTION
     ) = map(_Raised, list(ErrorCode)[1:])
     # fmt: on
+
+
+class InputWarning(UserWarning):
+    """A value that is allowed, and was probably not meant; its text asks what was.
+
+    Attributes:
+        code: Always "UNLIKELY_VALUE".
+        name: Name of the value, such as `material.elastic_modulus`.
+        value: What it is, in the unit of the robot file.
+        meant: What may have been meant; None where nothing is near.
+    """
+
+    code = "UNLIKELY_VALUE"
+
+    def __init__(self, text: str, name: str, value: float, meant: float | None) -> None:
+        super().__init__(text)
+        self.name, self.value, self.meant = name, value, meant
 
 
 class RobotFileError(InputError):

@@ -90,7 +90,7 @@ def test_rows_come_back_in_order_however_they_are_cut(wrist, rows, cores):
     # Solved one at a time they are the same to the last bit: lanes do not touch each other.
     some = np.unique([0, rows // 2, rows - 1])
     for row in some:
-        alone = nf.solve_batch(wrist, loads.part(int(row), 1))
+        alone = nf.solve_batch(wrist, loads[row : row + 1])
         assert alone["total_angle"][0] == found["total_angle"][row]
     assert seen[-1] == (rows, rows)
     assert all(before < after for (before, _), (after, _) in itertools.pairwise(seen))
@@ -132,7 +132,7 @@ def test_paths_of_unlike_lengths(wrist):
         nf.Load(stroke=0.7),
     ],
 )
-def test_robots_of_unlike_length_share_a_program(wrist, load, margin):
+def test_robots_of_unlike_length(wrist, load, margin):
     robots = [
         wrist.replace(
             notch=(nf.ArcNotch("on-axis", 1.40, 0.8, uncut_length=1.2, repeat=count),),
@@ -149,6 +149,10 @@ def test_robots_of_unlike_length_share_a_program(wrist, load, margin):
             all_of_it = found[name][row]
             own = all_of_it[tuple(slice(size) for size in one.shape)]
             np.testing.assert_allclose(own, one, rtol=1e-8, atol=1e-9, err_msg=name)
+    again = nf.solve_batch(robots[:1], load, outputs=names)
+    for name, values in again.items():  # to the bit, whatever robots are beside it
+        own = found[name][:1][tuple(slice(size) for size in values.shape)]
+        np.testing.assert_array_equal(own, values, err_msg=name)
     assert np.isnan(found["notch_angle"][0, 2:]).all()
     assert np.isnan(found["body_position"][0, 3:]).all()
     margin.within("tip", found["tip_position"][1] - nf.solve(robots[1], load).tip_position, 1e-9)
@@ -169,3 +173,23 @@ def test_an_empty_batch_cannot_be_drawn():
     with pytest.raises(nf.InputError) as problem:
         nf.plot(nf.Batch({}))
     assert problem.value.code is ErrorCode.NO_DATA
+
+
+def test_works_are_those_of_paths(wrist):
+    path = nf.pull(0.0, 0.8, steps=4).release()
+    paths, names = [path, nf.pull(0.0, 1.0, steps=4).release()], ("dissipation", "tendon_work")
+    batch = nf.simulate_batch(wrist, paths, outputs=[*names, "total_angle"])
+    assert set(batch) == {*names, "total_angle", "converged"}
+    for row, load in enumerate(paths):
+        single = nf.simulate(wrist, load)
+        for name in names:
+            np.testing.assert_allclose(batch[name][row], getattr(single, name), atol=1e-12)
+        # released, all work was lost to friction, but for the coarse steps
+        lost, done = batch["dissipation"][row, -1].sum(), batch["tendon_work"][row, -1].sum()
+        assert lost == pytest.approx(done, rel=0.02)
+        assert done > 0.01
+    each = nf.solve_batch(wrist, path, outputs=[*names, "stroke"])
+    half = 0.5 * path.tension * each["stroke"]
+    np.testing.assert_allclose(each["tendon_work"], half, atol=1e-12)
+    with refused("UNKNOWN_NAME", "dissipation"):
+        nf.differentiable(wrist, path, ["notch.depth"], outputs=["dissipation"])

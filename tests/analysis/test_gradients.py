@@ -7,7 +7,7 @@ import pytest
 
 import notchflex as nf
 from notchflex._jax import jax, jnp
-from notchflex.analysis.derivatives.numbers import slope
+from notchflex.analysis.derivatives.geometry_slopes import slope
 from notchflex.errors import ErrorCode
 from refusals import refused
 
@@ -162,8 +162,12 @@ def test_it_maps_and_compiles(margin):
 
 def test_what_is_not_solved_has_no_slope():
     robot = nf.load_robot("pacheco2021-a")
-    draw = nf.differentiable(robot, nf.stroke_path(50.0, 50.0, steps=1), ["stroke"])
+    outputs = ("total_angle", "converged")
+    draw = nf.differentiable(
+        robot, nf.stroke_path(50.0, 50.0, steps=1), ["stroke"], outputs=outputs
+    )
     assert not draw()["converged"][0]
+    assert np.isnan(draw()["total_angle"][0])
     assert np.isnan(jax.grad(lambda v: draw(v)["total_angle"][0])(draw.start)["stroke"]).all()
 
 
@@ -261,7 +265,8 @@ def test_values_that_do_not_fit_are_said():
         bend({"tension": -1.0})
     with refused(ErrorCode.WRONG_TYPE):
         nf.differentiable("pacheco2021-a", nf.Load(tension=1.0), ["tension"])  # pyright: ignore
-    deep = nf.differentiable(bend.robot, nf.pull(0.0, 1.0, 2), ["notch.depth"])
+    outputs = ("total_angle", "converged")
+    deep = nf.differentiable(bend.robot, nf.pull(0.0, 1.0, 2), ["notch.depth"], outputs=outputs)
     with refused(ErrorCode.INVALID_ROBOT):
         deep({"notch.depth": 5.0})
     # Where it is traced nobody can raise.
@@ -278,7 +283,8 @@ def test_values_that_do_not_fit_are_said():
 )
 def test_a_value_that_is_no_number_is_not_taken_for_none(loads, parameter):
     """Inside a compiled program it gives no converged state and no slope; outside it is refused."""
-    bend = nf.differentiable(nf.load_robot("pacheco2021-a"), loads, [parameter])
+    outputs = ("total_angle", "converged")
+    bend = nf.differentiable(nf.load_robot("pacheco2021-a"), loads, [parameter], outputs=outputs)
     values = {parameter: jnp.asarray(bend.start[parameter]).at[0, 0].set(jnp.nan)}
     with pytest.raises(nf.InputError):
         bend(values)
@@ -320,3 +326,14 @@ def test_second_derivatives_are_refused_with_a_sentence():
         jax.hessian(lambda values: bend(values)["total_angle"][0])(bend.start)
     assert problem.value.code is ErrorCode.UNSUPPORTED
     assert "differentiated once" in str(problem.value)
+
+
+@pytest.mark.parametrize("jacobian", [jax.jacfwd, jax.jacrev])
+def test_all_usual_outputs_have_a_jacobian(jacobian):
+    bend = nf.differentiable(
+        nf.load_robot("pacheco2021-a"), nf.pull(0.5, 1.0, steps=2), ["notch.depth", "tension"]
+    )
+    slopes = jacobian(bend)(bend.start)
+    assert slopes["tip_position"]["tension"].shape == (2, 3, 2, 1)
+    assert np.isfinite(slopes["total_angle"]["notch.depth"]).all()
+    assert len(repr(bend)) < 300

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.derivatives.flexure_table import FlexureTable
 from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.sparse_slopes import SparseSlopes
+from notchflex.analysis.derivatives.geometry_slopes import FlexureTable, SparseSlopes
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.mechanics.chain import flexure, sites_of
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
-from notchflex.solver.programs.pytree_layout import PytreeLayout
+from notchflex.solver.programs.static_structure import PytreeLayout
 
 PULL = nf.pull(1.0, 1.0, steps=1)
 HEAVY = PULL.loaded(tip_force=(0.01, 0.0, 0.0), gravity=(9.81, 0.0, 0.0))

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex.analysis import varied
 from notchflex.analysis.uncertainty.assumed import tolerances_of
 from notchflex.analysis.uncertainty.draws import sources_of, values_at
-from notchflex.analysis.varied import varied_chains as varied
-from notchflex.analysis.varied.fit_polynomial import PolynomialAccuracy, fit_polynomial
-from notchflex.analysis.varied.sparse_polynomial import leja_points
+from notchflex.analysis.varied import PolynomialAccuracy, fit_polynomial, leja_points
 from notchflex.robot.value_names.varied import VariedRobots
 from refusals import refused
 
@@ -87,9 +86,14 @@ def test_rows_of_notches_with_elastic_ends_are_those_of_the_robots():
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["pacheco2021-a-true", "pacheco2021-b-true"])
 def test_assumed_tolerances_of_wrists_with_elastic_ends_need_no_robot_for_each_row(name):
-    """Up to a quarter of the wall: a thousand robots were assembled one by one."""
+    """Up to a quarter of the wall: a thousand robots were assembled one by one.
+
+    With the error of the law, whose factors multiply the terms by the notches, it pays from some
+    3,200 robots on.
+    """
     robot, load = nf.load_robot(name), nf.pull(0.5, 0.9, steps=2)
-    exact_robot, assumed = robot.replace(tolerance=None), tolerances_of(robot)[0]
+    assumed = [one for one in tolerances_of(robot)[0] if not one.value.endswith("stiffness_factor")]
+    exact_robot = robot.replace(tolerance=None)
     sources = sources_of(exact_robot, assumed)
     levels = np.random.default_rng(1).uniform(1e-6, 1.0 - 1e-6, (2600, len(sources)))
     robots = VariedRobots(exact_robot, values_at(sources, levels))

@@ -245,3 +245,20 @@ def test_good_file_is_good(folder):
     robot = load_robot(folder / "mine.toml")
     save_robot(robot, folder / "copy.toml")
     assert load_robot(folder / "copy.toml") == robot
+
+
+@pytest.mark.parametrize(
+    ("words", "option"),
+    [
+        ("calibrate --strts 3", "--starts"),
+        ("calibrate pacheco2021-a=x.csv --strts 3", "--starts"),
+        ("measure x.jpg --bord x", "--board"),
+        ("sense a b --tip-nois 3", "--tip-noise"),
+        ("compare a b --pth", "--path"),
+        ("simulate a --tensin 3", "--tension"),
+    ],
+)
+def test_an_unknown_option_is_answered_by_the_nearest(call, words, option):
+    code, out, err = call(*words.split())
+    assert (code, out) == (2, "")
+    assert f"Did you mean {option}?" in err

@@ -191,3 +191,11 @@ def test_nothing_solved_is_still_written_and_drawn(call, tmp_path):
     assert code == 1
     assert json.loads(out)["tip_rmse_mm"] is None
     assert (tmp_path / "d.png").exists()
+
+
+def test_errors_of_no_solved_point_are_dashes(call, tmp_path):
+    (tmp_path / "far.csv").write_text("tendon_displacement_mm,total_deg\n30,40\n")
+    code, out, err = call("compare", "pacheco2021-a", "far.csv")
+    assert (code, "nan" in out) == (1, False)
+    assert "0 points of 1 trial" in out
+    assert "not converged" in err

@@ -20,7 +20,6 @@ def test_healthy_installation(call):
     assert found["device"]["x64"] is True
     assert found["canary"] == {"expected": 268_435_456.0, "computed": 268_435_456.0}
     assert found["backend"]["name"] == "native"
-    assert found["backend"]["optimisation"] == 0
     assert {"jax", "jaxlib", "numpy", "cyclopts"} <= found["packages"].keys()
     assert all(found["packages"].values())
     assert "matplotlib" in found["extras"]["plot"]["packages"]

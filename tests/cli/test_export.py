@@ -17,7 +17,7 @@ def test_files_of_one_call_agree(call, tmp_path):
     files = {one["file"]: one for one in document["files"]}
     assert {one["robot_hash"] for one in files.values()} == {document["robot_hash"]}
     assert document["robot"]["notch"][0]["depth"] == 1.38
-    assert files["a.dxf"]["path_inside_edge_mm"] == 0.0125
+    assert files["a.dxf"]["path_inside_edge_mm"] == [0.0125, 0.0125]
     assert files["a.dxf"]["cut_off_mm"] == -5.0
     assert files["a.stl"]["box_mm"][0][2] == pytest.approx(-5.0)
     assert not ezdxf.readfile(tmp_path / "a.dxf").audit().errors
@@ -82,12 +82,12 @@ def test_a_load_that_does_not_converge_writes_nothing(call, tmp_path):
         ("OUT_OF_RANGE", ["--dxf", "a.dxf", "--kerf", "-1"]),
         ("NOT_FINITE", ["--dxf", "a.dxf", "--kerf", "nan"]),
         ("NOT_A_NUMBER", ["--dxf", "a.dxf", "--kerf", "25um"]),
-        ("OUT_OF_RANGE", ["--dxf", "a.dxf", "--kerf", "25"]),
+        ("INVALID_INPUT", ["--dxf", "a.dxf", "--kerf", "25"]),
         ("OUT_OF_RANGE", ["--dxf", "a.dxf", "--kerf", "0.8"]),
         ("UNKNOWN_NAME", ["--dxf", "a.dxf", "--seam", "cross"]),
-        ("OUT_OF_RANGE", ["--dxf", "a.dxf", "--seam-at", "1e9"]),
+        ("INVALID_INPUT", ["--dxf", "a.dxf", "--seam-at", "1e9"]),
         ("OUT_OF_RANGE", ["--stl", "a.stl", "--channels", "0.5"]),
-        ("OUT_OF_RANGE", ["--stl", "a.stl", "--chord", "0"]),
+        ("INVALID_INPUT", ["--stl", "a.stl", "--chord", "0"]),
         ("OUT_OF_RANGE", ["--stl", "a.stl", "--tension", "-1"]),
         ("UNKNOWN_NAME", ["--dxf", "a.dxf", "--set", "notch.dept=1"]),
     ],
@@ -129,3 +129,20 @@ def test_a_missing_package_is_named(refused, monkeypatch, option, package, extra
     file = f"a.{option.removeprefix('--')}"
     message = refused("MISSING_PACKAGE", "export", "pacheco2021-a", option, file)
     assert f"notchflex[{extra}]" in message
+
+
+def test_each_format_gets_the_load_that_it_needs(call, tmp_path):
+    """A deck without a tension has a usual one; solids stay straight where that is wanted."""
+    robot = "pacheco2021-c"
+    files = ["--dxf", "a.dxf", "--stl", "a.stl", "--inp", "a.inp", "--mesh", "coarse"]
+    plain = ["--set", "tendon.radius=0.6", "--set", "notch.precurvature_deg=0", "--json", "a.json"]
+    for load in ([], ["--tension", "1", "--straight"]):
+        code, out, err = call("export", robot, *files, *plain, *load)
+        assert (code, len(out.splitlines())) == (0, 3)
+        assert ("No tension was given" in err) is not bool(load)
+        box = {
+            one["file"]: one.get("box_mm")
+            for one in json.loads((tmp_path / "a.json").read_text())["files"]
+        }["a.stl"]
+        assert box[1][0] < 1.0
+        assert f"tendon 1 at {1 if load else ''}" in (tmp_path / "a.inp").read_text()

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex._summary import short
+from notchflex.control import TargetSearch
 
 
 @pytest.fixture
@@ -40,12 +42,58 @@ def test_targets_are_followed_and_written(call, targets, tmp_path):
     assert code == 0
 
 
+def test_headers_in_own_words(call, targets, tmp_path):
+    text = (tmp_path / "targets.csv").read_text()
+    rows = [line.split(",") for line in text.splitlines()[1:]]
+    in_um = "".join(f"{x},{1e3 * float(z)}\n" for x, z in rows)
+    (tmp_path / "own.csv").write_text(f"quer,Höhe [um]\n{in_um}", encoding="utf-8")
+    assert call("follow", "pacheco2021-a", "own.csv")[0] == 2
+    named = ("--column", "tip_x_mm=quer", "--column", "tip_z_mm=Höhe [um]")
+    code, out, _ = call("follow", "pacheco2021-a", "own.csv", *named)
+    assert code == 0
+    assert "8 of 8 targets met" in out
+
+
 def test_a_target_out_of_reach_exits_with_1(call, tmp_path):
     (tmp_path / "far.csv").write_text("tip_x_mm,tip_z_mm\n2.4,9.3068\n30,0\n")
     code, out, err = call("follow", "pacheco2021-a", "far.csv", "--tolerance", "0.05")
     assert code == 1
     assert "TARGET_OUT_OF_REACH" in out
     assert "target 2" in err
+
+
+def test_targets_typed_to_a_hundredth_are_met(call, tmp_path):
+    """They lie off the one path of the tip, which a search to 1e-7 mm never meets."""
+    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.5, 1.0, steps=7))
+    rows = [f"{x:.2f},{z:.2f}\n" for x, _, z in path.tip_position]
+    (tmp_path / "typed.csv").write_text("tip_x_mm,tip_z_mm\n" + "".join(rows))
+    code, out, _ = call("follow", "pacheco2021-a", "typed.csv", "--json", "f.json")
+    assert code == 0
+    assert "7 of 7 targets met" in out
+    written = json.loads((tmp_path / "f.json").read_text())
+    for target, step in zip(written["targets"], written["steps"], strict=True):
+        goal = np.array([one for one in target["target"]["tip_position_mm"] if one is not None])
+        missed = np.linalg.norm(np.array(step["tip_position_mm"])[[0, 2]] - goal)
+        assert target["error_mm"] == pytest.approx(missed, abs=1e-9)
+        assert target["error_deg"] == 0.0
+    code, out, _ = call("follow", "pacheco2021-a", "typed.csv", "--tolerance", "1e-7")
+    assert code == 1
+    assert "0 of 7 targets met" in out
+
+
+def test_a_target_of_an_angle_has_its_own_tolerance():
+    robot = nf.load_robot("pacheco2021-a")
+    goals = {"tip_position": [(2.4, None, 9.3068)], "total_angle": [np.radians(26.0)]}
+    search = TargetSearch(near=0.2, near_angle=np.radians(5.0))
+    found = nf.follow(robot, goals, search=search)
+    missed = np.degrees(found.path.total_angle[found.step[0]]) - 26.0
+    assert found.error_deg[0] == pytest.approx(abs(missed), abs=1e-9)
+    assert found.reached[0]
+    assert 0.001 < found.error_deg[0] < 5.0
+    closer = nf.follow(robot, goals, search=TargetSearch(near=0.2, near_angle=1e-6))
+    assert not closer.reached[0]
+    missed = f"{short(float(closer.error_mm[0]))} mm and {short(float(closer.error_deg[0]))} deg"
+    assert f"misses it by {missed};" in closer.reason[0]
 
 
 @pytest.mark.parametrize(("unit", "scale"), [("m", 1e-3), ("µm", 1e3)])
@@ -91,6 +139,7 @@ def test_bad_targets_are_refused(refused, tmp_path, name):
         ("OUT_OF_RANGE", ("--least-tension", "2", "--most-tension", "1")),
         ("OUT_OF_RANGE", ("--rate", "0")),
         ("OUT_OF_RANGE", ("--tolerance", "0")),
+        ("OUT_OF_RANGE", ("--angle-tolerance", "0")),
         ("OUT_OF_RANGE", ("--most-strain", "-1")),
         ("NOT_FINITE", ("--most-tension", "nan")),
         ("UNKNOWN_NAME", ("--approach", "sideways")),

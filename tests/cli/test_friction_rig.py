@@ -41,6 +41,19 @@ def test_prints_and_draws(capsys, rig):
             assert text in picture
 
 
+def test_headers_in_own_words(capsys, rig):
+    own = TABLE.replace("weight_1_g", "Zug").replace("turn_1_deg", "Winkel")
+    (rig / "own.csv").write_text(own)
+    assert run(["friction-rig", "own.csv", "--json", "-"]) == 2
+    capsys.readouterr()
+    named = ("--column", "weight_1_g=Zug", "--column", "turn_1_deg=Winkel")
+    documents = []
+    for words in (["own.csv", *named], ["rig.csv"]):
+        assert run(["friction-rig", *words, "--json", "-"]) == 0
+        documents.append(json.loads(capsys.readouterr().out))
+    assert documents[0]["coefficient"] == documents[1]["coefficient"]
+
+
 def test_document(capsys):
     assert run(["friction-rig", "rig.csv", "--json", "-"]) == 0
     document = json.loads(capsys.readouterr().out)

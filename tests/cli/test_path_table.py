@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 
 from fake_path import fake_path
-from notchflex.cli.tables.path_columns import MEANINGS, parse_columns, usual_groups
-from notchflex.cli.tables.path_rows import MAX_ROWS, reversals_of, rows_note, shown_rows
-from notchflex.cli.tables.path_table import print_path
+from notchflex.cli.tables.path_table import (
+    MAX_ROWS,
+    MEANINGS,
+    parse_columns,
+    print_path,
+    reversals_of,
+    rows_note,
+    shown_rows,
+    usual_groups,
+)
 from notchflex.errors import ErrorCode, InputError
 from notchflex.results.quantities.registry import QUANTITIES
 

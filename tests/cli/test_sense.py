@@ -83,6 +83,11 @@ def test_bad_input_is_refused(refused, read, code, arguments):
     refused(code, "sense", ROBOT, *arguments)
 
 
+def test_a_column_that_is_told_must_be_read(refused, read):
+    told = "colour=tip_z_mm"  # it was left out without a word
+    assert "colour_mm" in refused("UNKNOWN_NAME", "sense", ROBOT, read, "--column", told)
+
+
 def test_tensions_that_are_all_negative_are_refused(refused, tmp_path):
     text = "tendon_force_N,tendon_displacement_mm,tip_x_mm\n-0.2,0.225,1.4\n-0.4,0.473,2.9\n"
     (tmp_path / "pushed.csv").write_text(text)

@@ -89,3 +89,10 @@ def test_show_says_how_right_it_is(call):
     low, high = (found["closing_tension_N"][end][0] for end in ("low", "high"))
     assert low < 1.6153 < high
     assert found["total_angle_deg_by_10um_depth"] == pytest.approx(3.94, abs=0.01)
+
+
+def test_draws_belong_to_uncertain(call):
+    """They were ignored without a word."""
+    code, _, err = call("simulate", "pacheco2021-a", "--tension", "1", "--draws", "16")
+    assert code == 2
+    assert "--uncertain" in err

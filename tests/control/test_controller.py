@@ -98,6 +98,17 @@ def test_bad_measurements_hold_the_last_command():
         assert controller.status.code == "INVALID_INPUT"
 
 
+def test_a_fault_of_the_program_is_no_invalid_input(monkeypatch):
+    controller = nf.Controller(nf.load_robot("pacheco2021-a"), "total_angle")
+
+    def fails(*_):
+        raise ValueError("a fault")
+
+    monkeypatch.setattr("notchflex.control.controller.solve_directly", fails)
+    with pytest.raises(ValueError, match="a fault"):
+        controller.step(0.3)
+
+
 def test_out_of_reach_is_flagged_and_the_nearest_commanded():
     controller = nf.Controller(WRIST)
     tension = controller.step((30.0, 0.0, 0.0))

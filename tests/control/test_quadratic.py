@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from notchflex.control.search.quadratic import least_step
+from notchflex.control.search.iterative_search import least_step
 
 
 @pytest.mark.parametrize("seed", range(12))

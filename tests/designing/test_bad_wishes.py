@@ -12,7 +12,7 @@ from mutations import mutated
 from notchflex.cli import run
 from notchflex.designing import read_design
 
-TEMPLATE = Path(nf.__file__).parent / "designing" / "specification" / "template.toml"
+TEMPLATE = Path(nf.__file__).parent / "designing" / "template.toml"
 TEXT = TEMPLATE.read_text(encoding="utf-8")
 
 BAD = {

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 import notchflex as nf
 from oracles.wrist import A
+from refusals import refused
 
 TENSION, ANGLE = 2.0, 90.0
 EQUAL = {
@@ -70,3 +71,48 @@ def test_unknown_names_are_refused(name):
     with pytest.raises(nf.InputError) as caught:
         nf.design(EQUAL | {"constraint": [wish]})
     assert caught.value.code is nf.ErrorCode.UNKNOWN_NAME
+
+
+def on_grid(values, grid):
+    return np.abs(np.asarray(values) / grid - np.round(np.asarray(values) / grid)).max() < 1e-9
+
+
+@pytest.mark.parametrize(("grid", "along"), [(0.005, "each"), (0.01, "polynomial")])
+def test_lengths_on_a_grid_are_evaluated_again(grid, along):
+    """The numbers are those of the robot that a shop can make, not of the one beside it."""
+    least = 152.0  # wrist A has 150 deg
+    variable = EQUAL["variable"][0] | {"along": along}
+    limit = {"quantity": "total_angle", "state": "pulled", "lower": least}
+    spec = EQUAL | {"variable": [variable], "constraint": [limit]}
+    free, made = nf.design(spec), nf.design(spec, grid=grid)
+    depths = [one.depth for one in made.robot.notches]
+    assert on_grid(depths, grid)
+    assert not on_grid([one.depth for one in free.robot.notches], grid)
+    assert [len(repr(one)) <= 5 for one in depths] == [True] * 5  # 1.405, no 16 digits
+    assert on_grid([one.value for one in made.variables], grid)
+    angle = np.degrees(nf.solve(made.robot, nf.Load(tension=TENSION)).total_angle)
+    assert made.wishes[0].achieved[0] == pytest.approx(angle, rel=1e-9)
+    assert made.path.total_angle[-1] == pytest.approx(np.radians(angle), rel=1e-9)
+    # A neighbour on the grid meets the limit, though the nearest one may not.
+    assert made.met, made.reason
+    assert angle >= least
+    assert np.abs(np.array(depths) - [one.depth for one in free.robot.notches]).max() <= 1.5 * grid
+
+
+def test_a_grid_that_an_exact_value_is_not_on():
+    wish = {"quantity": "closing_angle", "take": "sum", "equal": 120.0}
+    height = {"value": "notch.height", "lower": 0.62, "upper": 0.64}
+    spec = {"robot": "pacheco2021-a", "variable": [height], "constraint": [wish]}
+    exact, made = nf.design(spec), nf.design(spec, grid=0.005)
+    assert exact.converged
+    assert made.robot.notches[0].height == 0.625
+    assert not made.converged
+    assert "on a grid of 0.005 mm" in made.reason
+    # Closing angles are in proportion to the height.
+    wanted = 120.0 * 0.625 / exact.robot.notches[0].height
+    assert made.wishes[0].achieved[0] == pytest.approx(wanted, rel=1e-6)
+    with refused("UNSUPPORTED", "grid", "limits"):
+        nf.design(spec, grid=0.5)
+    for grid in (-0.1, np.inf):
+        with refused("OUT_OF_RANGE", "grid"):
+            nf.design(spec, grid=grid)

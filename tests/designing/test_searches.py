@@ -11,7 +11,7 @@ import notchflex as nf
 from design_wishes import bend, s_curve, s_wrist, tip_first, wide_wrist
 from notchflex.analysis.axis_points import axis_points
 from notchflex.analysis.kinematics import tip_from_angles
-from notchflex.designing.model.curves import target_points
+from notchflex.designing.model.quantities import target_points
 
 
 def test_constant_curvature_synthesis():

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 import notchflex as nf
 from notchflex.cli import run
@@ -131,6 +132,22 @@ def test_robust_on_the_command_line(tmp_path, monkeypatch, capsys):
     # By hand: the sum has a standard deviation of 0.005 sqrt(5) mm, of which 95 % need 1.645.
     off = nf.load_robot("made/robot.toml").notches[0].height - 0.5
     assert 1.645 < 5.0 * off / (0.005 * 5.0**0.5) < 1.72
+
+
+def test_a_yield_is_that_of_the_robot_on_the_grid(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("wish.toml").write_text(ROBUST, encoding="utf-8")
+    run(["design", "wish.toml", "--robust", "--grid", "0.01", "-o", "made"])
+    document = json.loads(Path("made/design.json").read_text(encoding="utf-8"))
+    height = nf.load_robot("made/robot.toml").notches[0].height
+    assert height in (0.5, 0.51)
+    (shown,) = (one["value"] for one in document["variables"] if one["name"] == "notch.height")
+    assert shown == height
+    known = norm.cdf(5.0 * (height - 0.5) / (0.005 * 5.0**0.5))
+    assert document["yields"][0]["achieved"] == pytest.approx(known, abs=0.005)
+    capsys.readouterr()
+    assert run(["design", "wish.toml", "--front", "--grid", "0.01"]) == 2
+    assert "--grid" in capsys.readouterr().err
 
 
 @pytest.mark.nightly

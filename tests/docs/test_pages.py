@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 import notchflex as nf
+from notchflex.results.files.csv import path_columns
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -170,15 +171,44 @@ def test_reference_has_every_public_name():
 def test_checked_site_fetches_nothing(tmp_path: Path, make: Any):
     check = make("check_site")
     good = '<link href="style.css"><a href="https://doi.org/x">paper</a><img src="a.svg">'
+    good += '<script src="iframe-worker.js"></script>'
     for number in range(15):
         (tmp_path / f"{number}.html").write_text(good)
-    for name in ("style.css", "a.svg"):
+    for name in ("style.css", "iframe-worker.js"):
+        (tmp_path / name).write_text((DOCS / name).read_text())
+    for name in ("search.js", "a.svg"):
         (tmp_path / name).touch()
     assert check.problems(tmp_path) == []
-    (tmp_path / "3.html").write_text('<script src="//cdn.net/x.js"></script><a href="gone.html">')
-    (tmp_path / "4.html").write_text("<p>a $x_j$</p><pre>$ notchflex robots</pre><p>2 $</p>")
-    (tmp_path / "5.html").write_text("<math><mi>k</mi><mi>l</mi><mi>z</mi><mi>z</mi></math>")
-    (tmp_path / "6.html").write_text('<div class="doc doc-object doc-module">solve</div>')
+    bad = {
+        3: '<script src="//cdn.net/x.js"></script><a href="gone.html">',
+        4: "<p>a $x_j$</p><pre>$ notchflex robots</pre><p>2 $</p>",
+        5: "<math><mi>k</mi><mi>l</mi><mi>z</mi><mi>z</mi></math>",
+        6: '<div class="doc doc-object doc-module">solve</div>',
+    }
+    for number, content in bad.items():
+        (tmp_path / f"{number}.html").write_text(good + content)
     wrong = check.problems(tmp_path)
     assert len(wrong) == 5
     assert "$x_j$" in wrong[2]
+    (tmp_path / "0.html").write_text("")
+    (tmp_path / "search.js").unlink()
+    (tmp_path / "style.css").write_text("")
+    index, style, worker = (one for one in check.problems(tmp_path) if one not in wrong)
+    assert "index" in index
+    assert "cuts off" in style
+    assert "iframe-worker.js" in worker
+
+
+def test_the_menu_has_the_titles_of_the_pages():
+    menu = re.findall(r'\{ "([^"]+)" = "([^"]+\.md)" \}', (ROOT / "zensical.toml").read_text())
+    assert len(menu) > 30
+    heads = {page: (ROOT / "docs" / page).read_text().partition("\n")[0] for _, page in menu}
+    assert {page: f"# {title}" for title, page in menu} == heads
+
+
+def test_columns_that_the_page_on_control_cuts_out_are_those_of_the_tip():
+    columns = re.search(r"cut -d, -f(\d+),(\d+)", (DOCS / "control.md").read_text())
+    assert columns is not None
+    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.5, 1.0, steps=6).release())
+    heads = list(path_columns(path))
+    assert [heads[int(number) - 1] for number in columns.groups()] == ["tip_x_mm", "tip_z_mm"]

@@ -260,7 +260,7 @@ def test_what_pushes_at_the_tip():
     assert ((sensed.low[:, 0] <= push) & (sensed.high[:, 0] >= push)).all()
     assert sensed.contact.tolist() == (push > 0.0).tolist()
     # Where the tendon sticks another force, solved by itself, gives the same stroke.
-    other = names["read"].load.part(0, 5)
+    other = names["read"].load[:5]
     moved = (nf.Load(tip_force=(0.0165, 0.0, 0.0)).external,)
     changed = nf.LoadPath(other.tension, other.stroke, external=(*other.external[:4], *moved))
     stroke = nf.simulate(names["wrist"], changed).stroke[-1, 0]

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.export.document import Subject
 from notchflex.export.flat.pattern import flat_pattern
-from notchflex.export.options import PatternOptions
-from notchflex.results.same_robot import robot_digest
+from notchflex.export.formats import PatternOptions, Subject
+from notchflex.results.state import robot_digest
 
 LAYERS = ("CUT", "CUT_OFF", "REFERENCE", "TEXT")
 
@@ -53,6 +52,14 @@ def test_ezdxf_reads_it_back_without_errors(name, version, tmp_path):
         assert points == pytest.approx(np.array(outline), abs=1e-9)
 
 
+@pytest.mark.parametrize(("degrees", "unit"), [(False, 4), (True, 0)])
+def test_degrees_and_mm_have_no_common_unit(wrist, tmp_path, degrees, unit):
+    y_unit = "deg" if degrees else "mm"
+    assert written(wrist, tmp_path, y_unit=y_unit).header["$INSUNITS"] == unit
+    nf.export_robot(wrist, tmp_path / "a.svg", PatternOptions(y_unit=y_unit))
+    assert ET.parse(tmp_path / "a.svg").getroot().get("width").endswith("mm") is not degrees
+
+
 def test_no_line_stands_twice(tmp_path):
     space = written(nf.load_robot("gao2017"), tmp_path, seam="split").modelspace()
     edges = set()
@@ -78,8 +85,9 @@ def test_the_cut_off_is_the_last_line_that_is_cut(wrist, tmp_path):
     ("options", "words"),
     [
         ({}, "NOT COMPENSATED"),
-        ({"kerf": 0.025}, "0.0125 mm for half the kerf of 0.025 mm"),
-        ({"polishing": 0.004}, "0.004 mm for electropolishing"),
+        ({"kerf": 0.025}, "half the kerf of 0.025 mm"),
+        ({"kerf": (0.02, 0.03)}, "half the kerf of 0.02 mm along the tube and 0.03 mm round it"),
+        ({"polishing": 0.004}, "removes 0.004 mm from every surface"),
     ],
 )
 def test_the_title_block_says_what_the_path_is(wrist, tmp_path, options, words):
@@ -94,7 +102,7 @@ def test_cuts_beside_the_axis_are_named_so(tmp_path):
     whole = "\n".join(
         one.dxf.text for one in written(nf.load_robot("york2015"), tmp_path).query("TEXT")
     )
-    assert "cuts 1-5: OFF-AXIS" in whole
+    assert "notches 1-5: OFF-AXIS" in whole
     assert "ON-AXIS" not in whole
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import asdict
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -10,11 +11,11 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.export.simulators.joint_model import joint_model
+from notchflex.export.formats import SimulatorOptions
+from notchflex.export.simulators import joint_model as samples
+from notchflex.export.simulators.joint_model import fit_spring, joint_model
 from notchflex.export.simulators.mjcf import mjcf
 from notchflex.export.simulators.mujoco_run import measure_errors
-from notchflex.export.simulators.options import SimulatorOptions
-from notchflex.export.simulators.springs import fit_spring
 from refusals import refused
 
 mujoco: Any = pytest.importorskip("mujoco", reason="needs the extra robotics")
@@ -195,6 +196,7 @@ def test_without_mujoco_a_sentence_says_that_nothing_was_measured(wrist, tmp_pat
     mujoco.MjModel.from_xml_path(str(file))
 
 
+@pytest.mark.filterwarnings("ignore::notchflex.InputWarning")  # 1e6 N is meant
 @pytest.mark.parametrize(
     ("top", "code"),
     [
@@ -215,3 +217,39 @@ def test_ranges_that_cannot_be_fitted_are_refused(wrist, tmp_path, top, code):
 def test_a_robot_that_never_closes_needs_a_range(tmp_path):
     with refused("MISSING_VALUE", "largest tension"):
         nf.export_robot(nf.load_robot("liu2022"), tmp_path / "a.xml")
+
+
+def test_a_spring_is_tried_on_a_triangle_not_on_all_samples(monkeypatch):
+    """Up to 300 trials had each solved all samples of all tendons."""
+    angle = np.concatenate([np.linspace(0.0, 0.5, 2000), np.linspace(0.5, 0.0, 2000)])
+    moment = np.where(angle < 0.2, angle, 0.2 + 0.3 * (angle - 0.2))
+    solved, lstsq = [], np.linalg.lstsq
+    monkeypatch.setattr(
+        np.linalg, "lstsq", lambda *args, **keys: solved.append(args[0]) or lstsq(*args, **keys)
+    )
+    spring = fit_spring(angle, moment, np.repeat([1.0, -1.0], 2000), 1.0)
+    assert len(solved) > 20
+    assert max(len(one) for one in solved) < 70
+    # The corner at 0.2 lies between two places where a spring may begin.
+    assert spring.moment(angle) == pytest.approx(moment, abs=3e-3)
+
+
+def test_what_closes_at_no_tension_is_no_range(wrist, monkeypatch):
+    """A search that finds -0.03 N had ended in "a tendon can only pull: got -0.03 N"."""
+    found = nf.closing(wrist)
+    tension = np.array([-0.03, np.nan, 1.6, 1.8, np.inf])
+    monkeypatch.setattr(samples, "closing", lambda _: dataclasses.replace(found, tension=tension))
+    assert samples.load_range(wrist) == pytest.approx(1.6)
+    tension[2:] = np.nan
+    with refused("MISSING_VALUE", "closes"):
+        samples.load_range(wrist)
+
+
+def test_a_base_of_100_m_changes_no_joint():
+    """Its file ended in an error of linear algebra, or in a tension that nobody had given."""
+    short = nf.load_robot("pacheco2021-b-true")
+    models = [joint_model(short.with_value("tube.base_length", base)) for base in (10.0, 1e5)]
+    assert models[1].top == pytest.approx(models[0].top, rel=1e-6)
+    for first, second in zip(models[0].springs, models[1].springs, strict=True):
+        at = first.range
+        assert second.moment(at) == pytest.approx(first.moment(at), rel=1e-3, abs=1e-4)

@@ -7,9 +7,8 @@ import pytest
 
 import notchflex as nf
 from notchflex.export.cuts import cuts_of
-from notchflex.export.document import Subject
 from notchflex.export.flat.pattern import flat_pattern
-from notchflex.export.options import PatternOptions
+from notchflex.export.formats import PatternOptions, Subject
 from refusals import refused
 
 READY = list(nf.list_robots())
@@ -119,9 +118,43 @@ def test_kerf_moves_the_leaning_edge_of_a_triangle_at_right_angles():
     assert along[~on_it] == pytest.approx(notch.height - 0.02, abs=1e-9)
 
 
-def test_polishing_moves_the_path_by_its_full_amount(wrist):
-    first, second = (pattern_of(wrist, **o).cuts[0] for o in ({"kerf": 0.03}, {"polishing": 0.015}))
-    assert np.array(first.outlines[0]) == pytest.approx(np.array(second.outlines[0]), abs=1e-12)
+@pytest.mark.parametrize("name", ["pacheco2021-a", "york2015"])
+def test_kerf_along_and_round_the_tube_can_differ(name):
+    """A slot round the tube and one along it are not equally wide."""
+    along, across = 0.03, 0.05
+    for plain, moved in zip(
+        pattern_of(name).cuts, pattern_of(name, kerf=(along, across)).cuts, strict=True
+    ):
+        edge, path = np.array(plain.outlines[0]), np.array(moved.outlines[0])
+        assert np.ptp(edge[:, 0]) - np.ptp(path[:, 0]) == pytest.approx(along, abs=1e-9)
+        if plain.placed.cut.radial:
+            lost = np.ptp(edge[:, 1]) - np.ptp(path[:, 1])
+            assert lost == pytest.approx(across, abs=1e-9)
+        else:
+            robot, side = nf.load_robot(name), plain.placed.cut.side_deg
+            low, high = (wrapped(robot, line, side)[:, 1].min() for line in (edge, path))
+            assert high - low == pytest.approx(across / 2, abs=1e-9)
+
+
+def test_a_beam_of_two_widths_cuts_a_round_corner_where_it_is(wrist):
+    """The ellipse of the beam touches the edge along its path and nowhere crosses it."""
+    along, across, corner = 0.03, 0.06, 0.2
+    edge = np.array(pattern_of(wrist, corner_radius=corner, chord=1e-5).cuts[0].outlines[0])
+    path = np.array(
+        pattern_of(wrist, corner_radius=corner, kerf=(along, across), chord=1e-5)
+        .cuts[0]
+        .outlines[0]
+    )
+    # In units of the beam's semi-axes it is a circle of radius 1.
+    edge, path = (line * [2.0 / along, 2.0 / across] for line in (edge, path))
+    start, step = edge, np.roll(edge, -1, axis=0) - edge
+    away = path[:, None] - start
+    part = np.clip((away * step).sum(-1) / (step**2).sum(-1), 0.0, 1.0)
+    distance = np.linalg.norm(away - part[..., None] * step, axis=-1).min(axis=1)
+    # Chords of 1e-5 mm, in units of 0.015 mm.
+    assert distance == pytest.approx(1.0, abs=2e-3)
+    with refused("OUT_OF_RANGE", "radius"):
+        pattern_of(wrist, corner_radius=corner, kerf=(0.01, 0.1))
 
 
 def test_a_corner_radius_takes_the_corners_away(wrist):
@@ -143,11 +176,18 @@ def test_curves_are_within_the_chord_tolerance():
     assert len(coarse.outlines[0]) < len(fine.outlines[0])
 
 
-def test_the_order_is_from_the_tip_to_the_base():
+def test_the_order_is_from_the_tip_to_the_base_and_the_numbers_are_those_of_the_notches():
     for name in READY:
-        ends = [one.placed.end for one in pattern_of(name).cuts]
+        cuts = pattern_of(name).cuts
+        ends = [one.placed.end for one in cuts]
         assert ends == sorted(ends, reverse=True)
-        assert [one.number for one in pattern_of(name).cuts] == list(range(1, len(ends) + 1))
+        numbers = [int(one.name.rstrip("ab")) for one in cuts]
+        assert numbers == [one.placed.notch for one in cuts]
+        assert len({one.name for one in cuts}) == len(cuts)
+    assert [one.name for one in pattern_of("york2015").cuts] == ["5", "4", "3", "2", "1"]
+    # The last of the links has the slot on its far side too, a pair of triangles has two cuts.
+    assert [one.name for one in pattern_of("gao2017").cuts][:3] == ["27b", "27a", "26"]
+    assert [one.name for one in pattern_of("liu2022").cuts][-3:] == ["2a", "1b", "1a"]
 
 
 def test_outlines_are_counter_clockwise_and_closed_by_no_second_point():
@@ -216,26 +256,37 @@ def test_a_tip_inside_the_last_cut_gets_a_ring_and_a_warning():
 
 
 @pytest.mark.parametrize(
-    ("code", "options"),
+    "options",
     [
-        ("OUT_OF_RANGE", {"kerf": -0.01}),
-        ("NOT_FINITE", {"kerf": math.nan}),
-        ("NOT_FINITE", {"shank": math.inf}),
-        ("WRONG_TYPE", {"kerf": "0.025"}),
-        ("WRONG_TYPE", {"polishing": True}),
-        ("UNKNOWN_NAME", {"seam": "cross"}),
-        ("UNKNOWN_NAME", {"dxf_version": "R2018"}),
-        ("UNKNOWN_NAME", {"y_unit": "inch"}),
-        ("OUT_OF_RANGE", {"chord": 0.0}),
-        ("CONFLICT", {"kerf": 0.2, "corner_radius": 0.05}),
+        {"kerf": -0.01},
+        {"kerf": math.nan},
+        {"shank": math.inf},
+        {"kerf": "0.025"},
+        {"polishing": True},
+        {"seam": "cross"},
+        {"dxf_version": "R2018"},
+        {"y_unit": "inch"},
+        {"paper": "a5"},
+        {"chord": 0.0},
+        {"kerf": (0.02, 0.02, 0.02)},
+        {"kerf": (0.02, -0.02)},
     ],
 )
-def test_options_that_are_not_allowed(code, options):
-    with refused(code, next(iter(options)) if len(options) == 1 else "corner_radius"):
+def test_options_that_are_not_allowed(options):
+    with refused("INVALID_INPUT", *options):
         PatternOptions(**options)
 
 
-@pytest.mark.parametrize("options", [{"kerf": 0.8}, {"kerf": 2.0}, {"corner_radius": 0.41}])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"kerf": 0.8},
+        {"kerf": 2.0},
+        {"corner_radius": 0.41},
+        {"kerf": 0.2, "corner_radius": 0.05},
+        {"polishing": 0.4},
+    ],
+)
 def test_what_does_not_fit_a_cut_is_refused(wrist, options):
     with refused("OUT_OF_RANGE", "mm"):
         pattern_of(wrist, **options)

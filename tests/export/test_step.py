@@ -10,9 +10,8 @@ import pytest
 import notchflex as nf
 from export.closed_form import volume_of_windows
 from notchflex.export.cuts import cuts_of
-from notchflex.export.document import Subject
 from notchflex.export.export import build
-from notchflex.export.options import SolidOptions
+from notchflex.export.formats import SolidOptions, Subject
 from refusals import refused
 
 pytestmark = [
@@ -52,7 +51,7 @@ def end_face(solid, tip, normal):
 def test_the_volume_is_that_of_sectors_and_segments(name, tmp_path):
     robot = nf.load_robot(name)
     solid = written(robot, tmp_path, shank=3.0)
-    wanted = volume_of_windows(robot, cuts_of(robot).tip + 3.0)
+    wanted = volume_of_windows(robot, cuts_of(robot).end + 3.0)
     assert solid.volume == pytest.approx(wanted, rel=1e-9)
 
 
@@ -63,7 +62,7 @@ def test_a_channel_takes_its_volume(tmp_path):
         tendon=(dataclasses.replace(robot.tendon[0], end_body=3),),
     )
     plain, drilled = (written(robot, tmp_path, channels=width).volume for width in (0.0, 0.6))
-    uncut = cuts_of(robot).tip + 10.0 - 2 * 0.55
+    uncut = cuts_of(robot).end + 10.0 - 2 * 0.55
     assert plain - drilled == pytest.approx(uncut * math.pi * 0.3**2, rel=1e-6)
 
 
@@ -81,7 +80,7 @@ def test_a_bent_robot_ends_at_the_tip_of_its_state(wrist, tmp_path):
     tip, normal = np.array(state.tip_position), np.array(state.body_rotation)[-1][:, 2]
     assert end_face(solid, tip, normal) == pytest.approx(tip, abs=1e-6)
     # The loft through nine sections.
-    straight = volume_of_windows(wrist, cuts_of(wrist).tip + 10.0)
+    straight = volume_of_windows(wrist, cuts_of(wrist).end + 10.0)
     assert solid.volume == pytest.approx(straight, rel=1e-4)
 
 

@@ -12,10 +12,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import notchflex as nf
+from notchflex.export.formats import SimulatorOptions
+from notchflex.export.simulators.document import transmission_table
 from notchflex.export.simulators.joint_model import joint_model
-from notchflex.export.simulators.options import SimulatorOptions
 from notchflex.export.simulators.text import inertia, quaternion, roll_pitch_yaw
-from notchflex.export.simulators.transmission import transmission_table
 
 
 def numbers(element: ElementTree.Element, tag: str, key: str) -> np.ndarray:
@@ -68,7 +68,7 @@ def test_the_tip_of_a_wrist_bent_when_free(bent_wrist, tmp_path):
 
 
 def test_names_with_signs_of_xml_are_written(wrist, tmp_path):
-    named = wrist.replace(name='a--b <&> \x01 "c"')
+    named = wrist.replace(name='a--b <&> "c"')
     nf.export_robot(named, tmp_path / "a.urdf", SimulatorOptions(1.2))
     nf.export_robot(named, tmp_path / "a.xml", SimulatorOptions(1.2))
     for name in ("a.urdf", "a.xml"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.fit.model.branch_residuals import branch_difference, branch_words
+from notchflex.fit.model.residuals import branch_difference, branch_words
 
 BRANCH = np.repeat([1, -1], 10)
 

@@ -7,6 +7,7 @@ import pytest
 import notchflex as nf
 from notchflex.fit import Constant
 from notchflex.fit.model.constants import unknowns
+from notchflex.fit.model.drawing import deviations_of
 from refusals import refused
 
 TWO = {"A": nf.load_robot("pacheco2021-a"), "B": nf.load_robot("pacheco2021-b")}
@@ -74,3 +75,10 @@ def test_what_cannot_be_fitted_is_refused_in_words(fit, code, name):
 def test_limits_and_priors_must_make_sense(made):
     with pytest.raises(nf.InputError):
         made()
+
+
+def test_the_law_deviates_in_the_last_notch_only():
+    """A factor on all notches is no other number than the moduli."""
+    wrist = nf.load_robot("pacheco2021-a-true")
+    found = deviations_of({"A": wrist}, unknowns({"A": wrist}, "notch.depth"))
+    assert [one.name for one in found if "stiffness" in one.name] == ["notch[5].stiffness_factor"]

@@ -144,11 +144,17 @@ def test_draws():
     drawn = Posterior(
         NAMES, draws, dict.fromkeys(NAMES, 5.0), dict.fromkeys(NAMES, float("nan")), 1
     )
+    assert len(repr(drawn)) < 400
     document = as_read(posterior_document(drawn, draws=True))
     assert document["constants"][0]["mean"] == 5.0
     assert document["constants"][1]["split_r_hat"] is None
     assert document["draws"][NAMES[1]] == [[1.0, 3.0, 5.0], [7.0, 9.0, 11.0]]
     assert "draws" not in posterior_document(drawn)
+
+
+def test_a_profile_is_shown_in_a_few_lines():
+    found = fitted()
+    assert len(repr(found.profile(found.names[0]))) < 400
 
 
 def test_written_robot_keeps_comments_and_says_where_values_came_from(tmp_path):
@@ -168,7 +174,7 @@ def test_written_robot_keeps_comments_and_says_where_values_came_from(tmp_path):
         f"{low:.5g} to {high:.5g} (95 %) (changed from 0.13)"
     )
     assert changed[0].startswith("elastic_modulus = ")
-    assert " MPa (95 %) (changed from 10000.0)" in changed[0]
+    assert " MPa (95 %, by 2 whole pulls) (changed from 10000.0)" in changed[0]
     # fitted again: one note, and still what the comment speaks of
     notes = {"friction.coefficient": "b.csv: at least 0.1 (95 %)"}
     nf.save_robot(back.with_value("friction.coefficient", 0.2), tmp_path / "b.toml", fitted=notes)

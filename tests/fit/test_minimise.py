@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from notchflex.fit.estimation.minimise import Cost, minimise
+from notchflex.fit.estimation.intervals import Cost, minimise
 
 WIDE = (np.full(2, -np.inf), np.full(2, np.inf))
 

@@ -29,7 +29,7 @@ def test_an_offset_of_all_depths_is_found_and_written(tmp_path):
     seen = nf.Measurements(
         "bench.csv", seen.load, seen.pull, True, exact.observed, dict(seen.deviation)
     )
-    found = calibrate(WRIST, seen, "offset:notch.depth", starts=1)
+    found = calibrate(WRIST, seen, "offset:notch.depth", starts=1, priors=False)
     assert found.values["offset:notch.depth"] == pytest.approx(0.012, abs=1e-7)
     assert found.units["offset:notch.depth"] == "mm"
     interval = found.intervals["offset:notch.depth"]
@@ -74,7 +74,7 @@ def test_precurvature_as_one_constant_times_the_height_of_two_wrists():
         for name, one in wrists.items()
     }
     seen = {name: simulate_measurements(one, UP) for name, one in made.items()}
-    found = calibrate(wrists, seen, RATIO, starts=1, intervals=False)
+    found = calibrate(wrists, seen, RATIO, starts=1, priors=False, intervals=False)
     assert found.values[RATIO] == pytest.approx(2.86, abs=1e-6)
     assert found.robots["B"].notches[4].precurvature_deg == pytest.approx(1.43, abs=1e-6)
 
@@ -98,7 +98,7 @@ def test_the_tension_that_acts_is_the_factor_times_the_reading_less_the_offset()
     truth = simulate_measurements(WRIST, nf.LoadPath(np.maximum(acting, 0.0), UP.stroke))
     seen = nf.Measurements("shown", UP, truth.pull, True, truth.observed)
     names = ("sensor.force_factor", "sensor.force_offset")
-    found = calibrate(WRIST, seen, names, starts=1, intervals=False)
+    found = calibrate(WRIST, seen, names, starts=1, priors=False, intervals=False)
     assert list(found.values.values()) == pytest.approx([factor, offset], abs=1e-6)
     assert found.robots[WRIST.name] == WRIST
 

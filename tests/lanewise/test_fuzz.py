@@ -163,7 +163,7 @@ def test_random_programs(data):
 
 
 @pytest.mark.nightly
-@settings(few, max_examples=10_000)
+@settings(few, max_examples=2_000)
 @given(st.data())
 def test_very_many_random_programs(data):
     check(data)

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.loads.applied import (
+from notchflex.loads.command import (
     BodyLoads,
     applied,
     bending_normal,

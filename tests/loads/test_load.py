@@ -50,7 +50,7 @@ def test_what_is_no_load_is_refused(loads):
         load_path(loads, 1)
 
 
-@pytest.mark.parametrize("value", [None, "1", b"1", True, [["a"]], [[1.0], [1.0, 2.0]], 10**400])
+@pytest.mark.parametrize("value", ["1", b"1", True, [["a"]], [[1.0], [1.0, 2.0]], 10**400])
 def test_load_paths_are_numbers(value):
     with refused("WRONG_TYPE", "tension"):
         nf.LoadPath(value, [[NAN]])
@@ -92,3 +92,21 @@ def test_paths_of_different_tendons_follow_each_other():
     np.testing.assert_array_equal(back.tension[2:], [[0, NAN], [1, NAN]])
     with refused("WRONG_TYPE", "LoadPath"):
         both.then(nf.Load(tension=1.0))
+
+
+def test_loads_are_copies():
+    """A list or array that is changed later changed a load before."""
+    tension, turn = [1.0, None], np.array([0.0, 0.0, 0.1])
+    load = nf.Load(tension=tension, stroke=np.array([0.5]), base_rotation=turn)
+    tension[0], turn[2] = 5.0, 1.0
+    assert (load.tension, load.stroke, load.base_rotation) == ((1.0, None), (0.5,), (0.0, 0.0, 0.1))
+
+
+def test_a_base_turns_at_most_once():
+    turn = np.radians([0.0, 0.0, 360.0])
+    np.testing.assert_array_equal(nf.LoadPath([[1.0]], base_rotation=turn).base_rotation, turn)
+    for wrong in ([90.0, 0.0, 0.0], [1e308, 1e308, 0.0]):  # degrees; too large for a sine
+        with refused("OUT_OF_RANGE", "base_rotation", "360 deg"):
+            nf.Load(tension=1.0, base_rotation=wrong)
+        with refused("OUT_OF_RANGE", "base_rotation", "360 deg"):
+            nf.LoadPath([[1.0]], base_rotation=wrong)

@@ -25,7 +25,7 @@ MODULUS, LIMIT, LOSS, PULL = 40_000.0, 0.03, 0.4, 2.0
 SCRIPT = f"""
 import json
 import notchflex as nf
-from notchflex.mechanics.chain.fibres import with_fibres
+from notchflex.mechanics.chain.flexures import with_fibres
 from notchflex.mechanics.flexure import rod
 robot = nf.Robot(
     name="new parts",
@@ -75,7 +75,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_new_parts_solve_as_their_closed_form(package: Path) -> None:
-    environment = os.environ | {"PYTHONPATH": str(package), "NOTCHFLEX_OPTIMISATION": "0"}
+    environment = os.environ | {"PYTHONPATH": str(package)}
     run = subprocess.run(
         [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=False
     )

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.photographs.chain.axis_points import axis_points, on_axis_points, straight_chain
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import chain_table
+from notchflex.photographs.chain.outline import axis_points, on_axis_points, straight_chain
 from notchflex.photographs.measure import measure_picture
 from photographs.renderer import Scene, render
 from refusals import refused

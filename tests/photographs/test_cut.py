@@ -10,9 +10,7 @@ import pytest
 import notchflex as nf
 from notchflex.cli.app import run
 from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.cut.depths import depths
-from notchflex.photographs.cut.measure_cut import combined
-from notchflex.photographs.cut.straight import StraightFit, seen_edges
+from notchflex.photographs.cut.measure_cut import StraightFit, combined, depths, seen_edges
 from notchflex.photographs.measured import MeasuredPhotograph
 from photographs.renderer import Scene, render
 from refusals import refused

@@ -209,6 +209,11 @@ def test_loads_come_from_a_table_or_from_names(tmp_path, photograph):
         table.write_text(text)
         with refused(code):
             nf.measure(photograph, ROBOT, loads=table)
+    table.write_text(f"Bild,Kraft [mN]\n{name},400\n")
+    named = {"photograph": "Bild", "tension": "Kraft [mN]"}
+    assert nf.measure(photograph, ROBOT, loads=table, columns=named).loads == {
+        "tendon_force_N": ("0.4",)
+    }
     for pattern in ("wrist", "pull_{tension}N", "{tension}{tension}"):
         with refused("BAD_SYNTAX"):
             nf.measure(photograph, ROBOT, pattern=pattern)
@@ -337,3 +342,9 @@ def test_hard_views(seed, monkeypatch):
     found = measure_picture(picture, chain_table(ROBOT), "wrist")
     assert found.reason == ""
     assert np.degrees(np.sqrt(((found.notch_angle - angles) ** 2).mean())) < 0.15
+
+
+def test_a_picture_as_long_as_a_wire_is_refused(tmp_path):
+    cv2.imwrite(str(tmp_path / "wire.png"), np.zeros((64, 70_000, 3), np.uint8))
+    with refused("OUT_OF_RANGE", "70000 x 64", "50 times"):
+        nf.measure([tmp_path / "wire.png"], nf.load_robot("pacheco2021-a"))

@@ -32,9 +32,11 @@ def test_constants_of_a_wrist_that_was_photographed(tmp_path):
     found.write_csv(str(tmp_path / "measured.csv"))
     read = read_measurements(tmp_path / "measured.csv", ROBOT)
     assert not read.from_rest
-    fitted = calibrate(ROBOT, read, list(TRUE), starts=1)
-    assert fitted.converged
-    for name, value in TRUE.items():
-        interval = fitted.intervals[name]
-        assert interval.lower < value < interval.upper
-        assert interval.upper - interval.lower < 0.05 * value
+    # The tolerances of the drawing leave the modulus of this wrist open by 5 %.
+    for priors, width in ((True, 0.15), (False, 0.05)):
+        fitted = calibrate(ROBOT, read, list(TRUE), starts=1, priors=priors)
+        assert fitted.converged
+        for name, value in TRUE.items():
+            interval = fitted.intervals[name]
+            assert interval.lower < value < interval.upper
+            assert interval.upper - interval.lower < width * value

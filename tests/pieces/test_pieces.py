@@ -13,7 +13,7 @@ import pytest
 import notchflex as nf
 from notchflex.cli import run
 from notchflex.fit import calibrate, calibration_document, simulate_measurements
-from notchflex.pieces.options import PieceFolder
+from notchflex.pieces.run import PieceFolder
 from swept import digests
 
 pytest.importorskip("polars")
@@ -82,7 +82,7 @@ def test_other_draws_are_refused(wrist, tolerances, change):
 
 @pytest.mark.nightly
 def test_another_version_is_refused(wrist, tolerances, monkeypatch):
-    monkeypatch.setattr("notchflex.pieces.manifest.__version__", "0.0.1")
+    monkeypatch.setattr("notchflex.pieces.folder.__version__", "0.0.1")
     with pytest.raises(nf.InputError) as caught:
         drawn(wrist, tolerances)
     assert caught.value.code.name == "CONFLICT"
@@ -95,7 +95,7 @@ def explored(robot, folder: Any = None, **options: Any) -> nf.Workspace:
 @pytest.mark.nightly
 def test_states_in_pieces(tmp_path, monkeypatch):
     """Other rays of the same sequence: extent and volume agree as those of two seeds do."""
-    monkeypatch.setattr("notchflex.workspaces.in_pieces._PIECE", 1024)  # 32,768 states
+    monkeypatch.setattr("notchflex.workspaces.explore._PIECE", 1024)  # 32,768 states
     robot = nf.load_robot("two-axis-wrist")
     whole, pieces = explored(robot), explored(robot, tmp_path / "x")
     assert len(os.listdir(tmp_path / "x" / "pieces")) == 2

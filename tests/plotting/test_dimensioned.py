@@ -8,7 +8,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import notchflex as nf
-from notchflex.plotting.drawings.dimensioned import MAX_SHAPES, dimensioned_figure, save_dimensioned
+from notchflex.plotting import save
+from notchflex.plotting.drawings.dimensioned import MAX_SHAPES, dimensioned_figure
 from notchflex.plotting.drawings.notch_views import notch_view
 from notchflex.plotting.shapes.outline import outline
 from notchflex.plotting.shapes.robot_shape import shape_from_angles
@@ -90,6 +91,7 @@ def test_arc_of_the_section_is_that_of_the_cut():
     )
 
 
+@pytest.mark.filterwarnings("ignore::notchflex.InputWarning")  # 0.5 mm is shallow
 def test_cut_face_of_an_on_axis_cut_shows_both_corners():
     view = view_of(nf.load_robot("pacheco2021-a"))
     # Outer corner: radius - depth; the radial edge meets the bore at the same angle.
@@ -167,7 +169,7 @@ def test_unknown_kind_is_refused():
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_drawing_is_written(tmp_path, suffix):
     file = tmp_path / f"drawing.{suffix}"
-    save_dimensioned(nf.load_robot("gao2017"), file)
+    save(dimensioned_figure(nf.load_robot("gao2017")), file)
     assert file.stat().st_size > 5000
 
 

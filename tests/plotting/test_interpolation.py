@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from notchflex.plotting.shapes.interpolation import interpolate_poses, rotation_of
+from notchflex.plotting.shapes.robot_shape import interpolate_poses, rotation_of
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-7, 0.3, 1.5])

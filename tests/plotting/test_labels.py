@@ -24,7 +24,7 @@ from notchflex.plotting import (
     path_picture,
     save_animation,
 )
-from notchflex.plotting.labels import SYMBOLS, for_browser, for_paper, heading_lines
+from notchflex.plotting.style import SYMBOLS, for_browser, for_paper, heading_lines
 
 NASTY = r"$x_1$ \frac{a} $5 100 % & <b>bold</b> %{x} a_b \$ </script>"
 WRIST = "pacheco2021-a"

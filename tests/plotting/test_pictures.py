@@ -24,8 +24,8 @@ from notchflex.plotting import (
     state_picture,
 )
 from notchflex.plotting.animation import MAX_FRAMES, frames_of
-from notchflex.plotting.labels import for_browser as html
 from notchflex.plotting.sheet import Area, Bars, Curve, Panel, grid
+from notchflex.plotting.style import for_browser as html
 from notchflex.results.quantities.registry import QUANTITIES
 from refusals import refused
 

@@ -22,6 +22,7 @@ def test_only_angles_change_their_number_at_the_edge():
     assert scaled == {
         "notch_angle",
         "total_angle",
+        "tip_axis_angle",
         "edge_angle",
         "chord_angle",
         "total_chord_angle",

@@ -93,3 +93,17 @@ def test_whole_numbers_are_asked_for_whatever_comes(number):
         dataclasses.replace(NOTCH, repeat=number)
     with refused("INVALID_ROBOT", "`end_body`"):
         nf.Tendon(0.7, end_body=number)
+
+
+@pytest.mark.parametrize(
+    ("name", "cited"),
+    [
+        ("pacheco2021-a", ["Pacheco, Gafford"]),
+        ("york2015", ["Pacheco, Gafford", "York et al."]),
+        ("liu2022", ["Liu et al.", "Gao et al."]),
+    ],
+)
+def test_a_robot_names_the_papers_of_its_parts(name, cited):
+    own, *papers = nf.load_robot(name).citations()
+    assert own.startswith(f"notchflex {nf.__version__}")
+    assert [one[: len(start)] for one, start in zip(papers, cited, strict=True)] == cited

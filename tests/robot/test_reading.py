@@ -187,6 +187,15 @@ def test_no_robot_at_all(read):
         read("")
 
 
+@pytest.mark.parametrize("name", [None, b"wrist.toml", 3])
+def test_what_names_no_robot(name):
+    """A TypeError before."""
+    with refused("WRONG_TYPE", repr(name), error=nf.RobotFileError):
+        nf.load_robot(name)
+    with refused("UNKNOWN_NAME", str(name)):
+        nf.load_robot("pacheco2021-a").with_value(name, 1.0)
+
+
 def test_a_file_that_is_none(tmp_path: Path, read):
     with refused("FILE_NOT_FOUND", "none.toml", error=nf.RobotFileError):
         nf.load_robot(tmp_path / "none.toml")

@@ -5,7 +5,7 @@ import pickle
 import pytest
 
 import notchflex as nf
-from notchflex.results.same_robot import differences
+from notchflex.results.state import differences
 from notchflex.robot import robot_from_text, robot_text
 from notchflex.robot.reading import READY
 from refusals import refused
@@ -31,7 +31,7 @@ def test_what_was_read_is_written_unchanged_and_fresh_files_are_the_same_robot()
         "notch.height": {"sd": 0.01, "per_notch": True},
     }
     assert robot_text(robot, SOURCE + TABLE) == SOURCE + TABLE
-    assert robot_from_text(robot_text(robot)) == robot
+    assert robot_from_text(robot_text(robot, "")) == robot
     assert pickle.loads(pickle.dumps(robot)) == robot
     assert hash(robot) != hash(robot.replace(tolerance=None))
 

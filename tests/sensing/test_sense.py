@@ -6,12 +6,10 @@ import pytest
 import notchflex as nf
 from notchflex.sensing import SensorNoise, sense
 from notchflex.sensing.history import estimate, with_noise
-from notchflex.sensing.merging import merged
-from notchflex.sensing.model import SensingModel
+from notchflex.sensing.model import SensingModel, unknown_force
 from notchflex.sensing.own_reading import own_readings
-from notchflex.sensing.readings import readings_of
+from notchflex.sensing.readings import merged, readings_of
 from notchflex.sensing.tables import sensed_document
-from notchflex.sensing.unknown import unknown_force
 from notchflex.solver.newton import DEFAULT
 from refusals import refused
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.derivatives.adjoint import gradient
 from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.tangent import Change, PathTangents
+from notchflex.analysis.derivatives.tangent import Change, PathTangents, gradient
 from notchflex.mechanics.chain import assemble
 from notchflex.solver.programs.prepare import PreparedChain
 
@@ -62,7 +61,7 @@ def test_gradient_in_the_world_of_a_turned_base(margin):
 
 
 def test_a_step_that_failed_later_does_not_matter():
-    path = nf.simulate(nf.load_robot("pacheco2021-a"), [nf.Load(tension=1.0), nf.Load(stroke=1e3)])
+    path = nf.simulate(nf.load_robot("pacheco2021-a"), [nf.Load(tension=1.0), nf.Load(stroke=40.0)])
     assert path.converged.tolist() == [True, False]
     change = changes(path)
     first, second = (gradient(path, {"total_angle": row}).along(change) for row in np.eye(2))
@@ -111,7 +110,7 @@ def test_rows_from_rest_do_not_know_of_each_other(margin):
     change = [model.change(robot, load, "friction.coefficient")]
     found = model.derivatives(path, change, ("total_angle",))["total_angle"][0]
     for start in (0, 3):
-        part = load.part(start, 3)
+        part = load[start : start + 3]
         alone = ForwardModel(robot, part)
         own = alone.solve(robot, part)
         np.testing.assert_array_equal(path.total_angle[start : start + 3], own.total_angle)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.loads.command import make_commands
+from notchflex.results.warnings import path_warnings
 from notchflex.solver.held_stiffness import held_stiffness
 from oracles.held_stiffness import held_stiffness as dense
 
@@ -92,3 +95,27 @@ def test_stability_costs_no_eigenvalues_where_the_symmetric_part_tells_it(monkey
     path = CASES["strips"]()
     monkeypatch.setattr(np.linalg, "eigvals", None)
     assert path.stable.all()
+
+
+@pytest.mark.parametrize("strokes", [[0.3, 0.3, 0.3, 0.3], [0.3001, 0.3, 0.3001, 0.3]])
+def test_strokes_that_depend_on_each_other_fix_no_tensions(strokes):
+    # The fourth stroke follows from three: 0.1 um more on two of them changes the tensions wholly.
+    robot = nf.load_robot("two-axis-wrist")
+    path = nf.simulate(robot, nf.Load(stroke=strokes))
+    if not path.converged[0]:  # the singular system may also find none of the many answers
+        assert path.reason_code == [nf.Failure.STROKES_CONTRADICT.name]
+        return
+    assert not path.stable.any()
+    (warning,) = path_warnings(path)
+    assert nf.Failure.INDETERMINATE_TENSIONS.text in warning
+    assert "axial_stiffness" in warning
+
+
+def test_tensions_are_determined_by_stretch_or_where_no_more_strokes_hold_than_are_independent():
+    robot = nf.load_robot("two-axis-wrist")
+    tendons = tuple(dataclasses.replace(one, axial_stiffness=500.0) for one in robot.tendon)
+    elastic = dataclasses.replace(robot, tendon=tendons)
+    loads = [nf.Load(stroke=[0.0] * 4), nf.Load(stroke=[0.3] * 4)]
+    assert nf.simulate(elastic, loads).stable.all()
+    loads = [nf.Load(stroke=[0.0] * 4), nf.Load(stroke=[0.4, 0.1, 0.4, 0.1])]
+    assert nf.simulate(robot, loads).stable.all()

@@ -135,6 +135,7 @@ def test_no_random_history_gains_work() -> None:
 
 
 @pytest.mark.nightly
+@pytest.mark.filterwarnings("ignore::notchflex.InputWarning")  # any material
 @pytest.mark.parametrize("name", ["liu2022", "gao2017", "two-axis-wrist"])
 def test_every_notch_kind_takes_nitinol(name: str) -> None:
     robot = nf.load_robot(name)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.closing_loads.closing import moment_arms
+from notchflex.analysis.closing_loads import moment_arms
 from notchflex.mechanics.chain import assemble
 
 YORK = nf.load_robot("york2015")

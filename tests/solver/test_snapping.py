@@ -33,6 +33,8 @@ def test_it_closes_and_opens(cycle):
     assert cycle.converged.all()
     closed = cycle.contact_force > 0.0
     assert closed[24, :4].all()
+    assert (closed == cycle.closed).all()
+    assert (cycle.contact_force[~cycle.closed] == 0.0).all()
     assert not closed[-1].any()
     assert np.abs(cycle.notch_angle[-1]).max() < 1e-9
     # Each notch closes at a higher tension than it opens.
@@ -173,3 +175,15 @@ def test_friction_opposes_what_slides_through_a_closed_notch():
     first = (slice(3, 4), 0, slice(0, 2))
     assert (np.diff(path.contact_slid, axis=0)[2, 0, :2] > 0.0).all()
     np.testing.assert_allclose(path.contact_log_ratio[first], path.contact_bound[first])
+
+
+def test_what_is_open_or_slack_is_exactly_zero(cycle):
+    loads = [nf.Load(stroke=stroke) for stroke in (0.0, 2.0, 3.4, 1.0, 0.0, -0.1)]
+    driven = nf.simulate(wrist(), loads)
+    assert driven.tension[-1, 0] == 0.0
+    for path in (cycle, driven):
+        assert (path.contact_force > 0.0).any()
+        assert (path.contact_force >= 0.0).all()
+        assert (path.gap >= 0.0).all()
+        np.testing.assert_array_equal(path.gap == 0.0, path.contact_force > 0.0)
+        np.testing.assert_array_equal(path.closed, path.contact_force > 0.0)

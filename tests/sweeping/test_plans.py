@@ -16,9 +16,9 @@ import notchflex as nf
 from mutations import mutated
 from notchflex.cli import run
 from notchflex.pieces.sketch import Scale, Sketch
-from notchflex.sweeping.points import Points
+from notchflex.sweeping.rows import Points
 
-TEMPLATE = Path(nf.__file__).parent / "sweeping" / "plan" / "template.toml"
+TEMPLATE = Path(nf.__file__).parent / "sweeping" / "template.toml"
 TEXT = TEMPLATE.read_text(encoding="utf-8")
 
 

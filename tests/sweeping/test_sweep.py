@@ -17,7 +17,7 @@ import tomlkit
 
 import notchflex as nf
 from notchflex.cli import run
-from notchflex.pieces import piece as pieces
+from notchflex.pieces import folder as pieces
 from notchflex.pieces.folder import locked
 from notchflex.plotting.sweeps.columns import _label
 from refusals import refused as expect_refused
@@ -140,7 +140,8 @@ def test_a_stopped_sweep_goes_on(whole, tmp_path, monkeypatch):
     rotten = bytearray(files[1].read_bytes())
     rotten[200] ^= 1  # a number, which nothing else would tell
     files[1].write_bytes(rotten)
-    (folder / "pieces" / ".piece-000000005-abc.parquet").write_bytes(b"half")
+    (folder / "pieces" / ".notchflex-piece-000000005-abc.parquet").write_bytes(b"half")
+    monkeypatch.setattr("notchflex._replacing._swept", set())
     worked = []
     make = pieces.make_piece
     monkeypatch.setattr(
@@ -157,7 +158,7 @@ def test_another_plan_version_or_robot_is_refused(whole, tmp_path, monkeypatch, 
     other = plan(sampling={"points": 100, "seed": 5})
     refused("CONFLICT", "another seed", other, whole)
     refused("CONFLICT", "another robot", plan(robot="pacheco2021-b"), whole)
-    monkeypatch.setattr("notchflex.pieces.manifest.__version__", "0.0.1")
+    monkeypatch.setattr("notchflex.pieces.folder.__version__", "0.0.1")
     refused("CONFLICT", "another version", plan(), whole)
     assert digests(whole) == before
 

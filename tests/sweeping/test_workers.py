@@ -17,10 +17,9 @@ import pytest
 import tomlkit
 
 import notchflex as nf
-from notchflex.pieces import connection
-from notchflex.pieces.connection import scheduler_at
+from notchflex.pieces import running as connection
 from notchflex.pieces.folder import manifest_in
-from notchflex.pieces.running import on_cluster
+from notchflex.pieces.running import on_cluster, scheduler_at
 from notchflex.sweeping.worker import sweep_worker
 from swept import TABLE, digests, plan
 

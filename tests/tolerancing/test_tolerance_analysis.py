@@ -7,10 +7,10 @@ import pytest
 
 import notchflex as nf
 from notchflex.analysis.uncertainty.draws import deviation, moments
-from notchflex.pieces.codes import CODES
+from notchflex.pieces.folder import CODES
 from notchflex.robot.tolerance import Tolerance
 from notchflex.tolerancing.analysis import tolerances_for
-from notchflex.tolerancing.criteria import criteria_of
+from notchflex.tolerancing.spec import criteria_of
 from notchflex.tolerancing.study import Study
 from notchflex.tolerancing.yields import replicates, yield_interval
 from refusals import refused

@@ -17,7 +17,7 @@ def test_this_machine_only_by_default_and_a_warning_otherwise():
         assert exposed(host) == ""
     for host in ("0.0.0.0", "::", "192.168.0.7", "example.org"):
         assert host in exposed(host)
-        assert "no password" in exposed(host)
+        assert "without encryption" in exposed(host)
 
 
 def test_the_default_of_the_viewer_is_this_machine():

@@ -42,7 +42,7 @@ def nothing_goes_wrong(visit):
     """After every test: no error in the console, and no other host was asked for anything."""
     yield
     assert visit.errors == []
-    assert visit.hosts == {visit.viewer.address.removeprefix("http://")}
+    assert visit.hosts == {visit.viewer.address.split("/")[2]}
     assert visit.viewer.address.startswith("http://127.0.0.1:")
 
 
@@ -169,6 +169,7 @@ def test_what_is_saved_is_what_is_seen(visit):
     assert f"{float(rows[-1]['total_deg']):.2f}" == angle
     name, content = visit.saved("Robot file (TOML)")
     assert robot_from_text(content.decode()) == visit.viewer.session.robot
+    assert "E_lin, Table 3" in content.decode()
     name, content = visit.saved("Picture (PNG)")
     picture = image.imread(io.BytesIO(content), format="png")
     assert picture.shape[:2] == (1200, 1920)

@@ -1,5 +1,7 @@
 """What a person sees: how much room the scene has, what lies over it, and from where it is seen."""
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -101,6 +103,34 @@ def test_a_strain_beyond_the_allowed_one_stands_out(visit):
     assert coloured(shot(visit), (214, 0, 147)).sum() > 500  # and so do the notches
     visit.reset()
     assert visit.page.locator("[data-warning]").count() == 0
+
+
+def test_what_is_prepared_is_told_in_sight_and_old_numbers_are_grey(visit):
+    """Also where the panel is scrolled down to the list of robots."""
+
+    def opacity():
+        return visit.page.locator("table").evaluate("table => getComputedStyle(table).opacity")
+
+    visit.reset()
+    visit.page.set_viewport_size({"width": WIDTH, "height": 560})
+    visit.open("Robot")
+    go = threading.Event()
+    visit.viewer.ask(lambda: go.wait(60.0))  # the page waits for its turn until it was looked at
+    visit.viewer.page.busy("preparing the robot")
+    visit.row("ready robot").scroll_into_view_if_needed()
+    note = visit.page.locator("[data-waiting]")
+    note.wait_for()
+    seen = note.bounding_box()
+    assert seen["y"] > 0.0
+    assert seen["y"] + seen["height"] < 560.0
+    assert CHARTS_WIDTH < seen["x"] < WIDTH - 295.0 - seen["width"]
+    assert opacity() == "0.3"
+    go.set()
+    visit.viewer.ask(visit.viewer.page.update)
+    note.wait_for(state="detached")
+    assert opacity() == "1"
+    visit.open("Robot")
+    visit.page.set_viewport_size({"width": WIDTH, "height": HEIGHT})
 
 
 def test_from_the_side_the_tube_stands_upright_and_its_rims_are_level(visit):

@@ -1,5 +1,7 @@
 """The handle, the cloud and the sensed force in a real browser."""
 
+import io
+import threading
 import time
 
 import numpy as np
@@ -9,7 +11,7 @@ import notchflex as nf
 from notchflex.plotting.curves import LOADING, UNLOADING
 from visit import Visit, changed
 
-pytest.importorskip("matplotlib.image")
+image = pytest.importorskip("matplotlib.image")
 pytest.importorskip("viser", reason="the extra `viewer` is not installed")
 pytestmark = [pytest.mark.browser, pytest.mark.nightly]
 
@@ -25,6 +27,15 @@ def visit(browser):
 
 def switch(visit, label):
     visit.row(label).locator("input[type=checkbox]").first.click()
+
+
+def drag_the_tip(visit):
+    """Show the arrows, and wait until they are there."""
+    switch(visit, "drag the tip")
+    wait(lambda: visit.viewer.shown.handle)
+    there = threading.Event()
+    visit.viewer.ask(there.set)
+    wait(there.is_set)
 
 
 def pixel(visit, point):
@@ -69,7 +80,7 @@ def drag(visit, points):
 def test_the_tip_follows_the_mouse_with_its_friction_history(visit, record_property):
     wrist = visit.viewer.session.robot
     visit.set_tension(0.6)
-    switch(visit, "drag the tip")
+    drag_the_tip(visit)
     loading = np.linspace(0.6, 1.4, 41)[1:]
     path = nf.simulate(wrist, [nf.Load(tension=float(one)) for one in [*loading, *loading[::-1]]])
     tips = path.tip_position
@@ -93,6 +104,22 @@ def test_the_tip_follows_the_mouse_with_its_friction_history(visit, record_prope
     visit.no_notice()
     switch(visit, "drag the tip")
     visit.reset()
+
+
+def test_a_saved_picture_is_without_the_arrows_to_drag(visit):
+    def saved():
+        _, content = visit.saved("Picture (PNG)")
+        return image.imread(io.BytesIO(content), format="png")[..., :3]
+
+    scene = {"x": 290, "y": 60, "width": 400, "height": 440}
+    plain = saved()
+    drag_the_tip(visit)
+    handle = visit.picture(scene)
+    assert changed(plain, saved()) < 1e-4
+    assert changed(handle, visit.picture(scene)) < 1e-3  # on the page they are still there
+    switch(visit, "drag the tip")
+    wait(lambda: not visit.viewer.shown.handle)
+    assert changed(handle, visit.picture(scene)) > 1e-3
 
 
 def test_the_cloud_and_the_sensed_force_come_and_go(visit):

@@ -10,8 +10,7 @@ import notchflex as nf
 from notchflex.viewer.controls import STROKE, reach_of
 from notchflex.viewer.overlays.background import Background
 from notchflex.viewer.overlays.sensed import intervals, read, sensed, turning_points
-from notchflex.viewer.session import Session
-from notchflex.viewer.steering import steer
+from notchflex.viewer.session import Session, steer
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.plotting.shapes.robot_shape import shape_at
-from notchflex.viewer.scene.solids import PIECES, ROUND, at_rest, body_solids, skins
+from notchflex.viewer.scene.scene import PIECES, ROUND, at_rest, body_solids, skins
 from robots import ready
 
 trimesh = pytest.importorskip("trimesh", reason="the extra `viewer` is not installed")

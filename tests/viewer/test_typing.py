@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from notchflex.viewer.page.sliders import NumberField, Slider
+from notchflex.viewer.page.folders import NumberField, Slider
 from notchflex.viewer.tasks import PAUSE, Tasks
 
 

@@ -7,11 +7,9 @@ import pytest
 
 import notchflex as nf
 from notchflex.workspaces import workspace
-from notchflex.workspaces.actuation import rays
-from notchflex.workspaces.comparing import overlaps
+from notchflex.workspaces.cloud import DIRECTIONS, alpha_size, hull_of, inside, overlaps, voxel_map
 from notchflex.workspaces.limits import in_python, limits_of
-from notchflex.workspaces.shape import alpha_size, hull_of, inside
-from notchflex.workspaces.voxels import DIRECTIONS, voxel_map
+from notchflex.workspaces.rays import rays
 from refusals import refused
 
 RNG = np.random.default_rng(0)
@@ -203,7 +201,7 @@ def test_a_robot_whose_notches_never_close_needs_a_tension():
 def test_files_hold_all_states(found, tmp_path):
     xarray = pytest.importorskip("xarray")
     from notchflex.results.files.json import json_text
-    from notchflex.workspaces.files import save_netcdf, workspace_document
+    from notchflex.workspaces.cloud import save_netcdf, workspace_document
 
     save_netcdf({"a": found, "b/c": found}, str(tmp_path / "both.nc"))
     read = xarray.load_dataset(tmp_path / "both.nc", engine="h5netcdf", group="b-c")

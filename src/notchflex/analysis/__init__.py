@@ -2,10 +2,9 @@
 
 from notchflex.analysis.axis_points import AxisPlaces, axis_places, axis_points, points_on_axis
 from notchflex.analysis.batch import simulate_batch, solve_batch
-from notchflex.analysis.closing_loads.closing import Closing, closing
-from notchflex.analysis.closing_loads.search import ClosingStatus
+from notchflex.analysis.closing_loads import Closing, ClosingStatus, closing
 from notchflex.analysis.derivatives.differentiable import Differentiable, differentiable
-from notchflex.analysis.derivatives.kinks import Kink
+from notchflex.analysis.derivatives.tangent import Kink
 from notchflex.analysis.derivatives.tip_response import TipResponse, tip_response
 from notchflex.analysis.kinematics import (
     SharedStroke,

@@ -7,25 +7,227 @@ bounds the memory. Where JAX has a GPU, whole pieces run there in parallel.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, closing, nullcontext
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float, Int
+from threadpoolctl import threadpool_limits
 
-from notchflex.analysis.batch_rows import BatchRobots, missing_value, tables_of, varied_rows
+from lanewise import WIDTH
+from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import (
     DEFAULT_OUTPUTS,
+    OUTPUTS,
+    WORKS,
     Batch,
     check_outputs,
+    follow_row,
 )
-from notchflex.analysis.varied.varied_chains import VariedChains
+from notchflex.analysis.solve import prepare_for
+from notchflex.analysis.varied import VariedChains, varied_chains
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
+from notchflex.loads.command import follows, is_planar, is_unloaded, make_commands
 from notchflex.loads.load_path import join_paths, load_path
-from notchflex.loads.validation import check_integer, one_or_several
+from notchflex.loads.validation import check_integer, one_or_several, short_repr
+from notchflex.results.quantities.path_formulas import work_of_steps
 from notchflex.robot import Robot
+from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure
 from notchflex.solver.programs.threads import number_of_cores, on_cores
+
+# Largest number of rows of a piece, by the number of rows.
+_PIECE_SIZES = {0: 64, 512: 256, 8192: 2048}
+
+
+@dataclass(frozen=True)
+class BatchRobots:
+    """The robots of a batch.
+
+    Attributes:
+        every: One for all rows, or one per row.
+        varied: The same as one robot with varied numbers, where the robots need not be built.
+    """
+
+    every: Sequence[Robot]
+    varied: VariedRobots | None = None
+
+    @classmethod
+    def of(cls, robots: Any) -> BatchRobots:
+        """Convert the robots that a caller gives."""
+        if isinstance(robots, VariedRobots):
+            return cls(robots, robots)
+        message = "a batch needs a notchflex.Robot, or some of them"
+        every = one_or_several(robots, Robot, message)
+        if not every or not all(isinstance(robot, Robot) for robot in every):
+            raise InputError.WRONG_TYPE(f"{message}; got {short_repr(robots)}")
+        return cls(every)
+
+    @property
+    def max_tendons(self) -> int:
+        """Largest number of tendons of a robot."""
+        unlike = self.every if self.varied is None else [self.varied.robot]
+        return max(robot.number_of_tendons for robot in unlike)
+
+    @property
+    def threads(self) -> AbstractContextManager[Any]:
+        """Context that limits the threads of matrix products while rows are solved.
+
+        Every core has its own piece; a product that assembles varied robots must not use others.
+        """
+        return nullcontext() if self.varied is None else threadpool_limits(1)
+
+
+@dataclass(frozen=True)
+class BatchRows:
+    """Rows of a batch whose robots run through one program.
+
+    Attributes:
+        rows: Indices of these rows in the batch.
+        chains: A row per robot, or one for all.
+        commands: A row per path, or one for all, then the steps.
+        layouts: Layouts of the chains and of one command, and names of the outputs.
+        turn: Rotation from the base to the world; None for the identity.
+    """
+
+    rows: np.ndarray
+    chains: Float[np.ndarray, "k chain"]
+    commands: Float[np.ndarray, "k s command"]
+    layouts: tuple[StaticStructure, PytreeLayout, tuple[str, ...]]
+    turn: Float[np.ndarray, "3 3"] | None
+
+    def pieces(self, cores: int) -> Iterator[slice]:
+        """Return the rows of each call of the program: equal pieces, balanced over the cores."""
+        rows = len(self.rows)
+        max_size = max(size for limit, size in _PIECE_SIZES.items() if rows >= limit)
+        each = -(-rows // (max_size * cores))
+        size = -(-rows // (each * cores * WIDTH)) * WIDTH
+        return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
+
+    def packed(
+        self, index: slice
+    ) -> tuple[Float[np.ndarray, "*k chain"], Float[np.ndarray, "k s command"]]:
+        """Return chains of a piece of the rows (one if shared), and their commands."""
+        commands = self.commands[index]
+        if len(self.commands) == 1:
+            commands = np.repeat(self.commands, index.stop - index.start, axis=0)
+        return self.chains[0] if len(self.chains) == 1 else self.chains[index], commands
+
+    def run(self, index: slice, numbers: np.ndarray) -> dict[str, np.ndarray]:
+        """Solve a piece of the rows: quantities in the world, NaN where they are not known."""
+        chains, commands = self.packed(index)
+        by_row = (chains.ndim == 2, True, False)
+        robot, command, names = self.layouts
+        solved = tuple(dict.fromkeys(one for name in names for one in WORKS.get(name, (name,))))
+        found = follow_row.rows(by_row, chains, commands, numbers, robot, command, solved)
+        outputs = found | {name: _work(found, name) for name in names if name in WORKS}
+        outputs = {name: outputs[name] for name in sorted(names)}
+        failed = ~outputs["converged"]
+        for name, values in outputs.items():
+            if name in REGISTERED and values.dtype.kind == "f":
+                outputs[name] = REGISTERED[name].turned(values, self.turn)
+                if failed.any():
+                    outputs[name][failed] = np.nan
+        return outputs
+
+
+def _work(found: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+    """Return the work since rest, where force and length are 0, rows and steps as leading axes."""
+    force, length = (
+        (np.concatenate([np.zeros_like(after[:, :1]), after[:, :-1]], axis=1), after)
+        for after in (found[one] for one in WORKS[name])
+    )
+    return np.cumsum(work_of_steps(force, length), axis=1)
+
+
+@dataclass(frozen=True)
+class VariedRows(BatchRows):
+    """Rows whose robots differ by a few numbers: chains are computed piece by piece."""
+
+    varied: VariedChains
+
+    def packed(self, index: slice) -> tuple[np.ndarray, np.ndarray]:
+        """Return chains and commands of a piece of the rows."""
+        return self.varied.rows(index)
+
+
+def varied_rows(varied: VariedChains, count: int, outputs: tuple[str, ...]) -> VariedRows:
+    """Return the rows of robots whose chains are computed piece by piece."""
+    layouts = (varied.structure, varied.command, outputs)
+    nothing = np.zeros((0, 0))
+    return VariedRows(np.arange(count), nothing, nothing, layouts, varied.turn, varied)
+
+
+def missing_value(values: np.ndarray) -> float:
+    """Return the value for missing entries: NaN, or 0 for integers and flags."""
+    return np.nan if values.dtype.kind == "f" else 0
+
+
+def tables_of(
+    robots: BatchRobots,
+    joined: LoadPath,
+    paths: int,
+    count: int,
+    outputs: tuple[str, ...],
+    refinement: int,
+) -> Sequence[BatchRows]:
+    """Return rows of a batch by the structure of their robots."""
+    steps = len(joined) // paths
+    if robots.varied is not None and paths == 1:
+        varied = varied_chains(robots.varied, joined, refinement)
+        if varied is not None:
+            return [varied_rows(varied, count, outputs)]
+    groups: dict[Any, list[tuple[np.ndarray, np.ndarray, np.ndarray]]] = {}
+    for kind, rows, robot, part in _parts(robots.every, joined, paths):
+        ready = prepare_for(robot, part, None, refinement)
+        commands = make_commands(part, robot, ready.chain)
+        layout = ready.command_layout(commands)
+        packed = layout.pack(commands, leading=1).reshape(-1, steps, layout.size)
+        group = groups.setdefault((ready.static_structure, layout, kind), [])
+        group.append((rows, ready.dynamic_vector, packed))
+    tables = []
+    for (structure, layout, _), entries in groups.items():
+        numbers, chains, commands = zip(*entries, strict=True)
+        packed = np.stack(chains), np.concatenate(commands)
+        layouts = structure, layout, outputs
+        tables.append(BatchRows(np.concatenate(numbers), *packed, layouts, joined.base_to_world))
+    return tables
+
+
+def _parts(
+    robots: Sequence[Robot], joined: LoadPath, paths: int
+) -> Iterator[tuple[int, np.ndarray, Robot, LoadPath]]:
+    """Return rows that are prepared together: what acts, their numbers, robot and loads.
+
+    Rows of one robot are apart where other kinds of loads act: none changes another's modes.
+    """
+    steps = np.arange(len(joined)).reshape(paths, -1)
+    if len(robots) > 1:
+        for row, robot in enumerate(robots):
+            yield 0, np.array([row]), robot, joined if paths == 1 else joined[steps[row]]
+        return
+    kinds = np.bitwise_or.reduce(_kinds(robots[0], joined).reshape(paths, -1), axis=1)
+    for kind in np.unique(kinds).tolist():
+        rows = np.flatnonzero(kinds == kind)
+        part = joined if len(rows) == paths else joined[steps[rows].ravel()]
+        yield kind, rows, robots[0], part
+
+
+def _kinds(robot: Robot, load: LoadPath) -> Int[np.ndarray, " s"]:
+    """Return what acts in each step, as bits: loads, across the plane, following, strokes."""
+    alone = [replace(load[:1], external=(external,)) for external in load.different]
+    acting = np.array(
+        [
+            (not is_unloaded(one)) + 2 * (not is_planar(one, robot)) + 4 * follows(one)
+            for one in alone
+        ]
+    )
+    which = load.which if len(alone) > 1 else 0
+    return acting[which] + 8 * ~np.isnan(load.stroke).all(axis=1)
 
 
 def solve_batch(
@@ -50,8 +252,8 @@ def solve_batch(
         progress: Called with the rows done and the rows of the whole batch.
 
     Returns:
-        Arrays by name, rows as leading axis. A row that did not converge says so in `converged`
-        and holds the last good state.
+        Arrays by name, rows as leading axis, in the world, and `converged` always. A row that did
+        not converge holds NaN.
 
     Raises:
         InputError: Robots and loads that are not one or equally many, no such output, or no core.
@@ -126,7 +328,7 @@ def simulate_varied(
     Returns:
         Arrays by name, rows and then steps as leading axes.
     """
-    rows = varied_rows(chains, len(chains.numbers), check_outputs(outputs))
+    rows = varied_rows(chains, len(chains.numbers), with_converged(outputs))
     numbers = np.array((settings or DEFAULT).numbers)
     arrays: dict[str, np.ndarray] = {}
     for index in rows.pieces(1):
@@ -146,7 +348,7 @@ def _simulate(
     progress: Callable[[int, int], None] | None,
 ) -> dict[str, np.ndarray]:
     """Simulate paths, joined to one, each from rest."""
-    asked = check_outputs(outputs)
+    names = with_converged(outputs)
     threads = number_of_cores() if cores is None else check_integer(cores, "cores")
     if threads < 1:
         raise InputError.OUT_OF_RANGE(f"cores must be 1 or more, or None for all; got {threads}")
@@ -162,7 +364,7 @@ def _simulate(
     done = 0
     work = [
         (table, index)
-        for table in tables_of(robots, joined, paths, count, asked, refinement)
+        for table in tables_of(robots, joined, paths, count, names, refinement)
         for index in table.pieces(threads)
     ]
     solving = on_cores(lambda one: one[0].run(one[1], numbers), work, threads)
@@ -175,6 +377,11 @@ def _simulate(
             if progress is not None:
                 progress(done, count)
     return arrays
+
+
+def with_converged(outputs: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of outputs, checked; `converged` is always among them."""
+    return tuple(dict.fromkeys([*check_outputs(outputs, (*OUTPUTS, *WORKS)), "converged"]))
 
 
 def _store(

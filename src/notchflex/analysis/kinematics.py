@@ -138,7 +138,7 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
     if first.fibre is None:
         raise InputError.UNSUPPORTED(
             'the kinematic model needs a first tendon with path = "wall-arc"; '
-            f"the first tendon of {robot.name} has another"
+            f"that of {robot.name} has another: leave the model out, or set tendon[1].path"
         )
     column = first.numbers.index(0)
     arm = np.asarray(first.fibre[:, column, 0])

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.analysis.closing_loads.closing import Closing, closing, moment_arms
+from notchflex.analysis.closing_loads import Closing, closing, moment_arms
 from notchflex.mechanics.chain import assemble, sites_of
 from notchflex.mechanics.flexure import Site, rod_at
 from notchflex.results.quantities.registry import DEGREES

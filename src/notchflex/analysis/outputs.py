@@ -12,23 +12,25 @@ from notchflex._jax import jax, jnp
 from notchflex._pytree import choose
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary, short
+from notchflex._values import ByValue, frozen
 from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.validation import short_repr
 from notchflex.mechanics.chain import Chain
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.solver.continuation import solve_load_step
-from notchflex.solver.derived.reported import believable
+from notchflex.solver.derived.quantities import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
-from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
-from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
 from notchflex.solver.solver_state import SolverState, at_rest
 
 _OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]
-DEFAULT_OUTPUTS = ("total_angle", "tip_position", "tip_rotation", "converged")
+DEFAULT_OUTPUTS = ("total_angle", "notch_angle", "tip_position", "tip_rotation", "converged")
 OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *_OF_STATE]),)
 """What can be asked of a batch or of a function that can be differentiated."""
+WORKS = {name: one.work_of for name, one in REGISTERED.items() if one.work_of}
+"""What can be asked of a batch besides: works, with what they are integrated of."""
 
 
 class UnknownOutputError(InputError, KeyError):
@@ -45,7 +47,7 @@ class UnknownOutputError(InputError, KeyError):
         return str(self.args[0])
 
 
-class Batch(Displayed, Mapping[str, np.ndarray]):
+class Batch(ByValue, Displayed, Mapping[str, np.ndarray]):
     """Result of a batch: arrays by name, the rows of the batch as leading axis.
 
     Example:
@@ -57,7 +59,10 @@ class Batch(Displayed, Mapping[str, np.ndarray]):
 
     def __init__(self, arrays: dict[str, np.ndarray]) -> None:
         """Hold arrays by name."""
-        self._arrays = arrays
+        self._arrays = {name: frozen(values) for name, values in arrays.items()}
+
+    def _value(self) -> Any:
+        return self._arrays
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return one of the arrays."""
@@ -110,17 +115,17 @@ class OutputTable(dict[str, Array]):
         return cls(zip(names, values, strict=True))
 
 
-def check_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
+def check_outputs(outputs: Sequence[str], allowed: Sequence[str] = OUTPUTS) -> tuple[str, ...]:
     """Return the names of outputs, checked.
 
     Raises:
         InputError: There is no such output, or none is asked.
     """
     names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
-    wrong = [name for name in names if name not in OUTPUTS]
+    wrong = [name for name in names if name not in allowed]
     if wrong or not names:
         problem = f"there is no output {short_repr(wrong[0])}" if wrong else "no output is asked"
-        raise InputError.UNKNOWN_NAME(f"{problem}; there are {', '.join(OUTPUTS)}")
+        raise InputError.UNKNOWN_NAME(f"{problem}; there are {', '.join(allowed)}")
     return names
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.applied import follows, is_planar, is_unloaded
-from notchflex.loads.command import make_commands
+from notchflex.loads.command import follows, is_planar, is_unloaded, make_commands
 from notchflex.loads.load_path import load_path
+from notchflex.loads.plausibility import unlikely_loads
 from notchflex.loads.validation import check_is_robot
 from notchflex.mechanics.chain import tendons_in_plane
 from notchflex.mechanics.flexure import LEVELS, MAX_REFINEMENT
@@ -36,8 +37,8 @@ def simulate(
         loads: A path such as `pull(0.0, 3.0).release()`, or loads in order.
         from_state: State to continue from; rest where not given.
         settings: Tolerance and limits of the solver.
-        refinement: 0 for the usual strain modes; 1, 2 or 3 adds more. A result that does not change
-            has converged (`moment_error` estimates the remaining error).
+        refinement: 0 for the usual strain modes and fibres; 1, 2 or 3 adds more. A result that does
+            not change has converged (`moment_error` estimates the remaining error).
 
     Returns:
         The states, one per load. Where a load does not converge, `converged` is false and `reason`
@@ -133,6 +134,9 @@ def _follow(
     ready = prepare_for(robot, load, from_state, refinement)
     start = None if from_state is None else fitted(from_state, ready.chain)
     commands = make_commands(load, robot, ready.chain)
+    by_stroke = commands.by_stroke is not None
+    for warning in unlikely_loads(load, by_stroke, ready.usual_loads):
+        warnings.warn(warning, stacklevel=3)
     states = run(ready, commands, start, settings, each_from_start=each_from_rest)
     return EquilibriumPath(
         robot, load, ready, states, each_from_rest=each_from_rest, settings=settings

@@ -25,13 +25,12 @@ from notchflex.results.path import EquilibriumPath
 from notchflex.results.state import State
 from notchflex.robot import Robot
 from notchflex.solver.continuation import solve_load_step
-from notchflex.solver.derived.reported import believable
+from notchflex.solver.derived.quantities import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
-from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
 from notchflex.solver.programs.threads import number_of_cores, on_cores
 
 States = Float[np.ndarray, "k state"]
@@ -43,7 +42,7 @@ class BatchStepper:
 
     Attributes:
         robot: The robot.
-        outputs: Quantities that a step returns, in the frame of the base.
+        outputs: Quantities that a step returns; the base is not turned.
         cores: Number of cores to use; all where not given.
 
     Example:
@@ -160,6 +159,3 @@ def _step_row(
     converged = result.converged & believable(SolvedState(robot, result.solved).quantity)
     solved = choose(converged, result.solved, last)
     return state_layout.pack(solved), report_quantities(robot, solved, outputs), converged
-
-
-__all__ = ["BatchStepper"]

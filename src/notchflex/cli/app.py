@@ -10,16 +10,18 @@ import gc
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from cyclopts import App, CycloptsError, MissingArgumentError, RepeatArgumentError
 
 from notchflex import __version__
 from notchflex.cli import terminal
 from notchflex.cli.terminal import BAD_INPUT, DONE, INTERNAL_ERROR, INTERRUPTED
-from notchflex.errors import InputError
-from notchflex.results.files.streams import let_go
+from notchflex.errors import InputError, InputWarning
+from notchflex.results.files.writing import let_go
 
 ABOUT = """Statics of tendon-driven notched-tube robots.
 
@@ -267,6 +269,15 @@ def main() -> None:
     terminal.prepare_streams()
     # Modules make objects that stay; to search them for cycles every 700 takes 0.1 s.
     gc.set_threshold(100_000, *gc.get_threshold()[1:])
+    shown = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
+        if issubclass(category, InputWarning):
+            terminal.warn(str(message))
+        else:
+            shown(message, category, *place)
+
+    warnings.showwarning = show
     try:
         code = run()
     except Exception:

@@ -8,12 +8,13 @@ import os
 import shutil
 import sys
 import unicodedata
+import warnings
 from collections.abc import Callable, Generator, Iterable, Sequence
 from datetime import timedelta
 from functools import partial
 from typing import TYPE_CHECKING, TextIO
 
-from notchflex.results.files.streams import let_go
+from notchflex.results.files.writing import let_go
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -245,6 +246,8 @@ def use_compile_cache() -> None:
     """
     from notchflex.solver.programs import store
 
+    # On a full disk the command's own file says so.
+    warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
     folder = store.program_folder()
     if folder is None or store.VARIABLE in os.environ:
         return

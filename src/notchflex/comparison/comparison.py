@@ -10,15 +10,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import NDArray
 
-from notchflex._jax import constant
 from notchflex.analysis import axis_points, equal_stroke, tip_from_angles
 from notchflex.errors import InputError
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.fit.measurements.simulated import solved_rows
-from notchflex.fit.model.branch_residuals import branch_words
-from notchflex.fit.model.residuals import misfit
-from notchflex.fit.model.rows import OUTPUTS, Predicted
-from notchflex.mechanics.motion import rotation_about
+from notchflex.fit.model.residuals import OUTPUTS, Predicted, branch_words, misfit
+from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:
@@ -91,13 +88,19 @@ class Comparison:
     def measured_tip(self) -> Float[np.ndarray, "p 3"]:
         """Measured tip in the world [mm], (P, 3); NaN for unknown coordinates.
 
-        As measured, or else by forward kinematics of the measured notch angles.
+        As measured, or else that of the model, moved as arcs of the measured notch angles lie from
+        arcs of the model's: strips and U-links are no arcs, but bend nearly as the model's do.
         """
         angles = self.measured_notch_angle + self.beyond_faces
         complete = np.isfinite(angles).all(axis=1)
         tip = np.full(self.tip.shape, np.nan)
         if complete.any():
-            tip[complete] = _tip_in_world(self.robot, self.measured, angles[complete])
+            of_model = self.notch_angle + self.beyond_faces
+            measured, modelled = (
+                _tip_in_world(self.robot, self.measured, one[complete])
+                for one in (angles, of_model)
+            )
+            tip[complete] = self.tip[complete] + measured - modelled
         measured = self.measured.observed.get("tip_position")
         if measured is None:
             return tip
@@ -125,7 +128,7 @@ class Comparison:
         return np.where(np.isnan(off).all(axis=1), np.nan, np.sqrt(np.nansum(off**2, axis=1)))
 
     @property
-    def tip_rmse(self) -> float:
+    def rmse_tip(self) -> float:
         """Root-mean-square distance of the tip from the measured tip [mm]."""
         return float(self._rms(self.tip_error))
 
@@ -282,7 +285,7 @@ def _tip_in_world(
 ) -> NDArray[np.float64]:
     """Forward kinematics of notch angles, with the base rotation."""
     tip, _ = tip_from_angles(robot, angles)
-    return np.asarray(tip) @ np.asarray(rotation_about(constant(measured.load.base_rotation))).T
+    return QUANTITIES["tip_position"].turned(np.asarray(tip), measured.load.base_to_world)
 
 
 def _error(name: str, measured: Measurements, model: dict[str, Any]) -> float:

@@ -80,7 +80,7 @@ def errors_document(comparison: Comparison) -> dict[str, Any]:
             "notches": comparison.rmse_notches * DEGREES if measured else None,
             "total": comparison.rmse_total * DEGREES,
         },
-        "tip_rmse_mm": comparison.tip_rmse,
+        "tip_rmse_mm": comparison.rmse_tip,
         "rmse_others": {
             f"{name}_{edge(name)[1]}": value * edge(name)[2]
             for name, value in comparison.others.items()
@@ -139,7 +139,7 @@ def summary(comparison: Comparison) -> str:
         "root-mean-square errors:",
         f"  notches      {notches} deg",
         f"  total angle  {_number(comparison.rmse_total * DEGREES)} deg",
-        f"  tip          {_number(comparison.tip_rmse)} mm",
+        f"  tip          {_number(comparison.rmse_tip)} mm",
     ]
     for name, value in comparison.others.items():
         title, unit, scale = edge(name)

@@ -1,13 +1,12 @@
 """Control: what to command so that the robot meets a target, with friction history."""
 
 from notchflex.control.controller import Controller, ControlStatus
-from notchflex.control.csv import read_targets
 from notchflex.control.following import Following, Reach
 from notchflex.control.inverse import follow, reach
 from notchflex.control.limits import Limits
 from notchflex.control.observer import Observer
 from notchflex.control.search.problem import TargetSearch
-from notchflex.control.targets import Targets
+from notchflex.control.targets import Targets, read_targets
 
 __all__ = [
     "ControlStatus",

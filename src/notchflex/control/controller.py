@@ -12,7 +12,7 @@ from jaxtyping import Float
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.observer import Observer
 from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
-from notchflex.control.program.response import Response
+from notchflex.control.program.drive_model import Response
 from notchflex.control.search.iterative_search import search_iteratively, solve_directly
 from notchflex.control.search.problem import TargetSearch
 from notchflex.control.search.rate import cross_dead_bands, limit_rate
@@ -49,10 +49,10 @@ _START = ControlStatus(False, "", float("nan"), 0, False)
 class Controller:
     """Drives for one target after the other, for use in a loop.
 
-    A step never raises and never takes more than its number of solves. Feedforward is the exact
-    inverse with friction history. Two kinds of measurements correct it: the target quantity itself,
-    such as the position of the tip, and tension with stroke, which correct the friction history
-    and the coefficient of friction.
+    A step never raises for what it is given, and never takes more than its number of solves.
+    Feedforward is the exact inverse with friction history. Two kinds of measurements correct it:
+    the target quantity itself, such as the position of the tip, and tension with stroke, which
+    correct the friction history and the coefficient of friction.
 
     Args:
         robot: The robot.
@@ -138,15 +138,17 @@ class Controller:
         try:
             goal = self._flat(target)
             if (np.abs(goal) > LARGEST_TARGET).any() or np.isnan(goal).all():
-                raise ValueError
+                raise InputError.OUT_OF_RANGE("a target is a number of a size that a robot has")
+            seen = None if measured is None else self._flat(measured)
             if self.observer is not None and tension is not None and stroke is not None:
                 self._observe(tension, stroke)
-            if measured is not None:
-                self._correct(self._flat(measured))
-            self._seek(goal - self._deviation)
-        except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError):
+        except InputError:
             # A control loop must continue after invalid input: the command stays unchanged.
             self.status = ControlStatus(False, "INVALID_INPUT", float("nan"), 0, True)
+            return self._command.copy()
+        if seen is not None:
+            self._correct(seen)
+        self._seek(goal - self._deviation)
         return self._command.copy()
 
     @property
@@ -164,13 +166,16 @@ class Controller:
     def _flat(self, given: Any) -> np.ndarray:
         """Values by name, or those of the only quantity, as one vector."""
         named = given if isinstance(given, Mapping) else {next(iter(self._shapes)): given}
-        if len(named) != len(self._shapes):
-            raise ValueError
+        if set(named) != set(self._shapes):
+            raise InputError.UNKNOWN_NAME(f"give {', '.join(self._shapes)}, and nothing else")
         parts = []
         for name, shape in self._shapes.items():
-            part = np.asarray(named[name], float)
+            try:
+                part = np.asarray(named[name], float)
+            except (ArithmeticError, RuntimeError, TypeError, ValueError) as error:
+                raise InputError.WRONG_TYPE(f"{name} is no number") from error
             if part.shape != shape:
-                raise ValueError
+                raise InputError.WRONG_SHAPE(f"{name} has the shape {shape}; got {part.shape}")
             if name == DIRECTION:
                 part = part / np.sqrt(part @ part)
             parts.append(part.ravel())
@@ -188,7 +193,9 @@ class Controller:
         assert self.observer is not None
         model, state = self.observer.observe(tension, stroke)
         if not self.observer.accepted:
-            raise ValueError
+            raise InputError.NOT_FINITE(
+                "tension and stroke are finite numbers, one for each tendon"
+            )
         if state.shape == self._before.shape:
             self._problem = self._problem._replace(
                 model=self.observer.seen_by(model, self._problem)
@@ -226,6 +233,3 @@ class Controller:
         self.status = ControlStatus(
             failure is None, code, attempt.error, attempt.solves, not solved
         )
-
-
-__all__ = ["ControlStatus", "Controller"]

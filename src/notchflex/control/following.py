@@ -1,23 +1,27 @@
-"""The result of following targets: drives, states, and the error of each target."""
+"""The result of following targets: drives, states, the error of each target, documents."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from notchflex._quantity import DEGREES
 from notchflex._summary import Displayed, Summary, short, vector
 from notchflex.analysis.solve import simulate
+from notchflex.control.search.branches import KEPT
 from notchflex.control.search.problem import Attempt
-from notchflex.control.targets import Targets
-from notchflex.control.units import unit_hint
+from notchflex.control.targets import DIRECTION, Targets, unit_hint
 from notchflex.errors import Failure
 from notchflex.loads import Load, LoadPath
 from notchflex.results.equilibrium import Equilibrium
+from notchflex.results.files.io import whole_document
 from notchflex.results.path import EquilibriumPath
+from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.results.state import SavedState, State
 from notchflex.robot import Robot
 
@@ -33,7 +37,10 @@ class Following(Displayed):
         step: Which of the loads meets each target, from 0, (k,).
         attempts: Where the search for each target ended.
         start: The state before the first; None for rest.
-        tolerance: Error at which a target counted as met.
+        misses: Entries of the robot less those of the targets, mm, N, rad, (k, m); NaN where free.
+        units: Unit of each entry, "mm", "deg" (of angles and directions) or another, (m,).
+        tolerance: Distance from the lengths of a target at which it counts as met, mm.
+        angle_tolerance: Angle from those of a target at which it counts as met, rad.
     """
 
     robot: Robot
@@ -42,7 +49,10 @@ class Following(Displayed):
     step: Int[np.ndarray, " k"]
     attempts: tuple[Attempt, ...]
     start: State | SavedState | None = None
+    misses: Float[np.ndarray, "k m"] = field(default_factory=lambda: np.zeros((0, 0)))
+    units: tuple[str, ...] = ()
     tolerance: float = 0.0
+    angle_tolerance: float = 0.0
 
     def __len__(self) -> int:
         """Number of targets."""
@@ -72,11 +82,48 @@ class Following(Displayed):
     @property
     def reached(self) -> Bool[np.ndarray, " k"]:
         """Whether each target is met."""
-        return np.array([one.failure is None for one in self.attempts])
+        return np.array([failure is None for failure in self.failures])
+
+    @cached_property
+    def failures(self) -> list[Failure | None]:
+        """Why each target is not met; None where it is, or is missed by less than the tolerances.
+
+        Targets of other units than mm and deg are met as exactly as the search is told.
+        """
+        near = (self.error_mm <= self.tolerance) & (
+            self.error_deg <= self.angle_tolerance * DEGREES
+        )
+        near &= {*self.units} <= {"mm", "deg"}
+        return [
+            None if is_near and one.response.converged and one.excess <= KEPT else one.failure
+            for one, is_near in zip(self.attempts, near, strict=True)
+        ]
+
+    @property
+    def error_mm(self) -> Float[np.ndarray, " k"]:
+        """Distance from the lengths of each target, mm; 0 for a target without."""
+        return self._distance("mm")
+
+    @property
+    def error_deg(self) -> Float[np.ndarray, " k"]:
+        """Root of the sum of squares of what the angles of each target miss, deg; 0 without."""
+        return self._distance("deg")
+
+    def _distance(self, unit: str) -> Float[np.ndarray, " k"]:
+        of_unit = self.misses[:, [one == unit for one in self.units]]
+        scale = DEGREES if unit == "deg" else 1.0
+        return scale * np.sqrt(np.nansum(of_unit**2, axis=1))
+
+    def missed(self, targets: int | slice) -> str:
+        """Return the distance from a target, or the largest from some, in words with units."""
+        return " and ".join(
+            f"{short(float(np.max(self._distance(unit)[targets])))} {unit}"
+            for unit in dict.fromkeys(self.units)
+        )
 
     @property
     def error(self) -> Float[np.ndarray, " k"]:
-        """Weighted distance from each target (mm, N, rad)."""
+        """Weighted distance from each target (mm, N, rad), which the search makes small."""
         return np.array([one.error for one in self.attempts])
 
     @property
@@ -87,7 +134,7 @@ class Following(Displayed):
     @property
     def code(self) -> list[str]:
         """Name of the `Failure` for each target; empty where it is met."""
-        return [one.failure.name if one.failure else "" for one in self.attempts]
+        return [failure.name if failure else "" for failure in self.failures]
 
     @property
     def reason(self) -> list[str]:
@@ -95,14 +142,14 @@ class Following(Displayed):
         return [self._reason(target) for target in range(len(self))]
 
     def _reason(self, target: int) -> str:
-        failure, error = self.attempts[target].failure, self.attempts[target].error
+        failure = self.failures[target]
         if failure is None:
             return ""
         hint = ""
         if failure is not Failure.SEARCH_STOPPED:
             positions = self.targets.values.get("tip_position")
             hint = unit_hint(self.robot, None if positions is None else positions[target])
-        return f"{failure.text.format(error=error)}; {failure.remedy}{hint}"
+        return f"{failure.text.format(error=self.missed(target))}; {failure.remedy}{hint}"
 
     @cached_property
     def tension(self) -> Float[np.ndarray, "k t"]:
@@ -128,7 +175,7 @@ class Following(Displayed):
         met = int(self.reached.sum())
         rows = [
             ("targets", f"{len(self)}, {met} met"),
-            ("largest error", short(float(self.error.max()))),
+            ("largest error", self.missed(slice(None))),
             ("largest tension", f"{short(float(self.path.tension.max()))} N"),
             ("solves", f"{int(self.solves.sum())}"),
         ]
@@ -168,7 +215,7 @@ class Reach(Displayed):
     @property
     def reached(self) -> bool:
         """Whether the target is met."""
-        return self._attempt.failure is None
+        return self.following.failures[self.target] is None
 
     @property
     def error(self) -> float:
@@ -220,7 +267,7 @@ class Reach(Displayed):
             ("tension", f"{', '.join(short(float(one)) for one in self.tension)} N"),
             ("stroke", f"{', '.join(short(float(one)) for one in self.stroke)} mm"),
             ("tip position", f"{vector(self.tip_position, 3)} mm"),
-            ("error", short(self.error)),
+            ("error", self.following.missed(self.target)),
             ("met", "yes" if self.reached else self.reason),
         ]
         if len(loads) > 1:
@@ -228,4 +275,53 @@ class Reach(Displayed):
         return Summary(f"Target of {self.following.robot.name}", rows)
 
 
-__all__ = ["Following", "Reach"]
+def following_document(following: Following) -> dict[str, Any]:
+    """Return the document of the path, with a list `targets` of the result for each target.
+
+    Keys of a target: `target`, its values by quantity (units as those of the steps), `step` (of
+    the path, from 0), `reached`, `error_mm` and `error_deg`, `reason`, `reason_code`
+    and `solves`.
+    """
+    targets = [
+        {
+            "target": _in_file_units(following, index),
+            "step": int(following.step[index]),
+            "reached": bool(following.reached[index]),
+            "error_mm": float(following.error_mm[index]),
+            "error_deg": float(following.error_deg[index]),
+            "reason": following.reason[index],
+            "reason_code": following.code[index],
+            "solves": int(following.solves[index]),
+        }
+        for index in range(len(following))
+    ]
+    return whole_document(following.path) | {"targets": targets}
+
+
+def _in_file_units(following: Following, index: int) -> dict[str, Any]:
+    """The target with the keys and units of the JSON document."""
+    values: dict[str, Any] = {}
+    for name, numbers in following.targets.row(index).items():
+        key, scale = name, 1.0
+        if name != DIRECTION:
+            quantity = QUANTITIES[name]
+            key, scale = quantity.key or name, quantity.scale
+        values[key] = numbers * scale
+    return values
+
+
+def following_columns(following: Following) -> dict[str, Sequence[Any]]:
+    """Return the columns beside those of the path: which target each step is for, and its error.
+
+    A step of an overshoot is for no target.
+    """
+    steps = len(following.path)
+    columns: dict[str, list[Any]] = {
+        name: [None] * steps for name in ("target", "error_mm", "error_deg", "target_code")
+    }
+    for index, step in enumerate(following.step):
+        columns["target"][step] = index + 1
+        columns["error_mm"][step] = float(following.error_mm[index])
+        columns["error_deg"][step] = float(following.error_deg[index])
+        columns["target_code"][step] = following.code[index]
+    return dict(columns)

@@ -13,7 +13,7 @@ from notchflex.control.problem_setup import ProblemOptions, make_problem, presen
 from notchflex.control.search.branches import Approach, approach_target
 from notchflex.control.search.problem import Attempt, Problem, TargetSearch
 from notchflex.control.search.rate import cross_dead_bands, limit_rate
-from notchflex.control.targets import Targets, make_targets
+from notchflex.control.targets import Targets, make_targets, units_of
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.validation import check_is_robot, short_repr
@@ -52,7 +52,7 @@ def reach(
         approach: "least", the way with the smallest drives; "direct", without an overshoot;
             "loading" or "unloading", with rising or falling drives at the end.
         weights: What an error of a quantity counts per unit (mm, N, rad); 1 each.
-        search: Tolerance and budget.
+        search: Tolerances and budget.
 
     Returns:
         The drives and the state there. Where the target is not met, `code` and `reason` say why,
@@ -103,7 +103,7 @@ def follow(
         limits: Limits on drives and robot; `rate` limits the change from target to target.
         approach: As for `reach`. All but "direct" may overshoot on the way to a target.
         weights: As for `reach`.
-        search: Tolerance and budget.
+        search: Tolerances and budget.
 
     Returns:
         The drives, the states there, and how near each target was met.
@@ -125,7 +125,10 @@ def follow(
 
 
 def _follow(
-    robot: Robot, targets: Targets, options: ProblemOptions, approach: Approach
+    robot: Robot,
+    targets: Targets,
+    options: ProblemOptions,
+    approach: Approach,
 ) -> Following:
     if approach not in get_args(Approach):
         raise InputError.UNKNOWN_NAME(
@@ -154,9 +157,18 @@ def _follow(
             present, response = attempt.drive, attempt.response
             before = response.state
     applied = _load_path(problem, np.array(drives))
-    tolerance = problem.search.tolerance
+    values = np.array([attempt.response.values[aim.entries] for attempt in attempts])
     return Following(
-        robot, targets, applied, np.array(last), tuple(attempts), options.state, tolerance
+        robot,
+        targets,
+        applied,
+        np.array(last),
+        tuple(attempts),
+        options.state,
+        values - aim.goals,
+        units_of(targets),
+        problem.search.near,
+        problem.search.near_angle,
     )
 
 
@@ -167,6 +179,3 @@ def _load_path(problem: Problem, drives: np.ndarray) -> LoadPath:
     stroke = np.where(by_stroke, drives, np.nan)
     external = tuple(one.external[0] for _ in drives)
     return LoadPath(np.maximum(tension, 0.0), stroke, one.base_rotation, external)
-
-
-__all__ = ["follow", "reach"]

@@ -1,18 +1,23 @@
-"""Targets: series of values of quantities of the robot."""
+"""Targets: series of values of quantities of the robot, also from a CSV file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex._quantity import REGISTERED
+from notchflex._quantity import DEGREES, REGISTERED
+from notchflex.analysis.kinematics import tip_from_angles
 from notchflex.errors import InputError
-from notchflex.loads.validation import check_number, short_repr
+from notchflex.loads.validation import check_is_robot, check_number, short_repr
+from notchflex.results.files.csv_reading import read_data_table
+from notchflex.results.quantities.registry import AXES, QUANTITIES
 from notchflex.robot import Robot
+from notchflex.robot.error_messages import nearest
 
 DIRECTION = "tip_direction"
 """Unit vector along the tube at the tip, in the world: the last column of `tip_rotation`."""
@@ -92,6 +97,16 @@ def aim_at(
     sizes = [len(numbers) for numbers in index]
     each = np.repeat([weights.get(name, 1.0) for name in targets.values], sizes)
     return Aim(np.concatenate(index), np.concatenate(goals, axis=1), each)
+
+
+def units_of(targets: Targets) -> tuple[str, ...]:
+    """Return the unit of every entry of the targets; that of directions is deg."""
+    turned = (DIRECTION, "tip_rotation")
+    return tuple(
+        "deg" if name in turned else REGISTERED[name].unit
+        for name, values in targets.values.items()
+        for _ in range(values[0].size)
+    )
 
 
 def _check_weights(weights: Mapping[str, float] | None, targets: Targets) -> dict[str, float]:
@@ -236,3 +251,110 @@ def _check_rotations(rotations: Float[np.ndarray, "k 3 3"]) -> None:
             "a target of tip_rotation is not a rotation matrix: its rows must be of length 1, at "
             "right angles and right-handed"
         )
+
+
+# Columns of a simulation that say what was commanded are no targets, but may stand in the file.
+_COMMANDS = ("tension", "stroke")
+
+
+def read_targets(
+    source: str | os.PathLike[str], robot: Robot, columns: Mapping[str, str] | None = None
+) -> Targets:
+    r"""Read targets from a CSV file.
+
+    Columns have the names that results have: `tip_x_mm`, `tip_y_mm`, `tip_z_mm`, `total_deg`,
+    `notch_1_deg`, ...; `tip_direction_x` (and `_y`, `_z`) is the unit vector along the tube at the
+    tip. An empty entry is free. Other columns are not allowed, so that a slip is not ignored.
+
+    Args:
+        source: Path of the file.
+        robot: The robot that is to meet them.
+        columns: Headers of the file for columns, such as `{"tip_x_mm": "x"}`.
+
+    Returns:
+        The targets, one per row.
+
+    Raises:
+        InputError: The file cannot be used; the message names line and column.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from notchflex import load_robot
+        >>> _ = Path("targets.csv").write_text("tip_x_mm,tip_z_mm\n2.1,9.5\n2.4,9.3\n")
+        >>> len(read_targets("targets.csv", load_robot("pacheco2021-a")))
+        2
+    """
+    table = read_data_table(source, columns)
+    known = dict(_columns(check_is_robot(robot)))
+    unknown = [name for name in table.header if name not in known]
+    if unknown:
+        near = nearest(unknown[0], known, 2)
+        raise InputError.TABLE_COLUMNS(
+            f"{table.name}: {short_repr(unknown[0])} is not a column of targets"
+            f"{near or f'; there are {_shown(known)}'}"
+        )
+    shapes = target_shapes(robot)
+    values: dict[str, np.ndarray] = {}
+    for header in table.header:
+        name, index = known[header]
+        scale = DEGREES if header.endswith("_deg") else 1.0
+        empty = np.full((len(table), *shapes[name]), np.nan)
+        values.setdefault(name, empty)[(slice(None), *index)] = (
+            table.numbers(header, may_miss=True) / scale
+        )
+    return make_targets(Targets(values), robot, several=True)
+
+
+def _columns(robot: Robot) -> Iterator[tuple[str, tuple[str, tuple[int, ...]]]]:
+    """Yield every column, and the quantity and entry that it is."""
+    sizes = sizes_of(robot)
+    for name in target_shapes(robot):
+        if name == DIRECTION:
+            yield from ((f"{DIRECTION}_{axis}", (name, (i,))) for i, axis in enumerate(AXES))
+            continue
+        quantity = QUANTITIES[name]
+        if not quantity.column or name in _COMMANDS:
+            continue
+        match quantity.per:
+            case ():
+                yield quantity.header(), (name, ())
+            case ("axis",):
+                yield from ((quantity.header(axis=a), (name, (i,))) for i, a in enumerate(AXES))
+            case ("notch",):
+                count = sizes["notch"]
+                yield from ((quantity.header(notch=i + 1), (name, (i,))) for i in range(count))
+            case _:
+                continue
+
+
+def _shown(columns: dict[str, tuple[str, tuple[int, ...]]]) -> str:
+    """Columns for a message: of those per notch the first alone."""
+    names = [name for name, (_, index) in columns.items() if not ("notch_" in name and index[0])]
+    return ", ".join(names)
+
+
+# A position is near a robot whose straight length it is a part from the first to the second of.
+_LENGTH_RATIOS = (0.2, 2.0)
+# Sizes of other units, mm.
+_UNITS = {"m": 1000.0, "µm": 0.001}
+
+
+def unit_hint(robot: Robot, position: Float[np.ndarray, " 3"] | None) -> str:
+    """Say in which unit a position that is out of reach would be near the robot.
+
+    Args:
+        robot: The robot.
+        position: Where its tip shall be, mm, NaN where free; None if no position is targeted.
+
+    Returns:
+        Words to add to a reason; empty where no other unit explains the position.
+    """
+    if position is None:
+        return ""
+    length = float(np.linalg.norm(tip_from_angles(robot, np.zeros(robot.number_of_notches))[0]))
+    size = float(np.sqrt(np.nansum(position**2))) / length
+    low, high = _LENGTH_RATIOS
+    for unit, scale in _UNITS.items():
+        if low <= size * scale <= high:
+            return f"; positions are in mm, and this one would be near the robot in {unit}"
+    return ""

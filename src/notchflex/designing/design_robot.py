@@ -1,18 +1,23 @@
-"""`nf.design`: a robot from a specification."""
+"""`nf.design`: a robot from a specification, in every allowed form, on a grid of lengths."""
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from notchflex.analysis.uncertainty.assumed import tolerances_of
 from notchflex.designing.explanation import chosen_form, curves_missed, explain, yield_sentences
-from notchflex.designing.forms import problems_of
-from notchflex.designing.model.wishes import Wish
+from notchflex.designing.model.point import Solver
+from notchflex.designing.model.quantities import COMPLIANCE, CURVE, OF_STATES
+from notchflex.designing.model.variables import StatePaths, check_states, state_paths, variables_of
+from notchflex.designing.model.wishes import Wish, wishes_of
 from notchflex.designing.result import (
     Design,
     VariableResult,
@@ -20,18 +25,195 @@ from notchflex.designing.result import (
     asked_in_words,
     total_counts,
 )
-from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Progress
-from notchflex.designing.search.robust_search import YieldOf, check_limits, robust_search
-from notchflex.designing.search.rows import TOLERANCE
-from notchflex.designing.search.search import Searches, search
-from notchflex.designing.specification.asked import DesignConstraint
-from notchflex.designing.specification.reading import read_design, spec_from_table
-from notchflex.designing.specification.spec import DesignSpec, RobustOptions
+from notchflex.designing.search.problem import TOLERANCE, DesignEvaluation, DesignProblem, Progress
+from notchflex.designing.search.robust import YieldOf, check_limits, robust_search
+from notchflex.designing.search.search import Searches, SearchResult, search
+from notchflex.designing.specification import (
+    DesignConstraint,
+    DesignSpec,
+    RobustOptions,
+    read_design,
+    spec_from_table,
+)
 from notchflex.errors import InputError
-from notchflex.loads.validation import short_repr
-from notchflex.robot import Robot, load_robot
+from notchflex.loads.validation import check_number, short_repr
+from notchflex.robot import Robot, from_table, load_robot, to_table
 from notchflex.robot.robot import remember_source, source_of
 from notchflex.robot.tolerance import Tolerance
+from notchflex.robot.value_names import numbers_at
+
+MAX_FORMS = 200
+
+
+def problems_of(spec: DesignSpec, robot: Robot) -> list[DesignProblem]:
+    """Make a problem for every size and every number of notches that a design may choose.
+
+    Raises:
+        InputError: What is asked does not fit the robot or itself.
+    """
+    _check_stock(spec, robot)
+    robots = _forms(spec, robot)
+    problems: list[DesignProblem] = []
+    for one in robots:
+        check_states(spec.state, one.number_of_tendons)
+        wishes = wishes_of(spec, one)
+        paths = _paths(spec, wishes, one)
+        variables = variables_of(one, spec.variable, paths.states)
+        outputs = _outputs(wishes)
+        problems.append(DesignProblem(Solver(variables, paths, outputs), wishes))
+    return problems
+
+
+def _check_stock(spec: DesignSpec, robot: Robot) -> None:
+    seen: dict[str, int] = {}
+    for number, stock in enumerate(spec.stock, start=1):
+        for path in stock.values:
+            try:
+                single = numbers_at(robot, path)
+            except InputError as error:
+                raise InputError(f"`stock[{number}]`: {error}", error.code) from None
+            for one in single:
+                if one in seen:
+                    raise InputError.CONFLICT(f"`stock[{number}]`: `{path}` is given twice.")
+                seen[one] = number
+    for number, variable in enumerate(spec.variable, start=1):
+        if variable.value.startswith("state."):
+            continue
+        try:
+            both = [one for one in numbers_at(robot, variable.value) if one in seen]
+        except InputError as error:
+            raise InputError(f"`variable[{number}]`: {error}", error.code) from None
+        if both:
+            raise InputError.CONFLICT(
+                f"`variable[{number}]`: `{both[0]}` is chosen by `stock[{seen[both[0]]}]` too; "
+                "leave one of them out."
+            )
+
+
+def _forms(spec: DesignSpec, robot: Robot) -> list[Robot]:
+    numbers = spec.number_of_notches or (robot.number_of_notches,)
+    sizes = [
+        [tuple(zip(stock.values, size, strict=True)) for size in stock.sizes]
+        for stock in spec.stock
+    ]
+    combinations = list(itertools.product(numbers, itertools.product(*sizes)))
+    if len(combinations) > MAX_FORMS:
+        raise InputError.OUT_OF_RANGE(
+            f"there are {len(combinations)} combinations of sizes and numbers of notches; at most "
+            f"{MAX_FORMS} can be searched."
+        )
+    robots: list[Robot] = []
+    problem: InputError | None = None
+    for number, chosen in combinations:
+        try:
+            one = robot
+            if spec.number_of_notches:
+                one = with_notches(robot, int(number))
+            values = dict(pair for size in chosen for pair in size)
+            robots.append(one.with_values(values) if values else one)
+        except InputError as error:
+            problem = error  # a size that does not suit the robot; others may
+    if not robots:
+        assert problem is not None
+        raise InputError(
+            f"no size and number of notches makes a robot: {problem}", problem.code
+        ) from None
+    return robots
+
+
+def with_notches(robot: Robot, count: int) -> Robot:
+    """Return a robot with another number of equal notches; tendons end behind the last as before.
+
+    Raises:
+        InputError: Its notches are not given by one table, or no robot has so many.
+    """
+    if len(robot.notch) != 1:
+        raise InputError.UNSUPPORTED(
+            "`number_of_notches` is for robots of equal notches, given by one [[notch]] table; "
+            f"{robot.name} has {len(robot.notch)}."
+        )
+    table: dict[str, Any] = to_table(robot)
+    table["notch"] = [table["notch"][0] | {"repeat": count}]
+    for tendon in table["tendon"]:
+        if tendon.get("end_body") == robot.number_of_notches:
+            tendon["end_body"] = count
+    return remember_source(from_table(table), source_of(robot))
+
+
+def _paths(spec: DesignSpec, wishes: tuple[Wish, ...], robot: Robot) -> StatePaths:
+    """Lay out the states that anything is asked of."""
+    used: list[str] = []
+    probes: list[tuple[str, tuple[float, float, float]]] = []
+    curves = {f"{CURVE}{one.name}": one.state for one in spec.curve}
+    for wish in wishes:
+        asked = wish.asked
+        names = [one for one in (asked.state, asked.minus) if one is not None]
+        if asked.quantity == COMPLIANCE:
+            probes += [(name, wish.direction) for name in names]
+        elif asked.quantity in curves:
+            used.append(curves[asked.quantity])
+        else:
+            used += names
+    return state_paths(spec.state, robot.number_of_tendons, list(dict.fromkeys(used)), probes)
+
+
+def _outputs(wishes: tuple[Wish, ...]) -> tuple[str, ...]:
+    names: list[str] = []
+    for wish in wishes:
+        quantity = wish.asked.quantity
+        if quantity in OF_STATES:
+            names.append(quantity)
+        elif quantity == COMPLIANCE:
+            names.append("tip_position")
+        elif quantity.startswith(CURVE):
+            names += ["body_position", "body_rotation"]
+    return tuple(dict.fromkeys(names)) or ("total_angle",)
+
+
+# Lengths that are tried on both sides of where the search ended; of more, the nearest is taken.
+_MOST = 6
+
+
+def on_grid(searches: Searches, grid: float) -> Searches:
+    """Return the searches with the best robot on a grid.
+
+    Of the neighbours of the best robot it is the one that meets the constraints, or comes nearest,
+    with the smallest sum.
+
+    Args:
+        searches: The searches.
+        grid: Step of all lengths that are variables, mm; 0 for none.
+
+    Raises:
+        InputError: No robot on the grid lies within the limits and can be solved.
+    """
+    if not grid:
+        return searches
+    best = searches.optimum
+    problem, solver = copy(best.problem), best.problem.solver
+    variables = replace(solver.variables, grid=grid)
+    problem.solver, problem.failures = replace(solver, variables=variables), {}
+    vars(problem).pop("_kept", None)
+    exact = problem.x(best.found.z)
+    steps = np.where(variables.lengths, exact / grid, 0.0)
+    sides = [sorted({np.floor(one), np.ceil(one)}) for one in steps]
+    if sum(map(len, sides)) > len(sides) + _MOST:
+        sides = [[np.round(one)] for one in steps]
+    results: list[SearchResult] = []
+    for places in itertools.product(*sides):
+        x = np.where(variables.lengths, np.array(places) * grid, exact)
+        z = (x - variables.lower) / variables.span
+        one = problem.evaluate(z) if np.abs(z - 0.5).max(initial=0.0) <= 0.5 + 1e-9 else None
+        if one is not None:
+            found = best.found._replace(z=z, evaluation=one)
+            results.append(replace(best, problem=problem, found=found))
+    if not results:
+        reasons = "; ".join(problem.failures) or "all lie beyond the limits of the variables"
+        raise InputError.UNSUPPORTED(
+            f"no robot on a grid of {grid:g} mm beside the best one can be made: {reasons}; give a "
+            "smaller grid."
+        )
+    return replace(searches, rounded=min(results, key=lambda one: one.merit))
 
 
 def design(
@@ -39,6 +221,7 @@ def design(
     *,
     robot: Robot | None = None,
     robust: bool = False,
+    grid: float = 0.0,
     progress: Progress | None = None,
 ) -> Design:
     """Choose numbers of a robot so that it meets a specification.
@@ -48,6 +231,8 @@ def design(
         robot: The robot to begin with, instead of the one that the specification names.
         robust: Make the yield of robots made within the tolerances as great as possible, or what
             `robust` and `wanted_yield` of the specification say.
+        grid: Step of all lengths that the design chooses, mm, such as 0.005; the numbers of the
+            result are those of the robot on this grid. 0 for any length.
         progress: Called with the stage, what is done of it and how much there is.
 
     Returns:
@@ -57,7 +242,7 @@ def design(
 
     Raises:
         InputError: The specification is not allowed, contradicts itself or does not fit the robot,
-            or no robot between the limits can be solved.
+            or no robot between the limits, or on the grid, can be solved.
 
     Example:
         >>> wish = {"quantity": "closing_angle", "take": "sum", "equal": 120.0}
@@ -67,14 +252,16 @@ def design(
         '0.627 mm'
     """
     asked, first = given(spec, robot)
+    if not 0.0 <= check_number(grid, "grid") < np.inf:
+        raise InputError.OUT_OF_RANGE(f"grid must be 0 mm or more and finite; got {grid:g} mm.")
     if robust and not asked.is_robust:
         asked = replace(asked, robust=RobustOptions())
     problems = problems_of(asked, first)
     tolerances = _tolerances(asked, first, problems) if asked.is_robust else ()
-    searches = search(problems, asked.search, progress)
+    searches, place = search(problems, asked.search, progress), partial(on_grid, grid=grid)
     if not asked.is_robust:
-        return made_of(asked, first, problems, searches)
-    searches, yields = robust_search(asked, tolerances, searches, progress)
+        return made_of(asked, first, problems, place(searches))
+    searches, yields = robust_search(asked, tolerances, searches, progress, place)
     return with_yields(made_of(asked, first, problems, searches), yields)
 
 
@@ -147,7 +334,9 @@ def made_of(
     if searches.interrupted:
         reason = "interrupted; this is the best robot so far"
     elif not met:
-        reason = "not all constraints can be met; this is the robot that comes nearest"
+        grid = problem.solver.variables.grid
+        where = f" on a grid of {grid:g} mm" if grid else ""
+        reason = f"not all constraints can be met{where}; this is the robot that comes nearest"
     elif far := curves_missed(best):
         reason = far[0].rstrip(".")
     elif not optimum.stationary:
@@ -166,7 +355,10 @@ def made_of(
                 variables.columns, one.point.x.tolist(), variables.start.tolist(), strict=True
             )
         ),
-        explanation=(*chosen_form(spec, one.point.robot, len(problems)), *explain(best)),
+        explanation=(
+            *chosen_form(spec, one.point.robot, len(problems)),
+            *explain(searches.optimum),
+        ),
         solves=solves,
         gradients=gradients,
         starts=len(searches.outcomes),

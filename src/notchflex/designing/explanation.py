@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import floor, log10
 
 import numpy as np
 
-from notchflex._summary import short
+from notchflex._summary import round_number, short
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.optimality import ActiveLimit, multipliers
-from notchflex.designing.search.problem import DesignProblem
-from notchflex.designing.search.robust_search import YieldOf
-from notchflex.designing.search.rows import TOLERANCE, Row
+from notchflex.designing.search.problem import TOLERANCE, DesignProblem, Row
+from notchflex.designing.search.robust import YieldOf
 from notchflex.designing.search.search import SearchResult
-from notchflex.designing.specification.asked import DesignObjective
-from notchflex.designing.specification.spec import DesignSpec
+from notchflex.designing.specification import DesignObjective, DesignSpec
 from notchflex.robot import Robot
 from notchflex.robot.value_names import numbers_at
 
@@ -105,14 +102,8 @@ def _effect(problem: DesignProblem, held: ActiveLimit) -> tuple[float, float]:
         row = problem.rows[held.row]
         limits = [abs(one) for one in (row.lower, row.upper) if np.isfinite(one)]
         size = max(limits, default=0.0) or float(problem.sizes[held.row])
-    step = _round(_PART * size)
+    step = round_number(_PART * size)
     return step, held.cost * step
-
-
-def _round(value: float) -> float:
-    """Return 1, 2 or 5 times a power of ten, not above a value."""
-    power = 10.0 ** floor(log10(value)) if value > 0.0 else 1.0
-    return max(one * power for one in (1.0, 2.0, 5.0) if one * power <= value * (1.0 + 1e-9))
 
 
 def _sentence(problem: DesignProblem, held: ActiveLimit) -> str:

@@ -17,16 +17,20 @@ from jaxtyping import Float
 
 from notchflex._extras import need
 from notchflex._summary import Displayed, Summary, short
-from notchflex.designing.design_robot import given, made_of
-from notchflex.designing.forms import problems_of
+from notchflex.designing.design_robot import given, made_of, problems_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.result import Design
 from notchflex.designing.search.local import search_from
-from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Progress, Vector
-from notchflex.designing.search.rows import TOLERANCE, objective_reading
-from notchflex.designing.search.search import Searches, SearchResult
-from notchflex.designing.search.starts import draw, evaluate_all, smooth
-from notchflex.designing.specification.spec import DesignSpec
+from notchflex.designing.search.problem import (
+    TOLERANCE,
+    DesignEvaluation,
+    DesignProblem,
+    Progress,
+    Vector,
+    objective_reading,
+)
+from notchflex.designing.search.search import Searches, SearchResult, draw, evaluate_all, smooth
+from notchflex.designing.specification import DesignSpec
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 
@@ -69,7 +73,7 @@ class DesignFront(Displayed):
         Raises:
             InputError: A file cannot be written.
         """
-        from notchflex.designing.files import write_front
+        from notchflex.designing.result import write_front
 
         return write_front(self, folder)
 

@@ -1,23 +1,33 @@
-"""The result of a design."""
+"""The result of a design: its tables, documents and files."""
 
 from __future__ import annotations
 
+import importlib.util
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from notchflex._summary import Displayed, Summary, short
+from notchflex.designing.explanation import yield_sentences
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.problem import DesignProblem
-from notchflex.designing.search.robust_search import YieldOf
-from notchflex.designing.search.search import Searches, SearchResult
-from notchflex.designing.specification.asked import DesignConstraint, DesignObjective
-from notchflex.designing.specification.spec import DesignSpec
-from notchflex.errors import ConvergenceError
+from notchflex.designing.search.robust import YieldOf
+from notchflex.designing.search.search import SearchResult
+from notchflex.designing.specification import DesignConstraint, DesignObjective, DesignSpec
+from notchflex.errors import ConvergenceError, InputError
+from notchflex.results.files.csv import write_csv
+from notchflex.results.files.json import document_head, write_json
+from notchflex.results.files.writing import check_folder, write_text
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
+from notchflex.robot.writing import robot_text
+
+if TYPE_CHECKING:
+    from notchflex.designing.front import DesignFront
+
 
 MINIMISE, MAXIMISE = "as small as possible", "as great as possible"
 
@@ -136,8 +146,6 @@ class Design(Displayed):
         Raises:
             InputError: A file cannot be written.
         """
-        from notchflex.designing.files import write_design
-
         return write_design(self, folder)
 
     def raise_if_failed(self) -> Design:
@@ -198,4 +206,146 @@ def total_counts(problems: Sequence[DesignProblem]) -> tuple[int, int]:
     return sum(one["solves"] for one in counts), sum(one["gradients"] for one in counts)
 
 
-__all__ = ["Design", "Searches", "VariableResult", "WishResult"]
+def design_document(made: Design) -> dict[str, Any]:
+    """Return a design as a document.
+
+    Returns:
+        `robot` (its description) and `name` as in every document, `design` (its name),
+        `converged`, `met`, `reason`, `wishes`, `variables`, `explanation`, `solves`, `gradients`
+        and `starts`, and of a robust design `yields`. Angles in deg, lengths in mm, forces in N.
+    """
+    return {
+        **document_head(made.robot),
+        "design": made.spec.name,
+        "converged": made.converged,
+        "met": made.met,
+        "reason": made.reason,
+        "wishes": [
+            {
+                "quantity": one.title,
+                "unit": one.unit,
+                "asked": one.asked,
+                "achieved": list(one.achieved),
+                "before": list(one.before),
+                "met": one.met,
+                "parts": list(one.parts),
+            }
+            for one in made.wishes
+        ],
+        "variables": [vars(one) for one in made.variables],
+        "explanation": list(made.explanation),
+        "solves": made.solves,
+        "gradients": made.gradients,
+        "starts": made.starts,
+        **({"yields": [vars(one) for one in made.yields]} if made.yields else {}),
+    }
+
+
+def wish_rows(design: Design) -> list[tuple[str, str, str, str, str, str, str]]:
+    """Return a row for every number asked: quantity, part, unit, asked, achieved, before, met."""
+    rows: list[tuple[str, str, str, str, str, str, str]] = []
+    for one in design.wishes:
+        met = "" if one.met is None else "yes" if one.met else "no"
+        for number, value in enumerate(one.achieved):
+            part = one.parts[number] if len(one.parts) == len(one.achieved) else ""
+            was = repr(one.before[number]) if number < len(one.before) else ""
+            rows.append((one.title, part, one.unit, one.asked, repr(value), was, met))
+    return rows
+
+
+HEADS = ("quantity", "part", "unit", "asked", "achieved", "before", "met")
+
+
+FRONT_TABLE, FRONT_PICTURE = "front.csv", "front.svg"
+ROBOT, TABLE, DOCUMENT, PICTURE = "robot.toml", "wishes.csv", "design.json", "design.svg"
+
+
+def file_names() -> tuple[str, ...]:
+    """Return the names of the files, with a picture where one can be drawn."""
+    drawn = importlib.util.find_spec("matplotlib") is not None
+    return (ROBOT, TABLE, DOCUMENT, *((PICTURE,) if drawn else ()))
+
+
+def write_design(
+    made: Design, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
+) -> tuple[Path, ...]:
+    """Write the files of a design into a folder.
+
+    Args:
+        made: The design.
+        folder: The folder; it is made if it is missing.
+        inputs: Files that are read; none of them may be replaced.
+
+    Returns:
+        The files.
+
+    Raises:
+        InputError: A file cannot be written.
+    """
+    names = file_names()
+    files = check_folder(os.fspath(folder), names, "-o", inputs=inputs)
+    make_folder(folder)
+    write_text(files[0], designed_text(made))
+    write_csv(files[1], HEADS, wish_rows(made))
+    write_json(files[2], design_document(made))
+    if PICTURE in names:
+        from notchflex._plot import plot
+
+        plot(made).save(files[3])
+    return files
+
+
+def write_front(
+    front: DesignFront, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
+) -> tuple[Path, ...]:
+    """Write a front into a folder: point_01.toml and so on, the table and the picture.
+
+    Raises:
+        InputError: A file cannot be written.
+    """
+    robots = [f"point_{number:02d}.toml" for number in range(1, len(front.points) + 1)]
+    drawn = [FRONT_PICTURE] if PICTURE in file_names() else []
+    files = check_folder(os.fspath(folder), (*robots, FRONT_TABLE, *drawn), "-o", inputs=inputs)
+    make_folder(folder)
+    for file, point in zip(files, front.points, strict=False):
+        write_text(file, designed_text(point))
+    names = [f"{v.name} [{v.unit}]" if v.unit else v.name for v in front.points[0].variables]
+    rows = (
+        [name, *values, *(v.value for v in point.variables)]
+        for name, point, values in zip(robots, front.points, front.objectives.tolist(), strict=True)
+    )
+    write_csv(files[len(robots)], ["robot", *front.titles, *names], rows)
+    if drawn:
+        from notchflex._plot import plot
+
+        plot(front).save(files[-1])
+    return files
+
+
+def make_folder(folder: str | os.PathLike[str]) -> None:
+    """Make a folder, if it is missing.
+
+    Raises:
+        InputError: It cannot be made.
+    """
+    try:
+        Path(folder).mkdir(exist_ok=True)
+    except OSError as problem:
+        words = problem.strerror or problem
+        raise InputError.FILE_UNWRITABLE(f"-o {folder} cannot be made: {words}.") from None
+
+
+def designed_text(made: Design) -> str:
+    """Return the robot file: what was asked and achieved, and below it the robot."""
+    state = "converged" if made.converged else made.reason
+    lines = [f"# Designed by notchflex: {_one_line(made.spec.name)}; {state}."]
+    for one in made.wishes:
+        achieved = f"{numbers(one.achieved)} {one.unit}".rstrip()
+        missed = " (not met)" if one.met is False else ""
+        lines.append(f"#   {one.title}: asked {one.asked}, achieved {achieved}{missed}")
+    lines += [f"#   {sentence}" for sentence in yield_sentences(made.yields)]
+    return "\n".join([*map(_one_line, lines), "", robot_text(made.robot)])
+
+
+def _one_line(text: str) -> str:
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split("\n"))

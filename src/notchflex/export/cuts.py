@@ -1,10 +1,27 @@
-"""All cuts of a robot, one after the other along its tube."""
+"""All cuts of a robot along the tube that they are cut into, and where tendons pass its edges.
 
+Polishing takes a layer from every surface of the tube afterwards. The tube and its cuts are then
+those before it, so that what is left has the dimensions of the robot: the walls are thicker, and
+the cuts narrower and less deep.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from contextlib import contextmanager
 from typing import NamedTuple
 
+import numpy as np
+from jaxtyping import Float
+
+from notchflex._jax import constant
 from notchflex.errors import InputError
-from notchflex.robot import Robot
+from notchflex.mechanics.chain.mass import body_lengths
+from notchflex.mechanics.tendon.openings import passage
+from notchflex.robot import Robot, Tube
 from notchflex.robot.notches.cut import NotchCut
+from notchflex.robot.notches.profile import shrunk
 
 
 class PlacedCut(NamedTuple):
@@ -19,6 +36,11 @@ class PlacedCut(NamedTuple):
     cut: NotchCut
 
     @property
+    def name(self) -> str:
+        """What messages call it."""
+        return f"the cut of notch {self.notch}"
+
+    @property
     def start(self) -> float:
         """Its proximal end along the tube [mm]."""
         return min(along for along, _ in self.cut.corners)
@@ -30,35 +52,45 @@ class PlacedCut(NamedTuple):
 
 
 class RobotCuts(NamedTuple):
-    """The cuts of a robot.
+    """A tube and what is cut out of it.
 
     Attributes:
+        tube: The tube that is cut.
         cuts: Every cut, base to tip as the notches stand.
-        notch_start: Where each notch starts along the straight tube [mm].
-        tip: Where the robot ends [mm]. A cut may reach beyond: the strip of Liu 2022 ends at the
-            last cut.
+        start: Where the tube is cut off on the base side, from the base [mm]; negative.
+        end: Where it ends [mm].
+        warnings: A sentence where that is not the tip of the robot file.
     """
 
+    tube: Tube
     cuts: tuple[PlacedCut, ...]
-    notch_start: tuple[float, ...]
-    tip: float
+    start: float
+    end: float
+    warnings: tuple[str, ...]
 
 
-def cuts_of(robot: Robot) -> RobotCuts:
+def cuts_of(robot: Robot, shank: float = 0.0, polishing: float = 0.0) -> RobotCuts:
     """Return every cut of a robot in its straight tube.
 
+    Args:
+        robot: The robot, as it is after polishing.
+        shank: Uncut tube on the base side [mm].
+        polishing: Thickness that polishing takes from every surface [mm].
+
     Raises:
-        InputError: A kind of notch does not know its cuts.
+        InputError: A kind of notch does not know its cuts, or polishing fills a cut or the bore.
 
     Example:
         >>> from notchflex.robot import load_robot
         >>> cuts = cuts_of(load_robot("pacheco2021-a"))
-        >>> len(cuts.cuts), round(cuts.cuts[-1].start, 9), round(cuts.tip, 9)
+        >>> len(cuts.cuts), round(cuts.cuts[-1].start, 9), round(cuts.end, 9)
         (5, 8.0, 10.0)
     """
     at = robot.tube.base_length
+    diameters = robot.tube.outer_diameter, robot.tube.inner_diameter
+    with naming("the tube before polishing"):
+        stock = Tube(diameters[0] + 2.0 * polishing, diameters[1] - 2.0 * polishing)
     cuts: list[PlacedCut] = []
-    starts: list[float] = []
     neighbours = (None, *robot.notches, None)
     for number, notch in enumerate(robot.notches, start=1):
         layout = notch.cut_layout(robot.tube, neighbours[number - 1], neighbours[number + 1])
@@ -68,6 +100,88 @@ def cuts_of(robot: Robot) -> RobotCuts:
                 "drawing, pattern or solid of it; give its class a method `cut_layout`."
             )
         cuts += [PlacedCut(number, cut.moved(at)) for cut in layout.cuts]
-        starts.append(at)
         at += layout.length
-    return RobotCuts(tuple(cuts), tuple(starts), at)
+    last, wall = max(one.end for one in cuts), robot.tube.outer_radius - robot.tube.inner_radius
+    warnings: tuple[str, ...] = ()
+    if at <= last:
+        warnings = (
+            f"the last cut ends at {last:.6g} mm and the robot file at {at:.6g} mm, which leaves "
+            f"no ring at the tip; a ring of the thickness of the wall, {wall:.6g} mm, was added "
+            "beyond the cut. Give the last notch an `uncut_length` to set it.",
+        )
+        at = last + wall
+    if polishing:
+        cuts = [_unpolished(one, robot.tube, stock, polishing) for one in cuts]
+    return RobotCuts(stock, tuple(cuts), -shank - polishing, at + polishing, warnings)
+
+
+@contextmanager
+def naming(what: str) -> Generator[None]:
+    """Put what is made before what is wrong with it."""
+    try:
+        yield
+    except InputError as problem:
+        raise InputError(f"{what}: {problem}", problem.code) from None
+
+
+def angle_at(height: float, radius: float) -> float:
+    """Return the angle from the side of a cut at which a surface has a height [rad]."""
+    return math.acos(min(1.0, max(-1.0, height / radius)))
+
+
+def _unpolished(one: PlacedCut, tube: Tube, stock: Tube, polishing: float) -> PlacedCut:
+    """Return a cut before polishing, which moves its walls into the material.
+
+    A radial wall is then no longer radial: in the middle of the wall it lies where the robot has
+    it, which keeps the area of the section.
+    """
+    cut, top = one.cut, stock.outer_radius
+    inside = polishing, polishing
+    with naming(one.name):
+        if cut.radial:
+            middle = 0.5 * (tube.outer_radius + tube.inner_radius)
+            profile = [(x, -middle * angle_at(y, tube.outer_radius)) for x, y in cut.corners]
+            corners = [(x, top * math.cos(y / middle)) for x, y in shrunk(profile, inside, 0.0)]
+        else:
+            corners = shrunk(cut.corners, inside, top)
+    radii = tuple(max(radius - polishing, 0.0) for radius in cut.radii)
+    return one._replace(cut=cut._replace(corners=tuple(corners), radii=radii))
+
+
+class Hole(NamedTuple):
+    """A point that a tendon is led through.
+
+    Attributes:
+        body: The body it is fixed to, 0 the base.
+        place: Its place in the frame of that body, mm.
+    """
+
+    body: int
+    place: Float[np.ndarray, " 3"]
+
+
+def tendon_holes(robot: Robot, tendon: int) -> list[Hole]:
+    """Return the points that a tendon runs through, base to tip.
+
+    Args:
+        robot: The robot.
+        tendon: Which tendon, from 0.
+    """
+    one = robot.tendon[tendon]
+    lengths = constant(body_lengths(robot.tube, robot.notches))
+    line = passage(robot.notches, lengths, one.direction_deg, robot.tube.outer_radius, one.radius)
+    side = np.radians(one.direction_deg)
+    position = one.radius * np.array([np.cos(side), np.sin(side), 0.0])
+
+    def hole(body: int, along: float) -> Hole:
+        return Hole(body, position + np.array([0.0, 0.0, along]))
+
+    last = one.end_body or robot.number_of_notches
+    holes = [hole(0, 0.0)]
+    if line.base_leaves > 0.0:
+        holes.append(hole(0, float(line.base_leaves)))
+    for j in np.flatnonzero(line.visits[:last]):
+        holes.append(hole(int(j) + 1, float(line.enters[j])))
+        if j + 1 < last:
+            holes.append(hole(int(j) + 1, float(line.leaves[j])))
+    return holes

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from notchflex._replacing import replacing
 from notchflex.errors import InputError
-from notchflex.export.document import Document, Subject
-from notchflex.export.formats import FORMATS, format_of
+from notchflex.export.formats import FORMATS, Document, Subject, format_of
 from notchflex.results.files.writing import check_output
 from notchflex.robot import Robot
 
@@ -95,7 +94,7 @@ def write(documents: Mapping[str, Document]) -> list[Exported]:
     written: list[Exported] = []
     for file, document in documents.items():
         with replacing(file) as temporary:
-            document.save(temporary)
+            document.writer(document.content, temporary)
         written.append(Exported(file, document.warnings, document.facts))
     return written
 

@@ -1,24 +1,217 @@
 """The table of formats: which file each one writes, with which function, options and libraries.
 
-A new format is a line here, its function, and an option of `cli/verbs/export.py`.
+A new format is a line here and its function; its option of the command line follows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from importlib import import_module
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
 
 from notchflex._extras import need
 from notchflex.errors import InputError
-from notchflex.export.document import Document, Subject
-from notchflex.export.finite_elements.options import DeckOptions
-from notchflex.export.options import PatternOptions, SolidOptions
-from notchflex.export.simulators.options import SimulatorOptions
+from notchflex.robot.part import Float, Int, part, quantity
 
-Builder = Callable[[Subject, Any], Document]
+if TYPE_CHECKING:
+    from notchflex.results import EquilibriumPath
+    from notchflex.robot import Robot
+
+
+Seam = Literal["past", "split"]
+AngleUnit = Literal["mm", "deg"]
+DxfVersion = Literal["R2000", "R12"]
+Paper = Literal["a4", "a3"]
+
+_LONGEST = 1e4  # mm; longer than any tube
+
+
+def _length(text: str, most: float = 10.0) -> Any:
+    return quantity("mm", text, at_least=0.0, at_most=most)
+
+
+def _pair(value: object) -> object:
+    return value if isinstance(value, tuple | list) else (value, value)
+
+
+_Width = Annotated[Float, _length("width of the beam")]
+_Kerf = Annotated[tuple[_Width, _Width], BeforeValidator(_pair), Field(validate_default=True)]
+_Polishing = Annotated[Float, _length("what polishing removes from every surface")]
+_Shank = Annotated[Float, _length("uncut tube on the base side", _LONGEST)]
+_Chord = Annotated[
+    Float, quantity("mm", "distance of a curve from its chords", at_least=1e-5, at_most=1.0)
+]
+
+
+@part(kw_only=False, refuse=InputError)
+class PatternOptions:
+    """Options of flat patterns (DXF, SVG, dimensioned PDF sheet).
+
+    Args:
+        kerf: Width of the slot that the beam leaves [mm], or two: that of a slot round the tube,
+            measured along it, and that of a slot along the tube, measured round it. With 0 the
+            pattern is the nominal geometry, and the shop compensates; otherwise the path runs half
+            a kerf into the waste. The drawing says which.
+        corner_radius: Radius of the sharp corners of the cuts [mm]; 0 or at least half the kerf.
+        polishing: What electropolishing removes from every surface after cutting [mm]. Tube and
+            cuts are then those before it, so that the finished robot has its dimensions.
+        seam: Cuts that cross the seam run `"past"` it, or are `"split"` into two closed outlines.
+        seam_deg: Side of the tube on which it is unrolled [deg].
+        two_axis: Whether the machine has a linear and a rotary axis only, so that its beam always
+            points to the tube axis; cuts with other walls are then refused.
+        y_unit: Unit of the coordinate round the tube: `"mm"` on the outer surface, or `"deg"`.
+        shank: Uncut tube on the base side, by which the robot is held [mm]; the cut-off runs at
+            its end.
+        chord: Largest distance of a curve from its chords [mm].
+        dxf_version: `"R2000"`, or `"R12"` for old programs.
+        paper: Size of the pages of the sheet, which lie across: `"a4"` or `"a3"`.
+
+    Raises:
+        InputError: A value is not allowed.
+
+    Example:
+        >>> PatternOptions(kerf=0.025).inside
+        (0.0125, 0.0125)
+    """
+
+    kerf: _Kerf = 0.0  # pyright: ignore[reportAssignmentType] - made two widths
+    corner_radius: Annotated[Float, _length("radius of sharp corners")] = 0.0
+    polishing: _Polishing = 0.0
+    seam: Annotated[Seam, Field(description='"past" or "split"')] = "past"
+    seam_deg: Annotated[
+        Float, quantity("deg", "side of the seam", at_least=-360.0, at_most=360.0)
+    ] = 180.0
+    two_axis: Annotated[bool, Field(strict=True)] = False
+    y_unit: Annotated[AngleUnit, Field(description='"mm" or "deg"')] = "mm"
+    shank: _Shank = 10.0
+    chord: _Chord = 0.001
+    dxf_version: Annotated[DxfVersion, Field(description='"R2000" or "R12"')] = "R2000"
+    paper: Annotated[Paper, Field(description='"a4" or "a3"')] = "a4"
+
+    @property
+    def inside(self) -> tuple[float, float]:
+        """Distance of the path from the edges of the cuts, along the tube and round it [mm]."""
+        along, around = self.kerf
+        return 0.5 * along, 0.5 * around
+
+
+@part(kw_only=False, refuse=InputError)
+class SolidOptions:
+    """Options of solids (STL, STEP).
+
+    Args:
+        channels: Diameter of the channels of the tendons, drilled through the wall along the whole
+            tube [mm]; 0 for none.
+        shank: Uncut tube on the base side [mm].
+        chord: Largest distance of the flat sides of an STL from the round surface [mm].
+        polishing: What electropolishing removes from every surface after cutting [mm]. The solid
+            is then that before it, straight, so that the finished robot has its dimensions.
+
+    Raises:
+        InputError: A value is not allowed.
+
+    Example:
+        >>> SolidOptions(shank=2.0).channels
+        0.0
+    """
+
+    channels: Annotated[Float, _length("diameter of the channels", _LONGEST)] = 0.0
+    shank: _Shank = 10.0
+    chord: _Chord = 0.001
+    polishing: _Polishing = 0.0
+
+
+Mesh = Literal["coarse", "medium", "fine"]
+_MESHES = {"coarse": (1, 3, 4, 3, 4), "medium": (1, 5, 6, 6, 8), "fine": (2, 8, 8, 10, 12)}
+
+
+_Elements = Annotated[Int, Field(ge=1, le=100, description="number of elements")]
+
+
+@part(kw_only=False, refuse=InputError)
+class DeckOptions:
+    """Options of a deck of finite elements.
+
+    Args:
+        wall: Elements through the wall.
+        spine: Elements over half the arc that a notch leaves.
+        opening: Elements over half the opening of a notch.
+        notch: Elements along a notch.
+        uncut: Elements along an uncut length.
+        contact: Whether the faces of the notches may touch.
+        tip_moment: A moment on the end of the tube, which it keeps plane, toward the notches, N mm.
+    """
+
+    wall: _Elements = 1
+    spine: _Elements = 5
+    opening: _Elements = 6
+    notch: _Elements = 6
+    uncut: _Elements = 8
+    contact: Annotated[bool, Field(strict=True)] = True
+    tip_moment: Float = 0.0
+
+    @classmethod
+    def of_mesh(cls, mesh: Mesh, **options: Any) -> DeckOptions:
+        """Return the options with one of three meshes.
+
+        Args:
+            mesh: "coarse", "medium" or "fine".
+            **options: Other options.
+
+        Raises:
+            InputError: No such mesh.
+        """
+        if mesh not in _MESHES:
+            raise InputError.UNKNOWN_NAME(f"there is no mesh {mesh!r}; give {', '.join(_MESHES)}")
+        names = ("wall", "spine", "opening", "notch", "uncut")
+        return cls(**dict(zip(names, _MESHES[mesh], strict=True)), **options)
+
+
+@dataclass(frozen=True)
+class SimulatorOptions:
+    """Options of models for simulators of rigid bodies.
+
+    Args:
+        largest_tension: Largest tension of the range that the joints are fitted over, N. None for
+            that of the load, or without a load for 1.1 times the tension that closes the last notch
+            (the one that closes the first, where some notch never closes).
+    """
+
+    largest_tension: float | None = None
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Subject of an export: a robot, and for a robot under load the step of a path."""
+
+    robot: Robot
+    path: EquilibriumPath | None = None
+    step: int = 0
+
+
+def _write(content: str | bytes, file: Path) -> None:
+    file.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A file that is complete before it is written.
+
+    Args:
+        content: What is written: text (as UTF-8), bytes, or what its writer takes.
+        warnings: Sentences for the user about what is in the file.
+        facts: Numbers about what is in the file, for `--json`; plain values, units in the names.
+        writer: Writes the content to a file, which is then renamed.
+    """
+
+    content: Any
+    warnings: tuple[str, ...] = ()
+    facts: dict[str, Any] = field(default_factory=dict[str, Any])
+    writer: Callable[[Any, Path], None] = _write
 
 
 @dataclass(frozen=True)
@@ -43,9 +236,7 @@ class Format:
 
     def build(self, subject: Subject, options: Any) -> Document:
         """Make the document; nothing is written."""
-        module, _, function = self.builder.partition(":")
-        builder: Builder = getattr(import_module(module), function)
-        return builder(subject, options)
+        return resolve_name(self.builder)(subject, options)
 
     def check_packages(self, option: str) -> None:
         """Raise if a package that it needs is not installed."""
@@ -59,14 +250,14 @@ FORMATS: dict[str, Format] = {
     "dxf": Format(
         "flat pattern for the laser",
         (".dxf",),
-        "notchflex.export.flat.dxf:dxf_pattern",
+        "notchflex.export.flat.drawing:dxf_pattern",
         PatternOptions,
         _EZDXF,
     ),
     "svg": Format(
         "flat pattern at full size",
         (".svg",),
-        "notchflex.export.flat.svg:svg_pattern",
+        "notchflex.export.flat.drawing:svg_pattern",
         PatternOptions,
     ),
     "pdf": Format(
@@ -79,7 +270,7 @@ FORMATS: dict[str, Format] = {
     "stl": Format(
         "solid as triangles",
         (".stl",),
-        "notchflex.export.solids.stl:stl_solid",
+        "notchflex.export.solids.straight:stl_solid",
         SolidOptions,
         (("manifold3d", "export"), ("matplotlib", "plot")),
         bends=True,
@@ -116,7 +307,7 @@ FORMATS: dict[str, Format] = {
     "inp": Format(
         "deck of finite elements for CalculiX",
         (".inp",),
-        "notchflex.export.finite_elements.document:deck_document",
+        "notchflex.export.finite_elements.deck:deck_document",
         DeckOptions,
         bends=True,
     ),

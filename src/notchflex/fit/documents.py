@@ -1,4 +1,4 @@
-"""Fits as JSON documents, for `notchflex.results.files.json.write_json`, and as text.
+"""Fits as text, as JSON documents and as robot files that say where each value comes from.
 
 Constants are in the units of the robot file. None marks a missing number, also an open end
 of an interval.
@@ -7,21 +7,31 @@ of an interval.
 from __future__ import annotations
 
 import math
+import os
+from collections.abc import Iterable
+from math import isfinite
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from notchflex import __version__
-from notchflex.fit.assessment.diagnosis import diagnose
+from notchflex.errors import InputError
+from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose, with_unit
 from notchflex.fit.assessment.errors_of_parts import edge, errors_of_parts
 from notchflex.fit.assessment.folds import Fold, LeftOut
 from notchflex.fit.assessment.next_measurement import NextMeasurement
 from notchflex.fit.assessment.posterior import Posterior
 from notchflex.fit.estimation.calibration import Calibration
+from notchflex.fit.estimation.intervals import Interval
 from notchflex.fit.estimation.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
+from notchflex.fit.model.constants import Unknown
+from notchflex.fit.model.residuals import SENSOR
 from notchflex.results.files.json import plain
+from notchflex.results.files.writing import check_folder, write_text
 from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.robot.robot import to_table
+from notchflex.robot import robot_text
+from notchflex.robot.robot import source_of, to_table
 
 HEAD = {"program": "notchflex", "version": __version__}
 # An objective's value is a sum of these; half a chi squared has no unit.
@@ -36,9 +46,12 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
 
     Returns:
         `converged`, `reason`, `objective`, `cost`, `numbers_measured` (`numbers_counted` without
-        totals that are sums of the notches), `reduced_chi_squared`, `constants` (each with value,
-        unit, 95 % interval and whether it is by rows or by whole pulls, standard deviations,
-        limits), `correlation`, `verdict` (the sentences of `diagnose`), `noise`, `errors` (root
+        totals that are sums of the notches), `reduced_chi_squared`, `log_likelihood`, `aic`, `bic`,
+        `constants` (each with value, unit, 95 % interval and whether it is by rows or by whole
+        pulls, standard deviations, limits), `correlation`, `verdict` (the sentences of
+        `diagnose`), `trusted` and `tests` (probabilities of the patterns of the residuals, and
+        what other constants would gain),
+        `deviations_of_drawing` (in standard deviations of the tolerances), `noise`, `errors` (root
         mean squares of every notch, beside the repeats), `searches`, `solves` (number of rows
         solved) and `robots` (their data, and their descriptions with the fitted constants).
     """
@@ -55,10 +68,16 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         "numbers_counted": found.counted,
         "degrees_of_freedom": found.freedom,
         "reduced_chi_squared": _finite(found.reduced_chi_squared),
+        "log_likelihood": _finite(found.log_likelihood),
+        "aic": _finite(found.aic),
+        "bic": _finite(found.bic),
         "intervals_widened_by": found.widened,
         "constants": _constants(found),
         "correlation": [[_finite(one) for one in row] for row in found.correlation],
         "verdict": list(diagnose(found)),
+        "trusted": found.trusted,
+        "tests": _tests(found),
+        "deviations_of_drawing": found.deviations_of_drawing,
         "noise": _noise(found),
         "errors": _errors(found),
         "searches": _searches(found),
@@ -187,7 +206,7 @@ def posterior_document(drawn: Posterior, *, draws: bool = False) -> dict[str, An
                 "standard_deviation": drawn.deviations[name],
                 "interval_95": list(drawn.intervals[name]),
                 "effective_draws": _finite(drawn.effective[name]),
-                "split_r_hat": _finite(drawn.unlike[name]),
+                "split_r_hat": _finite(drawn.r_hat[name]),
             }
             for name in drawn.names
         ],
@@ -218,7 +237,7 @@ def _constants(calibration: Calibration) -> list[dict[str, Any]]:
                 "standard_deviation": _finite(calibration.deviations[unknown.name]),
                 "standard_deviation_by_pulls": _finite(by_pulls[number]),
                 "standard_deviation_by_rows": _finite(by_rows[number]),
-                "interval_by": "pulls" if calibration.by_pulls.wider[number] > 1.0 else "rows",
+                "interval_by": "pulls" if calibration.by_pulls.counts[number] else "rows",
                 "pulls": int(calibration.by_pulls.pulls[number]),
                 "before": unknown.start,
                 "limits": [_finite(unknown.lower), _finite(unknown.upper)],
@@ -226,6 +245,18 @@ def _constants(calibration: Calibration) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def _tests(calibration: Calibration) -> dict[str, Any] | None:
+    tests = calibration.tests
+    if tests is None:
+        return None
+    return {
+        "runs": _finite(tests.runs),
+        "notches": _finite(tests.notches),
+        "rejected": list(tests.rejected),
+        "missing": [one._asdict() for one in tests.missing],
+    }
 
 
 def _noise(calibration: Calibration) -> list[dict[str, Any]]:
@@ -279,3 +310,130 @@ def _searches(calibration: Calibration) -> list[dict[str, Any]]:
 def _finite(value: float) -> float | None:
     """A number; None instead of NaN and infinity."""
     return float(value) if math.isfinite(value) else None
+
+
+def summary(calibration: Calibration) -> str:
+    """Return constants with intervals and units, root-mean-square errors and the diagnosis."""
+    state = "converged" if calibration.converged else f"not converged: {calibration.reason}"
+    state += "" if calibration.trusted else ", not trusted"
+    lines = [f"{', '.join(calibration.given)}: {calibration.counted} numbers measured, {state}"]
+    width = max(map(len, calibration.names))
+    for name, value in calibration.values.items():
+        unit, interval = calibration.units[name], calibration.intervals.get(name)
+        ends = "" if interval is None else f"  95 %: {_ends(interval, unit)}"
+        lines.append(f"  {name:<{width}}  {with_unit(value, unit)}{ends}")
+    errors = [
+        f"{edge(name)[0]} {error * edge(name)[2]:.3g} {edge(name)[1]}"
+        for name, error in calibration.residuals.root_mean_squares().items()
+    ]
+    lines.append(f"  rms error: {', '.join(errors)}")
+    return "\n".join([*lines, *(diagnose(calibration) or (NO_PROBLEMS,))])
+
+
+def _ends(interval: Interval, unit: str) -> str:
+    ends = ("open" if end is None else f"{end:.5g}" for end in (interval.lower, interval.upper))
+    return f"{' to '.join(ends)} {unit}".strip()
+
+
+# More files than that are not named, but counted.
+_FILES = 3
+
+
+def write_fitted(
+    found: Calibration, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
+) -> tuple[Path, ...]:
+    """Write every fitted robot as a robot file, named after its label.
+
+    Comments of the file that the robot was read from are kept. A comment beside each fitted value
+    names the data and the 95 % interval. Constants of the measurement (`sensor.`) are not written.
+
+    Args:
+        found: The fit.
+        folder: Folder of the files; made if it is missing. Files of the same names are replaced.
+        inputs: Files that must not be replaced.
+
+    Returns:
+        The files.
+
+    Raises:
+        InputError: A file cannot be written, is one of `inputs`, or is the very file that the
+            robot was read from.
+
+    Example:
+        >>> write_fitted(found, "fitted")  # doctest: +SKIP
+        (PosixPath('fitted/my-wrist.toml'),)
+    """
+    names = [f"{label}.toml" for label in found.given]
+    files = check_folder(str(folder), names, "the folder of fitted robots", inputs=inputs)
+    targets = dict(zip(found.given, files, strict=True))
+    for label, target in targets.items():
+        if target.exists() and _text(target) == source_of(found.given[label]):
+            raise InputError.CONFLICT(
+                f"{target}: this would replace the file that {label} was read from; choose "
+                "another folder."
+            )
+    try:
+        Path(folder).mkdir(exist_ok=True)
+    except OSError as problem:
+        raise InputError.FILE_UNWRITABLE(
+            f"the folder {folder} cannot be made: {problem.strerror}."
+        ) from None
+    for label, target in targets.items():
+        robot = found.robots[label]
+        notes = {
+            one.path: _note(found, unknown)
+            for unknown in (*found.problem.unknowns, *found.drawing)
+            for one in unknown.sets
+            if one.label == label and one.path not in SENSOR
+        }
+        write_text(target, robot_text(robot, fitted=notes))
+    return files
+
+
+def _note(calibration: Calibration, unknown: Unknown) -> str:
+    """The comment beside a fitted value: the data, and how far to trust it."""
+    trouble = "" if calibration.converged else "; the search did not settle"
+    trouble += "" if calibration.trusted else "; not trusted"
+    files = _files(calibration, unknown)
+    if unknown in calibration.drawing:
+        return f"{files}: {unknown.start:+.2g} standard deviations of its tolerance{trouble}"
+    value = with_unit(calibration.values[unknown.name], unknown.unit)
+    rule = "" if unknown.path == unknown.sets[0].path else f"`{unknown.path}` = {value}, "
+    return f"{files}: {rule}{_trust(calibration, unknown)}{trouble}"
+
+
+def _files(calibration: Calibration, unknown: Unknown) -> str:
+    """Names of the files that a constant follows from."""
+    labels = dict.fromkeys(one.label for one in unknown.sets)
+    files = [Path(one).name for label in labels for one in data_of(calibration, label)]
+    files = list(dict.fromkeys(" ".join(one.split()) for one in files))
+    if len(files) > _FILES:
+        files = [*files[: _FILES - 1], f"{len(files) - _FILES + 1} more files"]
+    return ", ".join(files)
+
+
+def _trust(calibration: Calibration, unknown: Unknown) -> str:
+    interval, unit = calibration.intervals.get(unknown.name), unknown.unit
+    if interval is None:
+        size = calibration.deviations[unknown.name]
+        return f"standard deviation {size:.2g} {unit}".strip() if isfinite(size) else "no interval"
+    low, high = interval.lower, interval.upper
+    if calibration.tells_no_noise:
+        return f"no interval: {interval.reason}"
+    if low is None and high is None:
+        return "any value fits"
+    if low is not None and high is not None:
+        ends = f"{low:.5g} to {high:.5g}"
+    else:
+        ends = f"at most {high:.5g}" if low is None else f"at least {low:.5g}"
+    number = calibration.names.index(unknown.name)
+    pulls = int(calibration.by_pulls.pulls[number])
+    by_pulls = f", by {pulls} whole pulls" if calibration.by_pulls.counts[number] else ""
+    return f"{ends} {unit}".strip() + f" (95 %{by_pulls})"
+
+
+def _text(target: Path) -> str | None:
+    try:
+        return target.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError):
+        return None

@@ -9,13 +9,14 @@ from notchflex._extras import need
 
 need("gymnasium", "learn", "notchflex.learning")
 
-from notchflex.learning.environments import FollowEnv, ReachEnv  # noqa: E402
-from notchflex.learning.registration import register_environments  # noqa: E402
-from notchflex.learning.scripted import ScriptedPolicy  # noqa: E402
-from notchflex.learning.vector_environments import (  # noqa: E402
+from notchflex.learning.environments import (  # noqa: E402  # noqa: E402
+    FollowEnv,
     FollowVectorEnv,
+    ReachEnv,
     ReachVectorEnv,
+    register_environments,
 )
+from notchflex.learning.scripted import ScriptedPolicy  # noqa: E402
 
 register_environments()
 

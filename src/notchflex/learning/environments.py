@@ -1,17 +1,19 @@
-"""One robot at a time: `FollowEnv` and `ReachEnv`."""
+"""Environments of gymnasium: one robot at a time, and many in one call of the solver."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
 
 from notchflex.errors import InputError
-from notchflex.learning.episode import EpisodeSettings
-from notchflex.learning.frames import frame
-from notchflex.learning.rows import EpisodeRows
-from notchflex.loads.validation import short_repr
+from notchflex.learning.episode import EpisodeRows, EpisodeSettings, frame
+from notchflex.loads.validation import check_integer, short_repr
 
 RENDER_MODES = ["rgb_array"]
 _ROW = np.zeros(1, int)
@@ -136,4 +138,197 @@ class ReachEnv(RobotEnv):
     follows = False
 
 
-__all__ = ["FollowEnv", "ReachEnv", "RobotEnv", "check_render_mode"]
+class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
+    """Robots side by side, as many environments of one kind; n rows.
+
+    The episodes are those of `num_envs` single environments. One that has ended begins anew with
+    the next step, whose action it ignores (`AutoresetMode.NEXT_STEP`).
+
+    Args:
+        num_envs: How many.
+        cores: How many cores to use; all where not given.
+        render_mode: "rgb_array" for pictures, one per row, or None.
+        settings: As for the single environment.
+
+    Raises:
+        InputError: Settings that cannot be used.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
+        "render_modes": RENDER_MODES,
+        "render_fps": 20,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+    follows: ClassVar[bool]
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        cores: int | None = None,
+        render_mode: str | None = None,
+        **settings: Any,
+    ) -> None:
+        for name, value in (("num_envs", num_envs), ("cores", 1 if cores is None else cores)):
+            if check_integer(value, name) < 1:
+                raise InputError.OUT_OF_RANGE(f"{name} must be 1 or more; got {value}")
+        self.settings, self.num_envs = EpisodeSettings(**settings), num_envs
+        self.render_mode = check_render_mode(render_mode)
+        self.single_observation_space, self.single_action_space = self.settings.spaces()
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._rows = EpisodeRows(self.settings, num_envs, follow=self.follows, cores=cores)
+        self._random: list[np.random.Generator | None] = [None] * num_envs
+        self._ended = np.zeros(num_envs, bool)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin episodes anew.
+
+        Args:
+            seed: Of the first row, counted up from row to row; or one per row. Random numbers go on
+                where not given.
+            options: `reset_mask`, a flag per row, for some rows alone.
+
+        Returns:
+            Observations and information, rows as leading axis.
+
+        Raises:
+            InputError: Seeds or a mask of another number than that of the rows.
+        """
+        which = np.flatnonzero(self._masked(options))
+        seeds = self._seeds(seed)
+        for row in which:
+            if seeds[row] is not None or self._random[row] is None:
+                self._random[row] = seeding.np_random(seeds[row])[0]
+        self._begin(which)
+        self._ended[which] = False
+        is_reset = np.isin(np.arange(self.num_envs), which)
+        return self._rows.observation, self._information(is_reset, self._rows.distance)
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Pull the tendons of all rows; rows whose episode has ended begin another one instead.
+
+        Args:
+            actions: Change of every tension, from -1 to 1 of the largest change, (n, t).
+
+        Returns:
+            Observations, rewards, terminations, truncations and information, rows as leading axis.
+
+        Raises:
+            InputError: Actions of another shape, or not finite.
+        """
+        every, count = np.ones(self.num_envs, bool), self.num_envs
+        which, anew = np.flatnonzero(~self._ended), np.flatnonzero(self._ended)
+        numbers = np.asarray(actions)
+        some = numbers[which] if numbers.shape[:1] == (count,) else numbers
+        outcome = self._rows.step(which, some)
+        if len(anew):
+            self._begin(anew)
+        reward, distance = np.zeros(count), self._rows.distance
+        terminated, truncated = np.zeros(count, bool), np.zeros(count, bool)
+        reward[which], distance[which] = outcome.reward, outcome.distance
+        terminated[which], truncated[which] = outcome.terminated, outcome.truncated
+        self._ended = terminated | truncated
+        codes = [""] * count
+        for row, code in zip(which, outcome.code, strict=True):
+            codes[row] = code
+        info = self._information(every, distance, codes, terminated)
+        return self._rows.observation, reward, terminated, truncated, info
+
+    def render(self) -> tuple[Any, ...] | None:
+        """Return a picture of every row; None without a mode of rendering."""
+        if self.render_mode is None:
+            return None
+        return tuple(frame(self._rows, row) for row in range(self.num_envs))
+
+    def _begin(self, which: np.ndarray) -> None:
+        sources = [self._random[row] or np.random.default_rng() for row in which]
+        self._rows.reset(which, sources)
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + row for row in range(self.num_envs)]
+        seeds = list(seed)
+        if len(seeds) != self.num_envs:
+            raise InputError.WRONG_SHAPE(
+                f"seed is one number or one per row, {self.num_envs}; got {len(seeds)}"
+            )
+        return seeds
+
+    def _masked(self, options: dict[str, Any] | None) -> np.ndarray:
+        mask: Any = (options or {}).get("reset_mask")
+        if mask is None:
+            return np.ones(self.num_envs, bool)
+        mask = np.asarray(mask)
+        if mask.dtype != bool or mask.shape != (self.num_envs,):
+            raise InputError.WRONG_SHAPE(
+                f"reset_mask is one flag per row, {self.num_envs}; got {short_repr(mask)}"
+            )
+        return mask
+
+    def _information(
+        self,
+        is_reset: np.ndarray,
+        distance: np.ndarray,
+        code: list[str] | None = None,
+        reached: np.ndarray | None = None,
+    ) -> dict[str, Any]:
+        """Information in the form of gymnasium: an array, and which of its rows are given."""
+        codes = np.full(self.num_envs, None, object)
+        codes[is_reset] = np.array(code or [""] * self.num_envs, object)[is_reset]
+        values: dict[str, Any] = {"distance": np.where(is_reset, distance, 0.0), "code": codes}
+        if not self.follows:
+            none = np.zeros(self.num_envs, bool)
+            values["is_success"] = none if reached is None else reached.copy()
+        return values | {f"_{name}": is_reset.copy() for name in values}
+
+
+class FollowVectorEnv(RobotVectorEnv):
+    """`FollowEnv` in many rows.
+
+    Example:
+        >>> import gymnasium
+        >>> envs = gymnasium.make_vec("notchflex.learning:notchflex/Follow-v0", num_envs=8)
+        >>> observations, _ = envs.reset(seed=0)
+        >>> observations, rewards, *_ = envs.step(envs.action_space.sample())
+        >>> observations.shape, rewards.shape
+        ((8, 7), (8,))
+    """
+
+    follows = True
+
+
+class ReachVectorEnv(RobotVectorEnv):
+    """`ReachEnv` in many rows."""
+
+    follows = False
+
+
+IDENTIFIERS = {"notchflex/Follow-v0": "Follow", "notchflex/Reach-v0": "Reach"}
+"""Each with the beginning of the names of its classes."""
+
+
+def register_environments() -> None:
+    """Register all environments in gymnasium; those that are registered stay.
+
+    The environments count their steps themselves, so that gymnasium adds no limit: a vector
+    environment would have none.
+    """
+    from gymnasium.envs.registration import register, registry
+
+    for name, begin in IDENTIFIERS.items():
+        if name not in registry:
+            register(
+                id=name,
+                entry_point=f"notchflex.learning:{begin}Env",
+                vector_entry_point=f"notchflex.learning:{begin}VectorEnv",
+            )

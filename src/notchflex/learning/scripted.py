@@ -69,6 +69,3 @@ class ScriptedPolicy:
         tension = observation[: len(settings.largest)] * settings.largest
         command = self._controller.step(observation[-3:] * settings.length)
         return np.clip((command - tension) / settings.change, -1.0, 1.0)
-
-
-__all__ = ["ScriptedPolicy"]

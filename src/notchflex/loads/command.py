@@ -1,17 +1,274 @@
-"""Commands: the loads of a path as the arrays that the solver takes."""
+"""Commands: the loads of a path as the arrays that the solver takes.
+
+With R the rotation of a body against the base, a force f of constant direction in the base acts on
+the body's frame as R^T f, at a point p of the body with the moment p x R^T f about its origin. Of
+many such forces only three sums are needed whatever R is: f, the moments, and the products p f^T.
+Forces that turn with the body are constant in its frame.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from math import hypot
 from typing import NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from notchflex._jax import constant, jax, jnp
-from notchflex.loads.applied import BodyLoads, applied
+from notchflex._jax import array_module, constant, jnp
+from notchflex.errors import InputError
+from notchflex.loads.external import NOTHING, ExternalLoad
+from notchflex.loads.load import rotation_of
 from notchflex.loads.load_path import LoadPath
-from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.chain import Chain, bending_normal
+from notchflex.mechanics.motion import IN_PLANE, turned, unskew
 from notchflex.robot import Robot
+
+# Tolerance of a vector's component out of a plane.
+_ROUNDING = 1e-12
+
+
+class BodyLoads(NamedTuple):
+    """External loads on the bodies, base first; loads as leading axis. Units N, N mm.
+
+    Attributes:
+        dead_force: Sum of the forces of constant direction, in the base frame.
+        dead_moment: Sum of the moments of constant direction, in the base frame.
+        dead_arm: Sum of the products p f^T of the points where those forces act (in the body's
+            frame) and the forces (in the base frame).
+        following: Moment and force of loads that turn with a body, about its origin, in its frame.
+    """
+
+    dead_force: Float[Array, "*s bodies d"]
+    dead_moment: Float[Array, "*s bodies a"]
+    dead_arm: Float[Array, "*s bodies d d"]
+    following: Float[Array, "*s bodies w"]
+
+
+def applied(
+    load_path: LoadPath,
+    robot: Robot,
+    body_mass: Float[np.ndarray, " bodies"],
+    body_centre: Float[np.ndarray, "bodies 3"],
+    body_length: Float[np.ndarray, " bodies"],
+    frame: Float[np.ndarray, "3 3"] | None = None,
+) -> BodyLoads:
+    """Sum the external loads on each body.
+
+    Args:
+        load_path: The loads, s steps.
+        robot: The robot.
+        body_mass: Mass of each body, base first, g; zeros where the density is not known.
+        body_centre: Centre of mass of each body in its frame, mm.
+        body_length: Axial length of each body, mm; the tip is the end of the last one.
+        frame: Frame whose x and z span the plane of a flat chain; the sums are in that plane.
+
+    Returns:
+        The sums, s steps as leading axis; those on the base too.
+
+    Raises:
+        InputError: A body that the robot does not have, or gravity where nothing has a mass.
+    """
+    axes = _axes(
+        tuple(load_path.base_rotation.tolist()),
+        None if frame is None else tuple(frame.ravel().tolist()),
+    )
+    sums: list[tuple[np.ndarray, ...]] = []
+    for external in load_path.different:
+        _check(external, robot)
+        sums.append(_sums(external, axes, body_mass, body_centre, float(body_length[-1])))
+    if len(load_path) == 1:
+        return BodyLoads(*(constant(field[None]) for field in sums[0]))
+    # Loads that are equal over many steps are summed once.
+    every = (np.array(field)[load_path.which] for field in zip(*sums, strict=True))
+    return BodyLoads(*map(constant, every))
+
+
+def in_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
+    """Reduce loads of space to the plane that x and z of a frame span."""
+    turn = np.asarray(frame)
+    return _in_basis(loads, turn[:, IN_PLANE], turn[:, 1:2])
+
+
+def out_of_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
+    """Expand loads of the plane that x and z of a frame span to space."""
+    turn = np.asarray(frame)
+    return _in_basis(loads, turn[:, IN_PLANE].T, turn[:, 1:2].T)
+
+
+def _in_basis(loads: BodyLoads, along: np.ndarray, about: np.ndarray) -> BodyLoads:
+    """Transform loads to another basis, given by columns for forces and for moments."""
+    force, moment, arm, following = map(np.asarray, loads)
+    axes = about.shape[0]
+    turning = [following[..., :axes] @ about, following[..., axes:] @ along]
+    return BodyLoads(
+        constant(force @ along),
+        constant(moment @ about),
+        constant(along.T @ arm @ along),
+        constant(np.concatenate(turning, axis=-1)),
+    )
+
+
+def body_wrench(rotation: Float[Array, "d d"], one: BodyLoads) -> Float[Array, " w"]:
+    """Return the wrench (moment, force) of the loads on one body, about its origin, in its frame.
+
+    Args:
+        rotation: Rotation of the body against the base.
+        one: The sums for this body, without leading axes.
+
+    Returns:
+        The wrench, N mm and N; plain or traced numbers as given.
+
+    Example:
+        >>> at_side = BodyLoads(np.eye(3)[2], np.zeros(3), np.outer([2.0, 0, 0], [0, 0, 1.0]), 0.0)
+        >>> body_wrench(np.eye(3), at_side).tolist()
+        [0.0, -2.0, 0.0, 0.0, 0.0, 1.0]
+    """
+    xp = array_module(rotation, *one)
+    # The vector of the skew part of p f^T is minus half of p x f.
+    moment = turned(rotation.T, one.dead_moment) - 2.0 * unskew(one.dead_arm @ rotation)
+    return xp.concatenate([moment, one.dead_force @ rotation]) + one.following
+
+
+def is_unloaded(load_path: LoadPath) -> bool:
+    """Return whether no external load acts in any step."""
+    return all(one is NOTHING or one.is_nothing for one in load_path.different)
+
+
+def follows(load_path: LoadPath) -> bool:
+    """Return whether an external load turns with a body in any step."""
+    return any(external.follows for external in load_path.different)
+
+
+def is_planar(load_path: LoadPath, robot: Robot) -> bool:
+    """Return whether every external load stays in the robot's plane of bending, to rounding.
+
+    It does where each force lies in the plane and acts at a point of it, and each moment turns
+    about its normal. Own weight counts as acting on the tube axis. A robot whose notches bend in
+    several planes has no such plane.
+    """
+    normal = bending_normal(robot)
+    if normal is None:
+        return False
+    turn = load_path.base_to_world
+    turned_normal = normal if turn is None else turn @ normal
+    for external in load_path.different:
+        # Only directions matter here, not the mass or its position on the tube axis.
+        forces = list(_forces(external, 0, 0.0))
+        if external.gravity is not None:
+            forces.append((0, external.weight(1.0), _NONE, _NONE, False))
+        for _, force, moment, point, following in forces:
+            if _sticks_out(force, moment, point, normal if following else turned_normal, normal):
+                return False
+    return True
+
+
+def _sticks_out(
+    force: Sequence[float],
+    moment: Sequence[float],
+    point: Sequence[float],
+    normal: Float[np.ndarray, " 3"],
+    normal_of_body: Float[np.ndarray, " 3"],
+) -> bool:
+    """Return whether a force or its point leaves a plane, or a moment's axis is not its normal."""
+    across = hypot(*_cross(moment, normal.tolist()))
+    (off_plane,) = _components(force, (normal.tolist(),))
+    (component,) = _components(point, (normal_of_body.tolist(),))
+    return (
+        abs(off_plane) > _ROUNDING * hypot(*force)
+        or across > _ROUNDING * hypot(*moment)
+        or (any(force) and abs(component) > _ROUNDING * hypot(*point))
+    )
+
+
+def _components(vector: Sequence[float], axes: tuple[Sequence[float], ...]) -> list[float]:
+    x, y, z = vector
+    return [x * a + y * b + z * c for a, b, c in axes]
+
+
+def _cross(first: Sequence[float], second: Sequence[float]) -> list[float]:
+    (a, b, c), (x, y, z) = first, second
+    return [b * z - c * y, c * x - a * z, a * y - b * x]
+
+
+def _check(external: ExternalLoad, robot: Robot) -> None:
+    last = robot.number_of_notches
+    for force in external.body_forces:
+        if force.body > last:
+            raise InputError.OUT_OF_RANGE(
+                f"there is no body {force.body}; {robot.name} has the bodies 0 (the base) to "
+                f"{last}, one after each notch"
+            )
+    pulls = external.gravity is not None and any(external.gravity)
+    if pulls and robot.material.density is None and external.tip_mass == 0.0:
+        raise InputError.UNSUPPORTED(
+            f"gravity has nothing to act on: the density of {robot.name} is not known and no mass "
+            "hangs at its tip; give material.density (kg/m3) or a tip_mass (g)"
+        )
+
+
+_NONE = (0.0, 0.0, 0.0)
+_Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool]
+
+
+def _forces(external: ExternalLoad, last: int, tip: float) -> Iterator[_Force]:
+    """List all loads but the robot's weight: body, force, moment, point, whether it follows.
+
+    The tip is `tip` (mm) beyond the origin of the last body.
+    """
+    for one in external.body_forces:
+        yield one.body, one.force, one.moment, one.point, one.following
+    x, y, z = external.tip_point
+    point = (x, y, z + tip)
+    if any(external.tip_force) or any(external.tip_moment):
+        yield last, external.tip_force, external.tip_moment, point, external.following
+    if external.tip_mass:
+        yield last, external.weight(external.tip_mass), _NONE, point, False
+
+
+# Axes of force and moment components in the frame of the bodies, then in the world; as plain
+# numbers, which are faster than arrays for few forces.
+_Axes = tuple[tuple[Sequence[float], ...], ...]
+
+
+@lru_cache(maxsize=64)
+def _axes(base: tuple[float, ...], frame: tuple[float, ...] | None) -> _Axes:
+    """Return the axes of a frame (all three, or x and z of a plane) on a rotated base."""
+    turn, along, about = rotation_of(base), np.eye(3), np.eye(3)
+    if frame is not None:
+        along, about = np.reshape(frame, (3, 3))[:, IN_PLANE], np.reshape(frame, (3, 3))[:, 1:2]
+    columns = (along, about, *((along, about) if turn is None else (turn @ along, turn @ about)))
+    return tuple(tuple(map(tuple, one.T.tolist())) for one in columns)
+
+
+def _sums(
+    external: ExternalLoad,
+    axes: _Axes,
+    body_mass: Float[np.ndarray, " bodies"],
+    body_centre: Float[np.ndarray, "bodies 3"],
+    tip: float,
+) -> tuple[np.ndarray, ...]:
+    """Return the sums for all bodies."""
+    along, about, world_along, world_about = axes
+    count, d, a = len(body_mass), len(along), len(about)
+    moments, arms_end = d + a, d + a + d * d
+    table = np.zeros((count, arms_end + a + d))
+    for body, force, moment, point, follows in _forces(external, count - 1, tip):
+        if follows:
+            turning = [one + more for one, more in zip(moment, _cross(point, force), strict=True)]
+            table[body, arms_end:] += _components(turning, about) + _components(force, along)
+        else:
+            dead = _components(force, world_along)
+            arms = [part * one for part in _components(point, along) for one in dead]
+            table[body, :arms_end] += dead + _components(moment, world_about) + arms
+    if external.gravity is not None:
+        weight = body_mass[:, None] * np.array(_components(external.weight(1.0), world_along))
+        arms = (body_centre @ np.array(along).T)[:, :, None] * weight[:, None]
+        table[:, :d] += weight
+        table[:, moments:arms_end] += arms.reshape(count, -1)
+    arm = table[:, moments:arms_end].reshape(count, d, d)
+    return table[:, :d], table[:, d:moments], arm, table[:, arms_end:]
 
 
 class Command(NamedTuple):
@@ -39,25 +296,6 @@ def tension_commands(tension: Float[np.ndarray, "s t"]) -> Command:
     return Command(constant(tension), None, None)
 
 
-def pad_commands(commands: Command, flexures: int, by_stroke: bool) -> Command:
-    """Pad commands for a chain with more flexures, which carry no load.
-
-    Args:
-        commands: The commands, as leading axis.
-        flexures: Number of flexures of the chain.
-        by_stroke: Whether they stand beside commands by stroke.
-    """
-    target, drawn, loads = commands
-    if by_stroke and drawn is None:
-        drawn = cast("Array", np.zeros(target.shape, bool))
-    if loads is not None:
-        more = flexures + 1 - loads.dead_force.shape[1]
-        loads = jax.tree.map(
-            lambda leaf: np.pad(leaf, [(0, 0), (0, more)] + [(0, 0)] * (leaf.ndim - 2)), loads
-        )
-    return Command(target, drawn, loads)
-
-
 def make_commands(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     """Return the commands of a path; a tendon without one is slack (0 N)."""
     no_stroke = np.isnan(load.stroke)
@@ -70,6 +308,3 @@ def make_commands(load: LoadPath, robot: Robot, chain: Chain) -> Command:
         frame = None if chain.frame is None else np.asarray(chain.frame)
         loads = applied(load, robot, mass, centre, np.asarray(chain.body_length), frame)
     return Command(constant(target), drawn, loads)
-
-
-__all__ = ["Command", "make_commands", "pad_commands", "tension_commands"]

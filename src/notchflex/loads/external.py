@@ -19,7 +19,7 @@ from notchflex.loads.validation import (
 # Standard gravity in the world, m/s^2: what a mass hangs by where no gravity is given.
 HANGING = (0.0, 0.0, -9.81)
 
-_NONE = (0.0, 0.0, 0.0)
+NO_VECTOR = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class BodyForce:
 
     body: int
     force: Sequence[float]
-    moment: Sequence[float] = _NONE
-    point: Sequence[float] = _NONE
+    moment: Sequence[float] = NO_VECTOR
+    point: Sequence[float] = NO_VECTOR
     following: bool = False
 
     def __post_init__(self) -> None:
@@ -85,9 +85,9 @@ class ExternalLoad:
         (0.0, 0.0, -0.1962)
     """
 
-    tip_force: Sequence[float] = _NONE
-    tip_moment: Sequence[float] = _NONE
-    tip_point: Sequence[float] = _NONE
+    tip_force: Sequence[float] = NO_VECTOR
+    tip_moment: Sequence[float] = NO_VECTOR
+    tip_point: Sequence[float] = NO_VECTOR
     following: bool = False
     body_forces: Sequence[BodyForce] = ()
     tip_mass: float = 0.0
@@ -105,10 +105,11 @@ class ExternalLoad:
     def external(self) -> ExternalLoad:
         """The external loads alone, without what else a load may command."""
         given = vars(self)
-        if all(given[name] is default for name, default in _DEFAULTS):
+        numbers = [given[name] for name in EXTERNAL]
+        if numbers == _NOTHING:
             return NOTHING
         load = object.__new__(ExternalLoad)
-        vars(load).update({name: given[name] for name in EXTERNAL})  # checked already
+        vars(load).update(zip(EXTERNAL, numbers, strict=True))  # checked already
         return load
 
     @property
@@ -163,6 +164,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
 EXTERNAL = tuple(one.name for one in fields(ExternalLoad))
 _DEFAULTS = tuple((one.name, one.default) for one in fields(ExternalLoad))
 NOTHING = ExternalLoad()
+_NOTHING = [default for _, default in _DEFAULTS]
 
 
 def external_of_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
@@ -185,6 +187,3 @@ def external_of_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     if any(type(one) is not ExternalLoad for one in different):
         given = tuple(one.external for one in given)
     return given or (NOTHING,) * steps
-
-
-__all__ = ["EXTERNAL", "HANGING", "NOTHING", "BodyForce", "ExternalLoad"]

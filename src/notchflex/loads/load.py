@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from math import isfinite, isnan, nan
+from functools import lru_cache
+from math import hypot, isfinite, isnan, nan, pi
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from notchflex.errors import InputError
-from notchflex.loads.external import ExternalLoad
-from notchflex.loads.validation import check_number, short_repr
+from notchflex.loads.external import NO_VECTOR, ExternalLoad
+from notchflex.loads.validation import check_number, check_vector, short_repr
 
-BASE_TURN = ("base_rotation", "rotation vector, rad")
-"""Name and form of the rotation of the base, for messages."""
-
-NO_TURN = (0.0, 0.0, 0.0)
-"""Rotation vector of a base that is not turned."""
+_ONE_TURN = 2.0 * pi * (1.0 + 1e-9)  # and what rounding adds
 
 _PER_TENDON = "a number, or one entry per tendon with None where nothing is commanded"
 
@@ -44,8 +42,9 @@ class Load(ExternalLoad):
     A tendon of which neither tension nor stroke is commanded hangs slack (0 N).
 
     Raises:
-        InputError: An invalid external load; tensions and strokes are checked when the robot is
-            known.
+        InputError: A number that is not finite, text, an invalid external load, or a base turned
+            by more than one turn; the number of tendons and the signs are checked when the robot
+            is known.
 
     Example:
         >>> Load(tension=2.0, tip_force=(0.0, 0.1, 0.0))
@@ -54,7 +53,7 @@ class Load(ExternalLoad):
 
     tension: float | Sequence[float | None] | None = None
     stroke: float | Sequence[float | None] | None = None
-    base_rotation: Sequence[float] = NO_TURN
+    base_rotation: Sequence[float] = NO_VECTOR
 
     def __repr__(self) -> str:
         """Show what is given; tendons first."""
@@ -64,6 +63,16 @@ class Load(ExternalLoad):
         given = (f"{name}={value!r}" for name, value in values.items() if name in unlike)
         return f"Load({', '.join(given)})"
 
+    def __post_init__(self) -> None:
+        """Check the numbers and keep them as tuples, which the caller cannot change."""
+        super().__post_init__()
+        given = vars(self)
+        for name in ("tension", "stroke"):
+            if given[name] is not None:
+                given[name] = _commanded(given[name], name)
+        if self.base_rotation is not NO_VECTOR:
+            given["base_rotation"] = check_turn(self.base_rotation)
+
     def per_tendon(self, what: str, tendons: int) -> list[float]:
         """Return tension (N) or stroke (mm) of every tendon, NaN where not commanded.
 
@@ -72,27 +81,58 @@ class Load(ExternalLoad):
             tendons: Number of tendons of the robot.
 
         Raises:
-            InputError: Too many entries, or one that is not a finite number.
+            InputError: Too many entries.
         """
-        value = getattr(self, what)
-        entries = [nan] * tendons
-        if value is None:
-            return entries
-        if hasattr(value, "__array__"):
-            value = np.asarray(value).tolist()
-        several = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-        given: list[Any] = list(value) if several else [value]
-        if len(given) > tendons:
+        value = vars(self)[what]
+        entries = value if isinstance(value, tuple) else (value,)
+        if len(entries) > tendons:
             raise InputError.WRONG_SHAPE(
-                f"{what} has {len(given)} entries, but the robot has {tendons} tendons; "
+                f"{what} has {len(entries)} entries, but the robot has {tendons} tendons; "
                 f"give at most {tendons}"
             )
-        for i, entry in enumerate(given):
-            if entry is not None:
-                entries[i] = check_number(entry, what, _PER_TENDON)
-                if not isfinite(entries[i]):
-                    raise InputError.NOT_FINITE(f"{what} must be finite; got {short_repr(entry)}")
-        return entries
+        given = [nan if entry is None else entry for entry in entries]
+        return given if len(given) == tendons else given + [nan] * (tendons - len(given))
+
+
+def _commanded(value: Any, what: str) -> float | tuple[float | None, ...]:
+    """Return a command as a finite number, or as one per tendon and None where there is none."""
+    if hasattr(value, "__array__"):
+        value = np.asarray(value).tolist()
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        return tuple(None if entry is None else _finite(entry, what) for entry in value)
+    return _finite(value, what)
+
+
+def _finite(value: Any, what: str) -> float:
+    number = check_number(value, what, _PER_TENDON)
+    if not isfinite(number):
+        raise InputError.NOT_FINITE(f"{what} must be finite; got {short_repr(value)}")
+    return number
+
+
+def check_turn(value: Any) -> tuple[float, float, float]:
+    """Return the rotation vector of a base, at most one turn long: more is rather degrees."""
+    turn = check_vector(value, "base_rotation", "rotation vector, rad")
+    angle = hypot(*turn)
+    if angle > _ONE_TURN:
+        raise InputError.OUT_OF_RANGE(
+            f"base_rotation turns by {angle:.4g} rad ({angle * 180.0 / pi:.4g} deg); a rotation "
+            "vector is at most one turn long, 2 pi rad or 360 deg: look at its unit"
+        )
+    return turn
+
+
+@lru_cache(maxsize=64)
+def rotation_of(vector: tuple[float, ...]) -> Float[np.ndarray, "3 3"] | None:
+    """Return the rotation matrix of a rotation vector; None for the identity."""
+    if not any(vector):
+        return None
+    from notchflex._jax import constant  # not before it is needed: importing JAX takes a second
+    from notchflex.mechanics.motion import rotation_about
+
+    rotation = np.array(rotation_about(constant(vector)))
+    rotation.setflags(write=False)
+    return rotation
 
 
 def entries_of(values: np.ndarray) -> float | list[float | None] | None:
@@ -101,6 +141,3 @@ def entries_of(values: np.ndarray) -> float | list[float | None] | None:
     if all(entry is None for entry in entries):
         return None
     return entries[0] if len(entries) == 1 else entries
-
-
-__all__ = ["BASE_TURN", "NO_TURN", "Load"]

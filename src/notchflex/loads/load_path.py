@@ -4,51 +4,71 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import chain
 from math import isnan
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from notchflex._summary import Displayed, Summary
+from notchflex._values import ByValue, read_only
 from notchflex.errors import InputError
 from notchflex.loads.external import EXTERNAL, BodyForce, ExternalLoad, external_of_steps
-from notchflex.loads.load import BASE_TURN, NO_TURN, Load, entries_of
+from notchflex.loads.load import Load, check_turn, entries_of, rotation_of
 from notchflex.loads.validation import (
     check_table,
-    check_vector,
     one_or_several,
     short_repr,
 )
 
+_TURNED = (
+    "base_rotation must be the same for all loads of a path and for all paths of a batch; "
+    "make a path or a batch for each"
+)
 
-@dataclass(frozen=True, repr=False)
-class LoadPath(Displayed):
-    """Loads step by step.
+
+@dataclass(frozen=True, repr=False, eq=False)
+class LoadPath(ByValue, Displayed):
+    """Loads step by step; its arrays are read-only copies.
 
     Args:
-        tension: Commanded tensions, N, steps by tendons, NaN where not commanded.
-        stroke: Commanded strokes, mm, in the same form.
+        tension: Commanded tensions, N, steps by tendons, NaN where not commanded; None for none.
+        stroke: Commanded strokes, mm, in the same form; none by default.
         base_rotation: Rotation vector of the base in the world, rad.
         external: External loads, one per step; none by default. `loaded` puts the same on all.
 
     Raises:
         InputError: Unequal shapes, no step, a negative or infinite number, or both tension and
             stroke for one tendon.
+
+    Example:
+        >>> LoadPath([[0.0], [1.0]]) == LoadPath([[0.0], [0.5], [1.0]])[::2]
+        True
     """
 
-    tension: np.ndarray
-    stroke: np.ndarray
+    tension: np.ndarray = None  # pyright: ignore[reportAssignmentType]
+    stroke: np.ndarray = None  # pyright: ignore[reportAssignmentType]
     base_rotation: np.ndarray = field(default_factory=lambda: np.zeros(3))
     external: tuple[ExternalLoad, ...] = ()
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
-        tension = np.atleast_2d(check_table(self.tension, "tension"))
-        stroke = np.atleast_2d(check_table(self.stroke, "stroke"))
-        base_rotation = np.array(check_vector(self.base_rotation, *BASE_TURN))
+        tension: Any = self.tension
+        stroke: Any = self.stroke
+        if tension is None and stroke is None:
+            raise InputError.NO_DATA("a load path needs tensions (N) or strokes (mm); got neither")
+        pairs: Any = (("tension", tension, stroke), ("stroke", stroke, tension))
+        tension, stroke = (
+            read_only(
+                np.full(np.atleast_2d(other).shape, np.nan)
+                if table is None
+                else np.atleast_2d(check_table(table, name))
+            )
+            for name, table, other in pairs
+        )
+        base_rotation = read_only(check_turn(self.base_rotation))
         if tension.shape != stroke.shape or tension.ndim != 2:
             raise InputError.WRONG_SHAPE(
                 f"a load path needs tension and stroke of one shape, steps by tendons; "
@@ -93,17 +113,26 @@ class LoadPath(Displayed):
         """Return the number of steps."""
         return len(self.tension)
 
-    def __getitem__(self, step: int) -> Load:
-        """Return the load of one step, counted from 0.
+    @overload
+    def __getitem__(self, step: int) -> Load: ...
+    @overload
+    def __getitem__(self, step: slice | Int[np.ndarray, " k"]) -> LoadPath: ...
+    def __getitem__(self, step: int | slice | Int[np.ndarray, " k"]) -> Load | LoadPath:
+        """Return the load of one step, counted from 0, or the path of some steps.
 
         Raises:
             IndexError: No such step.
+            InputError: No step is left.
 
         Example:
             >>> from notchflex import pull
             >>> pull(0.0, 3.0, steps=31)[10]
             Load(tension=1.0)
         """
+        if isinstance(step, slice | np.ndarray):
+            which = range(len(self))[step] if isinstance(step, slice) else step.tolist()
+            external = tuple([self.external[number] for number in which])
+            return LoadPath(self.tension[step], self.stroke[step], self.base_rotation, external)
         if not -len(self) <= step < len(self):
             raise IndexError(f"step {step} of a load path of {len(self)} steps")
         return Load(
@@ -117,6 +146,11 @@ class LoadPath(Displayed):
         from notchflex.loads.summary import load_path_summary
 
         return load_path_summary(self)
+
+    @property
+    def base_to_world(self) -> Float[np.ndarray, "3 3"] | None:
+        """Rotation matrix from the frame of the base to the world; None for the identity."""
+        return rotation_of(tuple(self.base_rotation.tolist()))
 
     @cached_property
     def different(self) -> list[ExternalLoad]:
@@ -153,7 +187,7 @@ class LoadPath(Displayed):
         """Append another path; a tendon that one of them does not name is slack in it.
 
         Raises:
-            InputError: `following` is not a path.
+            InputError: `following` is not a path, or turns the base in another way.
 
         Example:
             >>> from notchflex import pull
@@ -165,19 +199,7 @@ class LoadPath(Displayed):
                 f"a load path goes on with another notchflex.LoadPath; got {short_repr(following)}"
             )
         count = max(self.tension.shape[1], following.tension.shape[1])
-        first, second = self.for_tendons(count), following.for_tendons(count)
-        return replace(
-            self,
-            tension=np.concatenate([first.tension, second.tension]),
-            stroke=np.concatenate([first.stroke, second.stroke]),
-            external=self.external + following.external,
-        )
-
-    def part(self, start: int, steps: int) -> LoadPath:
-        """Return some of its steps, from one on."""
-        some = slice(start, start + steps)
-        parts = (self.tension[some], self.stroke[some])
-        return LoadPath(*parts, self.base_rotation, self.external[some])
+        return join_paths([self.for_tendons(count), following.for_tendons(count)])
 
     def loaded(
         self,
@@ -243,7 +265,7 @@ def join_paths(paths: Sequence[LoadPath]) -> LoadPath:
         InputError: Their bases are turned differently.
     """
     if any((path.base_rotation != paths[0].base_rotation).any() for path in paths):
-        raise InputError.CONFLICT("base_rotation must be the same for all paths of a batch")
+        raise InputError.CONFLICT(_TURNED)
     return LoadPath(
         np.concatenate([path.tension for path in paths]),
         np.concatenate([path.stroke for path in paths]),
@@ -277,15 +299,12 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
             raise InputError.WRONG_TYPE(
                 f"a load must be a notchflex.Load; got {type(load).__name__}"
             )
-    turns = {
-        NO_TURN if load.base_rotation is NO_TURN else check_vector(load.base_rotation, *BASE_TURN)
-        for load in every
-    }
+    turns = {load.base_rotation for load in every}
     if len(turns) > 1:
-        raise InputError.CONFLICT("base_rotation must be the same for all loads of a path")
+        raise InputError.CONFLICT(_TURNED)
     tension = [load.per_tendon("tension", tendons) for load in every]
     stroke = [load.per_tendon("stroke", tendons) for load in every]
-    given = np.array(tension), np.array(stroke), np.array(turns.pop())
+    given = read_only(tension), read_only(stroke), _base_rotation(turns.pop())
     external = tuple(load.external for load in every)
     entries = zip(chain.from_iterable(tension), chain.from_iterable(stroke), strict=True)
     if any(pulled < 0.0 or not (isnan(pulled) or isnan(drawn)) for pulled, drawn in entries):
@@ -293,4 +312,7 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     return LoadPath.of_valid(*given, external)
 
 
-__all__ = ["LoadPath", "join_paths", "load_path"]
+@lru_cache(maxsize=64)
+def _base_rotation(vector: tuple[float, ...]) -> Float[np.ndarray, " 3"]:
+    """Return a rotation vector as an array, the same for the same vector."""
+    return read_only(vector)

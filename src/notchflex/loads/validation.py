@@ -143,7 +143,3 @@ def short_repr(value: Any) -> str:
     except ValueError:  # a whole number of thousands of digits
         text = f"a huge {type(value).__name__}"
     return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-__all__ = ["check_bool", "check_integer", "check_is_robot", "check_number", "check_pulls"]
-__all__ += ["check_table", "check_vector", "one_or_several", "short_repr"]

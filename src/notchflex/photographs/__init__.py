@@ -1,8 +1,7 @@
 """Photographs: the notch angles of bent robots, the notches of straight ones, with deviations."""
 
 from notchflex.photographs.board.layout import Board, board_of
-from notchflex.photographs.cut.measure_cut import measure_cut
-from notchflex.photographs.cut.measured_cut import MeasuredCut
+from notchflex.photographs.cut.measure_cut import MeasuredCut, measure_cut
 from notchflex.photographs.measure import measure
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 

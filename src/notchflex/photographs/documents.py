@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.photographs.cut.measured_cut import MeasuredCut
+from notchflex.photographs.cut.measure_cut import MeasuredCut
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.results.files.json import document_head
 

@@ -2,21 +2,216 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_closing
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
 
-from notchflex.photographs.board.ruler import RulerReading
-from notchflex.photographs.chain.axis_points import BASE, axis_points, on_axis_points
+from notchflex.photographs.board.sighting import RulerReading
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
-from notchflex.photographs.chain.outline import OutlineModel
+from notchflex.photographs.chain.outline import BASE, OutlineModel, axis_points, on_axis_points
 from notchflex.photographs.contrast import Contrast
 from notchflex.photographs.fitting import Fit, cost, covariance, misfit, refine
 from notchflex.photographs.missing import MAX_RESIDUAL, missing
-from notchflex.photographs.start import COARSE, reversed_view, starts, with_tilts
+
+COARSE = 360
+"""Longer side of the photograph in which robots are searched, px."""
+
+_CLOSINGS = (2, 4, 7, 11, 16)
+_BIN = 2.0
+_BREAK = 5  # bins: shorter breaks, by highlights, do not end a stretch
+_SHORTEST = 0.6  # of the length of the robot: its centre line is cut short on the inside of a bend
+_MAX_PARTS = 4
+_MIN_WIDTH = 3.0
+_SLIPS = (0.0, -0.4, -0.8, 0.4)
+"""How far the robot may lie from where the ribbon ends, pitches toward the base."""
+_WIDTHS = np.geomspace(_MIN_WIDTH, 0.3 * COARSE, 34)
+
+
+class Ribbon(NamedTuple):
+    """A stretch of constant width, from its free end on.
+
+    Attributes:
+        centre: Points of its centre line, px, (p, 2).
+        width: Its width, px.
+        quality: How constant its width is, 0 to 1.
+    """
+
+    centre: Numbers
+    width: float
+    quality: float
+
+
+def starts(table: ChainTable, contrast: Contrast, middle: Numbers) -> list[Numbers]:
+    """Return numbers from which fits are started, the most likely first.
+
+    Args:
+        table: The robot.
+        contrast: Contrast of the photograph, made smaller to `COARSE` px.
+        middle: Middle of that photograph, px.
+    """
+    ribbons = sorted(_ribbons(table, contrast), key=lambda one: -one.quality)
+    views: list[Numbers] = []
+    for ribbon in _different(ribbons)[:3]:
+        for side, slip in itertools.product((1.0, -1.0), _SLIPS):
+            numbers = _numbers(table, ribbon, side, slip, middle)
+            if numbers is not None:
+                views.append(numbers)
+    return views
+
+
+def _ribbons(table: ChainTable, contrast: Contrast) -> Iterator[Ribbon]:
+    import cv2
+
+    mask = (contrast.value > contrast.threshold).astype(np.uint8)
+    for radius in _CLOSINGS:
+        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+        closed: Any = cv2.morphologyEx(np.pad(mask, radius + 1), cv2.MORPH_CLOSE, disc)
+        closed = closed[radius + 1 : -radius - 1, radius + 1 : -radius - 1]
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
+        by_area = np.argsort(-stats[1:count, cv2.CC_STAT_AREA])[:_MAX_PARTS] + 1
+        for label in by_area:
+            if stats[label, cv2.CC_STAT_AREA] < 60:
+                continue
+            for levels in _levels(labels == label):
+                yield from _stretches(table, *levels)
+
+
+def _different(ribbons: list[Ribbon]) -> list[Ribbon]:
+    """Return those that differ in their free end or their width."""
+    kept: list[Ribbon] = []
+    for one in ribbons:
+        ends = [np.linalg.norm(one.centre[0] - other.centre[0]) for other in kept]
+        widths = [abs(math.log(one.width / other.width)) for other in kept]
+        if all(e > one.width or w > 0.15 for e, w in zip(ends, widths, strict=True)):
+            kept.append(one)
+    return kept
+
+
+def _levels(part: NDArray[np.bool_]) -> Iterator[tuple[Numbers, Numbers]]:
+    """Yield centres and widths of a connected part along it, from each of its two ends."""
+    rows, columns = np.nonzero(part)
+    count = len(rows)
+    number = np.full(part.shape, -1)
+    number[rows, columns] = np.arange(count)
+    ends: list[NDArray[np.int_]] = []
+    lengths: list[Numbers] = []
+    for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        y, x = rows + dy, columns + dx
+        is_inside = (y < part.shape[0]) & (x >= 0) & (x < part.shape[1])
+        other = np.where(is_inside, number[np.minimum(y, part.shape[0] - 1), x % part.shape[1]], -1)
+        has = other >= 0
+        ends.append(np.stack([np.nonzero(has)[0], other[has]]))
+        lengths.append(np.full(int(has.sum()), math.hypot(dx, dy)))
+    pairs = np.concatenate(ends, axis=1)
+    graph = coo_matrix((np.concatenate(lengths), (pairs[0], pairs[1])), (count, count)).tocsr()
+
+    def far(source: int) -> Numbers:
+        return dijkstra(graph, directed=False, indices=source)
+
+    first = int(far(0).argmax())
+    from_first = far(first)
+    second = int(from_first.argmax())
+    for distance in (from_first, far(second)):
+        bins = (distance / _BIN).astype(int)
+        area = np.bincount(bins)
+        centre = np.stack(
+            [np.bincount(bins, one) / np.maximum(area, 1) for one in (columns, rows)], axis=1
+        )
+        yield centre, area / _BIN
+
+
+def _stretches(table: ChainTable, centre: Numbers, width: Numbers) -> Iterator[Ribbon]:
+    """Yield the stretches of constant width that are long enough for the robot."""
+    ratio = table.length / (2.0 * table.outer)
+    for wanted in _WIDTHS:
+        fits = (width > 0.6 * wanted) & (width < 1.35 * wanted)
+        fits = binary_closing(fits, np.ones(_BREAK), border_value=0) | fits
+        changes = np.flatnonzero(np.diff(np.concatenate([[0], fits.astype(int), [0]])))
+        for begin, end in zip(changes[::2], changes[1::2], strict=True):
+            if (end - begin) * _BIN < _SHORTEST * wanted * ratio:
+                continue
+            own = float(np.percentile(width[begin:end], 55))
+            if not 0.94 < own / wanted < 1.07:
+                continue
+            long = min(end - begin, round(1.1 * own * ratio / _BIN))
+            even = np.abs(width[begin : begin + long] / own - 1.0) < 0.12
+            yield Ribbon(centre[begin:end], own, float(even.mean()))
+
+
+def _numbers(
+    table: ChainTable, ribbon: Ribbon, side: float, slip: float, middle: Numbers
+) -> Numbers | None:
+    """Return the numbers of a robot along a ribbon (from the tip on), slipped toward the base.
+
+    The slip is in pitches; `side` is 1 if the first notch is cut on the right from base to tip.
+    """
+    scale = ribbon.width / (2.0 * table.outer)
+    centre = ribbon.centre[1:]
+    if len(centre) < 6:
+        return None
+    smooth = _smoothed(centre, max(2, round(0.5 * ribbon.width / _BIN)))
+    step = np.diff(smooth, axis=0)
+    heading = np.unwrap(np.arctan2(-step[:, 1], -step[:, 0]))  # toward the tip
+    length = np.cumsum(np.linalg.norm(step, axis=1)) / scale + 0.15 * ribbon.width / scale
+    turned = side * (heading[0] - heading)  # toward the side of the notches, from here to the tip
+    neutral = length + 0.8 * table.outer * turned
+    neutral -= slip * table.length / table.notches
+    neutral = np.maximum.accumulate(neutral) + 1e-9 * np.arange(len(neutral))
+    ends = table.length - np.concatenate([[0.0], np.cumsum(table.height + table.uncut)])
+    behind = np.concatenate([[ends[0] + 0.3 * table.outer], ends[1:] + 0.5 * table.uncut])
+    at = np.interp(behind, neutral, heading)
+    angles = side * np.diff(at) * table.side
+    position = np.array([np.interp(ends[0], neutral, smooth[1:, axis]) for axis in (0, 1)])
+    over = ends[0] - neutral[-1]
+    if over > 0.0:
+        position = position - over * scale * np.array([math.cos(at[0]), math.sin(at[0])])
+    if over > 0.4 * table.length:
+        return None
+    roll = math.radians(5.0) if side > 0.0 else math.pi + math.radians(5.0)
+    view = [*(position - middle), at[0], math.log(scale), roll, 0.0, 0.003 / table.outer, 0.0, 0.0]
+    return np.array([*view, *np.clip(angles, -0.3, 1.6)])
+
+
+def _smoothed(points: Numbers, half: int) -> Numbers:
+    padded = (
+        np.concatenate(
+            [
+                2.0 * points[0] - points[half:0:-1],
+                points,
+                2.0 * points[-1] - points[-2 : -half - 2 : -1],
+            ]
+        )
+        if len(points) > half + 1
+        else points
+    )
+    if len(padded) == len(points):
+        return points
+    kernel = np.ones(2 * half + 1) / (2 * half + 1)
+    return np.stack([np.convolve(padded[:, axis], kernel, "valid") for axis in (0, 1)], axis=1)
+
+
+def with_tilts(numbers: Numbers, size: float) -> list[Numbers]:
+    """Return a start with the robot tilted toward the camera, and away from it."""
+    tilted = [numbers.copy(), numbers.copy()]
+    tilted[0][5], tilted[1][5] = size, -size
+    return tilted
+
+
+def reversed_view(numbers: Numbers) -> Numbers:
+    """Return the view that looks the same from far away: opposite roll and tilt."""
+    turned = numbers.copy()
+    turn = math.pi if math.cos(turned[4]) < 0.0 else 0.0
+    turned[4], turned[5] = 2.0 * turn - turned[4], -turned[5]
+    return turned
+
 
 _COARSE_WIDTH = 40.0  # of the tube in the first fits, px
 _FINE_WIDTH = 100.0  # of the tube in the last fits, px: edges of sharp photographs are then sharp

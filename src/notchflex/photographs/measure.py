@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,10 @@ from threadpoolctl import threadpool_limits
 from notchflex.analysis import tip_from_angles
 from notchflex.errors import InputError
 from notchflex.photographs.board.layout import Board
-from notchflex.photographs.board.ruler import NO_RULER, Ruler
-from notchflex.photographs.chain.axis_points import axis_points, on_axis_points
+from notchflex.photographs.board.sighting import NO_RULER, Ruler
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_table
+from notchflex.photographs.chain.outline import axis_points, on_axis_points
 from notchflex.photographs.contrast import contrast
 from notchflex.photographs.fitting import covariance
 from notchflex.photographs.judging import UNCERTAINTY, rejection_reason
@@ -25,7 +25,7 @@ from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.photographs.missing import MAX_RESIDUAL
 from notchflex.photographs.reading import read_photograph
-from notchflex.photographs.taken.loads import loads_of
+from notchflex.photographs.taken import loads_of
 from notchflex.robot import Robot
 
 NO_TUBE = "no tube of the proportions of the robot is seen"
@@ -40,6 +40,7 @@ def measure(
     loads: str | os.PathLike[str] | None = None,
     pattern: str | None = None,
     exif: bool = False,
+    columns: Mapping[str, str] | None = None,
     scale: float | None = None,
     board: Board | None = None,
     uncertainty_deg: float = math.degrees(UNCERTAINTY),
@@ -60,6 +61,7 @@ def measure(
             `{pull}` for a label of the pull: `"wrist_{pull}_{tension}N.jpg"`.
         exif: Whether UserComment or ImageDescription in the EXIF of each photograph gives the
             tension: `tension=1.2 N`, and a label of the pull if wanted: `tension=1.2 N; pull=2`.
+        columns: Headers of `loads` for columns, such as `{"tension": "Kraft [N]"}`.
         scale: Pixels of the photographs per mm at the robot, known to 0.3 %.
         board: Board of markers beside the robot, in the plane in which it bends: it gives the
             scale and the tilt.
@@ -85,7 +87,7 @@ def measure(
         raise InputError.NO_DATA("there is no photograph to measure; name one or more")
     table, ruler = chain_table(robot), Ruler(scale, board)
     uncertainty = checked_uncertainty(uncertainty_deg)
-    given = loads_of(names, robot, loads, pattern, exif)
+    given = loads_of(names, robot, loads, pattern, exif, columns)
     measured: list[MeasuredPhotograph] = []
     for number, name in enumerate(names):
         picture = read_photograph(name)

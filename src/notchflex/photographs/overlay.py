@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex._replacing import replacing
-from notchflex.photographs.cut.measured_cut import MeasuredCut
+from notchflex.photographs.cut.measure_cut import MeasuredCut
 from notchflex.photographs.measured import MeasuredPhotograph
 
 LONGEST = 1800

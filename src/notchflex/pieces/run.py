@@ -5,18 +5,31 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 from threadpoolctl import threadpool_limits
 
 from notchflex._extras import need
 from notchflex.errors import ErrorCode, InputError
-from notchflex.loads.validation import check_integer
-from notchflex.pieces.connection import check_address, local_cluster, scheduler_at
-from notchflex.pieces.folder import check_target, done_piece, locked, prepare_folder, tidy
-from notchflex.pieces.manifest import Manifest
-from notchflex.pieces.piece import Done, PieceTask
-from notchflex.pieces.running import in_threads, on_cluster
+from notchflex.loads.validation import check_integer, short_repr
+from notchflex.pieces.folder import (
+    Done,
+    Manifest,
+    PieceTask,
+    check_target,
+    done_piece,
+    locked,
+    prepare_folder,
+)
+from notchflex.pieces.running import (
+    check_address,
+    in_processes,
+    in_threads,
+    on_cluster,
+    scheduler_at,
+)
 
 Progress = Callable[[int, int, int, int], None]
 """Called with rows done, rows in all, rows without a result, and rows done by earlier calls."""
@@ -26,7 +39,7 @@ def check_workers(workers: int | None, scheduler: str | None) -> None:
     """Raise unless pieces can be worked on as asked for.
 
     Args:
-        workers: Number of processes of dask on this machine; threads of this process if None.
+        workers: Number of processes of this machine; threads of this process if None.
         scheduler: Address of a scheduler of dask.
 
     Raises:
@@ -37,9 +50,8 @@ def check_workers(workers: int | None, scheduler: str | None) -> None:
         raise InputError.CONFLICT("workers and a scheduler exclude each other; give one of them.")
     if workers is not None and not 1 <= check_integer(workers, "workers") <= 1024:
         raise InputError.OUT_OF_RANGE(f"workers must be 1 to 1024; got {workers}")
-    if workers is not None or scheduler is not None:
-        need("distributed", "cluster", "workers")
     if scheduler is not None:
+        need("distributed", "cluster", "scheduler")
         check_address(scheduler)
 
 
@@ -80,7 +92,7 @@ def run_pieces(
         task: The task.
         folder: Its folder, opened.
         pieces: The pieces; all where not given.
-        workers: Number of processes of dask on this machine; threads of this process if None.
+        workers: Number of processes of this machine; threads of this process if None.
         scheduler: Address of a scheduler of dask, whose workers see the same folder.
         cores: Number of threads; one per core where not given.
         progress: Called with rows done, rows in all, rows without a result, and rows done by
@@ -95,7 +107,6 @@ def run_pieces(
         return
     # Products of matrices by several threads may have other last digits.
     with threadpool_limits(1), locked(folder, pieces.start, pieces.stop):
-        tidy(folder, manifest.kind, pieces.start, pieces.stop)
         stored = [done_piece(folder, manifest, piece) for piece in pieces]
         finished = [one for one in stored if one is not None]
         left = [piece for piece, one in zip(pieces, stored, strict=True) if one is None]
@@ -108,7 +119,6 @@ def run_pieces(
                 raise
             message = f"{problem} All finished pieces are kept: make room, and call again."
             raise InputError.FILE_UNWRITABLE(message) from None
-        tidy(folder, manifest.kind, pieces.start, pieces.stop)
 
 
 @contextlib.contextmanager
@@ -127,10 +137,12 @@ def _running(
         task.prepare()  # in the calling thread: all threads need the same preparations
         with contextlib.closing(in_threads(task, folder, pieces, cores)) as running:
             yield running
+    elif workers is not None:
+        with contextlib.closing(in_processes(workers, task, folder, pieces)) as running:
+            yield running
     else:
-        cluster = local_cluster(workers) if workers else scheduler_at(scheduler or "")
         with (
-            cluster as client,
+            scheduler_at(scheduler or "") as client,
             contextlib.closing(on_cluster(client, task, folder, pieces)) as running,
         ):
             yield running
@@ -151,3 +163,63 @@ def _watch(
         done, unsolved = done + one.rows, unsolved + one.unsolved
         if progress is not None:
             progress(done, total, unsolved, before)
+
+
+@dataclass(frozen=True)
+class PieceFolder:
+    """A folder that keeps the finished pieces of a long computation, and who works on them.
+
+    The same call resumes an interrupted computation.
+
+    Args:
+        directory: The folder; it is made if it is missing.
+        workers: Number of processes of this machine; this process alone if None.
+        scheduler: Address of a scheduler of dask, whose workers see the same folder.
+
+    Raises:
+        InputError: Workers or scheduler cannot be used, or an extra is missing.
+    """
+
+    directory: str | os.PathLike[str]
+    workers: int | None = None
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        """Check workers and scheduler."""
+        if not isinstance(self.directory, str | os.PathLike):  # pyright: ignore
+            raise InputError.WRONG_TYPE(
+                f"folder must be the path of a folder; got {short_repr(self.directory)}"
+            )
+        check_workers(self.workers, self.scheduler)
+
+    @classmethod
+    def of(cls, folder: PieceFolder | str | os.PathLike[str]) -> Self:
+        """Return a folder, given as one or as its path."""
+        return folder if isinstance(folder, cls) else cls(folder)  # pyright: ignore
+
+    def run(
+        self,
+        task: PieceTask,
+        *,
+        pieces: range | None = None,
+        cores: int | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Work on those pieces of a task that are not there.
+
+        Args:
+            task: The task.
+            pieces: The pieces; all where not given.
+            cores: Number of threads; one per core where not given.
+            progress: As for `run_pieces`.
+        """
+        open_folder(task, self.directory, "--folder")
+        run_pieces(
+            task,
+            self.directory,
+            pieces=pieces,
+            workers=self.workers,
+            scheduler=self.scheduler,
+            cores=cores,
+            progress=progress,
+        )

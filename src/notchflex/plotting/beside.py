@@ -12,12 +12,14 @@ from notchflex.plotting.curves import (
     LINE,
     LOADING,
     NOTCH_LABEL,
+    SLACK,
     TIP_LABELS,
     UNLOADING,
     abscissa,
     branch_lines,
     converged_only,
     failures,
+    span_line,
     steps_by_branch,
 )
 from notchflex.plotting.fits.comparison import MODEL_COLOURS
@@ -25,7 +27,6 @@ from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import BELOW, Cell, Colour, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import GREY, rgb
-from notchflex.plotting.tendon_profiles import SLACK, span_line
 from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:

@@ -8,13 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from notchflex.plotting.bands import shaded
 from notchflex.plotting.curves import (
     LOADING,
     NOTCH_LABEL,
+    SLACK,
     UNLOADING,
     driven_by_stroke,
+    front_panel,
     notches_panel,
+    profile_panel,
+    pulled_tendons,
+    reverses_step_by_step,
+    shaded,
+    span_line,
     steps_by_branch,
     strain_panel,
     stroke_panel,
@@ -24,14 +30,6 @@ from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.plotting.tendon_profiles import (
-    SLACK,
-    front_panel,
-    profile_panel,
-    pulled_tendons,
-    reverses_step_by_step,
-    span_line,
-)
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 

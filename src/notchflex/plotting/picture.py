@@ -26,12 +26,12 @@ _KINDS = {
     "Comparison": "fits.comparison:comparison_picture",
     "Calibration": "fits.calibration:calibration_picture",
     "FrictionRig": "fits.friction:friction_picture",
-    "Design": "designs.design:design_picture",
-    "DesignFront": "designs.front:front_picture",
+    "Design": "designs:design_picture",
+    "DesignFront": "designs:front_picture",
     "ToleranceAnalysis": "tolerances.tolerances:tolerance_picture",
-    "Following": "control.following:following_picture",
-    "SensedForce": "sensing.sensed:sensed_picture",
-    "Workspace": "workspace.cloud:workspace_picture",
+    "Following": "following:following_picture",
+    "SensedForce": "following:sensed_picture",
+    "Workspace": "workspace:workspace_picture",
 }
 
 

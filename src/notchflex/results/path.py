@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
@@ -10,14 +10,12 @@ import jax.tree_util as tree_util
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex._jax import constant
 from notchflex._summary import Displayed, Summary
+from notchflex._values import ByValue, frozen, read_only
 from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import LoadPath
-from notchflex.loads.applied import out_of_frame
-from notchflex.loads.command import Command, make_commands
+from notchflex.loads.command import Command, make_commands, out_of_frame
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.motion import rotation_about
 from notchflex.results.equilibrium import Equilibrium
 from notchflex.results.quantities.path_formulas import friction_front
 from notchflex.results.quantities.properties import QUANTITIES, PathQuantities
@@ -25,6 +23,7 @@ from notchflex.results.reason import why_not
 from notchflex.results.recorded import Recorded
 from notchflex.results.state import State
 from notchflex.robot import Robot
+from notchflex.solver.derived.quantities import Shape
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import SolverRun
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class EquilibriumPath(PathQuantities, Displayed):
+class EquilibriumPath(ByValue, PathQuantities, Displayed):
     """Equilibria along a load path. Units mm, N, N mm, rad; s steps, n notches, t tendons.
 
     Where a step did not converge its row holds the last good state (its `tension` and `stroke`
@@ -73,17 +72,17 @@ class EquilibriumPath(PathQuantities, Displayed):
     @overload
     def __getitem__(self, step: int) -> Equilibrium: ...
     @overload
-    def __getitem__(self, step: slice) -> list[Equilibrium]: ...
-    def __getitem__(self, step: int | slice) -> Equilibrium | list[Equilibrium]:
-        """Return one state, or some of them."""
+    def __getitem__(self, step: slice) -> EquilibriumPath: ...
+    def __getitem__(self, step: int | slice) -> Equilibrium | EquilibriumPath:
+        """Return one state, or the path of some of them; work is counted from its first state."""
         if isinstance(step, slice):
-            return [Equilibrium(self, i) for i in range(*step.indices(len(self)))]
+            return replace(self, load=self.load[step], run=self.run.rows(step))
         if not -len(self) <= step < len(self):
             raise IndexError(f"step {step} of a path of {len(self)} steps")
         return Equilibrium(self, step % len(self))
 
     def quantity(self, name: str) -> Any:
-        """Return a quantity of every step by its name, steps as leading axis.
+        """Return a quantity of every step by its name, steps as leading axis, read only.
 
         Args:
             name: Name of a property, such as "notch_angle".
@@ -97,10 +96,16 @@ class EquilibriumPath(PathQuantities, Displayed):
             if quantity.source in ("path", "derived"):
                 kept[name] = quantity.formula(self)
             else:  # vectors and rotations of the solver are in the frame of the base
-                turn = self.base_to_world if quantity.in_world else None
-                values = self.solver_quantity(name)
-                kept[name] = values if turn is None else quantity.turned(values, turn)
+                kept[name] = self.solver_quantity(name)
+                if quantity.in_world:
+                    kept[name] = quantity.turned(kept[name], self.load.base_to_world)
+            kept[name] = frozen(kept[name])
         return kept[name]
+
+    def _value(self) -> Any:
+        solved = tuple(self.solver_quantity(name) for name in Shape._fields)
+        first = (self.run.before("tension"), self.run.before("stroke"))
+        return (self.robot, self.load, self.settings, self.each_from_rest, first, solved)
 
     def solver_quantity(self, name: str) -> np.ndarray:
         """Return a quantity that the solver reports of every step, by its name.
@@ -116,12 +121,6 @@ class EquilibriumPath(PathQuantities, Displayed):
         return values[np.maximum.accumulate(np.where(tried, np.arange(len(tried)), 0))]
 
     @cached_property
-    def base_to_world(self) -> Float[np.ndarray, "3 3"] | None:
-        """Rotation of the base in the world, shape (3, 3); None for the identity."""
-        turn = self.load.base_rotation
-        return np.asarray(rotation_about(constant(turn))) if any(turn.tolist()) else None
-
-    @cached_property
     def front(self) -> tuple[Int[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
         """Front of reversed friction along every tendon, m and eta, (s, t) each.
 
@@ -130,7 +129,8 @@ class EquilibriumPath(PathQuantities, Displayed):
         base; m is one more than there are when all have turned (eta is then NaN). A tendon that
         is pulled for the first time has m = 1 and eta = 1.
         """
-        return friction_front(self.contact_log_ratio, self.contact_bound)
+        contact, part = friction_front(self.contact_log_ratio, self.contact_bound)
+        return frozen(contact), frozen(part)
 
     @cached_property
     def failures(self) -> list[tuple[Failure | None, str]]:
@@ -146,12 +146,12 @@ class EquilibriumPath(PathQuantities, Displayed):
     def stability(self) -> tuple[np.ndarray, np.ndarray]:
         """Smallest eigenvalue of the stiffness, N mm, and sign of its determinant, (s,) each."""
         value, sign = self.run.stability(self.commands)
-        return np.asarray(value), np.asarray(sign)
+        return read_only(value), read_only(sign)
 
     def state_at(self, step: int) -> State:
         """Return the state after a step (or the last good one), to save or continue from."""
         solved: SolverState = tree_util.tree_map(
-            lambda leaf: np.asarray(leaf)[step], self.run.solved
+            lambda leaf: read_only(np.asarray(leaf)[step]), self.run.solved
         )
         chain = self.chain
         if solved.applied is not None and chain.frame is not None:

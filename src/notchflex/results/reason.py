@@ -27,6 +27,8 @@ _CLOSED_TOLERANCE = 1e-3
 # Largest free span of a tendon at which the edges of its channel count as meeting, relative to the
 # natural span.
 _EDGES_MEET = 5e-2
+# Tension of a slack tendon, relative to what friction takes: rounding.
+_SLACK = 1e-6
 # Axial stiffnesses, in closing forces of a notch, in ratios of ten. Where only stretch allows a
 # stroke, the second step changes the tension about ten times as much as the first; where the shape
 # determines the tension, a tenth as much.
@@ -52,6 +54,8 @@ def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
     all_closed = (path.gap[step] < _CLOSED_TOLERANCE * opening).all()
     if (all_closed or _past_closing(path, step)) and not np.isnan(path.load.stroke[step]).all():
         return _said(Failure.NOTCHES_CLOSED, last)
+    if (slack := _slack_by_loss(path, step)) is not None:
+        return _said(Failure.LOSS_LEAVES_SLACK, last, tendon=slack[0] + 1, loss=slack[1])
     tendons = [str(tendon + 1) for tendon in _drawn_by_stretch_alone(path, step)]
     if len(tendons) == 1:
         return _said(Failure.STROKE_OUT_OF_REACH, last, tendon=tendons[0])
@@ -93,6 +97,21 @@ def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None
             left = position[anchor] + rotation[anchor] @ leaves[notch, one]
             if runs[notch, one] and norm(entered - left) < _EDGES_MEET * natural[notch, one]:
                 return group.numbers[one], notch
+    return None
+
+
+def _slack_by_loss(path: EquilibriumPath, step: int) -> tuple[int, float] | None:
+    """Return a tendon driven by stroke, from 0, that its constant losses leave slack; their sum, N.
+
+    While the slack passes from a closed notch to the next, the tension rises at the same stroke.
+    """
+    for tendon in np.flatnonzero(np.isfinite(path.load.stroke[step])):
+        turning = path.contact_turning[step, tendon]
+        losses = path.chain.friction.constant_loss(turning, turning)
+        loss = 0.0 if losses is None else float(np.nansum(losses[0]))
+        tension = path.span_tension[step, tendon]
+        if np.nanmin(tension) < _SLACK * loss < np.nanmax(tension):
+            return int(tendon), loss
     return None
 
 

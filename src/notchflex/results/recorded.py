@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from notchflex._jax import jax
 from notchflex.loads.command import Command
-from notchflex.solver.derived.reported import STATE, Shape
+from notchflex.solver.derived.quantities import Shape, reported
 from notchflex.solver.solver_state import SolverState
 
-REPORTED = (*Shape._fields, *STATE)
+REPORTED = (*Shape._fields, *reported("state"))
 """Everything that a run reports of each state, by name."""
 
 BEFORE = ("tension", "stroke", "span_tension", "contact_slid")
@@ -57,6 +58,16 @@ class Recorded:
     def quantity(self, name: str) -> np.ndarray:
         """Return a quantity of each state by its name in the registry."""
         return self.reported[name]
+
+    def rows(self, some: slice) -> Recorded:
+        """Return some of the loads."""
+        start = np.arange(len(self.converged))[some][0]
+        first = dict(self.first)
+        if start:
+            every = {**self.reported, MATERIAL: self.solved.memory.material}
+            first = {name: np.asarray(every[name])[start - 1] for name in first}
+        cut = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "first"}
+        return Recorded(first=first, **jax.tree.map(lambda values: np.asarray(values)[some], cut))
 
     def before(self, name: str) -> np.ndarray:
         """Return a quantity of the state before the first load, by name."""

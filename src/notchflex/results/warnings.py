@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from notchflex.errors import Failure
 from notchflex.mechanics.chain import unchecked_dimensions
 
 if TYPE_CHECKING:
@@ -80,12 +81,16 @@ def _strains(path: EquilibriumPath) -> Iterator[str]:
 
 def _unstable(path: EquilibriumPath) -> Iterator[str]:
     bad = np.flatnonzero(np.asarray(path.converged) & ~np.asarray(path.stable))
-    if len(bad):
-        plural = "s are" if len(bad) > 1 else " is"
-        yield (
-            f"{len(bad)} step{plural} unstable, first step {bad[0] + 1} ({_load(path, bad[0])}): "
-            "a real robot would snap to another shape."
-        )
+    fixed = path.determinant_sign[bad] != 0.0 if len(bad) else np.zeros(0, bool)
+    snaps, many = "a real robot would snap to another shape", Failure.INDETERMINATE_TENSIONS
+    for steps, what, why in (
+        (bad[fixed], "unstable", snaps),
+        (bad[~fixed], "not determined", f"{many.text}; {many.remedy}"),
+    ):
+        if len(steps):
+            plural = "s are" if len(steps) > 1 else " is"
+            first = f"first step {steps[0] + 1} ({_load(path, steps[0])})"
+            yield f"{len(steps)} step{plural} {what}, {first}: {why}."
 
 
 def _coarse(path: EquilibriumPath) -> Iterator[str]:

@@ -19,7 +19,7 @@ from notchflex.robot.notches.opening import Opening
 from notchflex.robot.notches.strip import StripNotch
 from notchflex.robot.notches.u_link import ULink
 from notchflex.robot.reading import load_robot, robot_from_text
-from notchflex.robot.robot import Robot, from_table, to_table
+from notchflex.robot.robot import Drawing, Robot, from_table, to_table
 from notchflex.robot.schema import json_schema
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
@@ -33,6 +33,7 @@ __all__ = [
     "Capstan",
     "Changed",
     "Corner",
+    "Drawing",
     "Friction",
     "Frictionless",
     "Linear",

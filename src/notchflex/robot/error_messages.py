@@ -204,5 +204,6 @@ _RULES = {
     "bool_type": "it must be true or false",
     "string_too_short": "it must not be empty",
     "string_too_long": "it is too long",
+    "control_character": "it must not hold control characters",
     "string_pattern_mismatch": "it must be a word of letters, digits, - and _",
 }

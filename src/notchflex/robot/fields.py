@@ -30,6 +30,11 @@ def is_list(field: Any) -> bool:
     return field is not None and takes(field.annotation)
 
 
+def is_unsaid(name: str, value: object) -> bool:
+    """Return whether files and lists leave a key out: without a value, or a factor of 1."""
+    return value is None or (name.endswith("_factor") and value == 1.0)
+
+
 @functools.cache
 def kind_of(cls: type) -> str:
     """Return the word that names a kind in a file, "" for a part that comes in one kind only."""

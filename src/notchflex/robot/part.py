@@ -1,9 +1,11 @@
 """What every part of a robot is: a frozen dataclass, checked by pydantic when it is made."""
 
 import functools
+import inspect
 import operator
+import warnings
 from collections.abc import Callable, Iterable
-from typing import Annotated, Any, TypeVar, dataclass_transform, overload
+from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints, overload
 
 import pydantic.dataclasses
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationError
@@ -41,7 +43,8 @@ def part(
 ) -> Any:
     """Make a class a frozen pydantic dataclass that says clearly what is wrong with its values.
 
-    Wrong values raise `InputError`; unknown keys are refused by name.
+    Wrong values raise `InputError`; unknown keys are refused by name. What the attribute `warnings`
+    of an object holds is given as Python warnings when it is made by its class.
 
     Args:
         cls: The class with its annotated fields.
@@ -67,9 +70,23 @@ def _part(cls: type[T], *, kw_only: bool, refuse: Callable[[str], InputError]) -
         except ValidationError as error:
             problems = sentences(error, decorated)
             raise refuse("\n".join(f"{decorated.__name__}: {one}" for one in problems)) from None
+        for warning in getattr(self, "warnings", ()):
+            warnings.warn(warning, stacklevel=2)
 
     decorated.__init__ = checked
+    decorated.__signature__ = _plain_signature(decorated)
     return decorated
+
+
+def _plain_signature(cls: Any) -> inspect.Signature:
+    """Return the signature of a class without the checks of its annotations, for help."""
+    signature = inspect.signature(cls)
+    names = {name: one.annotation for name, one in signature.parameters.items()}
+    namespace = {"__annotations__": names, "__module__": cls.__module__}
+    plain = get_type_hints(type(cls.__name__, (), namespace))
+    return signature.replace(
+        parameters=[one.replace(annotation=plain[n]) for n, one in signature.parameters.items()]
+    )
 
 
 def _as_float(value: object) -> float:
@@ -102,7 +119,7 @@ Int = Annotated[int, BeforeValidator(_as_int)]
 
 # What a number of a unit may be at most, and at least where it must be greater than 0: far beyond
 # every robot, and near enough that nothing computed from it overflows.
-_MIN_MAGNITUDE = {"mm": 1e-6, "MPa": 1e-6, "N": 1e-6, "kg/m3": 1e-6, "": 1e-9}
+_MIN_MAGNITUDE = {"mm": 1e-6, "MPa": 1e-6, "N": 1e-6, "kg/m3": 1e-6, "deg": 1e-6, "": 1e-9}
 _MAX_MAGNITUDE = {"mm": 1e6, "MPa": 1e9, "kg/m3": 1e6, "deg": 3600.0, "": 1e3}
 
 MOST_STRAIN = 0.5
@@ -117,6 +134,7 @@ def quantity(
     below: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
+    usual: tuple[float, float] | None = None,
 ) -> Any:
     """Describe a number for use in `Annotated`: its unit, what it is, and what is allowed.
 
@@ -127,21 +145,25 @@ def quantity(
         below: Exclusive upper bound.
         at_least: Inclusive lower bound.
         at_most: Inclusive upper bound.
+        usual: Lowest and highest usual value; beyond them `Robot.warnings` asks what was meant.
 
     Where a bound is not given, the limits of the unit apply: 1e-6 to 1e6 mm, 1e-6 to 1e9 MPa, 3600
     deg and so on.
     """
     if above == 0.0 and at_least is None:
-        at_least = _MIN_MAGNITUDE[unit]
+        at_least = _MIN_MAGNITUDE.get(unit)
     if at_most is None and below is None:
         at_most = _MAX_MAGNITUDE.get(unit)
     if above is None and at_least is None and unit in _MAX_MAGNITUDE:
         at_least = -_MAX_MAGNITUDE[unit]
+    extra: dict[str, Any] = {"unit": unit} if unit else {}
+    if usual:
+        extra["usual"] = list(usual)
     return Field(
         gt=above,
         lt=below,
         ge=at_least,
         le=at_most,
         description=text,
-        json_schema_extra={"unit": unit} if unit else None,
+        json_schema_extra=extra or None,
     )

@@ -1,15 +1,38 @@
-"""What only the whole robot can tell: parts that do not fit each other."""
+"""What only the whole robot can tell: parts that do not fit each other, values hardly meant."""
 
+import functools
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from notchflex.errors import InputWarning
+from notchflex.robot.fields import fields_of
 from notchflex.robot.kinds import Notch, openings_along
 from notchflex.robot.tendon import Tendon
+from notchflex.robot.tube import Tube
 
 if TYPE_CHECKING:
     from notchflex.robot.robot import Robot
 
 MOST_NOTCHES = 10_000
+
+_OTHER_UNITS = {
+    "mm": {"m": 1e3, "inch": 25.4, "um": 1e-3},
+    "MPa": {"GPa": 1e3, "Pa": 1e-6, "kPa": 1e-3},
+    "N": {"kN": 1e3, "mN": 1e-3},
+    "N mm": {"mN mm": 1e-3},
+    "g": {"mg": 1e-3},
+    "m/s2": {"mm/s2": 1e-3},
+    "kg/m3": {"g/cm3": 1e3},
+    "": {"%": 0.01},
+}
+"""Units that are taken for those of a robot file, and what converts them."""
+
+_LEAST_DEPTH = 0.4
+"""Part of the diameter that is cut at least: less hardly bends, and is rather what remains."""
+_LEAST_CHANNEL = 0.12
+"""Part of the outer diameter that a channel in the wall takes at least."""
+_ON_SURFACE = 0.03
+"""Part of the outer diameter by which a tendon on the inner surface may seem to be in the wall."""
 
 
 def robot_problems(robot: "Robot") -> Iterator[tuple[str, str]]:
@@ -27,6 +50,7 @@ def robot_problems(robot: "Robot") -> Iterator[tuple[str, str]]:
                 f"is {tendon.radius} mm, outside the wall; it must be at most the outer "
                 f"radius, {robot.tube.outer_radius} mm.",
             )
+        yield from _diameter_problems(f"tendon[{i}].diameter", tendon, robot.tube)
         if tendon.end_body is not None and tendon.end_body > number:
             yield (
                 f"tendon[{i}].end_body",
@@ -40,6 +64,22 @@ def robot_problems(robot: "Robot") -> Iterator[tuple[str, str]]:
         from notchflex.robot.value_names import tolerance_problems  # it makes robots
 
         yield from tolerance_problems(robot)
+
+
+def _diameter_problems(name: str, tendon: Tendon, tube: Tube) -> Iterator[tuple[str, str]]:
+    """Find a tendon, of known diameter, that is neither all in the lumen nor all in the wall."""
+    if tendon.diameter is None:
+        return
+    inside, outside = (tendon.radius + sign * tendon.diameter / 2 for sign in (-1, 1))
+    lumen, surface = tube.inner_radius * (1 + 1e-9), tube.outer_radius * (1 + 1e-9)
+    if outside > lumen and (outside > surface or inside < tube.inner_radius * (1 - 1e-9)):
+        yield (
+            name,
+            f"is {tendon.diameter} mm; at a radius of {tendon.radius} mm the tendon reaches from "
+            f"{inside:.6g} to {outside:.6g} mm, neither all in the lumen (to "
+            f"{tube.inner_radius:.6g} mm) nor all in the wall (to {tube.outer_radius:.6g} mm); "
+            f"in the lumen its radius is at most {tube.inner_radius - tendon.diameter / 2:.6g} mm.",
+        )
 
 
 def _notch_problems(robot: "Robot") -> Iterator[tuple[str, str]]:
@@ -78,3 +118,109 @@ def _tendon_problems(robot: "Robot", tendon: Tendon) -> Iterator[tuple[str, str]
             f"through the {'bodies' if len(near) > 1 else 'body'} "
             f"{' and '.join(map(str, near))} there.",
         )
+
+
+def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
+    """Yield a warning for each value that was probably not meant; lengths in metres are one."""
+    by_unit: dict[tuple[str, str], list[tuple[str, float, tuple[float, float], float | None]]] = {}
+    for name, part in _parts(robot):
+        for key, usual, unit in _usual_values(type(part)):
+            value = getattr(part, key)
+            if value is None or usual[0] <= value <= usual[1]:
+                continue
+            other, meant = _meant(value, usual, unit)
+            entry = (f"{name}.{key}", value, usual, meant)
+            by_unit.setdefault((unit, other), []).append(entry)
+    for (unit, other), entries in by_unit.items():
+        yield _outside(entries, unit, other)
+    if not by_unit:
+        for i, tendon in enumerate(robot.tendon, start=1):
+            yield from _in_thin_wall(f"tendon[{i}].radius", tendon, robot.tube)
+        yield from _remaining_depths(robot)
+
+
+def unlikely(name: str, value: float, usual: tuple[float, float], unit: str) -> InputWarning:
+    """Ask about a value outside its usual limits."""
+    other, meant = _meant(value, usual, unit)
+    return _outside([(name, value, usual, meant)], unit, other)
+
+
+def _meant(value: float, usual: tuple[float, float], unit: str) -> tuple[str, float | None]:
+    """Return the unit in which a value is usual, and the value; "" and None where none is near."""
+    for other, factor in _OTHER_UNITS[unit].items():
+        if usual[0] <= value * factor <= usual[1]:
+            return other, value * factor
+    return "", None
+
+
+def _outside(
+    entries: list[tuple[str, float, tuple[float, float], float | None]], unit: str, other: str
+) -> InputWarning:
+    """Word the values of one unit that may all have been typed in one other unit."""
+    (name, value, (low, high), meant), *more = entries
+    names = [f"`{entry[0]}`" for entry in more[:2]] + [f"{len(more) - 2} more"] * (len(more) > 2)
+    also = f" (so {'is' if len(more) == 1 else 'are'} {' and '.join(names)})" if more else ""
+    question = f"did you mean {_shown(meant, unit)} ({_shown(value, other)})?" if meant else ""
+    text = (
+        f"`{name}` is {_shown(value, unit)}, outside the usual {_shown(low, '')} to "
+        f"{_shown(high, unit)}{also}; {question or 'is that what you mean?'}"
+    )
+    return InputWarning(text, name, value, meant)
+
+
+def _in_thin_wall(name: str, tendon: Tendon, tube: Tube) -> Iterator[InputWarning]:
+    """Ask about a tendon in a wall that has no room for a channel, unless its diameter is given."""
+    room = 2.0 * min(tendon.radius - tube.inner_radius, tube.outer_radius - tendon.radius)
+    is_inside = tendon.radius - tube.inner_radius > _ON_SURFACE * tube.outer_diameter
+    if is_inside and tendon.diameter is None and room < _LEAST_CHANNEL * tube.outer_diameter:
+        text = (
+            f"`{name}` is {_shown(tendon.radius, 'mm')}, inside the wall, where a channel has "
+            f"{_shown(room, 'mm')}; did you mean a tendon in the lumen, at most "
+            f"{_shown(tube.inner_radius, 'mm')}? One in the wall has a `diameter`."
+        )
+        yield InputWarning(text, name, tendon.radius, tube.inner_radius)
+
+
+def _remaining_depths(robot: "Robot") -> Iterator[InputWarning]:
+    """Ask whether the depth of a shallow notch is what remains of the tube."""
+    diameter, first = robot.tube.outer_diameter, 1
+    for notch in robot.notch:
+        cut = notch.spine_cut
+        if cut is not None and cut[0] < _LEAST_DEPTH * diameter:
+            name, remains = f"notch[{first}].depth", diameter - cut[0]
+            text = (
+                f"`{name}` is {_shown(cut[0], 'mm')}, a shallow cut of a tube of "
+                f"{_shown(diameter, 'mm')}; did you mean {_shown(remains, 'mm')}, if "
+                f"{_shown(cut[0], 'mm')} is what remains?"
+            )
+            yield InputWarning(text, name, cut[0], remains)
+            return  # the others are alike
+        first += notch.repeat
+
+
+def _parts(robot: "Robot") -> Iterator[tuple[str, Any]]:
+    """Yield the parts of a robot with their names, notches counted as in outputs."""
+    yield "tube", robot.tube
+    first = 1
+    for notch in robot.notch:
+        yield f"notch[{first}]", notch
+        first += notch.repeat
+    for i, tendon in enumerate(robot.tendon, start=1):
+        yield f"tendon[{i}]", tendon
+    yield "material", robot.material
+    yield "friction", robot.friction
+
+
+@functools.cache
+def _usual_values(cls: type) -> tuple[tuple[str, tuple[float, float], str], ...]:
+    """Return the keys of a part that have usual values, with these and their unit."""
+    extras = {name: field.json_schema_extra or {} for name, field in fields_of(cls).items()}
+    return tuple(
+        (name, tuple(extra["usual"]), extra.get("unit", ""))
+        for name, extra in extras.items()
+        if "usual" in extra
+    )
+
+
+def _shown(value: float, unit: str) -> str:
+    return f"{value:,.6g} {unit}".rstrip()

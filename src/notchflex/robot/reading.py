@@ -1,15 +1,26 @@
 """Reading robots: the ready ones by name, others from TOML files."""
 
+import errno
+import io
 import os
 import re
+import select
+import stat
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from notchflex._ready import READY, ready_names
 from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.error_messages import nearest
-from notchflex.robot.robot import Robot, from_table, remember_source
+from notchflex.robot.robot import Robot, from_table, remember_source, warn_unlikely
+from notchflex.robot.value_names.setting import Changed, change_table, set_values
+
+_LARGEST = 50_000_000
+"""Bytes of the largest text file that is read."""
+_PART, _WRITER_COMES = 2**16, 3.0
+"""Bytes that are read at once, and how long a pipe waits for its writer, s."""
 
 
 def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
@@ -31,18 +42,48 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
         >>> load_robot("pacheco2021-a").number_of_notches
         5
     """
+    robot = load_changed(name_or_path, ()).robot
+    warn_unlikely(robot)
+    return robot
+
+
+def load_changed(
+    name_or_path: str | os.PathLike[str], values: Sequence[tuple[str, object]]
+) -> Changed:
+    """Read a robot and set values of it, which may repair its file; nothing warns.
+
+    Args:
+        name_or_path: As for `load_robot`.
+        values: As for `set_values`.
+
+    Raises:
+        InputError: As `load_robot` and `set_values`.
+    """
     path = _find(name_or_path)
     shown = path.stem if path.parent == READY else str(path)
     text = _read_text(path, shown)
     table = parse_toml(text, shown)
     try:
-        robot = from_table(table)
+        robot, dropped = from_table(table), ()
     except InputError as error:
-        lines = str(error).splitlines()
-        raise RobotFileError.INVALID_ROBOT(
-            "\n".join(f"{shown}: {line}" for line in lines)
-        ) from None
-    return remember_source(robot, text)
+        if not values:
+            raise _in_file(shown, error) from None
+        try:
+            dropped = change_table(table, values)
+            robot, values = from_table(table), ()
+        except InputError as remaining:
+            raise _in_file(shown, remaining) from None
+        except (LookupError, TypeError, AttributeError):  # no table in which values can be set
+            raise _in_file(shown, error) from None
+    if values:
+        robot, dropped = set_values(robot, values)
+    return Changed(remember_source(robot, text), dropped)
+
+
+def _in_file(shown: str, error: InputError) -> RobotFileError:
+    """Name the file before each sentence of an error."""
+    lines = str(error).splitlines()
+    return RobotFileError("\n".join(f"{shown}: {line}" for line in lines), error.code)
 
 
 def robot_from_text(text: str, shown: str = "robot file") -> Robot:
@@ -60,6 +101,10 @@ def robot_from_text(text: str, shown: str = "robot file") -> Robot:
 
 def _find(name_or_path: str | os.PathLike[str]) -> Path:
     """Decide between a ready robot and a file."""
+    if not isinstance(name_or_path, str | os.PathLike):  # pyright: ignore
+        raise RobotFileError.WRONG_TYPE(
+            f"a robot is loaded by its name or the path of its file; got {name_or_path!r}."
+        )
     text = os.fspath(name_or_path)
     path = Path(text)
     is_path = not isinstance(name_or_path, str) or path.suffix == ".toml" or len(path.parts) > 1
@@ -80,10 +125,49 @@ def _find(name_or_path: str | os.PathLike[str]) -> Path:
     )
 
 
+def bounded_text(path: str | os.PathLike[str]) -> str:
+    """Read a text file in UTF-8, without a byte order mark.
+
+    Raises:
+        OSError: As `bounded_bytes`.
+        UnicodeDecodeError: It is no text in UTF-8.
+    """
+    return io.TextIOWrapper(io.BytesIO(bounded_bytes(path)), "utf-8-sig").read()
+
+
+def bounded_bytes(path: str | os.PathLike[str], most: int = _LARGEST) -> bytes:
+    """Read a file; a device may have no end, and a pipe nobody who writes into it.
+
+    Raises:
+        OSError: It cannot be read, has more than `most` bytes, or is a pipe without a writer.
+    """
+    with open(path, "rb", buffering=0, opener=_at_once) as file:
+        pipe = stat.S_ISFIFO(os.fstat(file.fileno()).st_mode)
+        ready = not pipe or select.select([file], [], [], _WRITER_COMES)[0]
+        # Without waiting a pipe reads as None where its writer is only slow.
+        part = file.read(_PART)
+        if part == b"" and not ready:
+            raise OSError(errno.EPIPE, "it is a pipe into which no program writes")
+        if pipe:
+            os.set_blocking(file.fileno(), True)
+        data = bytearray(part or b"")
+        while part is None or part:
+            part = file.read(_PART)
+            data += part or b""
+            if len(data) > most:
+                raise OSError(errno.EFBIG, f"it has more than {most / 1e6:.0f} MB")
+    return bytes(data)
+
+
+def _at_once(path: str, flags: int) -> int:
+    """Open a pipe without waiting for its writer, anything else as usual."""
+    pipe = stat.S_ISFIFO(os.stat(path).st_mode)
+    return os.open(path, flags | (os.O_NONBLOCK if pipe else 0))
+
+
 def _read_text(path: Path, shown: str) -> str:
     try:
-        # -sig: some editors begin a file with a byte order mark, which is not TOML
-        return path.read_text(encoding="utf-8-sig")
+        return bounded_text(path)
     except FileNotFoundError:
         raise RobotFileError.FILE_NOT_FOUND(f"{shown}: there is no such file.") from None
     except IsADirectoryError:

@@ -1,18 +1,23 @@
 """Description of a robot."""
 
 import dataclasses
+import datetime
 import functools
+import unicodedata
+import warnings
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, overload
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
 
-from notchflex.errors import InputError
+from notchflex import __version__
+from notchflex.errors import InputError, InputWarning
 from notchflex.robot.error_messages import sentences
-from notchflex.robot.fields import fields_of
+from notchflex.robot.fields import fields_of, is_unsaid
 from notchflex.robot.kinds import Friction, Material, Notch, one_of
 from notchflex.robot.part import ProblemError, part
-from notchflex.robot.problems import robot_problems
+from notchflex.robot.problems import robot_problems, robot_warnings
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tolerance import Tolerances
 from notchflex.robot.tube import Tube
@@ -29,6 +34,54 @@ else:
     AnyNotch, AnyMaterial, AnyFriction = one_of(Notch), one_of(Material), one_of(Friction)
 
 
+def _as_text(value: object) -> object:
+    """Take a date or a number as its text: TOML needs no quotes round `2026-11-26` or `3`."""
+    plain = isinstance(value, datetime.date | int) and not isinstance(value, bool)
+    return str(value) if plain else value
+
+
+def _printable(value: str) -> str:
+    """Refuse control characters, which files and terminals take for something else."""
+    if any(unicodedata.category(letter) == "Cc" for letter in value):
+        raise PydanticCustomError("control_character", "control characters are not allowed")
+    return value
+
+
+_PRINTABLE = AfterValidator(_printable)
+_Entry: TypeAlias = (
+    Annotated[str, Field(strict=True, max_length=60), BeforeValidator(_as_text), _PRINTABLE] | None
+)
+"""An entry of a title block."""
+
+
+@part(kw_only=True)
+class Drawing:
+    """What the title block of a drawing says; entries that are None stay empty or have a default.
+
+    Args:
+        part: Name or number of the part; by default the name of the robot.
+        revision: Its revision.
+        material: The material, as a workshop orders it; by default the kind of the model.
+        finish: The finish of its surface.
+        drawn: Who has drawn it.
+        date: The date.
+
+    Raises:
+        InputError: A value is no text, or has more than 60 letters.
+
+    Example:
+        >>> Drawing(part="W-12", revision="B").revision
+        'B'
+    """
+
+    part: Annotated[_Entry, Field(description="name or number of the part")] = None
+    revision: Annotated[_Entry, Field(description="revision")] = None
+    material: Annotated[_Entry, Field(description="material, as it is ordered")] = None
+    finish: Annotated[_Entry, Field(description="finish of the surface")] = None
+    drawn: Annotated[_Entry, Field(description="who has drawn it")] = None
+    date: Annotated[_Entry, Field(description="date")] = None
+
+
 @part
 class Robot:
     """A notched tube with its tendons, as in a robot file; immutable.
@@ -42,6 +95,7 @@ class Robot:
         friction: The friction between tendon and tube.
         tolerance: How far values may lie from these, by name, such as `{"notch.depth": 0.01}`;
             see `notchflex.uncertain`.
+        drawing: What the title block of its drawing says.
 
     Raises:
         InputError: A value is not allowed; the message names it as `--set` does.
@@ -60,7 +114,9 @@ class Robot:
         1.3
     """
 
-    name: Annotated[str, Field(strict=True, min_length=1, description="name of the robot")]
+    name: Annotated[
+        str, Field(strict=True, min_length=1, description="name of the robot"), _PRINTABLE
+    ]
     tube: Tube
     notch: Annotated[tuple[AnyNotch, ...], Field(min_length=1)]
     tendon: Annotated[tuple[Tendon, ...], Field(min_length=1)]
@@ -69,6 +125,9 @@ class Robot:
     tolerance: Annotated[
         Tolerances, Field(description="how far values may lie from these, by name")
     ] = ()
+    drawing: Annotated[Drawing, Field(description="what the title block of a drawing says")] = (
+        Drawing()
+    )
 
     @model_validator(mode="after")
     def _parts_fit(self) -> "Robot":
@@ -86,8 +145,9 @@ class Robot:
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state without the hash, which differs between processes."""
-        return {name: value for name, value in vars(self).items() if name != "_hash"}
+        """Return the state without the hash, which differs between processes, and the warnings."""
+        left_out = "_hash", "warnings"
+        return {name: value for name, value in vars(self).items() if name not in left_out}
 
     def __repr__(self) -> str:
         """Return a summary of a few lines."""
@@ -125,6 +185,23 @@ class Robot:
         """Every notch from base to tip, each with `repeat` 1."""
         return tuple(single for notch in self.notch for single in notch.expanded())
 
+    @functools.cached_property
+    def warnings(self) -> tuple[InputWarning, ...]:
+        """Values that are allowed and were probably not meant, such as a modulus in GPa."""
+        return tuple(robot_warnings(self))
+
+    def citations(self) -> tuple[str, ...]:
+        """Return what to cite: notchflex, and the papers whose models the parts are.
+
+        Example:
+            >>> from notchflex import load_robot
+            >>> [one.partition(":")[0] for one in load_robot("liu2022").citations()]
+            ['notchflex 0.1.0', 'Liu et al.', 'Gao et al.']
+        """
+        parts = (*self.notch, self.material, self.friction)
+        papers = dict.fromkeys(paper for one in parts for paper in one.papers)
+        return (f"notchflex {__version__}: statics of tendon-driven notched-tube robots", *papers)
+
     @property
     def number_of_notches(self) -> int:
         """Number of notches, with repeated ones counted each."""
@@ -139,14 +216,14 @@ class Robot:
         """Return a copy with other parts, such as `material=Linear(7510.0)`.
 
         Args:
-            parts: New values for any of `name`, `tube`, `notch`, `tendon`, `material`, `friction`
-                and `tolerance`.
+            parts: New values for any of `name`, `tube`, `notch`, `tendon`, `material`, `friction`,
+                `tolerance` and `drawing`.
 
         Raises:
             InputError: A value is not allowed, or there is no such part.
         """
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return remember_source(Robot(**(values | parts)), source_of(self))
+        return remember_source(from_table(values | parts), source_of(self))
 
     def with_value(self, path: str, value: object) -> "Robot":
         """Return a copy with one value changed.
@@ -158,12 +235,16 @@ class Robot:
             value: The new value, in the units of the robot file (mm, N, MPa, deg).
 
         Changing a kind (`material.kind`) keeps the keys that both kinds share and drops the others;
-        `notchflex.robot.set_values` tells which.
+        `notchflex.robot.set_values` tells which. A value that was probably not meant gives an
+        `InputWarning`, which `warnings` of the copy keeps.
 
         Raises:
             InputError: There is no such value, or the new one is not allowed.
         """
-        return self.with_values({path: value})
+        changed = self.with_values({path: value})
+        if changed.warnings and not self.warnings:
+            warn_unlikely(changed)
+        return changed
 
     def with_values(self, values: Mapping[str, object] | Iterable[tuple[str, object]]) -> "Robot":
         """Return a copy with several values changed at once; their order does not matter.
@@ -183,7 +264,10 @@ class Robot:
 
 def to_table(robot: Robot) -> dict[str, Any]:
     """Convert a robot to the plain table of its file: dicts, lists, numbers and text."""
-    tolerances = {one.value: one.written for one in robot.tolerance}
+    optional = {
+        "tolerance": {one.value: one.written for one in robot.tolerance},
+        "drawing": _part_table(robot.drawing),
+    }
     return {
         "name": robot.name,
         "tube": _part_table(robot.tube),
@@ -191,7 +275,7 @@ def to_table(robot: Robot) -> dict[str, Any]:
         "tendon": [_part_table(tendon) for tendon in robot.tendon],
         "material": _part_table(robot.material),
         "friction": _part_table(robot.friction),
-        **({"tolerance": tolerances} if tolerances else {}),
+        **{name: table for name, table in optional.items() if table},
     }
 
 
@@ -213,6 +297,12 @@ def from_table(table: Mapping[str, Any]) -> Robot:
         ) from None
 
 
+def warn_unlikely(robot: Robot) -> None:
+    """Give the warnings of a robot as Python warnings, to the caller of the caller."""
+    for warning in robot.warnings:
+        warnings.warn(warning, stacklevel=3)
+
+
 def source_of(robot: Robot) -> str | None:
     """Return the text of the file that a robot was read from, where there was one."""
     return getattr(robot, "_source", None)
@@ -228,9 +318,9 @@ def remember_source(robot: Robot, text: str | None) -> Robot:
 
 
 def _part_table(value: object) -> dict[str, Any]:
-    """List the values of a part, without those that are None."""
+    """List the values of a part that are said."""
     values = {name: getattr(value, name) for name in fields_of(type(value))}
-    return {name: one for name, one in values.items() if one is not None}
+    return {name: one for name, one in values.items() if not is_unsaid(name, one)}
 
 
 def _repeats(table: Mapping[str, Any]) -> list[int]:

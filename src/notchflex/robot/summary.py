@@ -64,6 +64,3 @@ def _values(values: Sequence[Any]) -> str:
     if numbers and len(values) > MOST:
         return f"{short(min(values))} to {short(max(values))}"
     return "/".join(short(one) if isinstance(one, float) else str(one) for one in values)
-
-
-__all__ = ["robot_summary"]

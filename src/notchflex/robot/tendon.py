@@ -25,13 +25,18 @@ class Tendon:
             the channel of the body before the gap ("straight-dead") or of the body beyond it
             ("straight-follower"); Liu 2022 leaves the choice open.
         free_length: Length between the drive and the base [mm]; counts for stretch only.
+        diameter: Its diameter [mm]; None is not known. It changes no result: a tendon that would
+            cross the inner or outer surface of the tube is refused.
 
     Example:
         >>> Tendon(0.70, direction_deg=180.0).path
         'wall-arc'
     """
 
-    radius: Annotated[Float, quantity("mm", "distance of the tendon from the tube axis", above=0)]
+    radius: Annotated[
+        Float,
+        quantity("mm", "distance of the tendon from the tube axis", above=0, usual=(0.02, 25)),
+    ]
     direction_deg: Annotated[
         Float, quantity("deg", "side of the tube on which the tendon runs")
     ] = 0.0
@@ -53,3 +58,7 @@ class Tendon:
     free_length: Annotated[
         Float, quantity("mm", "length between the drive and the base", at_least=0)
     ] = 0.0
+    diameter: Annotated[
+        Float | None,
+        quantity("mm", "diameter of the tendon, which must fit the lumen or the wall", above=0),
+    ] = None

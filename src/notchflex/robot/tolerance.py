@@ -60,6 +60,24 @@ def amount(deviation: Deviation | None, value: float) -> float:
     return math.inf if deviation is None else deviation
 
 
+def with_limits(tolerances: Sequence[Tolerance], path: str, value: float) -> str:
+    """Return a value as a drawing has it, with its tolerance; a standard deviation counts twice.
+
+    Example:
+        >>> with_limits((Tolerance("notch.depth", sd=0.01),), "notch.depth", 1.4)
+        '1.4 ±0.02'
+    """
+    text = f"{value:.6g}"
+    for one in tolerances:
+        if one.value == path:
+            plus, minus = (
+                2.0 * amount(one.sd, value) if far is None else amount(far, value)
+                for far in (one.plus, one.minus)
+            )
+            text += f" ±{plus:.3g}" if plus == minus else f" +{plus:.3g} −{minus:.3g}"
+    return text
+
+
 def read_tolerances(table: Any) -> Any:
     """Make tolerances of the table of a robot file, or leave those that are made."""
     if table is None:

@@ -24,8 +24,12 @@ class Tube:
         0.81
     """
 
-    outer_diameter: Annotated[Float, quantity("mm", "outer diameter of the tube", above=0)]
-    inner_diameter: Annotated[Float, quantity("mm", "inner diameter of the tube", above=0)]
+    outer_diameter: Annotated[
+        Float, quantity("mm", "outer diameter of the tube", above=0, usual=(0.1, 50))
+    ]
+    inner_diameter: Annotated[
+        Float, quantity("mm", "inner diameter of the tube", above=0, usual=(0.05, 50))
+    ]
     base_length: Annotated[
         Float, quantity("mm", "uncut length before the first notch", at_least=0)
     ] = 0.0

@@ -14,7 +14,7 @@ from tomlkit.exceptions import ParseError
 from notchflex._replacing import replacing
 from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.comments import FITTED_TO, add_note, set_value
-from notchflex.robot.fields import fields_of
+from notchflex.robot.fields import fields_of, is_unsaid
 from notchflex.robot.reading import robot_from_text
 from notchflex.robot.robot import Robot, source_of, to_table
 from notchflex.robot.tolerance import read_tolerances
@@ -22,6 +22,8 @@ from notchflex.robot.value_names import defaults_of
 
 _HEADER = re.compile(r"""\s*\[{1,2}\s*["']?(\w+)["']?\s*\]{1,2}\s*(#.*)?""")
 _NUMBERED = re.compile(r"(\w+)(?:\[(\*|\d+)\])?\.(\w+)")
+_OPTIONAL = "tolerance", "drawing"
+"""Tables that a robot file may have."""
 
 _Notes = Mapping[str, str]
 
@@ -54,7 +56,7 @@ def save_robot(
         >>> softer = load_robot("pacheco2021-a").with_value("material.elastic_modulus", 9_500.0)
         >>> save_robot(softer, "softer.toml")  # doctest: +SKIP
     """
-    source = source_of(robot)
+    source: str | None = None
     if template is not None:
         try:
             source = Path(template).read_text(encoding="utf-8-sig")
@@ -75,18 +77,21 @@ def robot_text(
 
     Args:
         robot: The robot to write.
-        template: Text of a robot file whose comments and order are kept.
+        template: Text of a robot file whose comments and order are kept; None takes that of the
+            robot's file, and "" a fresh layout.
         fitted: As for `save_robot`.
 
     Example:
         >>> from notchflex.robot import load_robot
         >>> softer = load_robot("pacheco2021-a").with_value("friction.coefficient", 0.12)
-        >>> text = robot_text(softer, fitted={"friction.coefficient": "a.csv: 0.1 to 0.14"})
+        >>> notes = {"friction.coefficient": "a.csv: 0.1 to 0.14"}
+        >>> text = robot_text(softer, "", notes)
         >>> text.splitlines()[-2]
         'coefficient = 0.12  # coefficient of friction; fitted by notchflex to a.csv: 0.1 to 0.14'
     """
     notes = fitted or {}
-    if template is not None:
+    template = source_of(robot) if template is None else template
+    if template:
         try:
             text = _rewritten(robot, template, notes)
             if robot_from_text(text) == robot:
@@ -147,7 +152,7 @@ def _fresh_part(part: Any, notes: _Notes) -> list[str]:
     lines: list[str] = []
     for key, record in fields_of(type(part)).items():
         value = getattr(part, key)
-        if value is None:
+        if is_unsaid(key, value):
             continue
         unit = (record.json_schema_extra or {}).get("unit", "")
         comment = ", ".join(word for word in (unit, record.description or "") if word)
@@ -194,15 +199,16 @@ def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
                 rewritten += _matched(mine, old[block.name], new[block.name])
         elif block.name in new:
             rewritten.append((block, new[block.name]))
-        elif block.name:  # a robot without the tolerances of its file
+        elif block.name:  # a robot without a table that its file has
             continue
         else:  # the head of the file: the name, and whatever is not under a header of its own
             headed = {one.name for one in blocks}
             rewritten.append(
-                (block, {k: v for k, v in new.items() if k not in (*headed, "tolerance")})
+                (block, {k: v for k, v in new.items() if k not in (*headed, *_OPTIONAL)})
             )
-    if "tolerance" in new and all(block.name != "tolerance" for block in blocks):
-        rewritten.append((_Block("tolerance", ["\n"], "[tolerance]\n"), new["tolerance"]))
+    for name in _OPTIONAL:
+        if name in new and all(block.name != name for block in blocks):
+            rewritten.append((_Block(name, ["\n"], f"[{name}]\n"), new[name]))
     texts: list[str] = []
     first = {"notch": 1, "tendon": 1}
     for block, table in rewritten:
@@ -252,9 +258,9 @@ def _matched(
 
 def _update(table: Any, values: dict[str, Any], section: str, notes: _Notes) -> None:
     """Update a tomlkit table to the given values, changing only what differs."""
-    for key in [key for key in table if key not in values]:
-        del table[key]
     defaults = defaults_of(section, values) if section else {}
+    for key in [key for key in table if key not in values and table[key] != defaults.get(key)]:
+        del table[key]
     for key, value in values.items():
         if key not in table:
             if key in notes or key not in defaults or defaults[key] != value:

@@ -14,10 +14,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
-from notchflex.sensing.candidates import Known, ReadingProblem
 from notchflex.sensing.history import History, Progress, whitening_of
 from notchflex.sensing.own_reading import OwnReading
-from notchflex.sensing.search import bad_fit, best, best_of_all, extreme
+from notchflex.sensing.search import Known, ReadingProblem, bad_fit, best, best_of_all, extreme
 from notchflex.solver.solver_state import SolverState
 
 

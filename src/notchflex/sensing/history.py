@@ -14,9 +14,8 @@ from jaxtyping import Float
 
 from notchflex.analysis.derivatives.tangent import Change, PathTangents
 from notchflex.results.path import EquilibriumPath
-from notchflex.sensing.candidates import Candidate, ReadingProblem
 from notchflex.sensing.model import SensingModel, Step
-from notchflex.sensing.search import best, best_of_all
+from notchflex.sensing.search import Candidate, ReadingProblem, best, best_of_all
 from notchflex.solver.solver_state import SolverState
 
 Progress = Callable[[int, int], None]
@@ -180,14 +179,3 @@ def _slopes_along(
             slopes.append(np.stack(row, axis=1))
         results.append(np.array(slopes))
     return results[0], results[1]
-
-
-__all__ = [
-    "LINEAR",
-    "History",
-    "Progress",
-    "estimate",
-    "known_inverse",
-    "whitening_of",
-    "with_noise",
-]

@@ -98,6 +98,3 @@ def _change(apart: Float[np.ndarray, "n m"], noise: Float[np.ndarray, "m m"]) ->
         return 0.0
     total = float(((apart @ whitening_of(noise).T) ** 2).sum())
     return 1.0 - freedom / total if total > freedom else 0.0
-
-
-__all__ = ["OwnReading", "own_readings"]

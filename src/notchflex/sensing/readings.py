@@ -1,13 +1,19 @@
-"""Readings of the sensors along a history, and the noise of the sensors."""
+"""Readings of the sensors along a history, their noise, and readings taken as one.
+
+A model that follows the noise of a held tendon pulls it to and fro: its contacts slide to the
+largest reading and remember it. So consecutive readings that noise explains are averaged before the
+model follows them; their mean has less noise. Whether the force was the same in all of them is not
+known: what each says of it is in `own_reading`.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
 from notchflex.errors import InputError
@@ -21,6 +27,8 @@ MAX_READINGS = 2000
 # Negative tensions up to this number of standard deviations may be noise.
 _MAX_NOISE = 10.0
 
+_LARGEST = 1e6  # of a deviation; with more a sensor tells nothing
+
 
 @dataclass(frozen=True)
 class SensorNoise:
@@ -33,7 +41,7 @@ class SensorNoise:
         angle: Of the measured notch angles, rad; half a degree by default.
 
     Raises:
-        InputError: A number that is negative or not finite.
+        InputError: A number that is negative or more than a million.
 
     Example:
         >>> SensorNoise(tension=0.02).stroke
@@ -50,9 +58,9 @@ class SensorNoise:
         for one in fields(self):
             what = f"the {one.name} of SensorNoise"
             value = check_number(getattr(self, one.name), what)
-            if not 0.0 <= value < np.inf:
+            if not 0.0 <= value <= _LARGEST:
                 raise InputError.OUT_OF_RANGE(
-                    f"{what} is a standard deviation, finite and 0 or more; got {value:g}"
+                    f"{what} is a standard deviation from 0 to {_LARGEST:g}; got {value:g}"
                 )
             object.__setattr__(self, one.name, value)
 
@@ -205,3 +213,61 @@ def _table(value: Any, name: str, width: int, form: str) -> Float[np.ndarray, "s
     if np.isinf(table).any():
         raise InputError.NOT_FINITE(f"{name} has an infinite number; give NaN where not measured")
     return table
+
+
+# Standard deviations by which a reading may differ from the mean of those before it.
+_SAME = 3.0
+
+
+def merged(readings: Readings) -> tuple[Readings, Int[np.ndarray, " s"]]:
+    """Merge consecutive readings that noise explains.
+
+    Returns:
+        The means, with how many readings each one is of, and the number of the mean, counted from
+        0, that every reading went into.
+    """
+    noise = readings.noise
+    sensors = (readings.tension, readings.stroke, readings.tip, readings.angles)
+    values = np.concatenate(sensors, axis=1)
+    deviations = np.concatenate(
+        [
+            np.full(table.shape[1], one)
+            for table, one in zip(
+                sensors, (noise.tension, noise.stroke, noise.tip, noise.angle), strict=True
+            )
+        ]
+    )
+    group = _groups(values, deviations)
+    count = np.bincount(group)
+    means = [_means(table, group) for table in sensors]
+    tension, stroke, tip, angles = means
+    joined = replace(
+        readings, tension=tension, stroke=stroke, tip=tip, angles=angles, count=count.astype(float)
+    )
+    return joined, group
+
+
+def _groups(
+    values: Float[np.ndarray, "s m"], deviations: Float[np.ndarray, " m"]
+) -> Int[np.ndarray, " s"]:
+    """Return which group every reading belongs to."""
+    group = np.zeros(len(values), int)
+    total, size = values[0].copy(), 1
+    for number, row in enumerate(values[1:], 1):
+        apart = np.abs(row - total / size)
+        same_sensors = np.array_equal(np.isnan(row), np.isnan(total))
+        if same_sensors and not (apart > _SAME * deviations * np.sqrt(1.0 + 1.0 / size)).any():
+            total, size = total + row, size + 1
+            group[number] = group[number - 1]
+        else:
+            total, size = row.copy(), 1
+            group[number] = group[number - 1] + 1
+    return group
+
+
+def _means(table: Float[np.ndarray, "s m"], group: Int[np.ndarray, " s"]) -> np.ndarray:
+    first = np.flatnonzero(np.diff(group, prepend=-1))
+    size = np.diff(np.append(first, len(group)))
+    means = np.add.reduceat(table, first, axis=0) / size[:, None]
+    # One reading alone stays what it is, to the last digit.
+    return np.where((size == 1)[:, None], table[first], means)

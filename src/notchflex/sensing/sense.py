@@ -14,15 +14,12 @@ from notchflex.loads.external import ExternalLoad
 from notchflex.loads.validation import check_is_robot, check_number
 from notchflex.robot import Robot
 from notchflex.sensing.bounds import Bounds, bounds
-from notchflex.sensing.candidates import Candidate
 from notchflex.sensing.history import estimate, with_noise
-from notchflex.sensing.merging import merged
-from notchflex.sensing.model import SensingModel
-from notchflex.sensing.observability import LeftOpen
+from notchflex.sensing.model import SensingModel, unknown_force
 from notchflex.sensing.own_reading import own_readings
-from notchflex.sensing.readings import Readings, SensorNoise, readings_of
-from notchflex.sensing.sensed import SensedForce
-from notchflex.sensing.unknown import unknown_force
+from notchflex.sensing.readings import Readings, SensorNoise, merged, readings_of
+from notchflex.sensing.search import Candidate
+from notchflex.sensing.sensed import LeftOpen, SensedForce
 from notchflex.solver.newton import DEFAULT
 
 Stage = Callable[[str, int, int], None]

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
 
 from notchflex._quantity import DEGREES
 from notchflex.errors import InputError
-from notchflex.results.files.csv_reading import Table, no_tendon_column, read_table, tendon_columns
+from notchflex.results.files.csv_reading import (
+    Table,
+    no_tendon_column,
+    read_data_table,
+    tendon_columns,
+)
 from notchflex.results.files.json import document_head
 from notchflex.results.quantities.registry import AXES, QUANTITIES
 from notchflex.robot import Robot
@@ -20,7 +25,10 @@ BESIDE = ("tip", "angles")
 
 
 def read_sensor_table(
-    file: str, robot: Robot, beside: Collection[str] = ()
+    file: str,
+    robot: Robot,
+    beside: Collection[str] = (),
+    named: Mapping[str, str] | None = None,
 ) -> dict[str, np.ndarray]:
     """Read tensions and strokes of a table, one row a reading; empty entries were not measured.
 
@@ -29,6 +37,7 @@ def read_sensor_table(
             `tendon_1_force_N` and so on.
         robot: The robot that was read.
         beside: What else is read, of `BESIDE`: `tip_x_mm`, ... or `notch_1_deg`, ...
+        named: Headers of the file for quantities, as for `read_measurements`.
 
     Returns:
         The readings by argument of `notchflex.sense`.
@@ -36,20 +45,24 @@ def read_sensor_table(
     Raises:
         InputError: No such table or column, or an entry that is not a number.
     """
-    table, tendons = read_table(file), robot.number_of_tendons
+    table, tendons = read_data_table(file, named), robot.number_of_tendons
     read: dict[str, np.ndarray] = {}
+    used: set[str] = set()
     for argument, quantity in (("tensions", "tension"), ("strokes", "stroke")):
         columns = tendon_columns(table.header, quantity, tendons)
         read[argument] = _columns(table, columns, tendons)
+        used |= {*columns.values()}
     if np.isnan(read["tensions"]).all() and np.isnan(read["strokes"]).all():
         raise no_tendon_column(table, tendons)
-    if "tip" in beside:
-        names = {i: QUANTITIES["tip_position"].header(axis=axis) for i, axis in enumerate(AXES)}
-        read["tip"] = _wanted(table, names, len(AXES))
-    if "angles" in beside:
-        count = robot.number_of_notches
-        names = {i: QUANTITIES["notch_angle"].header(notch=i + 1) for i in range(count)}
-        read["angles"] = _wanted(table, names, count) / DEGREES
+    count = robot.number_of_notches
+    for what, names, scale in (
+        ("tip", [QUANTITIES["tip_position"].header(axis=axis) for axis in AXES], 1.0),
+        ("angles", [QUANTITIES["notch_angle"].header(notch=i + 1) for i in range(count)], DEGREES),
+    ):
+        used |= {*names}
+        if what in beside:
+            read[what] = _wanted(table, dict(enumerate(names)), len(names)) / scale
+    table.unused(used)
     return read
 
 

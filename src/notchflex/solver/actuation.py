@@ -56,6 +56,17 @@ def command_residual(chain: Chain, command: Command, base: BaseReaction) -> Floa
     return command.either(by_stroke, by_tension)
 
 
+def without_slack(
+    chain: Chain, command: Command, point: Iterate, reached: Float[Array, " t"]
+) -> Iterate:
+    """Set the tensions of slack tendons at a solved point to zero, given the strokes reached."""
+    if command.by_stroke is None:
+        return point
+    missing = chain.stroke_stiffness * (reached - command.target)
+    slack = command.by_stroke & (point.base_tension < missing)
+    return point._replace(base_tension=jnp.where(slack, 0.0, point.base_tension))
+
+
 def command_slopes(
     chain: Chain, command: Command, base: BaseReaction
 ) -> tuple[Float[Array, "t t"], Float[Array, "t t"], Float[Array, "t t"]]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
-from notchflex.loads.applied import BodyLoads, body_wrench
+from notchflex.loads.command import BodyLoads, body_wrench
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.motion import Motion, identity
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import partial
 from typing import NamedTuple
 
@@ -47,8 +48,9 @@ _SUBSTEP_TOLERANCE, _SUBSTEP_RESIDUAL = 1e3, 1e-10
 # Fraction of a load step at which the external loads are complete, where they come first.
 _EXTERNAL_COMPLETE = 0.5
 # A notch that softens as it closes has limit points, where it snaps to another shape under constant
-# tension. Substeps that fail below this fraction of the load step are solved with an artificial
-# viscosity, within these fractions of the stiffness at rest, until the notches stand still.
+# tension; fibres on a flat plateau lose nearly all stiffness. Substeps that fail below this
+# fraction of the load step are solved with an artificial viscosity, within these fractions of the
+# stiffness at rest, until the notches stand still.
 _SNAP_MAX_FRACTION, _VISCOSITY, _MIN_VISCOSITY, _MAX_VISCOSITY = 0.3, 0.1, 1e-4, 30.0
 # A contact at its bound starts slightly beyond it, so that it goes on sliding.
 _BEYOND_BOUND = 1.0 + 1e-12
@@ -57,8 +59,11 @@ _SNAP_FACTOR = 4
 # Where Newton's method fails, sticking contacts are regularised: they get a compliance (slip in
 # heights of the notch per change of the log ratio) that is reduced from substep to substep, each
 # from the last shape, to zero. Many contacts on stiff tendons stick or slide in combinations that
-# are not found one contact at a time. Relaxed shapes only need this residual.
-_STICK_COMPLIANCE, _STICK_FACTOR, _MIN_STICK, _RELAXED_RESIDUAL = 1e-1, 1e-1, 1e-8, 1e-8
+# are not found one contact at a time. The reduction adapts: a factor that fails is replaced by its
+# root, up to the largest. What is not found in a few iterations would be found by luck of rounding.
+_STICK_COMPLIANCE, _STICK_FACTOR, _MAX_STICK_FACTOR, _MIN_STICK = 1e-1, 1e-1, 0.8, 1e-8
+# Relaxed shapes only need this residual, within these iterations.
+_RELAXED_RESIDUAL, _RELAXED_ITERATIONS = 1e-8, 10
 
 
 class _LoadStepSearch(NamedTuple):
@@ -70,7 +75,8 @@ class _LoadStepSearch(NamedTuple):
         attempts: Number of substeps tried.
         viscosity: Artificial viscosity of the next substep; 0 outside a snap.
         stick_compliance: Regularisation of its sticking contacts; 0 for none.
-        from_relaxed_shape: Whether it starts from a shape with regularised contacts.
+        stick_factor: Factor on the regularisation from one relaxed shape to the next.
+        from_compliance: Regularisation of the shape that it starts from; 0 for none.
         start_iterate: Its start, to which the viscosity refers: the last solved state, or an
             unconverged shape between it and the next.
         predicts: Whether its contacts are predicted, where strokes are commanded.
@@ -81,7 +87,8 @@ class _LoadStepSearch(NamedTuple):
     attempts: Int[Array, ""]
     viscosity: Float[Array, ""]
     stick_compliance: Float[Array, ""]
-    from_relaxed_shape: Bool[Array, ""]
+    stick_factor: Float[Array, ""]
+    from_compliance: Float[Array, ""]
     start_iterate: Iterate
     predicts: Bool[Array, ""]
 
@@ -109,7 +116,8 @@ def solve_load_step(
         The result.
     """
     external_first = _external_first(chain, last)
-    can_snap = chain.rods.section.ends is not None
+    section = chain.rods.section
+    can_snap = section.ends is not None or section.fibres is not None
     # With a single tendon, contacts are never the reason for a failure.
     may_relax = chain.tendons > 1
     max_iterations = settings.max_all_iterations * (_SNAP_FACTOR if can_snap else 1)
@@ -145,9 +153,18 @@ def _begin(last: SolverState) -> _LoadStepSearch:
         between=last,
         fraction_before=jnp.zeros(()),
     )
-    none, attempts = jnp.zeros(()), jnp.zeros((), int)
-    no, yes = jnp.array(False), jnp.array(True)
-    return _LoadStepSearch(start, jnp.ones(()), attempts, none, none, no, last.point, yes)
+    none = jnp.zeros(())
+    return _LoadStepSearch(
+        result=start,
+        fraction=jnp.ones(()),
+        attempts=jnp.zeros((), int),
+        viscosity=none,
+        stick_compliance=none,
+        stick_factor=none,
+        from_compliance=none,
+        start_iterate=last.point,
+        predicts=jnp.array(True),
+    )
 
 
 def _result_after(
@@ -183,23 +200,26 @@ def _search_after(
     """Return the settings of the next substep: its length, viscosity and regularisation."""
     fraction, viscosity, before = search.fraction, search.viscosity, search.result.solved.point
     inviscid, relaxed = viscosity == 0.0, search.stick_compliance > 0.0
-    relaxing = relaxed | search.from_relaxed_shape
+    relaxing = relaxed | (search.from_compliance > 0.0)
     solved = new.converged & inviscid & ~relaxed
     relaxes = relaxed & new.converged
     from_unsolved_shape = jnp.any(search.start_iterate.unknowns.modes != before.unknowns.modes)
-    starts_relaxing = inviscid & ~relaxed & ~from_unsolved_shape & ~new.converged & may_relax
-    compliance = search.stick_compliance
-    smaller = jnp.where(compliance < _MIN_STICK, 0.0, _STICK_FACTOR * compliance)
-    compliance = jnp.where(relaxes, smaller, 0.0)
+    plain_fails = inviscid & ~relaxing & ~from_unsolved_shape & ~new.converged
+    starts_relaxing = plain_fails & may_relax
+    root = jnp.sqrt(search.stick_factor)
+    retries = relaxed & ~new.converged & (search.from_compliance > 0.0) & (root < _MAX_STICK_FACTOR)
+    factor = jnp.where(retries, root, jnp.maximum(search.stick_factor**2, _STICK_FACTOR))
+    from_compliance = jnp.where(relaxes, search.stick_compliance, search.from_compliance)
+    from_compliance = jnp.where(relaxes | retries, from_compliance, 0.0)
+    compliance = jnp.where(from_compliance < _MIN_STICK, 0.0, factor * from_compliance)
     compliance = jnp.where(starts_relaxing, _STICK_COMPLIANCE, compliance)
+    abandons = relaxing & ~new.converged & ~retries
     # A snap continues under the same load.
-    shortens = (inviscid & ~starts_relaxing & ~from_unsolved_shape) | (relaxing & ~new.converged)
-    shorter = jnp.where(shortens, 0.5 * fraction, fraction)
+    shorter = jnp.where((plain_fails & ~starts_relaxing) | abandons, 0.5 * fraction, fraction)
     fraction = jnp.where(solved, 2.0 * fraction, shorter)
-    abandons = relaxing & ~new.converged
     predicts = search.predicts
     if can_snap:
-        keeps_viscosity = starts_relaxing | relaxes
+        keeps_viscosity = starts_relaxing | relaxes | retries
         after = _next_viscosity(viscosity, new.converged, fraction)
         viscosity = jnp.where(keeps_viscosity, viscosity, after)
         abandons = abandons | (~inviscid & ~new.converged & (viscosity == 0.0))
@@ -210,7 +230,15 @@ def _search_after(
     start = choose(abandons, last_point, choose(new.converged, new.point, search.start_iterate))
     attempts = search.attempts + 1
     return _LoadStepSearch(
-        result, fraction, attempts, viscosity, compliance, relaxes, start, predicts
+        result,
+        fraction,
+        attempts,
+        viscosity,
+        compliance,
+        factor,
+        from_compliance,
+        start,
+        predicts,
     )
 
 
@@ -254,7 +282,7 @@ def _solve_substep(
     predicts: Bool[Array, ""] | bool = True
     if command.by_stroke is not None:
         # Without prediction, contacts that slid before go on sliding.
-        predicts = search.predicts & ~(relaxed | search.from_relaxed_shape)
+        predicts = search.predicts & ~(relaxed | (search.from_compliance > 0.0))
         sliding = jax.tree.map(lambda old: _BEYOND_BOUND * old, memory.log_ratio)
         log_ratio = choose(predicts, log_ratio, sliding)
         start = start._replace(unknowns=start.unknowns._replace(log_ratio=log_ratio))
@@ -263,6 +291,8 @@ def _solve_substep(
     memory = memory._replace(stick_compliance=search.stick_compliance)
     if can_snap:
         memory = memory._replace(damping=(search.viscosity, iterate.unknowns.modes))
+    most = jnp.where(relaxed, _RELAXED_ITERATIONS, settings.max_iterations)
+    settings = dataclasses.replace(settings, max_iterations=most)
     problem = NewtonProblem(chain, command, memory, solved.point, predicts)
     return newton(problem, start, settings, residual_target)
 

@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import jnp
 from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.contact import ContactGroup
 
 # Friction law: x = clip(x + r (slip - c (x - x_prev))). The augmentation parameter r only affects
 # convergence and drops out at the solution; the compliance c of sticking contacts keeps the law
@@ -109,23 +110,16 @@ def bound_side(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Arra
 
 
 def is_active(
-    stiffness: Float[Array, " n"],
-    has_contact: Float[Array, "n l"],
-    force: Float[Array, "n l"],
-    gap: Float[Array, "n l"],
+    chain: Chain, group: ContactGroup, force: Float[Array, "n l"], gap: Float[Array, "n l"]
 ) -> Bool[Array, "n l"]:
     """Return which contacts press, by Signorini's condition: force >= 0, gap >= 0, product 0."""
-    return (force - stiffness[:, None] * gap > 0.0) & (has_contact > 0.0)
+    return (force - chain.contact_stiffness[:, None] * gap > 0.0) & (group.has_contact > 0.0)
 
 
 def signorini(
-    chain: Chain,
-    has_contact: Float[Array, "n l"],
-    force: Float[Array, "n l"],
-    gap: Float[Array, "n l"],
+    chain: Chain, group: ContactGroup, force: Float[Array, "n l"], gap: Float[Array, "n l"]
 ) -> Float[Array, "n l"]:
     """Compute the residual of Signorini's condition, as a fraction of the notch's height."""
-    stiffness = chain.contact_stiffness
-    by_force = force / (stiffness * notch_heights(chain))[:, None]
+    by_force = force / (chain.contact_stiffness * notch_heights(chain))[:, None]
     by_gap = gap / notch_heights(chain)[:, None]
-    return jnp.where(is_active(stiffness, has_contact, force, gap), by_gap, by_force)
+    return jnp.where(is_active(chain, group, force, gap), by_gap, by_force)

@@ -18,7 +18,6 @@ from jaxtyping import Array, Float
 from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.friction.registry import MIN_TENSION_RATIO
 from notchflex.solver.element import Iterate, Memory
 from notchflex.solver.tendon_spans import slip_mask
 
@@ -28,6 +27,8 @@ MAX_LOG_RATIO_STEP = 1.0
 # Fractions of the closing force below which a tendon is nearly slack, or below the solver's
 # tolerance; limit of the change of its log ratios in one step (only their sign counts).
 _NEARLY_SLACK, _NEGLIGIBLE, _SMALL_LOG_RATIO = 1e-8, 1e-14, 0.1
+# Largest ratio that a contact without its constant loss is predicted to hold.
+_MAX_GROWTH = 1e3
 # Tensions below this (N) count as slack, so that logarithms stay finite.
 _MIN_TENSION = 1e-100
 
@@ -55,9 +56,8 @@ def predict_log_ratios(
         zero = jnp.zeros_like(group.natural_gap)  # the loss at rest suffices for a prediction
         losses = chain.friction.constant_loss(zero, zero)
         if losses is not None:
-            old, new = (chain.friction.minimum_tension(one, zero, zero) for one in (old, new))
-            loss = slip_mask(group) * jnp.stack(losses, axis=-1)
-            predicted.append(_predict_sequentially(old, new, old_ratio, bound, loss))
+            loss, offset = slip_mask(group) * jnp.stack(losses, axis=-1), chain.friction.offset()
+            predicted.append(_predict_sequentially(old, new, offset, old_ratio, bound, loss))
             continue
         change = jnp.broadcast_to(jnp.log(new / old)[None, :, None], old_ratio.shape)
         rise, fall = (_cumulate(jnp.maximum(bound - side * old_ratio, 0.0)) for side in (1.0, -1.0))
@@ -84,7 +84,9 @@ def limit_slack(chain: Chain, point: Iterate, step: Iterate) -> Iterate:
     Without tension their log ratios have no effect, and a sticking contact would change them at
     random: only the direction of sliding matters. They must not shorten the rest of the step.
     """
+    # With a constant loss a slack tendon may be tight beyond its first contact.
     tension = jnp.maximum(jnp.abs(point.base_tension), jnp.abs(step.base_tension))
+    tension = tension + chain.friction.offset()
     relative = tension / chain.closing_force
     limits = jnp.where(relative <= _NEGLIGIBLE, _SMALL_LOG_RATIO, MAX_LOG_RATIO_STEP)
     limits = jnp.where(relative <= _NEARLY_SLACK, limits, jnp.inf)
@@ -134,6 +136,7 @@ def predict_contacts(
 def _predict_sequentially(
     old: Float[Array, " t"],
     new: Float[Array, " t"],
+    offset: Float[Array, ""] | float,
     remembered: Float[Array, "n t 2"],
     limits: Float[Array, "n t 2"],
     loss: Float[Array, "n t 2"],
@@ -146,18 +149,18 @@ def _predict_sequentially(
     def step(tensions: tuple[Array, Array], contact: tuple[Array, ...]) -> Any:
         old, new = tensions
         ratio, limit, force = contact
-        relative_loss = force / jnp.maximum(
-            old, MIN_TENSION_RATIO * jnp.maximum(force, _MIN_TENSION)
+        # The bound of the law without the loss follows from the limit in the last direction.
+        loading = jnp.maximum(old - force, 0.0) / jnp.maximum(
+            (old + offset) * jnp.exp(-limit) - offset, _MIN_TENSION
         )
-        loading_bound = limit + jnp.log(jnp.maximum(1.0 - relative_loss, MIN_TENSION_RATIO))
-        unloading_bound = jnp.log(jnp.maximum(jnp.exp(limit) - relative_loss, 1.0))
-        bound = jnp.maximum(
-            jnp.where(ratio < 0.0, unloading_bound, loading_bound), 0.0
-        )  # without the loss
-        old_beyond = old * jnp.exp(-ratio)
-        lowest = jnp.maximum(new - force, MIN_TENSION_RATIO * new) * jnp.exp(-bound)
-        tension_beyond = jnp.clip(old_beyond, lowest, new * jnp.exp(bound) + force)
-        predicted = jnp.log(new / tension_beyond)
+        unloading = ((old + offset) * jnp.exp(limit) - offset - force) / jnp.maximum(
+            old, _MIN_TENSION
+        )
+        growth = jnp.clip(jnp.where(ratio < 0.0, unloading, loading), 1.0, _MAX_GROWTH)
+        old_beyond = (old + offset) * jnp.exp(-ratio) - offset
+        lowest = jnp.maximum(new - force, 0.0) / growth
+        tension_beyond = jnp.clip(old_beyond, lowest, new * growth + force)
+        predicted = jnp.log((new + offset) / (tension_beyond + offset))
         stuck = (1.0 - 1e-13) * ratio
         return (old_beyond, tension_beyond), jnp.where(new == old, stuck, predicted)
 

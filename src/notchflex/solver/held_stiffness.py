@@ -25,12 +25,15 @@ from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_slopes
 from notchflex.solver.element import Memory, bound_side
 from notchflex.solver.linear_step.linearisation import LinearisedRows, linearise
-from notchflex.solver.linear_step.row_layout import RowLayout, row_layout
-from notchflex.solver.programs.capacity import pad_rows
+from notchflex.solver.linear_step.rows import RowLayout, row_layout
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
-from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.programs.static_structure import (
+    PytreeLayout,
+    StaticStructure,
+    lane_sizes,
+    pad_rows,
+)
 from notchflex.solver.residual import evaluate
 from notchflex.solver.solver_state import SolverState
 
@@ -39,6 +42,11 @@ from notchflex.solver.solver_state import SolverState
 _HOLDING_STIFFNESS = 1e3
 # Slip assumed for a contact at its bound, which goes on sliding, mm.
 _SLIP = 1e-3
+# Inextensible tendons that a stroke leaves slack by less than this part of a notch's height count
+# as held: no drive sets strokes so well. Their strokes, with a norm of 1 over the modes, depend on
+# each other where a combination of them falls below the second number. The third is the tension, in
+# closing forces of a notch, below which no tendon is stressed.
+_NEARLY_HELD, _DEPENDENT, _UNSTRESSED = 1e-3, 1e-6, 1e-9
 # Number of states computed at once.
 _BATCH = 16
 
@@ -48,7 +56,8 @@ class HeldStiffness(NamedTuple):
 
     Attributes:
         stiffness: Against the modes, N mm per unit of mode squared (N mm/rad for arc notches).
-        sign: Sign of the determinant of the whole system, with all that is eliminated.
+        sign: Sign of the determinant of the whole system, with all that is eliminated; 0 where the
+            strokes of inextensible tendons depend on each other, so that many tensions answer them.
     """
 
     stiffness: Float[np.ndarray, "s modes modes"]
@@ -81,8 +90,15 @@ def held_stiffness(
         *rows, slopes = _rows.along((False, False, True, True), *vectors, *layouts)
         rows = LinearisedRows(*(one[:, : prepared.chain.flexures] for one in rows))
         by_stroke = None if commands.by_stroke is None else np.asarray(commands.by_stroke)[some]
-        matrix = _assemble(prepared.chain, form, rows, slopes, by_stroke)
-        yield _condense_on_modes(prepared.chain, form, matrix)
+        matrix, strokes = _assemble(prepared.chain, form, rows, slopes, by_stroke)
+        stiffness, sign = _condense_on_modes(prepared.chain, form, matrix)
+        if by_stroke is not None:
+            missing = np.asarray(solved.stroke)[some] - np.asarray(commands.target)[some]
+            determinate = _independent(prepared.chain, strokes, by_stroke, missing)
+            tension = np.asarray(solved.point[1])[some]
+            stressed = tension > _UNSTRESSED * float(prepared.chain.closing_force)
+            sign = np.where(determinate | ~stressed.any(axis=-1), sign, 0.0)
+        yield HeldStiffness(stiffness, sign)
 
 
 @native(4, lane_sizes)
@@ -118,8 +134,11 @@ def _assemble(
     rows: LinearisedRows,
     slopes: Float[np.ndarray, "s 3 t t"],
     by_stroke: np.ndarray | None,
-) -> Float[np.ndarray, "s m m"]:
-    """Assemble the matrix over the unknowns of all flexures, base to tip, then base tensions."""
+) -> tuple[Float[np.ndarray, "s m m"], Float[np.ndarray, "s t modes"]]:
+    """Assemble the matrix over the unknowns of all flexures, base to tip, then base tensions.
+
+    And the derivatives of the strokes by the modes.
+    """
     states, flexures, count = rows.residual.shape[:3]
     order = np.array(chain.tendon_order, int)
     tensions = flexures * count + np.arange(len(order))
@@ -145,6 +164,7 @@ def _assemble(
     natural_gap = np.asarray(chain.rods.length).sum(-1)
     compliance = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.contact_stiffness) * natural_gap)
     matrix[:, contacts, contacts] += compliance[:, None]
+    lengths = np.zeros((2, states, 0, size))
     if by_stroke is not None:
         lengths = np.zeros((2, states, len(order), size))
         by_tendon = back[:, form.beyond - 2 * len(order) :].reshape(states, 2, len(order), size)
@@ -153,13 +173,33 @@ def _assemble(
         matrix[:, tensions[:, None], tensions] += slopes[:, 0]
         soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.stroke_stiffness))
         matrix[:, tensions, tensions] += soft
-    return matrix
+    return matrix, lengths[0][..., modes.ravel()]
+
+
+def _independent(
+    chain: Chain,
+    strokes: Float[np.ndarray, "s t modes"],
+    by_stroke: Bool[np.ndarray, "s t"],
+    missing: Float[np.ndarray, "s t"],
+) -> Bool[np.ndarray, " s"]:
+    """Return whether the strokes of the inextensible tendons that are held are independent."""
+    nearly = _NEARLY_HELD * float(np.asarray(chain.rods.length).sum(axis=-1).min())
+    held = by_stroke & np.isinf(np.asarray(chain.axial_stiffness)) & (missing < nearly)
+    scaled = strokes / np.sqrt(np.asarray(chain.stiffness).ravel())
+    scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=-1, keepdims=True), 1e-300)
+    return np.array(
+        [
+            np.linalg.matrix_rank(rows[some], tol=_DEPENDENT) == some.sum()
+            for rows, some in zip(scaled, held, strict=True)
+        ],
+        bool,
+    )
 
 
 def _condense_on_modes(
     chain: Chain, form: RowLayout, matrix: Float[np.ndarray, "s m m"]
-) -> HeldStiffness:
-    """Condense the matrix to the robot's modes."""
+) -> tuple[Float[np.ndarray, "s modes modes"], Float[np.ndarray, " s"]]:
+    """Condense the matrix to the robot's modes; also its determinant's sign."""
     modes = np.arange(chain.flexures)[:, None] * form.unknowns + np.arange(form.modes)
     others = np.setdiff1d(np.arange(matrix.shape[-1]), modes)
     own = modes[np.asarray(chain.rods.padding_mask) == 0.0]  # without padding
@@ -170,7 +210,7 @@ def _condense_on_modes(
     response = np.linalg.solve(some[:, others[:, None], others], some[:, others[:, None], own])
     stiffness[finite] = some[:, own[:, None], own] - some[:, own[:, None], others] @ response
     sign[finite] = np.linalg.slogdet(some)[0]
-    return HeldStiffness(stiffness, sign)
+    return stiffness, sign
 
 
 def stable(
@@ -179,8 +219,8 @@ def stable(
     """Return whether every state is stable, with sticking contacts held."""
     verdicts = [
         sign > 0.0 and bool(_positive_definite(one) or _smallest(one) > 0.0)
-        for stiffness, signs in held_stiffness(prepared, commands, solved)
-        for one, sign in zip(stiffness, signs, strict=True)
+        for held in held_stiffness(prepared, commands, solved)
+        for one, sign in zip(*held, strict=True)
     ]
     return np.array(verdicts, bool)
 
@@ -190,8 +230,8 @@ def stability(
 ) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
     """Return the smallest real part of the eigenvalues and the determinant's sign, by state."""
     results = list(held_stiffness(prepared, commands, solved))
-    smallest = [_smallest(one) for stiffness, _ in results for one in stiffness]
-    return np.array(smallest), np.array([one for _, sign in results for one in sign])
+    smallest = [_smallest(one) for held in results for one in held.stiffness]
+    return np.array(smallest), np.concatenate([held.sign for held in results])
 
 
 def _positive_definite(stiffness: Float[np.ndarray, "m m"]) -> bool:

@@ -14,12 +14,41 @@ from notchflex._pytree import Pytree, choose
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.flexure import in_space
-from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
-from notchflex.solver.element import Iterate, Memory
+from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded, without_slack
+from notchflex.solver.element import Iterate, Memory, Unknowns, is_active, notch_heights
 from notchflex.solver.friction_predictor import MAX_LOG_RATIO_STEP, limit_slack, predict_contacts
 from notchflex.solver.linear_step.block_elimination import linear_step
 from notchflex.solver.residual import Evaluation, evaluate, rounding_growth
-from notchflex.solver.step_limits import limit_closing
+
+# A limited step goes slightly beyond the gap, so that the contact counts as closed: by these parts
+# of the gap and of the notch's height. Without the latter a gap that is a rounding error would
+# stop every step, and the contact would neither close nor open.
+_OVERTRAVEL, _OVERLAP = 1e-6, 1e-12
+
+
+def limit_closing(
+    chain: Chain, unknowns: Unknowns, at: Evaluation, step: Iterate, fraction: Float[Array, ""]
+) -> Iterate:
+    """Limit a step so that its fraction to be taken bends no notch beyond contact.
+
+    Beyond, the material law would be evaluated at an impossible strain, and the next step would
+    open the contact again.
+    """
+    modes = step.unknowns.modes
+    for group, response, force in zip(
+        chain.contact_pairs, at.contacts, unknowns.contact_force, strict=True
+    ):
+        if response.slope is None:
+            continue  # several flexures bring these bodies together
+        closing = -fraction * jnp.einsum("nlm,nm->nl", response.slope, modes)
+        is_open = ~is_active(chain, group, force, response.gap)
+        stops = (
+            is_open & (closing > response.gap) & (response.gap > 0.0) & (group.has_contact > 0.0)
+        )
+        reach = (1.0 + _OVERTRAVEL) * response.gap + _OVERLAP * notch_heights(chain)[:, None]
+        allowed = jnp.where(stops, reach / jnp.where(stops, closing, 1.0), 1.0)
+        modes = modes * jnp.minimum(jnp.min(allowed, axis=-1, keepdims=True), 1.0)
+    return step._replace(unknowns=step.unknowns._replace(modes=modes))
 
 
 class Settings(Pytree, eq=True):
@@ -62,6 +91,7 @@ class NewtonResult(NamedTuple):
         bound: Largest log ratios of the contacts there.
         material: Memory of the material there.
         stroke: Tendon drawn out at the base there, mm.
+        presses: Which contacts of notches press there.
         residual: Largest scaled residual there.
         iterations: Number of iterations.
         converged: Whether the residual is within the tolerance.
@@ -72,6 +102,7 @@ class NewtonResult(NamedTuple):
     bound: tuple[Float[Array, "n t 2"], ...]
     material: Any
     stroke: Float[Array, " t"]
+    presses: tuple[Bool[Array, "n l"], ...]
     residual: Float[Array, ""]
     iterations: Int[Array, ""]
     converged: Bool[Array, ""]
@@ -186,6 +217,9 @@ def newton(
         )
 
     best = jax.lax.while_loop(proceed, iterate, _begin(problem, start)).best
+    best = best._replace(
+        point=choose(best.converged, _without_rounding(chain, command, best), best.point)
+    )
     if not chain.law.remembers:
         return best
     # The loop does not carry the memory: it is long, and only that of the last point counts.
@@ -193,6 +227,16 @@ def newton(
     return best._replace(
         material=flexure_states(chain, modes, memory.material, with_pose=False).memory
     )
+
+
+def _without_rounding(chain: Chain, command: Command, solved: NewtonResult) -> Iterate:
+    """Set to zero the forces of contacts that do not press, and the tensions of slack tendons."""
+    point = without_slack(chain, command, solved.point, solved.stroke)
+    pushing = tuple(
+        jnp.where(presses, jnp.maximum(force, 0.0), 0.0)
+        for presses, force in zip(solved.presses, point.unknowns.contact_force, strict=True)
+    )
+    return point._replace(unknowns=point.unknowns._replace(contact_force=pushing))
 
 
 def _begin(problem: NewtonProblem, start: Iterate) -> _Iteration:
@@ -203,6 +247,7 @@ def _begin(problem: NewtonProblem, start: Iterate) -> _Iteration:
         bound=problem.memory.bound,
         material=(),
         stroke=jnp.zeros(problem.chain.tendons),
+        presses=tuple(group.has_contact > 1.0 for group in problem.chain.contact_pairs),
         residual=jnp.array(jnp.inf),
         iterations=jnp.array(-1),
         converged=jnp.array(False),
@@ -233,6 +278,12 @@ def _result(
         bound=tuple(span.bound for span in evaluation.spans),
         material=(),
         stroke=stroke(chain, evaluation.base),
+        presses=tuple(
+            is_active(chain, group, force, response.gap)
+            for group, force, response in zip(
+                chain.contact_pairs, point.unknowns.contact_force, evaluation.contacts, strict=True
+            )
+        ),
         residual=residual,
         iterations=iterations,
         converged=within

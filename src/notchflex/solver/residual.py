@@ -12,7 +12,7 @@ from typing import NamedTuple
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
-from notchflex.loads.applied import BodyLoads
+from notchflex.loads.command import BodyLoads
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.contact import GapResponse
 from notchflex.mechanics.flexure import FlexureState
@@ -149,7 +149,7 @@ def evaluate(
         viscosity, before = memory.damping
         balance = balance + viscosity * chain.stiffness * (unknowns.modes - before)
     contact_force = tuple(
-        signorini(chain, group.has_contact, force, response.gap)
+        signorini(chain, group, force, response.gap)
         for group, force, response in zip(
             chain.contact_pairs, unknowns.contact_force, contacts, strict=True
         )
@@ -222,12 +222,14 @@ def _spans(
     runs = group.runs
     # Not written with ln T, so that a slack tendon stays regular.
     turning = crossing.exit_turning, crossing.entry_turning
-    at_base = chain.friction.minimum_tension(of_group(base_tension, group), *turning)[None]
+    offset = chain.friction.offset()
+    at_base = of_group(base_tension, group)[None] + offset
     tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
     beyond_both = at_base * jnp.cumprod(tension_ratio[..., 0] * tension_ratio[..., 1], axis=0)
     transmitted = shift_from_base(beyond_both, at_base[0])
-    gap_tension = runs * tension_ratio[..., 0] * transmitted
-    body_tension = tension_ratio[..., 1] * gap_tension
+    in_gap = tension_ratio[..., 0] * transmitted
+    gap_tension = runs * (in_gap - offset)
+    body_tension = runs * (tension_ratio[..., 1] * in_gap - offset)
     shortening = runs * (group.natural_gap - crossing.length)
     in_body = body_tension * group.body_length
     lengths = jnp.stack([shortening, gap_tension * group.natural_gap + in_body])
@@ -236,7 +238,7 @@ def _spans(
     stiffness = of_group(chain.memory_stiffness, group)[None]
     at_exit = summed[0] + summed[1] / stiffness
     at_entry = beyond[0] + (beyond[1] + in_body) / stiffness
-    limits = chain.friction.limits(*turning, (transmitted, gap_tension), log_ratio)
+    limits = chain.friction.limits(*turning, (transmitted - offset, gap_tension), log_ratio)
     return TendonSpans(
         crossing=crossing,
         tension_ratio=tension_ratio,

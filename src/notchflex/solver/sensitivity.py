@@ -130,6 +130,3 @@ def _zero_with_tangent(known: Array, varied: Array) -> Array:
 def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Array, Array]:
     known, varied = primals
     return jnp.zeros_like(varied), tangents[1] * jnp.where(known, 1.0, jnp.nan)
-
-
-__all__ = ["SubstepHistory", "attach_derivatives"]

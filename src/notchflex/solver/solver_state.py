@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant
-from notchflex.loads.applied import BodyLoads
+from notchflex.loads.command import BodyLoads
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.element import Iterate, Memory, Unknowns
 

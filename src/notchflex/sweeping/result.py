@@ -1,8 +1,9 @@
-"""A sweep as it lies in its folder: rows as a frame of polars, and what is summed up of them."""
+"""A sweep as it lies in its folder: what it is, its rows, and what is summed up of them."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,18 +15,56 @@ from jaxtyping import Int
 from notchflex._extras import need
 from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import InputError
-from notchflex.pieces.piece import piece_file
+from notchflex.pieces.folder import CODES, Manifest, check_own, head_of, manifest_in, piece_file
 from notchflex.pieces.sketch import Scale, Sketch
 from notchflex.results.files.json import write_json
 from notchflex.robot import Robot
 from notchflex.robot.error_messages import nearest
-from notchflex.sweeping.manifest import SweepManifest
-from notchflex.sweeping.plan.parts import SweepPlan
-from notchflex.sweeping.points import axis_values
+from notchflex.robot.robot import from_table, to_table
+from notchflex.sweeping.plan import SweepPlan, plan_from_table, plan_table
+from notchflex.sweeping.rows import SweepModel, axis_values
+from notchflex.tolerancing.study import piece_rows
 
 if TYPE_CHECKING:
     from polars import DataFrame, LazyFrame
     from xarray import Dataset
+
+
+KIND = "sweep"
+
+
+class SweepManifest(Manifest):
+    """Manifest of a sweep."""
+
+    @classmethod
+    def of(cls, plan: SweepPlan, robot: Robot, model: SweepModel) -> SweepManifest:
+        """Make the manifest of a plan.
+
+        Args:
+            plan: The plan.
+            robot: The robot that it names.
+            model: The model of both.
+        """
+        table = plan_table(plan)
+        return cls.made(
+            KIND,
+            plan.rows,
+            plan.piece or piece_rows(plan.rows, model),
+            plan={key: value for key, value in table.items() if key != "robot"},
+            robot=to_table(robot),
+            columns=list(model.columns),
+        )
+
+    @property
+    def plan(self) -> SweepPlan:
+        """The plan; its robot is only a name."""
+        return plan_from_table({**self.document["plan"], "robot": self.document["robot"]["name"]})
+
+    @property
+    def robot(self) -> Robot:
+        """The robot that is varied."""
+        return from_table(self.document["robot"])
+
 
 SUMMARY = "summary.json"
 _MAX_XARRAY = 100_000_000
@@ -258,3 +297,60 @@ def write_summary(sweep: Sweep) -> None:
         InputError: It cannot be written.
     """
     write_json(str(sweep.directory / SUMMARY), sweep.document())
+
+
+def check_content(manifest: SweepManifest, directory: str | os.PathLike[str]) -> None:
+    """Raise unless plan, robot and columns can be read from a manifest.
+
+    Raises:
+        InputError: Its file was changed.
+    """
+    try:
+        _ = manifest.plan, manifest.robot
+        columns = manifest.document["columns"]
+        if not isinstance(columns, list) or not all(isinstance(one, str) for one in columns):
+            raise TypeError
+    except (InputError, LookupError, TypeError, AttributeError):
+        raise InputError.FILE_DAMAGED(
+            f"{directory} cannot be read: its sweep.json was changed; give the plan again with "
+            "another folder."
+        ) from None
+
+
+def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
+    """Read a sweep, which may be unfinished.
+
+    Args:
+        directory: Its folder.
+
+    Returns:
+        The sweep: `lazy` and `to_xarray` are its rows.
+
+    Raises:
+        InputError: It is not a folder of a sweep, its `sweep.json` was changed, or polars is not
+            installed.
+    """
+    need("polars", "data", "read_sweep")
+    manifest = SweepManifest(manifest_in(directory, KIND).document)
+    check_content(manifest, directory)
+    output = manifest.plan.output
+    pieces: list[int] = []
+    codes = np.zeros(len(CODES), int)
+    failures: list[int] = []
+    sketches = {name: Sketch() for name in manifest.document["columns"]}
+    scales: dict[str, Scale] = {}
+    for piece in range(manifest.pieces):
+        file = piece_file(directory, piece)
+        head = head_of(file, manifest, piece)
+        if head is None:
+            continue
+        pieces.append(piece)
+        codes += np.array(head["codes"])
+        failures += head["failures"][: output.failures - len(failures)]
+        scales = {name: Scale(*pair) for name, pair in head["scales"].items()}
+        for name, document in head["columns"].items():
+            sketches[name] = sketches[name].merged(Sketch.read(document), output.extremes)
+    if not pieces:
+        check_own(directory, manifest)
+    counts: dict[str, int] = dict(zip(CODES, codes.tolist(), strict=True))
+    return Sweep(Path(directory), manifest, tuple(pieces), counts, failures, sketches, scales)

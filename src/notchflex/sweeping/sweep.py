@@ -1,25 +1,26 @@
-"""Runs a sweep, or what is left of it."""
+"""Runs a sweep, or what is left of it; estimates before it starts."""
 
 from __future__ import annotations
 
 import os
+import shutil
+import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from threadpoolctl import threadpool_limits
 
+from notchflex._extras import need
 from notchflex.errors import InputError
 from notchflex.loads.validation import check_integer, short_repr
-from notchflex.pieces.folder import check_target
+from notchflex.pieces.folder import FAILED, check_target, encoded
 from notchflex.pieces.run import Progress, check_workers, open_folder, run_pieces
 from notchflex.robot import Robot, load_robot
-from notchflex.sweeping.manifest import KIND, SweepManifest
-from notchflex.sweeping.model import model_of
-from notchflex.sweeping.plan import SweepPlan, read_plan
-from notchflex.sweeping.plan.reading import plan_from_table
-from notchflex.sweeping.reading import read_sweep
-from notchflex.sweeping.result import Sweep, write_summary
+from notchflex.solver.programs.threads import number_of_cores
+from notchflex.sweeping.plan import SweepPlan, plan_from_table, read_plan
+from notchflex.sweeping.result import KIND, Sweep, SweepManifest, read_sweep, write_summary
+from notchflex.sweeping.rows import model_of
 from notchflex.sweeping.worker import SweepWorker
 
 
@@ -40,7 +41,7 @@ def sweep(
     Args:
         plan: The plan, or the file that holds it; or its tables, as in the file.
         directory: The folder of the sweep; it is made if it is missing.
-        workers: Number of processes of dask on this machine; threads of this process if None.
+        workers: Number of processes of this machine; threads of this process if None.
         scheduler: Address of a scheduler of dask, whose workers see the same folder.
         part: Only this part of the pieces, such as (7, 100): the seventh of a hundred.
         progress: Called with rows done, rows in all, rows without a result, and rows done by
@@ -121,3 +122,68 @@ def check_part(part: tuple[int, int]) -> tuple[int, int]:
     if not 1 <= first <= count <= 10**9:
         raise InputError.OUT_OF_RANGE(f"part {first} of {count}: give one from 1 to {count}.")
     return first, count
+
+
+_LONG = 1.0
+"""Seconds: a shorter piece is timed once more, without what the first one prepares."""
+
+
+class Estimate(NamedTuple):
+    """Estimated size and time of a sweep.
+
+    Attributes:
+        rows: Its rows.
+        pieces: Its pieces.
+        piece_rows: Rows of a piece.
+        workers: Threads or processes.
+        row_seconds: Time of one row on one core, s.
+        seconds: Time of the sweep, s.
+        bytes: Size of its files.
+        free: Free space where the sweep would be written from, in bytes.
+        solved: Rows that were solved for this.
+        unsolved: How many of them have no result.
+        one_by_one: Whether robots are assembled one by one, which takes long.
+    """
+
+    rows: int
+    pieces: int
+    piece_rows: int
+    workers: int
+    row_seconds: float
+    seconds: float
+    bytes: float
+    free: int
+    solved: int
+    unsolved: int
+    one_by_one: bool
+
+
+def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = None) -> Estimate:
+    """Solve the first piece of a sweep, and estimate its whole time and size; nothing is written.
+
+    Args:
+        plan: The plan, or the file that holds it.
+        workers: As for `sweep`.
+    """
+    need("polars", "data", "sweep")
+    chosen, robot = plan_and_robot(plan)
+    model = model_of(chosen, robot)
+    manifest = SweepManifest.of(chosen, robot, model)
+    worker = SweepWorker(manifest, model)
+    worker.prepare()
+    start = time.perf_counter()
+    data, head = encoded(worker, 0)
+    taken = time.perf_counter() - start
+    if taken < _LONG:
+        start = time.perf_counter()
+        data, head = encoded(worker, 0)
+        taken = time.perf_counter() - start
+    solved = manifest.between(0)[1]
+    cores = min(workers or number_of_cores(), manifest.pieces)
+    each = taken / solved
+    size = len(data) * (manifest.rows / solved if chosen.output.rows else manifest.pieces)
+    return Estimate(
+        manifest.rows, manifest.pieces, manifest.document["piece"], cores, each,
+        each * manifest.rows / cores, size, shutil.disk_usage(".").free, solved,
+        sum(head["codes"][FAILED:]), model.one_by_one,
+    )  # fmt: skip

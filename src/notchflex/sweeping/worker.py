@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.pieces.codes import CODES, FAILED
-from notchflex.pieces.piece import Piece, Recipe
+from notchflex.pieces.folder import CODES, FAILED, Piece, Recipe
 from notchflex.pieces.sketch import Scale, Sketch
-from notchflex.sweeping.manifest import KIND, SweepManifest
-from notchflex.sweeping.model import SweepModel, model_of
-from notchflex.sweeping.points import Points
+from notchflex.sweeping.result import KIND, SweepManifest
+from notchflex.sweeping.rows import Points, SweepModel, model_of
 from notchflex.tolerancing.study import Outcomes
 
 _SCALED = 1024

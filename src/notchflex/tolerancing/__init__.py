@@ -1,9 +1,7 @@
 """Tolerances and acceptance limits: worst case, yield, and which dimension to control."""
 
-from notchflex.tolerancing.analysis import tolerance_analysis
-from notchflex.tolerancing.reading import read_tolerance_spec
-from notchflex.tolerancing.result import ToleranceAnalysis
-from notchflex.tolerancing.spec import AcceptanceLimit, ToleranceSpec
+from notchflex.tolerancing.analysis import ToleranceAnalysis, tolerance_analysis
+from notchflex.tolerancing.spec import AcceptanceLimit, ToleranceSpec, read_tolerance_spec
 
 __all__ = ["AcceptanceLimit", "ToleranceAnalysis", "ToleranceSpec"]
 __all__ += ["read_tolerance_spec", "tolerance_analysis"]

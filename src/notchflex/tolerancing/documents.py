@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from notchflex.errors import InputError
-from notchflex.pieces.codes import CODES
+from notchflex.pieces.folder import CODES
 from notchflex.results.files.json import document_head
-from notchflex.tolerancing.drawn import DrawnPieces
+from notchflex.tolerancing.analysis import ToleranceAnalysis
 from notchflex.tolerancing.linear import WORST_SD
-from notchflex.tolerancing.result import ToleranceAnalysis
+from notchflex.tolerancing.study import DrawnPieces
 
 PERCENTILES = (2.5, 50.0, 97.5)
 

@@ -1,30 +1,53 @@
-"""Robots at levels of their tolerances, solved under all loads: the numbers that have limits."""
+"""Robots within tolerances, solved under all loads: at levels, drawn, in memory or in pieces.
+
+A piece is a part of one replicate of scrambled Sobol points.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import math
+import os
+import pickle
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from notchflex._quantity import REGISTERED
-from notchflex.analysis.batch import simulate_batch
+from notchflex.analysis.batch import simulate_batch, simulate_varied
 from notchflex.analysis.outputs import Batch
 from notchflex.analysis.solve import simulate
 from notchflex.analysis.uncertainty.draws import ToleranceSource, sources_of, values_at
+from notchflex.analysis.varied import VariedChains, varied_chains
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
-from notchflex.pieces.codes import ACCEPTED, FAILED, INVALID, REJECTED
+from notchflex.pieces.folder import (
+    ACCEPTED,
+    CODES,
+    FAILED,
+    INVALID,
+    REJECTED,
+    Manifest,
+    Piece,
+    Recipe,
+    finished_head,
+    plain,
+)
+from notchflex.pieces.run import PieceFolder, Progress
+from notchflex.pieces.sketch import Scale, Sketch
+from notchflex.pieces.sobol import SobolPart
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
+from notchflex.robot.robot import to_table
 from notchflex.robot.tolerance import Tolerance
 from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.solver.newton import Settings
-from notchflex.tolerancing.criteria import Criterion, criteria_of
-from notchflex.tolerancing.spec import ToleranceSpec
+from notchflex.tolerancing.spec import Criterion, ToleranceSpec, criteria_of
+from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicate
 
 TAIL = 1e-6
 """What a normal distribution has beyond its end is drawn at the end: 1e-6 on either side, 4.8
@@ -86,7 +109,7 @@ class Study:
         last: dict[str, int] = {}
         for one in self.criteria:
             last[one.load] = max(last.get(one.load, 0), one.step + 1)
-        return {name: self.paths[name].load.part(0, steps) for name, steps in last.items()}
+        return {name: self.paths[name].load[:steps] for name, steps in last.items()}
 
     @cached_property
     def ranges(self) -> dict[str, tuple[float, float]]:
@@ -130,21 +153,13 @@ class Study:
             own = [index for index, one in enumerate(self.criteria) if one.load == name]
             outputs = tuple(dict.fromkeys(self.criteria[index].quantity.name for index in own))
             part = _part_of(progress, number, len(self.loads))
-            quantities = self.follow(robots, name, load, (*outputs, "converged"), part)
-            converged, turn = quantities["converged"], self.paths[name].base_to_world
-            turned = {
-                name: quantities[name]
-                if turn is None
-                else REGISTERED[name].turned(quantities[name], turn)
-                for name in outputs
-            }
+            quantities = self.follow(robots, name, load, outputs, part)
             for index in own:
                 criterion = self.criteria[index]
-                accepted = converged[:, criterion.step]
-                values[rows, index] = np.where(
-                    accepted, criterion.of(turned[criterion.quantity.name]), np.nan
-                )
-            failed = ~converged.all(axis=1)
+                accepted = quantities["converged"][:, criterion.step]
+                result = criterion.of(quantities[criterion.quantity.name])
+                values[rows, index] = np.where(accepted, result, np.nan)
+            failed = ~quantities["converged"].all(axis=1)
             codes[rows[failed]] = FAILED
         codes[(codes == ACCEPTED) & ~self.within(values).all(axis=1)] = REJECTED
         return Outcomes(values, codes)
@@ -227,3 +242,347 @@ def _part_of(
     if progress is None:
         return None
     return lambda done, count: progress(number * count + done, parts * count)
+
+
+SAMPLE = 4096
+"""Rows that polynomials of chains are made and checked with, from all over the study."""
+
+_EACH = 1024
+"""Largest number of separately assembled robots at a time: a chain takes much memory."""
+
+_PIECES = 16
+"""Approximate number of pieces of a study, unless they would be too small or too large."""
+_MIN_ROWS, _MAX_ROWS = 2**12, 2**18
+_MAX_SLOW_ROWS = 2**12
+"""Rows of a piece at most where robots are assembled one by one, which takes a thousand times as
+long: a piece that is lost, or waited for, is then no longer either."""
+_MAX_BYTES = 2**27
+"""What the solver returns of one piece at most, so that a worker needs less than 1 GiB."""
+
+
+@dataclass(frozen=True, eq=False)
+class PieceStudy(Study):
+    """A study whose polynomials of chains come from a sample that is always the same.
+
+    Attributes:
+        sample: Numbers of some rows from all over the study, by name.
+    """
+
+    sample: Mapping[str, Float[np.ndarray, " k"]] = dataclasses.field(
+        default_factory=dict[str, np.ndarray]
+    )
+
+    @cached_property
+    def chains(self) -> dict[str, VariedChains | None]:
+        """Chains of varied robots under every load; None where each is assembled separately."""
+        robots = VariedRobots(self.exact, self.sample, self.ranges)
+        if not robots.valid().all():
+            return dict.fromkeys(self.loads)
+        return {
+            name: varied_chains(robots, load, self.refinement) for name, load in self.loads.items()
+        }
+
+    @property
+    def one_by_one(self) -> bool:
+        """Whether robots are assembled one by one, under any load."""
+        return None in self.chains.values()
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes that the solver returns of one row."""
+        sizes: dict[tuple[str, str], int] = {}
+        for one in self.criteria:
+            values = self.paths[one.load].quantity(one.quantity.name)[0]
+            sizes[one.load, one.quantity.name] = len(self.loads[one.load]) * max(values.size, 1)
+        return 8 * sum(sizes.values())
+
+    def follow(
+        self, robots: VariedRobots, name: str, load: LoadPath, outputs: tuple[str, ...], part: Any
+    ) -> Batch:
+        """Follow a load with all robots, in the calling thread."""
+        del part
+        chains = self.chains[name]
+        options: dict[str, Any] = {"outputs": outputs, "settings": self.settings}
+        if chains is not None and chains.polynomial.covers(robots.table):
+            return simulate_varied(dataclasses.replace(chains, numbers=robots.table), **options)
+        parts = [
+            simulate_batch(
+                list(robots[start : start + _EACH]),
+                load, refinement=self.refinement, cores=1, **options,
+            )
+            for start in range(0, len(robots), _EACH)
+        ]  # fmt: skip
+        return Batch({key: np.concatenate([one[key] for one in parts]) for key in parts[0]})
+
+    def at(self, numbers: Mapping[str, Float[np.ndarray, " k"]]) -> Outcomes:
+        """Solve robots: numbers in the units of files, NaN where there is no result."""
+        count = len(next(iter(numbers.values())))
+        outcomes = self.solved(numbers, count)
+        scale = np.array([one.quantity.scale for one in self.criteria])
+        return Outcomes(outcomes.values * scale, outcomes.codes)
+
+
+def piece_rows(rows: int, study: PieceStudy) -> int:
+    """Return the rows of a piece, a power of two.
+
+    Args:
+        rows: Rows of the study.
+        study: The study.
+    """
+    size = 2 ** math.ceil(math.log2(max(rows / _PIECES, 1)))
+    most = 2 ** int(math.log2(max(_MAX_BYTES / study.row_bytes, 16)))
+    return min(max(size, _MIN_ROWS), _MAX_SLOW_ROWS if study.one_by_one else _MAX_ROWS, most)
+
+
+Histogram = tuple[Float[np.ndarray, " edges"], Int[np.ndarray, " bins"]]
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnRobots:
+    """The robots that were drawn within the tolerances.
+
+    Attributes:
+        numbers: Their numbers by name, (draws,).
+        outcomes: What became of them.
+    """
+
+    numbers: Mapping[str, Float[np.ndarray, " draws"]]
+    outcomes: Outcomes
+
+    @property
+    def codes(self) -> Int[np.ndarray, " codes"]:
+        """Number of robots by each of `CODES`."""
+        return np.bincount(self.outcomes.codes, minlength=len(CODES))
+
+    @property
+    def accepted(self) -> Int[np.ndarray, " replicates"]:
+        """Number of accepted robots in each replicate."""
+        return self.outcomes.accepted.reshape(REPLICATES, -1).sum(axis=1)
+
+    def beyond(self, criteria: Sequence[Criterion]) -> tuple[np.ndarray, np.ndarray]:
+        """Return how many robots are below and above the limits of each number, (k,) each."""
+        return beyond(self.outcomes.values, criteria)
+
+    def percentile(self, part: float) -> Float[np.ndarray, " k"]:
+        """Return the value of each number that a part of the robots stays below."""
+        values = self.outcomes.values
+        values = values[np.isfinite(values).all(axis=1)]
+        size = values.shape[1]
+        return np.quantile(values, part, axis=0) if len(values) else np.full(size, np.nan)
+
+    def histogram(self, index: int, bins: int) -> Histogram:
+        """Return edges and counts of the values of a number; both empty without a result."""
+        values = self.outcomes.values[:, index]
+        values = values[np.isfinite(values)]
+        if not len(values):
+            return np.zeros(0), np.zeros(0, int)
+        counts, edges = np.histogram(values, bins)
+        return edges, counts
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnPieces:
+    """Summary of robots that were drawn in pieces.
+
+    Attributes:
+        directory: The folder of the pieces.
+        codes: How many robots have each of `CODES`.
+        accepted: How many robots of each replicate are accepted.
+        below: How many robots are below the lower limit of each number, (k,).
+        above: The same above the upper limit.
+        sketches: Statistics of each number.
+        scales: Scales of the statistics.
+    """
+
+    directory: str | os.PathLike[str]
+    codes: Int[np.ndarray, " codes"]
+    accepted: Int[np.ndarray, " replicates"]
+    below: Int[np.ndarray, " k"]
+    above: Int[np.ndarray, " k"]
+    sketches: Sequence[Sketch]
+    scales: Sequence[Scale]
+
+    def beyond(self, criteria: Sequence[Criterion]) -> tuple[np.ndarray, np.ndarray]:
+        """Return how many robots are below and above the limits of each number, (k,) each."""
+        del criteria
+        return self.below, self.above
+
+    def percentile(self, part: float) -> Float[np.ndarray, " k"]:
+        """Return the value of each number that a part of the robots stays below.
+
+        It is exact to 1/1000 of half the range of most values.
+        """
+        both = zip(self.sketches, self.scales, strict=True)
+        return np.array([sketch.quantile(part, scale) for sketch, scale in both])
+
+    def histogram(self, index: int, bins: int) -> Histogram:
+        """Return edges and counts of the values of a number; both empty without a result."""
+        edges, counts = self.sketches[index].histogram(bins, self.scales[index])
+        return np.array(edges), np.array(counts, int)
+
+
+def beyond(
+    values: Float[np.ndarray, "robots k"], criteria: Sequence[Criterion]
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """Return how many robots are below and above the limits of each number."""
+    lower, upper = (np.array([getattr(one, end) for one in criteria]) for end in ("lower", "upper"))
+    return (values < lower).sum(axis=0), (values > upper).sum(axis=0)
+
+
+KIND = "tolerance"
+_SCALED = 1024
+"""Robots of the sample that find the scales of statistics."""
+_EXTREMES = 10
+"""Smallest and largest values that are kept of each number."""
+
+
+class ToleranceTask:
+    """Robots at levels of their tolerances, in pieces.
+
+    Args:
+        study: What deviates, and the numbers that have limits.
+        spec: What it was made from.
+        draws: About how many robots are drawn.
+        seed: Of the draws.
+    """
+
+    def __init__(self, study: Study, spec: ToleranceSpec, draws: int, seed: int) -> None:
+        self._content = (study.robot, spec, study.tolerances, study.settings, study.refinement)
+        self._draws, self.seed, self.each = draws, seed, points_of_each(draws)
+        self._own = threading.local()
+        sources = len(study.sources)
+        levels = np.concatenate(
+            [
+                replicate(sources, self.each, seed, number).between(0, SAMPLE // REPLICATES)
+                for number in range(REPLICATES)
+            ]
+            if self.each >= SAMPLE // REPLICATES
+            else [np.random.default_rng(seed).random((SAMPLE, sources))]
+        )
+        self.study = PieceStudy(
+            study.robot, study.tolerances, study.paths, study.criteria, study.settings,
+            study.refinement, 1, sample=study.drawn(levels),
+        )  # fmt: skip
+        self.manifest = self._manifest()
+
+    def _manifest(self) -> Manifest:
+        """Return all that the bytes of pieces depend on."""
+        rows = REPLICATES * self.each
+        study = self.study
+        return Manifest.made(
+            KIND,
+            rows,
+            min(piece_rows(rows, study), self.each),
+            robot=to_table(study.exact),
+            tolerances=plain(study.tolerances),
+            loads=plain(study.loads),
+            limits=[
+                [one.name, one.load, one.step, plain(one.lower), plain(one.upper)]
+                for one in study.criteria
+            ],
+            settings=plain(study.settings),
+            refinement=study.refinement,
+            seed=self.seed,
+        )
+
+    @property
+    def recipe(self) -> Recipe:
+        """Recipe by which another process makes the same task."""
+        return Recipe(tolerance_task, pickle.dumps((self._content, self._draws, self.seed)))
+
+    def prepare(self) -> None:
+        """Find scales and polynomials, which all threads need."""
+        assert self.scales
+        assert self.study.chains
+
+    @cached_property
+    def scales(self) -> list[Scale]:
+        """Scales of the statistics of every number."""
+        sample = {name: one[:: SAMPLE // _SCALED] for name, one in self.study.sample.items()}
+        outcomes = self.study.solved(sample, len(next(iter(sample.values()))))
+        return [Scale.of(column) for column in outcomes.values.T]
+
+    def _sequence(self, number: int) -> SobolPart:
+        """Return a replicate, for the calling thread."""
+        if getattr(self._own, "number", None) != number:
+            self._own.number = number
+            self._own.part = replicate(len(self.study.sources), self.each, self.seed, number)
+        return self._own.part
+
+    def piece(self, number: int) -> Piece:
+        """Draw and solve the robots of one piece."""
+        import polars
+
+        start, stop = self.manifest.between(number)
+        which, first = divmod(start, self.each)
+        levels = self._sequence(which).between(first, first + stop - start)
+        outcomes = self.study.at_levels(levels)
+        below, above = beyond(outcomes.values, self.study.criteria)
+        solved = np.asarray(np.isfinite(outcomes.values).all(axis=1))
+        complete = np.where(solved[:, None], outcomes.values, np.nan)
+        columns = zip(np.ascontiguousarray(complete.T), self.scales, strict=True)
+        head = {
+            "codes": np.bincount(outcomes.codes, minlength=len(CODES)).tolist(),
+            "replicate": which,
+            "below": below.tolist(),
+            "above": above.tolist(),
+            "scales": [[one.middle, one.half] for one in self.scales],
+            "columns": [
+                Sketch.of(values, start, scale, _EXTREMES).document() for values, scale in columns
+            ],
+        }
+        code = polars.Series("code", CODES, polars.Enum(CODES)).gather(outcomes.codes)
+        frame: dict[str, Any] = {"code": code}
+        for one, values in zip(self.study.criteria, outcomes.values.T, strict=True):
+            unit = f" [{one.quantity.unit}]" if one.quantity.unit else ""
+            frame[f"{one.name}{unit}"] = np.ascontiguousarray(values) * one.quantity.scale
+        return Piece(polars.DataFrame(frame, nan_to_null=True), head)
+
+
+def tolerance_task(content: bytes) -> ToleranceTask:
+    """Make the task of another process again, from objects that it pickled."""
+    (robot, spec, tolerances, settings, refinement), draws, seed = pickle.loads(content)
+    study = study_of(robot, spec, tolerances, settings, refinement)
+    return ToleranceTask(study, spec, draws, seed)
+
+
+def draw_in_pieces(
+    study: Study,
+    spec: ToleranceSpec,
+    draws: int,
+    seed: int,
+    folder: PieceFolder,
+    progress: Progress | None = None,
+) -> DrawnPieces:
+    """Draw robots in pieces, and sum up what became of them.
+
+    Args:
+        study: What deviates, and the numbers that have limits.
+        spec: What it was made from.
+        draws: About how many robots are drawn.
+        seed: Of the draws.
+        folder: Where pieces are kept.
+        progress: Called with robots done, robots in all, those without a result, and those done by
+            earlier calls.
+
+    Raises:
+        InputError: The folder holds something else, or cannot be written.
+    """
+    task = ToleranceTask(study, spec, draws, seed)
+    folder.run(task, cores=study.cores, progress=progress)
+    size, manifest = len(study.criteria), task.manifest
+    codes, accepted = np.zeros(len(CODES), int), np.zeros(REPLICATES, int)
+    below, above = np.zeros(size, int), np.zeros(size, int)
+    sketches, scales = [Sketch() for _ in range(size)], [Scale(0.0, 1.0)] * size
+    for piece in range(manifest.pieces):
+        head = finished_head(folder.directory, manifest, piece)
+        codes += np.array(head["codes"])
+        accepted[head["replicate"]] += head["codes"][ACCEPTED]
+        below += np.array(head["below"], int)
+        above += np.array(head["above"], int)
+        scales = [Scale(*pair) for pair in head["scales"]]
+        sketches = [
+            one.merged(Sketch.read(document), _EXTREMES)
+            for one, document in zip(sketches, head["columns"], strict=True)
+        ]
+    return DrawnPieces(folder.directory, codes, accepted, below, above, sketches, scales)

@@ -1,8 +1,8 @@
-"""Address and access of the page: other pages in the same browser are refused.
+"""Address and access of the page: only who knows its token is answered.
 
-A page of another site can send requests to 127.0.0.1, and after DNS rebinding even under its own
-name. Browsers send the page in `Origin` and the name that it used in `Host`, and a page can
-forge neither.
+Every user of the machine reaches 127.0.0.1, and so does a page of any site in a browser. The token
+is random and part of the printed address. The page keeps it as a cookie, which a browser does not
+send for other sites; a page of another port of the same machine is told by its `Origin`.
 
 viser 1.1 has no setting for a check and hands its own `process_request` to `websockets`. Its server
 thread looks `websockets.asyncio.server.serve` up when it starts, so that public function is
@@ -14,15 +14,18 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import hmac
 import http
 import importlib.util
 import io
 import ipaddress
+import secrets
 import socket
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
+from http.cookies import CookieError, SimpleCookie
 from threading import Lock
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 from notchflex.errors import InputError
 
@@ -68,8 +71,8 @@ def exposed(host: str) -> str:
     if is_this_machine_only(host):
         return ""
     return (
-        f"the viewer serves on {host}, not on {HOST} alone: whoever reaches this machine over the "
-        "network sees the robot, loads it and can send other robots; there is no password"
+        f"the viewer serves on {host}, not on {HOST} alone, and without encryption: whoever reads "
+        "the network or the printed address can use it"
     )
 
 
@@ -93,20 +96,22 @@ def check_host(host: str, port: int) -> None:
         ) from None
 
 
-_LOOPBACK = ("127.0.0.1", "localhost", "::1")
-_HTTP = 80  # browsers leave this port out
 _starting = Lock()
 
 
-def serve(host: str, port: int) -> viser.ViserServer:
+def serve(host: str, port: int) -> tuple[viser.ViserServer, str]:
     """Begin to serve on a host and a port, or the next free one; without messages.
+
+    Returns:
+        The server, and the address with its token.
 
     Raises:
         InputError: This version of viser cannot be guarded; nothing is served.
     """
     import viser
 
-    with _guarded(host) as guarded, contextlib.redirect_stdout(io.StringIO()):
+    token = secrets.token_urlsafe(24)
+    with _guarded(token) as guarded, contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=host, port=port, verbose=False)
     if server.get_port() not in guarded:
         server.stop()
@@ -116,11 +121,12 @@ def serve(host: str, port: int) -> viser.ViserServer:
         )
     # A page could ask for a public address, through a server of others.
     server.request_share_url = lambda verbose=True: None
-    return server
+    name = f"[{host}]" if ":" in host else host
+    return server, f"http://{name}:{server.get_port()}/?token={token}"
 
 
 @contextlib.contextmanager
-def _guarded(host: str) -> Generator[list[int]]:
+def _guarded(token: str) -> Generator[list[int]]:
     """Check the requests of servers that start inside the `with`; yield their ports."""
     from websockets.asyncio import server as module
 
@@ -130,7 +136,7 @@ def _guarded(host: str) -> Generator[list[int]]:
     def guarded_serve(handler: Any, address: str, port: int, **options: Any) -> Any:
         answer = options.pop("process_request", None)
         ports.append(port)
-        check = functools.partial(_answer, host, port, answer)
+        check = functools.partial(_answer, token, f"notchflex-{port}", answer)
         return plain(handler, address, port, process_request=check, **options)
 
     with _starting:
@@ -142,82 +148,26 @@ def _guarded(host: str) -> Generator[list[int]]:
 
 
 def _answer(
-    host: str, port: int, answer: Callable[[Any, Any], Any] | None, connection: Any, request: Any
+    token: str,
+    cookie: str,
+    answer: Callable[[Any, Any], Any] | None,
+    connection: Any,
+    request: Any,
 ) -> Any:
-    """Refuse a request, or pass it on."""
+    """Refuse a request, or pass it on; the page that is opened with the token gets a cookie."""
     headers = request.headers
-    reason = refusal(host, port, headers.get_all("Host"), headers.get_all("Origin"))
-    if reason is not None:
-        return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
-    return None if answer is None else answer(connection, request)
-
-
-def refusal(host: str, port: int, asked_for: Sequence[str], asked_by: Sequence[str]) -> str | None:
-    """Return why a request to a served host and port is refused, or None if it is allowed.
-
-    `asked_for` are the values of the header `Host`, `asked_by` those of `Origin`, which only
-    browsers send.
-
-    Example:
-        >>> refusal("127.0.0.1", 8080, ["localhost:8080"], ["http://localhost:8080"]) is None
-        True
-        >>> refusal("127.0.0.1", 8080, ["evil.example:8080"], []) is None
-        False
-    """
-    remedy = f"open http://{bracketed(host)}:{port}, with this port also through a tunnel"
-    if len(asked_for) != 1 or not _is_served(host, port, asked_for[0]):
-        names = ", ".join(map(repr, asked_for)) or "(missing)"
-        return f"Host {names} is not the address of this viewer; {remedy}"
-    if len(asked_by) > 1:
-        return f"the request names several origins; {remedy}"
-    for origin in asked_by:
-        scheme, _, address = origin.partition("://")
-        # Where every address is served, a page of another address must not pass for this one.
-        another = _is_wildcard(host) and _parts(address) != _parts(asked_for[0])
-        if scheme != "http" or another or not _is_served(host, port, address):
-            return f"Origin {origin!r} is another page; {remedy}"
-    return None
-
-
-def bracketed(host: str) -> str:
-    """Return a host for an address: IPv6 in brackets."""
-    return f"[{host}]" if ":" in host else host
-
-
-def _is_served(host: str, port: int, address: str) -> bool:
-    """Return whether an address such as `localhost:8080` is served."""
-    name, at = _parts(address)
-    if at != port:
-        return False
-    if name == host.lower() or name in _LOOPBACK:
-        return True
-    # On all addresses: any number will do, but of names only this machine's own, because
-    # rebinding needs a name.
-    machine = socket.gethostname().lower()
-    return _is_wildcard(host) and (
-        _number(name) is not None or name in (machine, f"{machine}.local")
-    )
-
-
-def _parts(address: str) -> tuple[str, int]:
-    """Return name and port of an address; "" and 0 if it is invalid."""
-    try:
-        split = urlsplit(f"//{address}")
-        port = split.port
-    except ValueError:
-        return "", 0
-    if split.hostname is None or split.netloc != address or "@" in address:
-        return "", 0
-    return split.hostname, _HTTP if port is None else port
-
-
-def _number(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
-    try:
-        return ipaddress.ip_address(name)
-    except ValueError:
-        return None
-
-
-def _is_wildcard(host: str) -> bool:
-    number = _number(host)
-    return number is not None and number.is_unspecified
+    in_address = parse_qs(urlsplit(request.path).query).get("token", [""])[-1]
+    cookies = SimpleCookie()
+    with contextlib.suppress(CookieError):
+        cookies.load("; ".join(headers.get_all("Cookie")))
+    in_cookie = cookies[cookie].value if cookie in cookies else ""
+    known = [hmac.compare_digest(one.encode(), token.encode()) for one in (in_address, in_cookie)]
+    own_page = {f"http://{host}" for host in headers.get_all("Host")}
+    if not any(known) or not own_page.issuperset(headers.get_all("Origin")):
+        text = "Open the address that notchflex printed; it holds a token.\n"
+        return connection.respond(http.HTTPStatus.FORBIDDEN, text)
+    response = None if answer is None else answer(connection, request)
+    if response is not None and known[0]:
+        kept = f"{cookie}={token}; Path=/; HttpOnly; SameSite=Strict"
+        response.headers["Set-Cookie"] = kept
+    return response

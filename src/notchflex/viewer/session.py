@@ -1,16 +1,23 @@
-"""A robot, its load history and its state: the model behind the page."""
+"""A robot, its load history and its state: the model behind the page, and drives toward a point."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from notchflex.analysis import simulate
+from notchflex.control import Limits, TargetSearch, reach
+from notchflex.control.limits import Drive
+from notchflex.errors import InputError
+from notchflex.loads import Load
 from notchflex.results import Equilibrium, EquilibriumPath
-from notchflex.robot import Robot
-from notchflex.viewer.controls import STROKE, TENSION, Controls
+from notchflex.robot import Friction, Material, Robot, kinds_of, list_robots, load_robot, to_table
+from notchflex.robot.fields import fields_of, is_list
+from notchflex.viewer.controls import POINTING, STROKE, TENSION, ControlRanges, Controls
 
 
 @dataclass
@@ -147,3 +154,135 @@ class Session:
     def path(self) -> EquilibriumPath:
         """Return the whole history as one path from rest, as `notchflex.simulate` finds it."""
         return simulate(self.robot, [one.load() for one in self.history.controls])
+
+
+# Finer than a screen shows, and never longer than an update may take.
+_SEARCH = TargetSearch(tolerance=1e-3, solves=8)
+
+
+class Steered(NamedTuple):
+    """Settings that bring the tip to a point, or next to it.
+
+    Attributes:
+        controls: The settings.
+        error: Distance of the tip from the point, mm.
+        reached: Whether the tip is there.
+    """
+
+    controls: Controls
+    error: float
+    reached: bool
+
+
+def steer(session: Session, ends: ControlRanges, point: Float[np.ndarray, " 3"]) -> Steered:
+    """Find settings of the tendons that bring the tip to a point, within their sliders.
+
+    Tendons that are pulled by tension are driven, all others held; where there are none, all
+    strokes. Where the tip is at the point already, nothing moves: a smaller tension that friction
+    lets hold the tip would only make the robot creep while the mouse rests.
+
+    Args:
+        session: The robot in its present state, with its friction history.
+        ends: Ends of the sliders.
+        point: Where the tip is to be, in the world, mm.
+    """
+    controls, robot = session.controls, session.robot
+    away = float(np.linalg.norm(session.solved.tip_position - point))
+    if away <= _SEARCH.tolerance:
+        return Steered(controls, away, True)
+    drive: Drive = TENSION if TENSION in controls.by else STROKE
+    driven = [by == drive for by in controls.by]
+    held = [None if free else value for free, value in zip(driven, controls.value, strict=True)]
+    none = [None] * len(held)
+    load = Load(
+        tension=none if drive == TENSION else held,
+        stroke=held if drive == TENSION else none,
+        tip_force=controls.tip_force,
+        tip_mass=controls.tip_mass,
+        base_rotation=POINTING[session.pointing],
+    )
+    low, high = zip(*(ends.ends(tendon, drive) for tendon in range(len(held))), strict=True)
+    limits = Limits(tension=(low, high)) if drive == TENSION else Limits(stroke=(low, high))
+    state = session.solved.state
+    reached = reach(
+        robot,
+        point,
+        state=state,
+        load=load,
+        drive=drive,
+        limits=limits,
+        approach="direct",
+        search=_SEARCH,
+    )
+    path = reached.following.load
+    values = (path.tension if drive == TENSION else path.stroke)[-1]
+    numbers = controls.numbers
+    count = len(held)
+    numbers[:count] = np.where(driven, values, numbers[:count])
+    return Steered(controls.with_numbers(numbers), reached.error, reached.reached)
+
+
+SECTIONS: dict[str, type] = {"friction": Friction, "material": Material}
+
+
+class PartNumber(NamedTuple):
+    """A number of a part: key in the robot file, value, unit ("" for none), description."""
+
+    key: str
+    value: float
+    unit: str
+    text: str
+
+
+def kinds(section: str) -> list[str]:
+    """Return the kinds of a part, `friction` or `material`, whose values are single numbers."""
+    every = kinds_of(SECTIONS[section])
+    return [kind for kind, cls in every.items() if not any(map(is_list, fields_of(cls).values()))]
+
+
+def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = None) -> Robot:
+    """Return a robot with another kind of `friction` or `material`.
+
+    Values that both kinds have are kept. Others come from the original robot, as its file describes
+    it, if it is of this kind, else from the first ready robot of this kind.
+
+    Raises:
+        InputError: The kind is unknown, or no robot has values for it.
+    """
+    if original is not None and getattr(original, section).kind == kind:
+        return robot.replace(**{section: getattr(original, section)})
+    try:
+        return robot.with_value(f"{section}.kind", kind)
+    except InputError:
+        if kind not in kinds(section):
+            raise
+    present = to_table(robot)[section]
+    for ready in list_robots():
+        table = to_table(load_robot(ready))[section]
+        if table["kind"] == kind:
+            shared = {key: present.get(key, value) for key, value in table.items()}
+            for values in (shared, table):  # values of both kinds need not fit together
+                named = {f"{section}.{key}": value for key, value in values.items()}
+                try:
+                    return robot.with_values({**named, f"{section}.kind": kind})
+                except InputError:
+                    continue
+    raise InputError.UNKNOWN_NAME(
+        f'no ready robot has a {section} of the kind "{kind}" to take values from'
+    )
+
+
+def numbers(robot: Robot, section: str) -> Iterator[PartNumber]:
+    """Yield the numbers of the `friction` or the `material` of a robot.
+
+    Example:
+        >>> [one.key for one in numbers(load_robot("pacheco2021-a"), "friction")]
+        ['coefficient']
+    """
+    part = getattr(robot, section)
+    fields: dict[str, Any] = getattr(type(part), "__pydantic_fields__", {})
+    for key, info in fields.items():
+        value = getattr(part, key)
+        if isinstance(value, float):
+            unit = str((info.json_schema_extra or {}).get("unit", ""))
+            yield PartNumber(key, value, unit, str(info.description))

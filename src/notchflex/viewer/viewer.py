@@ -10,15 +10,13 @@ import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.robot import Robot
-from notchflex.viewer import parts
 from notchflex.viewer.controls import STRETCH, Controls, reach_of
 from notchflex.viewer.overlays.overlays import Overlays
 from notchflex.viewer.page.page import Page
 from notchflex.viewer.page.readout import beyond
 from notchflex.viewer.scene.scene import Scene, Shown
-from notchflex.viewer.server import HOST, PORT, bracketed, check_host, check_installed, serve
-from notchflex.viewer.session import Session
-from notchflex.viewer.steering import steer
+from notchflex.viewer.server import HOST, PORT, check_host, check_installed, serve
+from notchflex.viewer.session import Session, steer, with_kind
 from notchflex.viewer.tasks import TargetQueue, TaskLoop, WatchedFile
 
 # A browser does not show more steps a second than this.
@@ -63,15 +61,10 @@ class Viewer(TaskLoop):
         self._read = read
         self._file = WatchedFile(file) if file is not None and read is not None else None
         self._looked, self._updated = 0.0, 0.0
-        self.server = serve(host, port)
+        self.server, self.address = serve(host, port)
         self._make_scene(robot)
         self.page = Page(self)
         self._draw(update=True)
-
-    @property
-    def address(self) -> str:
-        """The address for a browser."""
-        return f"http://{bracketed(self.server.get_host())}:{self.server.get_port()}"
 
     @property
     def goal(self) -> Controls:
@@ -214,7 +207,7 @@ class Viewer(TaskLoop):
 
     def change_part(self, section: str, kind: str) -> None:
         """Change the kind of friction or material of the robot."""
-        self.change(parts.with_kind(self.session.robot, section, kind, self.original))
+        self.change(with_kind(self.session.robot, section, kind, self.original))
 
     def change_number(self, key: str, value: float) -> None:
         """Change a number of the robot by its name in the robot file."""

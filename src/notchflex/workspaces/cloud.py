@@ -1,27 +1,230 @@
-"""The states of a workspace, its volumes and its maps."""
+"""The states of a workspace: their volumes and maps, two beside each other, and their files."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
+from scipy.spatial import ConvexHull, Delaunay, QhullError
 
 from notchflex._extras import need
+from notchflex._quantity import DEGREES
 from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import InputError
 from notchflex.loads.external import ExternalLoad
 from notchflex.loads.validation import check_number
+from notchflex.results.files.dataset import write_groups
+from notchflex.results.files.json import document_head
 from notchflex.results.quantities.registry import AXES
 from notchflex.robot import Robot
 from notchflex.workspaces.limits import Limit
-from notchflex.workspaces.shape import Hull, alpha_size, hull_of
-from notchflex.workspaces.voxels import VoxelMap, voxel_map
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+
+# A cloud thinner than this part of its size is flat, or a curve.
+_FLAT = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """The convex hull of points.
+
+    Attributes:
+        dimension: 3, 2 for points of a plane, 1 for points of a line, 0 for a single one.
+        size: Volume (mm³), area (mm²) or length (mm), by the dimension.
+        corners: Its corners, mm, (k, 3).
+        faces: Triples of corners, counted from 0; none unless it has a volume, (f, 3).
+        origin: A point of the cloud's middle, mm, (3,).
+        axes: Unit vectors of the space that the cloud fills, (dimension, 3).
+    """
+
+    dimension: int
+    size: float
+    corners: Float[np.ndarray, "k 3"]
+    faces: Int[np.ndarray, "f 3"]
+    origin: Float[np.ndarray, " 3"]
+    axes: Float[np.ndarray, "dimension 3"]
+
+    @property
+    def unit(self) -> str:
+        """Unit of its size."""
+        return ("", "mm", "mm²", "mm³")[self.dimension]
+
+
+def hull_of(points: Float[np.ndarray, "n 3"]) -> Hull:
+    """Return the convex hull of points, mm."""
+    origin, axes = _frame(points)
+    dimension = len(axes)
+    flat = (points - origin) @ axes.T
+    no_faces = np.zeros((0, 3), int)
+    if dimension == 0:
+        return Hull(0, 0.0, points[:1], no_faces, origin, axes)
+    if dimension == 1:
+        ends = [int(flat.argmin()), int(flat.argmax())]
+        return Hull(1, float(np.ptp(flat)), points[ends], no_faces, origin, axes)
+    hull = ConvexHull(flat)
+    corners = points[hull.vertices]
+    faces = no_faces
+    if dimension == 3:
+        index = np.zeros(len(points), int)
+        index[hull.vertices] = np.arange(len(hull.vertices))
+        faces = index[hull.simplices]
+    return Hull(dimension, float(hull.volume), corners, faces, origin, axes)
+
+
+def alpha_size(points: Float[np.ndarray, "n 3"], radius: float) -> float:
+    """Return volume (mm³) or area (mm²) of the alpha shape of points.
+
+    It is the union of the simplices of their Delaunay triangulation whose circumscribed sphere is
+    smaller than a radius: unlike the convex hull it leaves hollows out.
+
+    Args:
+        points: Points, mm.
+        radius: Largest radius, mm.
+    """
+    origin, axes = _frame(points)
+    if len(axes) < 2:
+        return 0.0
+    flat = (points - origin) @ axes.T
+    try:
+        simplices = flat[Delaunay(flat).simplices]
+    except QhullError:
+        return 0.0
+    edges = simplices[:, 1:] - simplices[:, :1]
+    sizes = np.abs(np.linalg.det(edges)) / (2.0 if len(axes) == 2 else 6.0)
+    is_regular = sizes > 1e-12 * sizes.max()
+    half = 0.5 * (edges[is_regular] ** 2).sum(axis=2)
+    centre = np.linalg.solve(edges[is_regular], half[..., None])[..., 0]
+    small = np.linalg.norm(centre, axis=1) <= radius
+    return float(sizes[is_regular][small].sum())
+
+
+def inside(
+    hull: Hull, points: Float[np.ndarray, "n 3"], slack: float = 1e-3
+) -> Bool[np.ndarray, " n"]:
+    """Return which points lie in a hull with a volume or an area.
+
+    Args:
+        hull: The hull.
+        points: Points, mm.
+        slack: How far outside a point may lie, as a part of the size of the hull: a hull of single
+            states misses the outermost ones of a thin workspace.
+    """
+    if hull.dimension < 2:
+        return np.zeros(len(points), bool)
+    near = slack * float(np.ptp(hull.corners, axis=0).max())
+    flat = (points - hull.origin) @ hull.axes.T
+    off = points - hull.origin - flat @ hull.axes
+    within = np.abs(off).max(axis=1) <= near
+    equations = ConvexHull((hull.corners - hull.origin) @ hull.axes.T).equations
+    for row in equations:  # few, while the points are many
+        within &= flat @ row[:-1] + row[-1] <= near
+    return within
+
+
+def _frame(
+    points: Float[np.ndarray, "n 3"],
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, "d 3"]]:
+    """Return the middle of points and the axes along which they spread."""
+    origin = points.mean(axis=0)
+    spread = points - origin
+    # Of many points the axes follow from their covariance.
+    values, vectors = np.linalg.eigh(spread.T @ spread / len(points))
+    deviation = np.sqrt(np.maximum(values[::-1], 0.0))
+    dimension = int((deviation > _FLAT * max(float(deviation[0]), 1e-9)).sum())
+    return origin, vectors[:, ::-1].T[:dimension]
+
+
+DIRECTIONS = 96
+"""Number of directions that the dexterity distinguishes, evenly on the sphere."""
+
+
+@dataclass(frozen=True, eq=False)
+class VoxelMap:
+    """Values of a workspace by voxel, v voxels that hold a state.
+
+    Attributes:
+        size: Edge of a voxel, mm.
+        centre: Centres, mm, (v, 3).
+        states: States in each, (v,).
+        dexterity: How many of `DIRECTIONS` directions the tip has in each, as a part, (v,).
+        values: Means of the quantities of the states by name, and of "hysteresis" the largest,
+            (v,) each; NaN where no state has it.
+        of_state: Voxel of every state, (n,).
+    """
+
+    size: float
+    centre: Float[np.ndarray, "v 3"]
+    states: Int[np.ndarray, " v"]
+    dexterity: Float[np.ndarray, " v"]
+    values: Mapping[str, Float[np.ndarray, " v"]]
+    of_state: Int[np.ndarray, " n"]
+
+    def __len__(self) -> int:
+        """Number of voxels."""
+        return len(self.states)
+
+
+def voxel_map(
+    points: Float[np.ndarray, "n 3"],
+    directions: Float[np.ndarray, "n 3"],
+    values: Mapping[str, Float[np.ndarray, " n"]],
+    size: float,
+) -> VoxelMap:
+    """Sort states into voxels.
+
+    Args:
+        points: Tip positions, mm.
+        directions: Unit vectors along the tube at the tip.
+        values: Further values of every state, NaN where one has none.
+        size: Edge of a voxel, mm.
+    """
+    cells = np.floor(points / size).astype(np.int64)
+    occupied, of_state, states = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    of_state = of_state.reshape(-1)
+    reached = np.unique(of_state * DIRECTIONS + nearest_directions(directions))
+    dexterity = np.bincount(reached // DIRECTIONS, minlength=len(occupied)) / DIRECTIONS
+    maps: dict[str, np.ndarray] = {}
+    for name, one in values.items():
+        is_finite = np.isfinite(one)
+        if name == "hysteresis":
+            most = np.full(len(occupied), -np.inf)
+            np.maximum.at(most, of_state[is_finite], one[is_finite])
+            maps[name] = np.where(np.isfinite(most), most, np.nan)
+        else:
+            count = np.bincount(of_state[is_finite], minlength=len(occupied))
+            total = np.bincount(of_state[is_finite], one[is_finite], minlength=len(occupied))
+            maps[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return VoxelMap(size, (occupied + 0.5) * size, states, dexterity, maps, of_state)
+
+
+def sphere_directions() -> Float[np.ndarray, "directions 3"]:
+    """Return the directions that the dexterity distinguishes, as unit vectors."""
+    # notation: a Fibonacci sphere, points at equal steps of height turned by the golden angle
+    number = np.arange(DIRECTIONS)
+    z = 1.0 - (2.0 * number + 1.0) / DIRECTIONS
+    turn = number * np.pi * (3.0 - np.sqrt(5.0))
+    flat = np.sqrt(1.0 - z**2)
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+
+
+def nearest_directions(directions: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
+    """Return the nearest of the directions of the dexterity, piece by piece.
+
+    Args:
+        directions: Unit vectors.
+    """
+    sphere = sphere_directions().T
+    pieces = [directions[start : start + 65536] for start in range(0, len(directions), 65536)]
+    return np.concatenate([(one @ sphere).argmax(axis=1) for one in pieces])
+
 
 _VOXELS = 32
 """Voxels along the longest side of a workspace."""
@@ -194,3 +397,128 @@ class Workspace(Displayed):
         return Summary(
             title, rows, ".voxels() maps dexterity, tension, strain, hysteresis, stiffness"
         )
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Overlap of two workspaces.
+
+    Attributes:
+        first: Label of the first.
+        second: Label of the second.
+        voxel: Edge of the common voxels, mm.
+        both: Voxels in which both have a state.
+        first_alone: Voxels in which only the first has one.
+        second_alone: Voxels in which only the second has one.
+        first_in_second: Part of the first's states inside the convex hull of the second.
+        second_in_first: Part of the second's states inside the convex hull of the first.
+    """
+
+    first: str
+    second: str
+    voxel: float
+    both: int
+    first_alone: int
+    second_alone: int
+    first_in_second: float
+    second_in_first: float
+
+
+def overlaps(found: Mapping[str, Workspace]) -> list[Overlap]:
+    """Compare every two of some workspaces on common voxels.
+
+    Raises:
+        InputError: One of them has no states.
+    """
+    if empty := [label for label, one in found.items() if not len(one)]:
+        raise InputError.NO_DATA(f"{empty[0]}: no state is left within the limits")
+    pairs = combinations(found.items(), 2)
+    return [_overlap(first, second, a, b) for (first, a), (second, b) in pairs]
+
+
+def _overlap(first: str, second: str, a: Workspace, b: Workspace) -> Overlap:
+    size = max(float(np.ptp(one.extent, axis=0).max()) for one in (a, b)) / 32.0
+    cells = []
+    for one in (a, b):
+        map_ = voxel_map(one.tip, one.direction, {}, size)
+        cells.append({tuple(row) for row in np.floor(map_.centre / size).astype(int).tolist()})
+    return Overlap(
+        first,
+        second,
+        size,
+        both=len(cells[0] & cells[1]),
+        first_alone=len(cells[0] - cells[1]),
+        second_alone=len(cells[1] - cells[0]),
+        first_in_second=float(inside(b.hull, a.tip).mean()),
+        second_in_first=float(inside(a.hull, b.tip).mean()),
+    )
+
+
+_PARTS = (0.05, 0.5, 0.95)
+
+
+def workspace_document(explored: Workspace) -> dict[str, Any]:
+    """Return what was found as a document of plain values, at the units of files."""
+    document: dict[str, Any] = {
+        **document_head(explored.robot),
+        "limits": [one.text for one in explored.limits],
+        "largest_tension_N": explored.largest,
+        "states": {
+            "solved": explored.tried,
+            "kept": len(explored),
+            "not_converged": explored.failed,
+            "beyond_limits": explored.beyond,
+        },
+    }
+    if not len(explored):
+        return document
+    hull, voxels = explored.hull, explored.voxels()
+    low, high = explored.extent
+    return document | {
+        "extent_mm": {axis: [low[i], high[i]] for i, axis in enumerate(AXES)},
+        "convex_hull": {"dimension": hull.dimension, "size": hull.size, "unit": hull.unit},
+        "alpha_shape": {"size": explored.alpha_size(), "unit": hull.unit},
+        "total_angle_deg": _spread(explored.angle * DEGREES),
+        "peak_strain": _spread(explored.strain),
+        "tension_N": _spread(explored.tension.max(axis=1)),
+        "hysteresis_mm": _spread(explored.hysteresis),
+        "softest_stiffness_N_mm": _spread(explored.stiffness),
+        "voxels": {
+            "edge_mm": voxels.size,
+            "count": len(voxels),
+            "dexterity_mean": float(voxels.dexterity.mean()),
+            "dexterity_largest": float(voxels.dexterity.max()),
+        },
+    }
+
+
+def _spread(values: np.ndarray) -> dict[str, float | None]:
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return {"p5": None, "p50": None, "p95": None, "largest": None}
+    parts = np.quantile(finite, _PARTS)
+    named: dict[str, float | None] = {
+        f"p{100 * part:g}": float(one) for part, one in zip(_PARTS, parts, strict=True)
+    }
+    return named | {"largest": float(finite.max())}
+
+
+def overlap_documents(overlaps: Sequence[Overlap]) -> list[dict[str, Any]]:
+    """Return comparisons as plain values."""
+    return [vars(one) for one in overlaps]
+
+
+def save_netcdf(workspaces: Mapping[str, Workspace], target: str) -> None:
+    """Write the states as NetCDF, each robot a group where there are several; whole or not at all.
+
+    Raises:
+        InputError: A package is missing, or the file cannot be written.
+    """
+    for module in ("xarray", "h5netcdf", "h5py"):
+        need(module, "data", "--nc")
+    several = len(workspaces) > 1
+    groups = {
+        label.replace("/", "-") if several else None: explored.to_xarray()
+        for label, explored in workspaces.items()
+    }
+    write_groups(target, groups)

@@ -149,7 +149,7 @@ def test_one_reading():
     alone = nf.friction_rig(nf.FrictionReadings([200.0], [150.0], [1.5], [1.5]))
     assert np.isnan(alone.interval).all()
     assert np.isnan(alone.standard_error)
-    assert len(alone.words) == 1
+    assert len(alone.words) == 2
     assert "not known" in alone.words[0]
     known = nf.FrictionReadings([200.0], [150.0], [1.5], [1.5], [[np.nan, 1.0, np.nan, np.nan]])
     rig = nf.friction_rig(known)
@@ -206,7 +206,7 @@ def test_equal_numbers_have_an_interval_of_nothing():
         ("weight_1_g,weight_2_g,turn_1_deg\n1,1,1\n", "TABLE_COLUMNS", "column turn_2_deg is"),
         ("{h}\n# note\n200,150,90,90\n150,200,90,90\n", "OUT_OF_RANGE", "line 4: weight 2"),
         ("{h}\n200,150,0,0\n", "OUT_OF_RANGE", "line 2: the string"),
-        ("{h}\n200,150,180,90\n", "OUT_OF_RANGE", "0 to less than 180"),
+        ("{h}\n200,150,-1,90\n", "OUT_OF_RANGE", "by 0 or more"),
         ("{h}\n200,,90,90\n", "NOT_A_NUMBER", "line 2: weight_2_g"),
         ("{h},turn_1_sd_deg\n200,150,90,90,0\n", "OUT_OF_RANGE", "line 2: turn_1_sd_deg is 0"),
     ],

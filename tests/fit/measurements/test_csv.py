@@ -17,7 +17,7 @@ from notchflex.fit import (
     simulate_measurements,
     write_measurements,
 )
-from notchflex.fit.measurements.writing import exactly_in_degrees
+from notchflex.fit.measurements.csv import exactly_in_degrees
 from refusals import refused
 from shared_data import measured_path
 

@@ -76,5 +76,7 @@ def test_validity_names_what_is_left():
     }
     for word, notch in said.items():
         assert any(word in text for text in validity(*notch, ring, ring)), word
-    far = Side("free", 3.0)
-    assert validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, far) != []
+    for far in (Side("free", 3.0), Side("clamped", 300.0), Side("clamped", 0.0)):
+        assert validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, far) == []
+    (near,) = validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, Side("free", 0.4))
+    assert near.startswith("ring / outer diameter is 0.247, below 0.37")

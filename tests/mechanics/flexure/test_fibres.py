@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.mechanics.chain.fibres import with_fibres
+from notchflex._jax import jax
+from notchflex.mechanics.chain.flexures import flexure, with_fibres
 from notchflex.mechanics.flexure import rod
+from notchflex.mechanics.material import section_law
 
 TUBE = nf.Tube(1.62, 1.40)
 ARC = nf.ArcNotch("on-axis", 1.40, 0.8, uncut_length=1.2)
@@ -33,3 +35,18 @@ def test_fibres_of_strips_are_those_of_a_rectangle(notch: nf.StripNotch | nf.ULi
     for power in (2, 4, 6):  # moments of h over 2 b h: h^n / (n + 1) of the half thickness
         mean = np.sum(area * arm**power, axis=-1) / np.sum(area, axis=-1)
         np.testing.assert_allclose(mean, half**power / (power + 1), rtol=1e-9)
+
+
+def test_refinement_takes_more_fibres(margin):
+    """A yielding section against very many fibres, all of them to rounding."""
+    wrist = nf.load_robot("pacheco2021-a-true")
+    law = section_law(wrist.material)
+    moments = []
+    for refinement in (0, 3, 4, 7):
+        made, _ = flexure(wrist.notches[0], None, wrist.tube, "tendons", refinement, True)
+        section = jax.tree.map(lambda leaf: leaf[0], made.section)
+        moments.append([float(law.moment(one, section)) for one in (0.2, 0.35, 0.5)])
+    *coarse, fine = np.array(moments)
+    errors = [np.max(np.abs(one / fine - 1.0)) for one in coarse]
+    assert errors[1] < 0.3 * errors[0]
+    margin.within("at refinement 3", errors[1], 3e-4)

@@ -16,8 +16,7 @@ import notchflex as nf
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.flexure import Rod, flexure_state, relative_pose, rod, with_level
 from notchflex.mechanics.flexure.strip import strip_rod
-from notchflex.mechanics.flexure.u_link import u_link_rod
-from notchflex.mechanics.flexure.u_link_geometry import CurvedEnd
+from notchflex.mechanics.flexure.u_link import CurvedEnd, u_link_rod
 from notchflex.mechanics.material import SectionLaw, section_law
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls

@@ -35,17 +35,38 @@ def test_a_base_of_no_length_is_rigid():
 def test_dimensions_outside_the_range_are_named():
     assert unchecked_dimensions(wrist()) == []
     (sentence,) = unchecked_dimensions(wrist(depth=1.2))
-    assert sentence.startswith("notches 1, 2, 3, 4, 5: depth / outer diameter is 0.741")
+    assert "depth / outer diameter is 0.741, below 0.75" in sentence
+    assert "up to 3 % off (all notches)" in sentence
+    assert "`notch.stiffness_factor`" in sentence
     shallow = nf.simulate(wrist(depth=1.2), nf.Load(tension=0.5))
     from notchflex.results.warnings import path_warnings
 
     assert sentence in path_warnings(shallow)
 
 
+@pytest.mark.parametrize("scale", [1.0, 10.0])
+def test_a_short_ring_counts_by_its_effect_in_proportion_to_the_tube(scale: float):
+    """The same robot is told the same at any size; a ring of little effect is not told of."""
+
+    def told(ring: float) -> list[str]:
+        names = ("depth", "height", "uncut_length")
+        sizes = {name: scale * getattr(wrist().notch[0], name) for name in names}
+        tube = nf.Tube(1.62 * scale, 1.40 * scale, base_length=ring * scale)
+        notch = replace(wrist().notch[0], **sizes)
+        parts = {"tube": tube, "notch": (notch,), "tendon": (nf.Tendon(0.7 * scale),)}
+        return unchecked_dimensions(replace(wrist(), **parts))
+
+    (sentence,) = told(0.3)
+    assert "ring / outer diameter is 0.185, below 0.37: 4 % of the stiffness" in sentence
+    assert "(notch 1)" in sentence
+    assert told(0.55) == told(0.0) == told(3.0) == []
+
+
 def test_short_rings_between_notches_that_open_to_different_sides_are_named():
     turned = wrist().with_value("notch[2].direction_deg", 90.0)
     (sentence,) = unchecked_dimensions(turned)
-    assert sentence.startswith("notches 1, 2, 3: a neighbour opens to another side")
+    assert "a neighbour opens to another side" in sentence
+    assert "(notches 1, 2, 3)" in sentence
     assert "1.2 mm" in sentence
     assert unchecked_dimensions(wrist().with_value("notch[2].direction_deg", 0.1 + 0.2 - 0.3)) == []
 

@@ -152,6 +152,9 @@ def test_cells_inside_validity(use: str, margin: Margin) -> None:
     for (name, (most_rms, most)), one, worst in zip(allowed.items(), rms, largest, strict=True):
         margin.within(f"{use}: {name}, rms of {len(found)}", one, most_rms, "%")
         margin.within(f"{use}: {name}, max", worst, most, "%")
+    if use == "judge":
+        error = liu().law_errors[0]
+        margin.within("law", np.sqrt(np.mean(rms[:3] ** 2)) - 100.0 * error, 0.1, "%")
 
 
 @pytest.mark.nightly

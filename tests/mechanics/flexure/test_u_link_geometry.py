@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from notchflex import ULink
-from notchflex.mechanics.flexure.u_link_geometry import CurvedEnd, Link
+from notchflex.mechanics.flexure.u_link import CurvedEnd, Link
 from reference_data import reference
 
 END = CurvedEnd(slot_radius=0.275, strip_thickness=0.70)

@@ -60,7 +60,9 @@ def test_without_turning_a_pull_loses_the_same_at_every_contact() -> None:
     tension, none = jnp.array([1.0, 0.5, 0.2]), jnp.zeros(3)
     limits = law.limits(none, none, (tension, tension), jnp.ones((3, 2)))
     np.testing.assert_allclose(
-        tension[:, None] * jnp.exp(-limits), np.stack([tension - LOSS] * 2, -1), rtol=1e-14
+        (tension[:, None] + law.offset()) * jnp.exp(-limits) - law.offset(),
+        np.stack([tension - LOSS] * 2, -1),
+        rtol=1e-14,
     )
 
 
@@ -91,3 +93,28 @@ def test_slopes_are_finite_at_every_tension(tension: float, sign: float) -> None
         step = 1e-7
         high, low = (total(law, jnp.array([tension + by]), turning) for by in (step, -step))
         np.testing.assert_allclose(slopes[1][0], (high - low) / (2 * step), rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["pacheco2021-a", "two-axis-wrist", "liu2022"])
+@pytest.mark.parametrize("first", ["force", "stroke", "together"])
+def test_loads_of_every_kind_are_solved_from_rest(name: str, first: str) -> None:
+    robot = nf.load_robot(name).replace(friction=nf.Capstan(MU, constant_loss=0.02))
+    none = (None,) * (robot.number_of_tendons - 1)
+    force = (0.005, 0.0, 0.0)
+    begins = {
+        "force": nf.Load(tip_force=force),
+        "stroke": nf.Load(stroke=(0.1, *none)),
+        "together": nf.Load(tension=(0.4, *none), tip_force=force),
+    }
+    loads = [begins[first], nf.Load(tension=(0.5, *none), tip_force=force), nf.Load(), nf.Load()]
+    path = nf.simulate(robot, loads)
+    assert path.converged.all(), path.reason
+    for step in range(len(loads)):
+        for tendon in range(robot.number_of_tendons):
+            tension = path.span_tension[step, tendon]
+            before, behind = tension[:-1], tension[1:]
+            turning = path.contact_turning[step, tendon][: len(before)]
+            ratio = np.exp(MU * turning)
+            over = np.stack([before - ratio * behind - 0.02, behind - ratio * before - 0.02])
+            assert np.nanmax(over) < 1e-8
+            assert np.nanmin(tension) > -1e-12

@@ -180,7 +180,7 @@ def test_no_closed_loop_gains_work() -> None:
 def test_bad_values_name_what_is_allowed() -> None:
     for keys, key in (
         ({"plateau_modulus": 50_000.0}, "plateau_modulus"),
-        ({"plateau_modulus": 1.0}, "plateau_modulus"),
+        ({"plateau_modulus": -1.0}, "plateau_modulus"),
         ({"unloading_stress": 400.0}, "unloading_stress"),
         ({"transformation_strain": 0.001}, "transformation_strain"),
     ):

@@ -104,5 +104,5 @@ def test_half_tube():
 @pytest.mark.parametrize("cut", SECTIONS)
 def test_scales_with_size(cut):
     small, large = (as_numpy(SECTIONS[cut](s, 0.8 * s, 1.7 * s)) for s in (1.0, 10.0))
-    powers = np.array([2, 1, 4, 4, 4, 1, 1, 1])
+    powers = np.array([2, 1, 4, 4, 4, 1, 1, 1, 1, 1, 0])
     np.testing.assert_allclose(np.array(large), np.array(small) * 10.0**powers, rtol=1e-11)

@@ -8,8 +8,8 @@ import pytest
 
 import notchflex as nf
 from notchflex.errors import ErrorCode, InputError
-from notchflex.results.files.record import robot_of
 from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.robot import robot_text
 from refusals import refused
 
 WHOLE = (".json", ".nc", ".parquet")
@@ -179,7 +179,7 @@ def test_arrays_that_do_not_fit_the_robot_are_told(loop, tmp_path):
     nf.save_path(loop, file)
     document = json.loads(file.read_text())
     facts = document["read_back"]["facts"]
-    facts["robot"] = robot_of(nf.load_robot("gao2017"))
+    facts["robot"] = robot_text(nf.load_robot("gao2017"))
     file.write_text(json.dumps(document))
     with refused(ErrorCode.FILE_DAMAGED):
         nf.read_path(file)

@@ -7,7 +7,8 @@ import pytest
 
 import notchflex as nf
 from notchflex._jax import jax, jnp
-from notchflex.solver.programs import backend, store
+from notchflex.solver.programs import compiled as backend
+from notchflex.solver.programs import store
 from notchflex.solver.programs.compiled import Native
 
 

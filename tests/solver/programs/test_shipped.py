@@ -22,9 +22,8 @@ shipped.FOLDER = Path({!r})
 
 
 def solved(code, **settings):
-    quick = {"NOTCHFLEX_OPTIMISATION": "0", store.VARIABLE: ""}
     command = [sys.executable, "-c", code]
-    environment = {**os.environ, **quick, **settings}
+    environment = {**os.environ, store.VARIABLE: "", **settings}
     found = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     return found.stdout.split()
 

@@ -141,7 +141,7 @@ from notchflex.solver.programs.compiled import Native
 state = nf.solve(nf.load_robot("pacheco2021-a"), nf.Load(tension=1.0))
 print(Native.compiled, repr(float(state.total_angle)))
 """
-    own = {**os.environ, store.VARIABLE: str(tmp_path), "NOTCHFLEX_OPTIMISATION": "0"}
+    own = {**os.environ, store.VARIABLE: str(tmp_path)}
     first, second = (
         subprocess.run(
             [sys.executable, "-c", code], env=own, capture_output=True, text=True, check=True

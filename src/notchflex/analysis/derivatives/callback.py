@@ -53,7 +53,12 @@ class VectorSolver:
     def values(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
         """Return the outputs; raise `InputError` for values that no robot or load can have."""
         path = self._path(flat)
-        return {name: np.asarray(getattr(path, name)) for name in self.outputs}
+        values = {name: np.asarray(getattr(path, name)) for name in self.outputs}
+        for name, each in values.items():
+            if _is_float(path, name) and not path.converged.all():
+                values[name] = each.copy()
+                values[name][~path.converged] = np.nan
+        return values
 
     def slopes(self, flat: Float[np.ndarray, " k"], output: str) -> np.ndarray:
         """Return the derivatives of an output by every value, as last axis.

@@ -13,9 +13,10 @@ from jax.core import Tracer
 from jaxtyping import Array
 
 from notchflex._jax import jax, jnp
+from notchflex._summary import Displayed, Summary
 from notchflex.analysis.derivatives.callback import TENDONS, TIP, VectorSolver, outputs_function
 from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.kinks import Kink, kinks
+from notchflex.analysis.derivatives.tangent import Kink, kinks
 from notchflex.analysis.outputs import OutputTable, check_outputs
 from notchflex.analysis.solve import check_refinement
 from notchflex.errors import InputError
@@ -36,7 +37,7 @@ def differentiable(
     loads: Load | LoadPath | Iterable[Load],
     parameters: Sequence[str],
     *,
-    outputs: Sequence[str] = ("total_angle", "tip_position", "converged"),
+    outputs: Sequence[str] = ("total_angle", "tip_position"),
     settings: Settings | None = None,
     refinement: int = 0,
 ) -> Differentiable:
@@ -48,7 +49,8 @@ def differentiable(
     the material's law has a kink, the derivative is that of one side: `kinks` lists such contacts
     and notches, `one_sided` gives both sides. With friction it is NaN from a load on that was
     solved in three parts or more, whose memory is not followed; smaller steps help. Inside a
-    program that JAX traces, numbers that no robot can have give `converged` false and NaN slopes.
+    program that JAX traces, numbers that no robot can have give NaN, and `converged` is
+    false there, as where a load does not converge.
 
     Args:
         robot: The robot.
@@ -56,7 +58,8 @@ def differentiable(
         parameters: What may vary: numbers of the robot by name (as for `Robot.with_value`, in the
             units of the robot file), and of the loads "tension" (N, steps by tendons), "stroke"
             (mm), "tip_force" (N, steps by 3) and "tip_moment" (N mm).
-        outputs: What to return, by names of `EquilibriumPath`.
+        outputs: What to return, by names of `EquilibriumPath`. `jax.jacfwd` and `jax.jacrev` take
+            numbers alone, no truth values such as `converged`.
         settings: How hard the solver tries.
         refinement: More strain modes, as for `simulate`.
 
@@ -98,8 +101,8 @@ def _present(robot: Robot, path: LoadPath, name: str) -> Any:
     return np.nan_to_num(commanded)
 
 
-@dataclass(frozen=True, eq=False)
-class Differentiable:
+@dataclass(frozen=True, eq=False, repr=False)
+class Differentiable(Displayed):
     """A robot under loads as a function of some of its numbers; see `differentiable`.
 
     Attributes:
@@ -133,6 +136,14 @@ class Differentiable:
             return self._traced(complete)
         self._check(complete)
         return self._function(self._flat(complete))
+
+    def _summary(self) -> Summary:
+        shapes = {
+            name: "×".join(map(str, at.shape)) or "a number" for name, at in self.start.items()
+        }
+        rows = [*shapes.items(), ("outputs", ", ".join(self.outputs))]
+        title = f"Function of {self.robot.name} under {len(self.load)} loads"
+        return Summary(title, rows, ".start holds the present values; call it with others by name")
 
     def kinks(self, values: Mapping[str, Any] | None = None, *, within: float = 1e-6) -> list[Kink]:
         """List the contacts and notches at a switch, where derivatives are those of one side.

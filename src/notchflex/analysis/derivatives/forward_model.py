@@ -13,10 +13,8 @@ from functools import cached_property, lru_cache, partial
 import numpy as np
 from jaxtyping import Bool, Float
 
-from notchflex.analysis.derivatives.adjoint import gradient
-from notchflex.analysis.derivatives.geometry_slopes import GeometrySlopes
-from notchflex.analysis.derivatives.numbers import slope
-from notchflex.analysis.derivatives.tangent import Change, PathTangents
+from notchflex.analysis.derivatives.geometry_slopes import GeometrySlopes, slope
+from notchflex.analysis.derivatives.tangent import Change, PathTangents, gradient
 from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
 from notchflex.loads.command import make_commands

@@ -10,14 +10,13 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex._jax import constant
+from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.kinks import Kink, kinks
-from notchflex.analysis.derivatives.tangent import Change
+from notchflex.analysis.derivatives.tangent import Change, Kink, kinks
 from notchflex.analysis.solve import check_refinement
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.applied import BodyLoads
-from notchflex.loads.command import Command
+from notchflex.loads.command import BodyLoads, Command
 from notchflex.loads.load_path import load_path
 from notchflex.loads.validation import check_is_robot
 from notchflex.results.path import EquilibriumPath
@@ -107,11 +106,10 @@ def tip_response(
     # Each state is varied alone: what the contacts remember of the state before stays.
     by_loads = model.derivatives(path, changes, _POSE, remembers=False)
     slopes = np.moveaxis(_pose_change(path, by_loads), 0, -1)
-    turn = np.eye(6)
-    if path.base_to_world is not None:
-        turn = np.kron(np.eye(2), path.base_to_world)
-    tendons = path.chain.tendons
-    return TipResponse(path, slopes[..., :tendons], slopes[..., tendons:] @ turn.T)
+    by_drive, by_wrench = np.split(slopes, [path.chain.tendons], axis=-1)
+    moment_and_force = by_wrench.reshape(*by_wrench.shape[:-1], 2, 3)
+    in_world = REGISTERED["base_force"].turned(moment_and_force, load.base_to_world)
+    return TipResponse(path, by_drive, in_world.reshape(by_wrench.shape))
 
 
 def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"]]:

@@ -94,6 +94,47 @@ class Bands(Displayed, Mapping[str, Band]):
         """Number of drawn robots."""
         return len(next(iter(self.samples.values())))
 
+    def variance_shares(self, name: str, step: int) -> dict[str, float]:
+        """Return the parts of the variance of a number that groups of values explain, of 1.
+
+        They are those of the linear regression on the drawn numbers, which are drawn independently;
+        what no line explains is "interactions".
+
+        Args:
+            name: A quantity that is one number a step, such as "total_angle".
+            step: Which step of the path.
+
+        Returns:
+            Shares of "material", "friction", "cuts", "law" (of a notch), "other" and
+            "interactions"; none where too few draws converged.
+        """
+        values = self.samples[name][:, step]
+        known = np.isfinite(values)
+        values = values[known]
+        if not len(values) or not np.ptp(values):
+            return {}
+        levels: dict[str, np.ndarray] = {}
+        for one, numbers in self.drawn.items():
+            if np.ptp(numbers[known]) > 0.0:
+                level = (numbers[known] - numbers[known].mean()) / numbers[known].std()
+                # Notches that deviate together are one number.
+                if not any(np.allclose(level, other) for other in levels.values()):
+                    levels[one] = level
+        if len(values) < 4 * len(levels):
+            return {}
+        table = np.stack(list(levels.values()), axis=1)
+        slopes = np.linalg.lstsq(table, values - values.mean(), rcond=None)[0]
+        shares = dict.fromkeys(("material", "friction", "cuts", "law", "other"), 0.0)
+        for one, slope in zip(levels, slopes.tolist(), strict=True):
+            section = one.partition(".")[0].partition("[")[0]
+            group = {"notch": "cuts"}.get(section, section)
+            if one.endswith(".stiffness_factor"):
+                group = "law"
+            shares[group if group in shares else "other"] += slope**2 / values.var()
+        total = sum(shares.values())
+        shares = {group: share / max(total, 1.0) for group, share in shares.items()}
+        return shares | {"interactions": max(1.0 - total, 0.0)}
+
     def end(self, name: str) -> EquilibriumPath:
         """Return one end of the bands as tables and files read a path.
 
@@ -218,19 +259,14 @@ def uncertain(
     results = simulate_batch(
         drawn.robots,
         path.load,
-        outputs=(*names, "converged"),
+        outputs=names,
         settings=settings,
         refinement=refinement,
         cores=cores,
         progress=progress,
     )
     converged = results["converged"]
-    turn = path.base_to_world
-    samples: dict[str, np.ndarray] = {}
-    for name in names:
-        values = results[name] if turn is None else REGISTERED[name].turned(results[name], turn)
-        mask = converged.reshape(converged.shape + (1,) * (values.ndim - 2))
-        samples[name] = np.where(mask, values, np.nan)
+    samples = {name: results[name] for name in names}
     return Bands(
         path, chosen, assumed, samples, drawn.values, converged.sum(axis=0), drawn.redrawn, seed
     )

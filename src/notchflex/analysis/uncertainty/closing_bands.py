@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from notchflex.analysis.batch import solve_batch
-from notchflex.analysis.closing_loads.closing import Closing
+from notchflex.analysis.closing_loads import Closing
 from notchflex.analysis.uncertainty.bands import Band, Bands, band, uncertain
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
@@ -37,6 +37,7 @@ class ClosingBands(NamedTuple):
         total_angle: Total angle at that load, rad.
         by_depth: Change of the total angle at that load if all notches are cut 10 µm deeper, rad;
             NaN for notches without a depth.
+        shares: Parts of the variance of that angle, by `Bands.variance_shares`.
     """
 
     bands: Bands
@@ -47,6 +48,7 @@ class ClosingBands(NamedTuple):
     tendon: int
     total_angle: Band
     by_depth: float
+    shares: dict[str, float]
 
 
 def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
@@ -73,10 +75,12 @@ def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
     stiffness = np.asarray(bands.path.chain.contact_stiffness)[own]
     angles = bands.samples["notch_angle"][:, :, own]
     tension, angle = _closing(loads, gaps, forces > gaps * stiffness, angles)
-    total = band(bands.samples["total_angle"][:, np.searchsorted(loads, load)])
+    step = int(np.searchsorted(loads, load))
+    total = band(bands.samples["total_angle"][:, step])
+    shares = bands.variance_shares("total_angle", step)
     by_depth = _by_depth(robot, _pull(robot, tendon, np.array([load])))
     closing = _with_never(tension), band(angle)
-    return ClosingBands(bands, own + 1, *closing, load, tendon, total, by_depth)
+    return ClosingBands(bands, own + 1, *closing, load, tendon, total, by_depth, shares)
 
 
 def _with_never(tension: Float[np.ndarray, "d n"]) -> Band:
@@ -98,6 +102,7 @@ def closing_document(closing_bands: ClosingBands) -> dict[str, Any]:
         "closing_angle_deg": _ends(closing_bands.angle, DEGREES),
         "load_N": closing_bands.load,
         "total_angle_deg": _ends(closing_bands.total_angle, DEGREES),
+        "total_angle_variance_shares": closing_bands.shares,
         "total_angle_deg_by_10um_depth": closing_bands.by_depth * DEGREES,
     }
 
@@ -111,7 +116,7 @@ def _pull(robot: Robot, tendon: int, loads: Float[np.ndarray, " s"]) -> LoadPath
     """Pull one tendon (from 1), the others slack."""
     tensions = np.zeros((len(loads), robot.number_of_tendons))
     tensions[:, tendon - 1] = loads
-    return LoadPath(tension=tensions, stroke=np.full_like(tensions, np.nan))
+    return LoadPath(tensions)
 
 
 def _closing(

@@ -41,13 +41,13 @@ def converted(
         values = tuple(map(convert_one, tokens))
         return values if several else values[0]
 
+    options.setdefault("allow_leading_hyphen", True)
     if several:
         options["show_default"] = False
     return Parameter(
         converter=convert,
         n_tokens=1,
         accepts_keys=False,
-        allow_leading_hyphen=True,
         metavar=f"{metavar}..." if several else metavar,
         negative=(),
         **options,

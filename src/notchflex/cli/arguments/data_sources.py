@@ -46,7 +46,7 @@ def _read_source(text: str) -> DataSource:
 
 Sources = Annotated[
     DataSource,
-    converted(_read_source, "[LABEL=]ROBOT=DATA.csv"),
+    converted(_read_source, "[LABEL=]ROBOT=DATA.csv", allow_leading_hyphen=False),
     Parameter(
         help=f"{PAIR}: a robot (ready, or a file) and its measurements (the columns of "
         "`notchflex.read_measurements`). The same robot again adds more data; a label "

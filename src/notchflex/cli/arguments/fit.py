@@ -71,6 +71,14 @@ class FitOptions:
         converted(partial(named, _PRIOR, _read_prior), "NAME=MEAN+-SD", several=True),
         Parameter(name="--prior", help="Prior of a constant, `NAME=MEAN+-SD`, in its unit."),
     ] = ()
+    priors: Annotated[
+        bool,
+        Parameter(
+            negative="--no-priors",
+            help="Whether what is not fitted may deviate from the file within its tolerances, or "
+            "those that are assumed. Not with `each:`, nor with other objectives.",
+        ),
+    ] = True
     objective: Annotated[
         Literal["least-squares", "robot-errors", "distances"],
         Parameter(

@@ -14,17 +14,14 @@ from notchflex.cli.arguments.conversion import converted
 from notchflex.errors import InputError
 
 if TYPE_CHECKING:
-    from notchflex.pieces.options import PieceFolder
+    from notchflex.pieces.run import PieceFolder
 
 PIECES = Group("In pieces", sort_key=7)
 
 Workers = Annotated[
     int | None,
     converted(whole(1, 1024), "N"),
-    Parameter(
-        help="Work in this number of processes of this machine (extra `cluster`); by default in "
-        "one process."
-    ),
+    Parameter(help="Work in this number of processes of this machine; by default in one process."),
 ]
 Scheduler = Annotated[
     str | None,
@@ -75,7 +72,7 @@ class InPieces:
                 "--workers and --scheduler exclude each other; give one of them."
             )
         from notchflex.pieces.folder import check_target
-        from notchflex.pieces.options import PieceFolder
+        from notchflex.pieces.run import PieceFolder
 
         check_target(self.folder, kind, "--folder", [os.fspath(one) for one in inputs])
         return PieceFolder(self.folder, self.workers, self.scheduler)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import texts
+from notchflex.cli.arguments.conversion import named, texts
 from notchflex.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,16 +60,39 @@ MeasuredAs = Annotated[
 ]
 
 
+Columns = Annotated[
+    tuple[str, ...],
+    texts(
+        "--column",
+        "NAME=HEADER",
+        'Which column of the data is what, such as `tension="Kraft [N]"`, `stroke=...`, '
+        "`total=...`, `notch_1=...` or `tip_x_mm=...`. Headers such as `Force [mN]` are "
+        "understood without it.",
+    ),
+]
+
+
+def named_columns(options: Sequence[str]) -> dict[str, str]:
+    """Read the values of `--column`."""
+    return dict(named("NAME=HEADER, such as tension=Kraft", str, text) for text in options)
+
+
 def chosen_robot(name: str, settings: Sequence[str]) -> Robot:
     """Load a robot with the values of `--set`; note the keys that a new kind drops."""
-    from notchflex.robot import load_robot, parse_assignment, set_values
+    from notchflex.robot import parse_assignment
+    from notchflex.robot.reading import load_changed
 
-    robot = load_robot(name)
-    if settings:
-        robot, dropped = set_values(robot, [parse_assignment(text) for text in settings])
-        if dropped:
-            terminal.note(f"the new kind has no {', '.join(dropped)}; dropped.")
+    robot, dropped = load_changed(name, [parse_assignment(text) for text in settings])
+    if dropped:
+        terminal.note(f"the new kind has no {', '.join(dropped)}; dropped.")
+    warn_unlikely(robot)
     return robot
+
+
+def warn_unlikely(robot: Robot) -> None:
+    """Write the warnings of a robot."""
+    for warning in robot.warnings:
+        terminal.warn(str(warning))
 
 
 def robot_files(name: str) -> list[Path]:
@@ -135,6 +158,7 @@ def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, R
         if "=" in text:
             label, values = variant(text, "ROBOT, LABEL: ROBOT, or ")
             robot = first.with_values(values)
+            warn_unlikely(robot)
         else:
             label, other = _label_and_robot(text)
             robot = chosen_robot(other, ())
@@ -167,7 +191,11 @@ def _label_and_robot(text: str) -> tuple[str, str]:
 
 
 def read_data(
-    file: str, robot: Robot, path: bool | None, measured_as: Literal["ring", "edge"] = "ring"
+    file: str,
+    robot: Robot,
+    path: bool | None,
+    measured_as: Literal["ring", "edge"] = "ring",
+    columns: Sequence[str] = (),
 ) -> Measurements:
     """Read measurements, and write how the rows were interpreted and what was not used.
 
@@ -176,11 +204,17 @@ def read_data(
         robot: The robot that was measured.
         path: The value of `--path`: None where neither it nor `--from-rest` was given.
         measured_as: The value of `--measured`.
+        columns: The values of `--column`.
     """
     from notchflex.fit.measurements.csv import read_measurements
 
     rest = None if path is None else not path
-    measured = read_measurements(file, robot, from_rest=rest, measured=measured_as)
+    measured = read_measurements(
+        file, robot, from_rest=rest, measured=measured_as, columns=named_columns(columns)
+    )
+    if measured.renamed:
+        pairs = ", ".join(f"{old} as {new}" for new, old in measured.renamed.items())
+        terminal.note(f"{measured.source}: read {pairs}.")
     if measured.order:
         terminal.note(f"{measured.source}: {measured.order}.")
     if measured.ignored:

@@ -32,6 +32,9 @@ def print_calibration(fit: Calibration) -> None:
     chi = fit.reduced_chi_squared
     noise = f"; reduced chi squared {chi:.3g} (about 1: as noise)" if math.isfinite(chi) else ""
     console.print(f"{kind} {fit.cost:.6g}{noise}")
+    if fit.drawing:
+        names = ", ".join(f"{name} {sd:+.2g}" for name, sd in fit.deviations_of_drawing.items())
+        console.print(f"Deviations within tolerances, in standard deviations: {names}.")
     console.print()
     _print_constants(console, fit)
     console.print()
@@ -117,7 +120,7 @@ def print_posterior(drawn: Posterior) -> None:
             "{:.4g} to {:.4g}".format(*drawn.intervals[name]),
             f"{drawn.deviations[name]:.2g}",
             f"{drawn.effective[name]:.0f}",
-            f"{drawn.unlike[name]:.3f}",
+            f"{drawn.r_hat[name]:.3f}",
         ]
         for name in drawn.names
     ]

@@ -8,6 +8,7 @@ import numpy as np
 
 from notchflex._quantity import DEGREES
 from notchflex.cli import terminal
+from notchflex.cli.tables.notch_tables import shown_numbers
 from notchflex.fit.assessment.errors_of_parts import edge
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def print_comparison(comparison: Comparison, others: dict[str, Comparison]) -> N
     measured = comparison.measured
     console.print(f"{comparison.robot.name}, {measured.source}", soft_wrap=True)
     points, trials = (
-        f"{number} {what}{'s' if number > 1 else ''}"
+        f"{number} {what}{'s' if number != 1 else ''}"
         for number, what in ((comparison.points, "point"), (len(measured.pulls), "trial"))
     )
     console.print(
@@ -51,15 +52,14 @@ def print_comparison(comparison: Comparison, others: dict[str, Comparison]) -> N
 
 def _columns(models: dict[str, Comparison]) -> list[tuple[str, list[str]]]:
     """Head and one number for each model, of every notch, the total and the tip if measured."""
-    first = next(iter(models.values()))
-    columns = [
-        (f"n{n + 1}\ndeg", [f"{one.rmse_notches[n] * DEGREES:.2f}" for one in models.values()])
+    first, every = next(iter(models.values())), models.values()
+    errors = [
+        (f"n{n + 1}\ndeg", ".2f", [one.rmse_notches[n] * DEGREES for one in every])
         for n in range(first.robot.number_of_notches)
         if np.isfinite(first.measured_notch_angle[:, n]).any()
     ]
     if np.isfinite(first.measured_total_angle).any():
-        numbers = [f"{one.rmse_total * DEGREES:.2f}" for one in models.values()]
-        columns.append(("total\ndeg", numbers))
+        errors.append(("total\ndeg", ".2f", [one.rmse_total * DEGREES for one in every]))
     if np.isfinite(first.measured_tip).any():
-        columns.append(("tip\nmm", [f"{one.tip_rmse:.3f}" for one in models.values()]))
-    return columns
+        errors.append(("tip\nmm", ".3f", [one.rmse_tip for one in every]))
+    return [(head, shown_numbers(values, form)) for head, form, values in errors]

@@ -8,7 +8,7 @@ import numpy as np
 
 from notchflex._quantity import DEGREES
 from notchflex.cli import terminal
-from notchflex.cli.tables.path_rows import MAX_ROWS
+from notchflex.cli.tables.path_table import MAX_ROWS
 
 if TYPE_CHECKING:
     from notchflex.control import Following
@@ -22,7 +22,10 @@ def print_following(following: Following) -> None:
     heads = [">target\n"]
     for what, unit in (("tension", "N"), ("stroke", "mm")):
         heads += [f">{what}{'' if tendons == 1 else f' {i + 1}'}\n{unit}" for i in range(tendons)]
-    heads += [">tip x\nmm", ">tip y\nmm", ">tip z\nmm", ">angle\ndeg", ">error\n", "\n"]
+    errors = {"mm": following.error_mm, "deg": following.error_deg}
+    errors = {unit: values for unit, values in errors.items() if values.any()}
+    heads += [">tip x\nmm", ">tip y\nmm", ">tip z\nmm", ">angle\ndeg"]
+    heads += [*(f">error\n{unit}" for unit in errors), "\n"]
     numbers = np.concatenate([following.tension, following.stroke, following.tip_position], axis=1)
     angle = following.path.total_angle[following.step] * DEGREES
     stride = -(-len(following) // MAX_ROWS)
@@ -33,7 +36,7 @@ def print_following(following: Following) -> None:
             str(i + 1),
             *(f"{value:.4f}" for value in numbers[i]),
             f"{angle[i]:.2f}",
-            f"{following.error[i]:.1e}",
+            *(f"{values[i]:.2g}" for values in errors.values()),
             " ".join([*(["overshoot"] if vias[i] else []), following.code[i]]).strip(),
         ]
         for i in shown

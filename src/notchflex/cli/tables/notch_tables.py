@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from itertools import compress, groupby, pairwise
 from typing import TYPE_CHECKING, Any, cast
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from notchflex.cli import terminal
 from notchflex.robot import Robot
-from notchflex.robot.fields import fields_of
+from notchflex.robot.fields import fields_of, is_unsaid
 from notchflex.robot.robot import to_table
 
 if TYPE_CHECKING:
@@ -68,18 +69,20 @@ def description_tables(robot: Robot) -> list[Table]:
     for number, notch in enumerate(robot.notches, start=1):
         values = named_values(notch)
         kind = values.pop("kind")
-        names[kind] = [SHORTER.get(name, name).replace("_", "\n") for name in values]
+        names[kind] = list(values)
         kinds.setdefault(kind, {}).setdefault(tuple(values.values()), []).append(number)
     tables: list[Table] = []
     for kind, of_kind in kinds.items():
         used = [
-            any(value not in _USUAL for value in column) for column in zip(*of_kind, strict=True)
+            any(value not in _USUAL and not is_unsaid(name, value) for value in column)
+            for name, *column in zip(names[kind], *of_kind, strict=True)
         ]
+        heads = [SHORTER.get(name, name).replace("_", "\n") for name in names[kind]]
         rows = [
             [run_of(numbers), *map(_value, compress(values, used))]
             for values, numbers in of_kind.items()
         ]
-        tables.append(_filled([f"{kind}\nnotch", *compress(names[kind], used)], rows))
+        tables.append(_filled([f"{kind}\nnotch", *compress(heads, used)], rows))
     return tables
 
 
@@ -146,7 +149,11 @@ def closing_legend(notches: list[dict[str, Any]]) -> str:
 
 
 def _numbers(rows: list[dict[str, Any]], key: str, form: str, scale: float = 1.0) -> list[str]:
-    values = [scale * row.get(key, np.nan) for row in rows]
+    return shown_numbers([scale * row.get(key, np.nan) for row in rows], form)
+
+
+def shown_numbers(values: Sequence[float], form: str) -> list[str]:
+    """Return numbers as cells of a table; a dash where there is none."""
     return [format(value, form) if np.isfinite(value) else NO_NUMBER for value in values]
 
 

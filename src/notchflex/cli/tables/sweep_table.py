@@ -8,7 +8,7 @@ from notchflex.cli import terminal
 
 if TYPE_CHECKING:
     from notchflex.sweeping import Sweep
-    from notchflex.sweeping.estimate import Estimate
+    from notchflex.sweeping.sweep import Estimate
 
 
 def duration(seconds: float) -> str:

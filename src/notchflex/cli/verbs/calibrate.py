@@ -12,7 +12,7 @@ from notchflex.cli import terminal
 from notchflex.cli.arguments.data_sources import DataSources, Sources
 from notchflex.cli.arguments.fit import BeyondFit, FitOptions, ParameterSpec
 from notchflex.cli.arguments.pieces import InPieces
-from notchflex.cli.arguments.robots import MeasuredAs, OnePath, Settings, read_data
+from notchflex.cli.arguments.robots import Columns, MeasuredAs, OnePath, Settings, read_data
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile
 from notchflex.cli.terminal import BAD_INPUT, DONE, NOT_CONVERGED
 from notchflex.errors import InputError
@@ -27,6 +27,7 @@ def calibrate(
     search: FitOptions,
     path: OnePath = None,
     measured: MeasuredAs = "ring",
+    column: Columns = (),
     beyond: BeyondFit = BeyondFit(),  # noqa: B008 - frozen
     settings: Settings = (),
     pieces: InPieces = InPieces(),  # noqa: B008 - frozen
@@ -65,7 +66,7 @@ def calibrate(
 
     _check_sensor(constants)
     data = {
-        label: [read_data(file, robots[label], path, measured) for file in files]
+        label: [read_data(file, robots[label], path, measured, column) for file in files]
         for label, files in sources.data.items()
     }
     with terminal.bars() as progress:
@@ -75,13 +76,14 @@ def calibrate(
             [fitting.Constant(*one) for one in constants],
             starts=search.starts,
             objective=search.fit_objective(),
+            priors=search.priors,
             seed=search.seed,
             progress=progress,
             folder=folder,
         )
         analyses, problems = _analyse(fit, beyond, candidates, search.seed, progress)
     if output is not None:
-        from notchflex.fit.fitted_robots import write_fitted
+        from notchflex.fit.documents import write_fitted
 
         files = write_fitted(fit, output, inputs=sources.files)
         terminal.note(f"written: {', '.join(map(str, files))}.")
@@ -95,7 +97,7 @@ def calibrate(
 
 def _check_sensor(constants: Sequence[ParameterSpec]) -> None:
     """Refuse an unknown constant of the measurement, which is in no robot file."""
-    from notchflex.fit.model.rows import SENSOR
+    from notchflex.fit.model.residuals import SENSOR
 
     for name, *_ in constants:
         path = name.rpartition(":")[2]

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import texts
 from notchflex.cli.arguments.robots import (
+    Columns,
     MeasuredAs,
     OnePath,
     RobotName,
@@ -39,6 +40,7 @@ def compare(
     *,
     path: OnePath = None,
     measured: MeasuredAs = "ring",
+    column: Columns = (),
     beside: Annotated[
         tuple[str, ...],
         texts(
@@ -65,7 +67,7 @@ def compare(
     outputs = Outputs([*robot_files(robot), data], quiet=quiet, json=json, csv=csv, plot=plot)
     chosen = chosen_robot(robot, settings)
     values = dict(_variant(text) for text in beside)
-    seen = read_data(data, chosen, path, measured)
+    seen = read_data(data, chosen, path, measured, column)
     robots = {label: chosen.with_values(one) for label, one in values.items() if one is not None}
     with terminal.counting(f"solving {len(seen)} rows of {chosen.name}") as counted:
         terminal.use_compile_cache()

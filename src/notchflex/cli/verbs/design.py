@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from notchflex._load_words import number
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import flag
+from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
@@ -41,6 +43,15 @@ def design(
             "`[robust]` and `wanted_yield` of the design file say."
         ),
     ] = False,
+    grid: Annotated[
+        float,
+        converted(
+            partial(number, form="a step in mm, 0 or more", least=0.0),
+            "MM",
+            help="Step of all lengths that are chosen [mm], such as 0.005; the numbers are those "
+            "of the robot on this grid.",
+        ),
+    ] = 0.0,
     json: JsonFile = None,
     plot: PlotFile = None,
     quiet: Quiet = False,
@@ -51,7 +62,7 @@ def design(
     what is achieved, which limits hold the design and what each costs. Ctrl-C keeps the best robot
     so far.
     """
-    from notchflex.designing.files import file_names, write_design
+    from notchflex.designing.result import file_names, write_design
 
     checked = () if output is None else check_folder(output, file_names(), "-o", inputs=[spec])
     files = {f"-o ({file.name})": str(file) for file in checked}
@@ -59,6 +70,12 @@ def design(
     with terminal.working("loading the solver"):
         terminal.use_compile_cache()
         import notchflex.designing as designing
+    if front and grid:
+        raise InputError.CONFLICT(
+            "--front is of robots with any length: leave out --grid, name the point that you "
+            "choose as `robot` of the design file, and run it again with --grid and without "
+            "--front."
+        )
     if front and robust:
         raise InputError.CONFLICT(
             "--front is of robots as drawn: leave out --robust, name the point that you choose as "
@@ -67,7 +84,7 @@ def design(
     if front:
         return _front(spec, output, outputs)
     with terminal.bars("ranking robots") as progress:
-        result = designing.design(spec, robust=robust, progress=progress)
+        result = designing.design(spec, robust=robust, grid=grid, progress=progress)
     if output is not None:
         written = write_design(result, output, inputs=[spec])
         terminal.note(f"written: {', '.join(map(str, written))}.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,10 +13,12 @@ from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted
 from notchflex.cli.arguments.loads import ExternalLoads
 from notchflex.cli.arguments.robots import (
+    Columns,
     RobotName,
     Settings,
     changed_title,
     chosen_robot,
+    named_columns,
     robot_files,
 )
 from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet, output_file
@@ -25,8 +28,12 @@ if TYPE_CHECKING:
     from notchflex.control import Following
 
 
-def _least_zero(what: str) -> Parameter:
-    return converted(partial(number, form=f"a finite number of {what}, 0 or more", least=0.0), "X")
+def _at_least(what: str, least: float = 0.0) -> Parameter:
+    form = f"a finite number of {what}, {'greater than 0' if least else '0 or more'}"
+    return converted(partial(number, form=form, least=least), "X")
+
+
+_ABOVE_ZERO = math.ulp(0.0)
 
 
 def follow(
@@ -41,6 +48,7 @@ def follow(
     ],
     /,
     *,
+    column: Columns = (),
     drive: Annotated[
         Literal["tension", "stroke"], Parameter(help="What is commanded: tensions or strokes.")
     ] = "tension",
@@ -54,31 +62,36 @@ def follow(
     ] = "direct",
     least_tension: Annotated[
         float,
-        _least_zero("N"),
+        _at_least("N"),
         Parameter(help="Smallest tension of a tendon, the pretension of antagonists [N]."),
     ] = 0.0,
     most_tension: Annotated[
-        float | None, _least_zero("N"), Parameter(help="Largest tension of a tendon [N].")
+        float | None, _at_least("N"), Parameter(help="Largest tension of a tendon [N].")
     ] = None,
     most_stroke: Annotated[
-        float | None, _least_zero("mm"), Parameter(help="Largest stroke of a tendon [mm].")
+        float | None, _at_least("mm"), Parameter(help="Largest stroke of a tendon [mm].")
     ] = None,
     rate: Annotated[
         float | None,
-        _least_zero("N or mm"),
+        _at_least("N or mm", _ABOVE_ZERO),
         Parameter(help="Largest change of a drive from target to target [N or mm]."),
     ] = None,
     most_strain: Annotated[
-        float | None, _least_zero("1"), Parameter(help="Largest peak strain of a notch.")
+        float | None, _at_least("1"), Parameter(help="Largest peak strain of a notch.")
     ] = None,
     least_gap: Annotated[
-        float | None, _least_zero("mm"), Parameter(help="Smallest gap of a notch [mm].")
+        float | None, _at_least("mm"), Parameter(help="Smallest gap of a notch [mm].")
     ] = None,
     tolerance: Annotated[
         float,
-        _least_zero("mm"),
-        Parameter(help="Error at which a target counts as met [mm, rad]."),
-    ] = 1e-7,
+        _at_least("mm", _ABOVE_ZERO),
+        Parameter(help="Distance from lengths of a target at which it counts as met [mm]."),
+    ] = 0.05,
+    angle_tolerance: Annotated[
+        float,
+        _at_least("deg", _ABOVE_ZERO),
+        Parameter(help="Angle from angles of a target at which it counts as met [deg]."),
+    ] = 0.2,
     external: ExternalLoads = ExternalLoads(),  # noqa: B008 - frozen
     settings: Settings = (),
     from_state: Annotated[
@@ -122,7 +135,7 @@ def follow(
         strain=most_strain,
         gap=least_gap,
     )
-    goals = control.read_targets(targets, chosen)
+    goals = control.read_targets(targets, chosen, named_columns(column))
     start = None if from_state is None else State.load(from_state)
     with terminal.working(f"following {len(goals)} targets with {chosen.name}"):
         terminal.use_compile_cache()
@@ -136,7 +149,7 @@ def follow(
             drive=drive,
             limits=limits,
             approach=approach,
-            search=control.TargetSearch(tolerance=tolerance),
+            search=control.TargetSearch(near=tolerance, near_angle=math.radians(angle_tolerance)),
         )
         path = following.path
     _write(following, outputs, changed_title(chosen, settings))
@@ -152,7 +165,7 @@ def follow(
 
 def _write(following: Following, outputs: Outputs, title: str) -> None:
     from notchflex._replacing import replacing
-    from notchflex.control.documents import following_columns, following_document
+    from notchflex.control.following import following_columns, following_document
     from notchflex.results.files.csv import write_path_csv
 
     def picture() -> Any:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
+from notchflex.cli.arguments.robots import Columns, named_columns
 from notchflex.cli.outputs import JsonFile, Outputs, PlotFile
 
 
@@ -20,13 +21,20 @@ def friction_rig(
     ],
     /,
     *,
+    law: Annotated[
+        Literal["capstan", "corner"],
+        Parameter(
+            help="Friction law of an edge: that of robots by default, or that of Liu 2022 (eq. 21)."
+        ),
+    ] = "capstan",
+    column: Columns = (),
     json: JsonFile = None,
     plot: PlotFile = None,
 ) -> None:
     """Find the coefficient of friction of a tendon over two edges from two hanging weights.
 
     Every row is a reading: weight 1 is just about to lift weight 2, the tendon turning over two
-    edges in between (Liu 2022, eq. 21). Prints the coefficient with its 95 % interval, the spread
+    edges in between. Prints the coefficient with its 95 % interval, the spread
     of the readings, outliers, and whether a constant coefficient is enough.
     """
     outputs = Outputs([data], json=json, plot=plot)
@@ -35,7 +43,7 @@ def friction_rig(
     from notchflex.fit.friction_rig.rig import friction_document
     from notchflex.fit.friction_rig.rig import friction_rig as estimate
 
-    rig = estimate(read_friction_rig(data))
+    rig = estimate(read_friction_rig(data, law, named_columns(column)))
 
     outputs.write_json(lambda: friction_document(rig))
     outputs.draw(rig)

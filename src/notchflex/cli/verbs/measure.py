@@ -10,7 +10,13 @@ from cyclopts import Parameter
 from notchflex._load_words import number, whole
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, flag
-from notchflex.cli.arguments.robots import Settings, chosen_robot, robot_files
+from notchflex.cli.arguments.robots import (
+    Columns,
+    Settings,
+    chosen_robot,
+    named_columns,
+    robot_files,
+)
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, Quiet, output_file
 from notchflex.cli.tables.measured_cut import write_cut
 from notchflex.cli.terminal import DONE, INTERRUPTED, NOT_CONVERGED
@@ -48,6 +54,7 @@ def measure(
             help="CSV with a column `photograph` and columns of loads, such as `tendon_force_N`.",
         ),
     ] = None,
+    column: Columns = (),
     pattern: Annotated[
         str | None,
         Parameter(
@@ -179,7 +186,12 @@ def measure(
             return write_cut(as_cut, outputs, output, write_robot, files)
         if uncertainty is not None:
             limit["uncertainty_deg"] = uncertainty
-        given: dict[str, Any] = {"loads": loads, "pattern": pattern, "exif": exif}
+        given: dict[str, Any] = {
+            "loads": loads,
+            "pattern": pattern,
+            "exif": exif,
+            "columns": named_columns(column),
+        }
         result = measured(photographs, chosen, progress=progress, **given, **ruler, **limit)
     done = True
     if correct:

@@ -11,7 +11,14 @@ from notchflex._load_words import number
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted
 from notchflex.cli.arguments.loads import ExternalLoads
-from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
+from notchflex.cli.arguments.robots import (
+    Columns,
+    RobotName,
+    Settings,
+    chosen_robot,
+    named_columns,
+    robot_files,
+)
 from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
@@ -89,6 +96,7 @@ def sense(
     ] = None,
     external: ExternalLoads = ExternalLoads(),  # noqa: B008 - frozen
     settings: Settings = (),
+    column: Columns = (),
     json: JsonFile = None,
     csv: CsvFile = None,
     plot: PlotFile = None,
@@ -103,7 +111,7 @@ def sense(
     chosen = chosen_robot(robot, settings)
     from notchflex.sensing.tables import read_sensor_table
 
-    read = read_sensor_table(data, chosen, beside)
+    read = read_sensor_table(data, chosen, beside, named_columns(column))
     with terminal.bars("finding the force") as show:
         terminal.use_compile_cache()
         import math

@@ -72,7 +72,7 @@ def simulate(
     refinement: Annotated[
         int,
         converted(whole(0, 3), "N"),
-        Parameter(help="0 to 3: more strain modes in every notch, to check the accuracy."),
+        Parameter(help="0 to 3: more strain modes and fibres, to check the accuracy."),
     ] = 0,
     settings: Settings = (),
     uncertain: Annotated[
@@ -83,10 +83,12 @@ def simulate(
         ),
     ] = False,
     draws: Annotated[
-        int,
+        int | None,
         converted(whole(2, 100_000), "N"),
-        Parameter(help="How many robots `--uncertain` draws within the tolerances."),
-    ] = 256,
+        Parameter(
+            help="How many robots `--uncertain` draws within the tolerances; 256 if not given."
+        ),
+    ] = None,
     from_state: Annotated[
         str | None,
         Parameter(
@@ -153,7 +155,7 @@ def simulate(
     """
     import numpy as np
 
-    from notchflex.cli.tables.path_columns import parse_columns
+    from notchflex.cli.tables.path_table import parse_columns
     from notchflex.loads import LoadPath
 
     terminal.be_quiet(quiet)
@@ -163,11 +165,7 @@ def simulate(
     robots = beside_robots(chosen, robot, beside)
     if external and not tension and not stroke:
         tension = (TendonCommand("--tension", 1, [math.nan]),)  # all hang slack, in one step
-    if uncertain and (beside or from_state is not None):
-        other = "--beside" if beside else "--from-state"
-        raise InputError.CONFLICT(
-            f"--uncertain draws robots that start from rest; leave out {other}, or --uncertain."
-        )
+    _check_bands(uncertain, draws, beside, from_state)
     tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
     outputs = Outputs(
         [*robot_files(robot), *beside_files(beside)],
@@ -192,12 +190,13 @@ def simulate(
         bands = None
         if uncertain:
             from notchflex import analysis
+            from notchflex.analysis.uncertainty.bands import DRAWS
 
             bands = analysis.uncertain(
                 chosen,
                 load,
                 outputs=analysis.band_names(shown),
-                draws=draws,
+                draws=draws or DRAWS,
                 refinement=refinement,
                 progress=counted,
             )
@@ -211,6 +210,19 @@ def simulate(
     if outputs.prints_tables:
         _print(paths, bands, title, columns=shown, every_row=every_row)
     return max(_report(path, label if beside else "") for label, path in paths.items())
+
+
+def _check_bands(
+    uncertain: bool, draws: int | None, beside: Sequence[str], from_state: str | None
+) -> None:
+    """Refuse options that `--uncertain` excludes or needs."""
+    if uncertain and (beside or from_state is not None):
+        other = "--beside" if beside else "--from-state"
+        raise InputError.CONFLICT(
+            f"--uncertain draws robots that start from rest; leave out {other}, or --uncertain."
+        )
+    if draws is not None and not uncertain:
+        raise InputError.CONFLICT("--draws counts the robots of --uncertain; give both or neither.")
 
 
 def _print(

@@ -19,7 +19,7 @@ from notchflex.results.files.writing import check_picture
 
 if TYPE_CHECKING:
     from notchflex.sweeping import Sweep
-    from notchflex.sweeping.estimate import Estimate
+    from notchflex.sweeping.sweep import Estimate
 
 _PART = "two whole numbers, such as 7/100 for the seventh of a hundred parts"
 
@@ -118,7 +118,7 @@ def sweep(
     if dry_run:
         with terminal.working("solving some rows"):
             terminal.use_compile_cache()
-            from notchflex.sweeping.estimate import estimate
+            from notchflex.sweeping.sweep import estimate
 
             expected = estimate(plan, workers=workers)
         outputs.write_json(expected._asdict)

@@ -50,7 +50,7 @@ def tolerance(
     refinement: Annotated[
         int,
         converted(whole(0, 3), "N"),
-        Parameter(help="0 to 3: more strain modes in every notch, to check the accuracy."),
+        Parameter(help="0 to 3: more strain modes and fibres, to check the accuracy."),
     ] = 0,
     settings: Settings = (),
     pieces: InPieces = InPieces(),  # noqa: B008 - frozen

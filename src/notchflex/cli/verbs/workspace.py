@@ -129,7 +129,7 @@ def workspace(
         from notchflex.loads import pull
         from notchflex.workspaces.limits import in_python
 
-        load = external.on(pull(0.0, 0.0, steps=1)).external[0]
+        load = external.on(pull(0.0, 0.0, steps=1))[0]
         limits = in_python(dict(limit))
         for label, one in robots.items():
             found[label] = exploring.workspace(
@@ -148,9 +148,9 @@ def workspace(
 
 
 def _write(found: Mapping[str, Workspace], outputs: Outputs) -> None:
-    from notchflex.workspaces.comparing import overlaps
-    from notchflex.workspaces.files import (
+    from notchflex.workspaces.cloud import (
         overlap_documents,
+        overlaps,
         save_netcdf,
         workspace_document,
     )

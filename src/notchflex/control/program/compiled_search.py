@@ -11,11 +11,11 @@ robot comes to.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
@@ -28,22 +28,160 @@ from notchflex.control.program.drive_step import (
     dead_band,
     drive_step,
 )
-from notchflex.control.program.search_state import LinearResponse, SearchState, SolvedRound
-from notchflex.control.program.task import SearchLayouts, Task
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
-from notchflex.solver.derived.reported import believable
+from notchflex.solver.derived.quantities import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.element import Iterate, Memory
 from notchflex.solver.friction_predictor import limit_slack
 from notchflex.solver.linear_step.block_elimination import linear_step
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
-from notchflex.solver.programs.pytree_layout import lane_sizes
+from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
 from notchflex.solver.residual import Evaluation, evaluate
 from notchflex.solver.solver_state import SolverState
+
+
+class SearchState(NamedTuple):
+    """State of the corrections of a solved load.
+
+    Attributes:
+        drive: The drives, (t,).
+        point: Unknowns and base tensions.
+        state: The state there, its history included.
+        values: The numbers of the response, (n,).
+        slopes: Their slopes by the drives, (t, n).
+        error: Weighted distance from the target.
+        sticks: 1 where a tendon sticks, (t,).
+        change: Correction of the drives from here, (t,).
+        next_point: Unknowns and base tensions after the correction.
+        stuck: Whether a tendon sticks that must move.
+        beyond: Drives to solve next, beyond the dead bands of tendons that stick, (t,).
+        close: Whether one more correction meets the target.
+        falls: Whether the last correction has brought it nearer.
+        met: Whether balance and target are met.
+        corrected: How many corrections were made.
+    """
+
+    drive: Array
+    point: Iterate
+    state: SolverState
+    values: Array
+    slopes: Array
+    sticks: Array
+    error: Array
+    change: Array
+    next_point: Iterate
+    stuck: Bool[Array, ""]
+    beyond: Array
+    close: Bool[Array, ""]
+    falls: Bool[Array, ""]
+    met: Bool[Array, ""]
+    corrected: Int[Array, ""]
+
+
+class LinearResponse(NamedTuple):
+    """Linear response of a point.
+
+    Attributes:
+        residual: Largest residual there.
+        values: The numbers of the response there, (n,).
+        state: The state there.
+        points: Changes of the point by a step to the balance, and by a unit of every drive, as
+            leading axis, 1 + t.
+        changes: The same of the numbers, (1 + t, n).
+    """
+
+    residual: Array
+    values: Array
+    state: SolverState
+    points: Iterate
+    changes: Array
+
+
+class SolvedRound(NamedTuple):
+    """State of the loop over solved loads."""
+
+    drive: Array
+    at: SearchState
+    result: LoadStepResult
+    solved: Int[Array, ""]
+
+
+class Task(NamedTuple):
+    """Task of the program; n numbers of a response, t tendons.
+
+    Attributes:
+        goal: What the numbers are to become, (n,).
+        weights: What an error of each counts, 0 of one that is free, (n,).
+        miss: Weighted differences from the target at the present drives, (n,).
+        slopes: Their slopes there, of a tendon that sticks as it last slid; zero where they are not
+            known, (n, t).
+        present: Drives to start from, (t,).
+        low: Lowest drives, (t,).
+        high: Highest drives, (t,).
+        driven: 1 where a tendon is driven, 0 where it is held, (t,).
+        turn: Rotation from the base to the world, (3, 3).
+        tolerance: Weighted error at which the target is met.
+        unit: Drive that about closes a notch, N or mm.
+        rounds: How many loads may be solved.
+        corrections: How many times the drives may be corrected after each.
+        redundant: 1 where drives are made as small as the target allows.
+    """
+
+    goal: Float[Array, " n"]
+    weights: Float[Array, " n"]
+    miss: Float[Array, " n"]
+    slopes: Float[Array, "n t"]
+    present: Float[Array, " t"]
+    low: Float[Array, " t"]
+    high: Float[Array, " t"]
+    driven: Float[Array, " t"]
+    turn: Float[Array, "3 3"]
+    tolerance: Float[Array, ""]
+    unit: Float[Array, ""]
+    rounds: Float[Array, ""]
+    corrections: Float[Array, ""]
+    redundant: Float[Array, ""]
+
+
+def blank_task(numbers: int, tendons: int, turn: np.ndarray) -> Task:
+    """Return the task of solving one load, without drives and without a target.
+
+    Args:
+        numbers: How many numbers a response has.
+        tendons: Number of tendons.
+        turn: Rotation from the base to the world.
+    """
+    none, drives, slopes = np.zeros(numbers), np.zeros(tendons), np.zeros((numbers, tendons))
+    number, one = np.zeros(()), np.ones(())
+    fields: list[Any] = [none, none, none, slopes, *[drives] * 4, turn]
+    fields += [number, one, one, number, number]  # one load, no correction
+    return Task._make(fields)
+
+
+class SearchLayouts(NamedTuple):
+    """Layouts of chain, load, state and task as vectors, and the reported quantities.
+
+    Attributes:
+        chain: Structure and layout of the chain.
+        command: Layout of one load.
+        state: Layout of a state.
+        task: Layout of a task.
+        first_contact: Where a packed state has the log ratios of the first contacts of all tendons,
+            and their largest.
+        outputs: Names of the quantities.
+    """
+
+    chain: StaticStructure
+    command: PytreeLayout
+    state: PytreeLayout
+    task: PytreeLayout
+    first_contact: tuple[tuple[int, ...], tuple[int, ...]]
+    outputs: tuple[str, ...]
+
 
 # Redundant drives are minimal if a step would change them by less than this part.
 _SMALL_RELAXATION = 1e-3

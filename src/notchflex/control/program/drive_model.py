@@ -14,24 +14,68 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import jax
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.solve import prepare_for
-from notchflex.control.program.compiled_search import search_drives
+from notchflex.control.program.compiled_search import SearchLayouts, Task, blank_task, search_drives
 from notchflex.control.program.drive_step import dead_band
-from notchflex.control.program.response import DriveAim, Response
-from notchflex.control.program.task import SearchLayouts, Task, blank_task
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import LoadPath
-from notchflex.mechanics.motion import rotation_about
 from notchflex.results.state import SavedState, State, fitted
 from notchflex.robot import Robot
-from notchflex.solver.derived.reported import unpad_quantity
+from notchflex.solver.derived.quantities import unpad_quantity
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.capacity import pad_rows
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.pytree_layout import PytreeLayout
+from notchflex.solver.programs.static_structure import PytreeLayout, pad_rows
 from notchflex.solver.solver_state import SolverState
+
+
+class Response(NamedTuple):
+    """A solved load, and how what was asked of it changes with the drives.
+
+    Attributes:
+        state: The state, packed for the padded chain.
+        values: Quantities that were asked, one after the other, flattened, (m,).
+        jacobian: Their change per unit of every drive (N or mm), (m, t). NaN where the load was
+            so hard that its derivatives are not known.
+        converged: Whether the load has an equilibrium within what the model is for.
+        whole: Whether it was solved in one substep.
+        sliding: The Jacobian, of tendons that stick as they last slid, (m, t).
+    """
+
+    state: Float[np.ndarray, " state"]
+    values: Float[np.ndarray, " m"]
+    jacobian: Float[np.ndarray, "m t"]
+    converged: bool
+    whole: bool
+    sliding: Float[np.ndarray, "m t"]
+
+
+class DriveAim(NamedTuple):
+    """A target of drives, and their limits; m target values, t tendons.
+
+    Attributes:
+        entries: Entries of a response that have a target, (m,).
+        goal: What they are to become, (m,).
+        weights: What an error of each counts, (m,).
+        low: Lowest drives, (t,).
+        high: Highest drives, (t,).
+        driven: Which tendons are driven, (t,).
+        tolerance: Weighted error at which the target is met.
+        unit: Drive that about closes a notch, N or mm.
+        solves: How many loads may be solved.
+    """
+
+    entries: np.ndarray
+    goal: np.ndarray
+    weights: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    driven: np.ndarray
+    tolerance: float
+    unit: float
+    solves: int
+
 
 # Corrections of drives and equilibrium after a solved load.
 _CORRECTIONS = 8.0
@@ -256,8 +300,8 @@ class DriveModel:
     @cached_property
     def _blank(self) -> Task:
         tendons = self.prepared.long.chain.tendons
-        turn = np.asarray(rotation_about(jnp.asarray(self.load.base_rotation)))
-        return blank_task(self._size, tendons, turn)
+        turn = self.load.base_to_world
+        return blank_task(self._size, tendons, np.eye(3) if turn is None else turn)
 
     @cached_property
     def _fields(self) -> dict[str, slice]:

@@ -6,16 +6,21 @@ either branch: by loading up to it, or by overshooting it and unloading.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.program.response import Response
-from notchflex.control.search.iterative_search import search_iteratively, solve_directly
+from notchflex.control.program.drive_model import Response
+from notchflex.control.search.iterative_search import (
+    largest_violation,
+    limit_rows,
+    search_iteratively,
+    solve_directly,
+)
 from notchflex.control.search.problem import Attempt, Problem
-from notchflex.control.search.search_point import largest_violation, limit_rows
 from notchflex.control.search.smaller import smaller_tensions
 from notchflex.control.search.starts import corners, other_starts, taut_tendons_suffice
 from notchflex.errors import Failure
@@ -25,18 +30,10 @@ Approach = Literal["direct", "loading", "unloading", "least"]
 # Overshoot beyond the drives that reverse all contacts, relative.
 _OVERSHOOT = 0.05
 # Relative tolerance of limits.
-_KEPT = 1e-6
-# If all searches fail, one restarts from the best result without drives smaller than this part of
-# the largest.
-_SMALL = 0.2
+KEPT = 1e-6
 # A target is out of reach if one of this number of last searches reduces the error by less than
 # this part.
 _LAST_SEARCHES, _NO_NEARER = 3, 1e-6
-# Number of parts in which the target moves from the present values.
-_PARTS = 6
-
-
-_search = partial(search_iteratively, patient=False)
 
 
 class ApproachPath(NamedTuple):
@@ -135,53 +132,10 @@ def find_anyhow(
     The tip of a robot that bends far moves to and fro: from afar a search may end in a trough that
     is not the deepest.
     """
-    # Where other tendons move, a tendon slides within its dead band too.
-    alone = bool(np.count_nonzero(start[problem.driven]) < 2)
-    taut = problem.driven & (start > problem.low)
-    own, few = problem._replace(driven=taut), 0 < taut.sum() < problem.driven.sum()
-    # Where a tendon turns round, one that is slack may seem to serve instead.
-    tried = few and known is not None and taut_tendons_suffice(problem, taut, goal, known)
-    best = first = solve_directly(own if tried else problem, before, start, goal, known)
+    attempts = _attempts(problem, before, start, goal, known)
+    best = next(attempts)
     solves = best.solves
-    if best.failure is not None and tried:
-        best = first = solve_directly(problem, before, start, goal, known)
-        solves += best.solves
-    if best.failure is not None and few:
-        best = best if tried else solve_directly(own, before, start, goal, known)
-        solves += 0 if tried else best.solves
-        if best.failure is not None:
-            best = _search(own, before, start, goal, known, over_bands=alone)
-            solves += best.solves
-    if best.failure is None:
-        return best._replace(solves=solves)
-    best = _search(problem, before, start, goal, known, over_bands=alone)
-    solves += best.solves
-    if best.failure is not None:
-        other = _search(problem, before, start, goal, known, over_bands=not alone)
-        solves += other.solves
-        best = min(best, other, key=_quality)
-    others = [(best.drive, True), *other_starts(problem, before, start)]
-    if best.failure is not None:
-        other = _meet_from(problem, before, [drive for drive, _ in others], goal, first, best.error)
-        solves += other.solves
-        best = other if other.failure is None else best
-    for other_start, over_bands in others[1:]:
-        if best.failure is None:
-            return best._replace(solves=solves)
-        other = _search(problem, before, other_start, goal, over_bands=over_bands)
-        solves += other.solves
-        best = min(best, other, key=_quality)
-    if best.failure is not None:
-        other = _by_parts(problem, before, start, goal)
-        solves += other.solves
-        best = min(best, other, key=_quality)
-    if best.failure is not None and problem.driven.sum() > 1:
-        few = np.where(best.drive < _SMALL * best.drive.max(), problem.low, best.drive)
-        other = _search(problem, before, few, goal)
-        solves += other.solves
-        best = min(best, other, key=_quality)
-    if best.failure is not None and taut.sum() > 1:
-        other = _from_corners(own, before, start, goal, best)
+    while best.failure is not None and (other := next(attempts, None)):
         solves += other.solves
         best = min(best, other, key=_quality)
     if best.failure is Failure.SEARCH_STOPPED:
@@ -190,64 +144,51 @@ def find_anyhow(
     return best._replace(solves=solves)
 
 
-def _meet_from(
+def _attempts(
     problem: Problem,
     before: np.ndarray,
-    starts: list[np.ndarray],
+    start: np.ndarray,
     goal: np.ndarray,
-    nearest: Attempt,
-    error: float,
-) -> Attempt:
-    """Solve from several starting drives, or continue from the nearest if its error is smaller."""
-    solves = 0
-    for start in starts:
-        other = solve_directly(problem, before, start, goal)
-        solves += other.solves
-        if other.failure is None:
-            return other._replace(solves=solves)
-        if (other.drive >= problem.low).all() and (other.drive <= problem.high).all():
-            nearest = min(nearest, other, key=_quality)
-    for go_on in (solve_directly, _find_within) if nearest.error < error else ():
-        # It had come near when its rounds were over.
-        nearest = go_on(problem, before, nearest.drive, goal)
-        solves += nearest.solves
-        if nearest.failure is None:
-            break
-    return nearest._replace(solves=solves)
-
-
-def _from_corners(
-    problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray, best: Attempt
-) -> Attempt:
-    """Search from just beyond all dead bands, on every side of them; return the best."""
-    solves = 0
-    for corner in corners(problem, before, start, problem.driven):
-        other = _search(problem, before, corner, goal, over_bands=False)
-        solves += other.solves
-        best = min(best, other, key=_quality)
-        if best.failure is None:
-            break
-    return best._replace(solves=solves)
-
-
-def _find_within(
-    problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray
-) -> Attempt:
-    """Search with dead bands, from drives that are near the target."""
-    return search_iteratively(problem, before, start, goal, over_bands=False)
+    known: Response | None,
+) -> Iterator[Attempt]:
+    """Yield what one search after the other finds, the cheapest and most promising first."""
+    search = partial(search_iteratively, patient=False)
+    taut = problem.driven & (start > problem.low)
+    own, few = problem._replace(driven=taut), 0 < taut.sum() < problem.driven.sum()
+    # Where a tendon turns round, one that is slack may seem to serve instead.
+    suffice = few and known is not None and taut_tendons_suffice(problem, taut, goal, known)
+    moved = (own, problem) if suffice else (problem, own)
+    for some in moved if few else (problem,):
+        yield solve_directly(some, before, start, goal, known)
+    # Where other tendons move, a tendon slides within its dead band too.
+    alone = bool(np.count_nonzero(start[problem.driven]) < 2)
+    if few:
+        yield search(own, before, start, goal, known, over_bands=alone)
+    for over_bands in (alone, not alone):
+        yield search(problem, before, start, goal, known, over_bands=over_bands)
+    starts = list(other_starts(problem, before, start))
+    for other_start, _ in starts:
+        yield solve_directly(problem, before, other_start, goal)
+    for other_start, over_bands in starts:
+        yield search(problem, before, other_start, goal, over_bands=over_bands)
+    if taut.sum() > 1:
+        for corner in corners(own, before, start, taut):
+            yield search(own, before, corner, goal, over_bands=False)
 
 
 def _settled(problem: Problem, before: np.ndarray, best: Attempt, goal: np.ndarray) -> Attempt:
     """Search on from where all searches ended, until that brings the target no nearer."""
     solves = 0
     for _ in range(_LAST_SEARCHES):
-        other = _find_within(problem, before, best.drive, goal)
+        other = search_iteratively(problem, before, best.drive, goal, over_bands=False)
         solves += other.solves
         nearer = other.error < (1.0 - _NO_NEARER) * best.error
         if nearer or other.failure is None:  # else it stays where it is: drives may be stuck
             best = min(best, other, key=_quality)
         if best.failure is Failure.SEARCH_STOPPED and not nearer and _keeps_limits(best):
-            best = best._replace(failure=Failure.TARGET_OUT_OF_REACH)
+            stopped = other.failure is Failure.SEARCH_STOPPED
+            failure = Failure.TARGET_OUT_OF_REACH if stopped else other.failure
+            best = best._replace(failure=failure)
         if best.failure is not Failure.SEARCH_STOPPED:
             break
     return best._replace(solves=solves)
@@ -260,22 +201,8 @@ def _quality(attempt: Attempt) -> tuple[bool, bool, float]:
 def _allowed(problem: Problem, response: Response) -> bool:
     """Whether a state keeps the limits."""
     room = limit_rows(problem, response.values, response.jacobian)[1]
-    return largest_violation(room) <= _KEPT
+    return largest_violation(room) <= KEPT
 
 
 def _keeps_limits(attempt: Attempt) -> bool:
-    return attempt.response.converged and attempt.excess <= _KEPT
-
-
-def _by_parts(problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray) -> Attempt:
-    """Move the target from the present values to where it is; the memory stays that of before."""
-    response = problem.model.solve(before, np.clip(start, problem.low, problem.high))
-    values, solves = response.values[problem.entries], 1
-    loose = problem._replace(search=problem.search.loose)
-    attempt = Attempt(start, response, np.inf, 0.0, 1, Failure.SEARCH_STOPPED)
-    for part in range(1, _PARTS + 1):
-        aim = problem if part == _PARTS else loose
-        towards = values + part / _PARTS * (goal - values)
-        attempt = _search(aim, before, attempt.drive, towards)
-        solves += attempt.solves
-    return attempt._replace(solves=solves)
+    return attempt.response.converged and attempt.excess <= KEPT

@@ -10,8 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.control.limits import Bound
-from notchflex.control.program.drive_model import DriveModel
-from notchflex.control.program.response import Response
+from notchflex.control.program.drive_model import DriveModel, Response
 from notchflex.errors import Failure, InputError
 from notchflex.loads.validation import check_integer, check_number
 
@@ -26,7 +25,9 @@ class TargetSearch:
     """Tolerance and budget of a search for a target.
 
     Attributes:
-        tolerance: Weighted error (mm, N, rad) at which a target counts as met.
+        tolerance: Weighted error (mm, N, rad) at which the search ends.
+        near: Distance from lengths of a target at which it counts as met, mm.
+        near_angle: Angle from angles of a target at which it counts as met, rad.
         solves: Largest number of solves for one target.
 
     Raises:
@@ -34,22 +35,18 @@ class TargetSearch:
     """
 
     tolerance: float = 1e-7
+    near: float = 0.05
+    near_angle: float = math.radians(0.2)
     solves: int = 80
-
-    @property
-    def loose(self) -> TargetSearch:
-        """For a target on the way to another."""
-        return TargetSearch(tolerance=max(self.tolerance, 1e-3), solves=self.solves)
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        check_number(self.tolerance, "the tolerance of a search")
         check_integer(self.solves, "the number of solves of a search")
-        if not self.tolerance > 0.0 or not self.solves >= 1:
-            raise InputError.OUT_OF_RANGE(
-                "a search needs a positive tolerance and at least one solve; "
-                f"got {self.tolerance!r} and {self.solves!r}"
-            )
+        for name, value in vars(self).items():
+            if not check_number(value, f"{name} of a search") > 0.0:
+                raise InputError.OUT_OF_RANGE(
+                    f"{name} of a search must be greater than 0; got {value!r}"
+                )
 
 
 class Problem(NamedTuple):

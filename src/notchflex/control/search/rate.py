@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.program.response import Response
+from notchflex.control.program.drive_model import Response
 from notchflex.control.search.iterative_search import search_iteratively, within_limits
 from notchflex.control.search.problem import Attempt, Problem, size_of
 from notchflex.errors import Failure

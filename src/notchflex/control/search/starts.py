@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from jaxtyping import Bool, Float
 
-from notchflex.control.program.response import Response
+from notchflex.control.program.drive_model import Response
 from notchflex.control.search.problem import Problem, size_of
 
 # Just beyond the dead bands of the present drives, by this part of them,

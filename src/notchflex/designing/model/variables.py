@@ -1,19 +1,23 @@
-"""The variables of a design as a vector, and the robot and the loads of a vector."""
+"""The variables of a design, and the robot, deviations and load path of a vector."""
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb, isfinite
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from notchflex.designing.specification.chosen import DesignVariable
-from notchflex.designing.specification.spec import DesignState
+from notchflex.analysis.uncertainty.draws import moments, sources_of
+from notchflex.designing.specification import DesignState, DesignVariable
 from notchflex.errors import InputError
+from notchflex.loads import LoadPath
+from notchflex.loads.external import ExternalLoad
 from notchflex.robot import Robot
 from notchflex.robot.error_messages import nearest
 from notchflex.robot.tolerance import Tolerance
@@ -74,12 +78,14 @@ class Variables:
         columns: The numbers of the vector.
         tolerances: Within what robots are made; derivatives by what deviates follow those by the
             vector.
+        grid: Step of the lengths of the robots, mm; 0 for any length.
     """
 
     robot: Robot
     states: Mapping[str, DesignState]
     columns: tuple[Column, ...]
     tolerances: tuple[Tolerance, ...] = ()
+    grid: float = 0.0
 
     @cached_property
     def lower(self) -> Float[np.ndarray, " v"]:
@@ -128,7 +134,21 @@ class Variables:
         for one, number in zip(self.columns, x.tolist(), strict=True):
             for path, weight in one.weights.items():
                 values[path] = values.get(path, 0.0) + weight * number
+        for one in itertools.compress(self.columns, self.lengths if self.grid else ()):
+            values |= {path: float(self._placed(values[path])) for path in one.weights}
         return values
+
+    @cached_property
+    def lengths(self) -> Bool[np.ndarray, " v"]:
+        """Which numbers are lengths of the robot."""
+        return np.array([one.unit == "mm" and one.load is None for one in self.columns], bool)
+
+    def on_grid(self, x: Float[np.ndarray, " v"]) -> Float[np.ndarray, " v"]:
+        """Return a vector with its lengths on the grid."""
+        return np.where(self.lengths, self._placed(x), x) if self.grid else x
+
+    def _placed(self, value: Any) -> Any:
+        return np.round(np.round(value / self.grid) * self.grid, 9)  # 1.405, not 1.4050000000000002
 
     def robot_at(self, x: Float[np.ndarray, " v"]) -> Robot:
         """Return the robot of a vector.
@@ -262,3 +282,238 @@ def _load_number(
             f"`{variable.value}`: the robot has {robot.number_of_tendons} tendons."
         )
     return LoadNumber(name, kind, tendon - 1)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """A number that is drawn, and the values that follow it.
+
+    Attributes:
+        nominal: Values of the drawing, by path.
+        sd: Their standard deviations.
+        mean: Mean of the deviation, in standard deviations.
+    """
+
+    nominal: Mapping[str, float]
+    sd: Mapping[str, float]
+    mean: float
+
+    @property
+    def law(self) -> str | None:
+        """The path of a constant of material or friction, where this is one."""
+        path = next(iter(self.nominal))
+        return path if path.startswith(("material.", "friction.")) else None
+
+    def moved(self, robot: Robot, part: float) -> Robot:
+        """Return a robot that deviates by a number of standard deviations.
+
+        Raises:
+            InputError: No robot can have these values.
+        """
+        return robot.with_values({p: one + part * self.sd[p] for p, one in self.nominal.items()})
+
+
+def deviations_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[Deviation]:
+    """Return what deviates; as many, in the same order, for all robots of one form.
+
+    Args:
+        robot: The robot with the values of the drawing.
+        tolerances: The tolerances.
+    """
+    deviations: list[Deviation] = []
+    for source in sources_of(robot, tolerances):
+        both = {path: moments(source.tolerance, value) for path, value in source.nominal.items()}
+        mean, sd = next(iter(both.values()))
+        sds = {path: one for path, (_, one) in both.items()}
+        deviations.append(Deviation(source.nominal, sds, mean / sd if sd > 0.0 else 0.0))
+    return deviations
+
+
+PROBE = 1e-3
+"""Force by which a compliance is found, to both sides, N."""
+
+Direction = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A small force at the tip after a state."""
+
+    state: str
+    direction: Direction
+    side: int
+
+
+@dataclass(frozen=True)
+class StatePaths:
+    """The states of a design, in pieces that each begin at rest.
+
+    Attributes:
+        states: The states by name.
+        tendons: Number of tendons of the robot.
+        pieces: What each piece goes through, in order: names of states, and at the end a probe.
+    """
+
+    states: Mapping[str, DesignState]
+    tendons: int
+    pieces: tuple[tuple[str | Probe, ...], ...]
+
+    @property
+    def step(self) -> dict[str | Probe, int]:
+        """The step of every state and probe, from 0; of one in several pieces the first."""
+        steps: dict[str | Probe, int] = {}
+        last = -1
+        for piece in self.pieces:
+            for one in piece:
+                last += 1 if isinstance(one, Probe) else self.states[one].steps
+                steps.setdefault(one, last)
+        return steps
+
+    @property
+    def lengths(self) -> list[int]:
+        """Number of steps of every piece."""
+        steps = (
+            (1 if isinstance(one, Probe) else self.states[one].steps for one in piece)
+            for piece in self.pieces
+        )
+        return [sum(one) for one in steps]
+
+    @property
+    def from_rest(self) -> Bool[np.ndarray, " s"]:
+        """Which steps begin at rest."""
+        lengths = self.lengths
+        begins = np.zeros(sum(lengths), bool)
+        begins[np.cumsum([0, *lengths[:-1]])] = True
+        return begins
+
+    def path(self, numbers: Mapping[LoadNumber, float]) -> LoadPath:
+        """Return the whole path.
+
+        Args:
+            numbers: Tensions and strokes that are variables.
+        """
+        commands: list[np.ndarray] = []
+        external: list[ExternalLoad] = []
+        for piece in self.pieces:
+            before = np.zeros((2, self.tendons))
+            load = ExternalLoad()
+            for one in piece:
+                if isinstance(one, Probe):
+                    force = np.array(load.tip_force) + one.side * PROBE * np.array(one.direction)
+                    commands.append(before[None])
+                    external.append(_external(self.states[one.state], tuple(force.tolist())))
+                    continue
+                state = self.states[one]
+                after = self._commanded(state, numbers)
+                # A slack tendon is pulled from 0 N; what changes from stroke to tension jumps.
+                slack = np.isnan(before).all(axis=0) & np.array([[True], [False]])
+                first = np.where(slack, 0.0, np.where(np.isnan(before), after, before))
+                part = np.arange(1, state.steps + 1) / state.steps
+                commands.append(first + part[:, None, None] * (after - first))
+                load = _external(state, state.tip_force)
+                external += [load] * state.steps
+                before = after
+        every = np.concatenate(commands)
+        return LoadPath(every[:, 0], every[:, 1], external=tuple(external))
+
+    def _commanded(
+        self, state: DesignState, numbers: Mapping[LoadNumber, float]
+    ) -> Float[np.ndarray, "2 t"]:
+        """Tensions and strokes of a state, NaN where not commanded."""
+        table = np.full((2, self.tendons), np.nan)
+        for row, kind in enumerate(("tension", "stroke")):
+            given = getattr(state, kind) or ()
+            table[row, : len(given)] = given
+        for one, value in numbers.items():
+            if one.state == state.name:
+                table[("tension", "stroke").index(one.kind), one.tendon] = value
+        return table
+
+
+def _external(state: DesignState, force: Sequence[float]) -> ExternalLoad:
+    return ExternalLoad(
+        tip_force=tuple(force), tip_moment=state.tip_moment, tip_mass=state.tip_mass
+    )
+
+
+def state_paths(
+    states: Sequence[DesignState],
+    tendons: int,
+    used: Sequence[str],
+    probes: Sequence[tuple[str, Direction]],
+) -> StatePaths:
+    """Lay out the states of a design.
+
+    Args:
+        states: The states.
+        tendons: Number of tendons of the robot.
+        used: Names of the states that anything is asked of.
+        probes: States and directions of tip compliances.
+
+    Raises:
+        InputError: States of one name, an unknown state before another, or a circle of states.
+    """
+    table = {one.name: one for one in states}
+    pieces: list[tuple[str | Probe, ...]] = []
+    for state, direction in dict.fromkeys(probes):
+        pieces += [(*history(table, state), Probe(state, direction, side)) for side in (1, -1)]
+    for name in used:
+        way = history(table, name)
+        if not any(piece[: len(way)] == way for piece in pieces):
+            # A longer piece serves the states on its way too.
+            pieces = [piece for piece in pieces if piece != way[: len(piece)]]
+            pieces.append(way)
+    return StatePaths(table, tendons, tuple(pieces))
+
+
+def check_states(states: Sequence[DesignState], tendons: int) -> None:
+    """Raise if states contradict each other or the robot.
+
+    Raises:
+        InputError: Two states of one name, an unknown state before another, a circle, no load, or
+            a load of a tendon that is not there.
+    """
+    table = {one.name: one for one in states}
+    for number, one in enumerate(states, start=1):
+        shown = f"`state[{number}]` ({one.name})"
+        if table[one.name] is not one:
+            raise InputError.CONFLICT(f"{shown}: another state has this name; rename one of them.")
+        history(table, one.name)
+        for kind in ("tension", "stroke"):
+            given = getattr(one, kind) or ()
+            if len(given) > tendons:
+                raise InputError.WRONG_SHAPE(
+                    f"{shown} gives a {kind} of {len(given)} tendons, but the robot has {tendons}."
+                )
+            finite = [value for value in given if value == value]
+            if any(abs(value) > 1e6 for value in finite):
+                raise InputError.OUT_OF_RANGE(f"{shown} has a {kind} beyond 1e6; give N and mm.")
+            if kind == "tension" and any(value < 0.0 for value in finite):
+                raise InputError.OUT_OF_RANGE(
+                    f"{shown} has a tension below 0 N; a tendon only pulls."
+                )
+        StatePaths({one.name: one}, tendons, ((one.name,),)).path({})  # raises for both at once
+
+
+def history(states: Mapping[str, DesignState], name: str) -> tuple[str, ...]:
+    """Return the states from rest up to one.
+
+    Raises:
+        InputError: One of them does not exist, or they run in a circle.
+    """
+    way: list[str] = []
+    before: str | None = name
+    while before is not None:
+        if before not in states:
+            raise InputError.UNKNOWN_NAME(
+                f"there is no state `{before}`{nearest(before, states)}; "
+                f"there are {', '.join(states) or 'none'}."
+            )
+        if before in way:
+            raise InputError.CONFLICT(
+                f"the states {' and '.join(way)} come after each other in a circle; one of them "
+                "must begin at rest, without `after`."
+            )
+        way.insert(0, before)
+        before = states[before].after
+    return tuple(way)

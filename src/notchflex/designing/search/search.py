@@ -1,20 +1,259 @@
-"""The whole search: every size and number of notches, several starts each, the best of all."""
+"""The whole search: starts drawn between the limits, one search from each, the best of all."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+from jaxtyping import Bool, Float
+from scipy.optimize import least_squares
+from scipy.stats import qmc
 
-from notchflex.designing.search.local import LocalOptimum, search_from, search_on
-from notchflex.designing.search.nearest import nearest
-from notchflex.designing.search.problem import DesignProblem, Progress, Vector
-from notchflex.designing.search.rows import TOLERANCE
-from notchflex.designing.search.squares import is_followed
-from notchflex.designing.search.starts import starts
-from notchflex.designing.specification.spec import SearchOptions
+from notchflex.analysis.batch import simulate_batch
+from notchflex.designing.model.point import Point, Solver
+from notchflex.designing.search.local import LocalOptimum, is_followed, search_from, search_on
+from notchflex.designing.search.problem import (
+    TOLERANCE,
+    DesignEvaluation,
+    DesignProblem,
+    Progress,
+    Vector,
+)
+from notchflex.designing.specification import SearchOptions
 from notchflex.errors import InputError
+from notchflex.loads import LoadPath
+from notchflex.robot import Robot
+
+_NUMBER = re.compile(r"\[\d+\]")
+# Penalty on a violation of one size, relative to the spread of the sums.
+_WEIGHT = 10.0
+# Number of robots drawn before the first search; at least two for every variable.
+_FEW = 8
+# Smallest distance between starts, relative to the diagonal of the box.
+_APART = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class StartingPoint:
+    """A robot that a search may start from."""
+
+    z: Vector
+    evaluation: DesignEvaluation
+
+
+def draw(count: int, variables: int, seed: int) -> Float[np.ndarray, "count variables"]:
+    """Return vectors between 0 and 1 of Sobol's sequence."""
+    if variables == 0:
+        return np.zeros((1, 0))
+    power = int(np.ceil(np.log2(max(count, 2))))
+    sobol = qmc.Sobol(variables, rng=np.random.default_rng(seed))
+    return sobol.random_base2(power)[:count]
+
+
+def smooth(problem: DesignProblem, count: int, seed: int) -> Float[np.ndarray, "count variables"]:
+    """Return vectors whose values run straight along the tube where each notch has its own.
+
+    Good designs are smooth, and among many values drawn one by one none is.
+    """
+    groups: dict[str, list[int]] = {}
+    for number, column in enumerate(problem.solver.variables.columns):
+        groups.setdefault(_NUMBER.sub("", column.name), []).append(number)
+    ends = draw(count, 2 * len(groups), seed)
+    vectors = np.zeros((len(ends), problem.count))
+    for k, columns in enumerate(groups.values()):
+        first, last = ends[:, 2 * k, None], ends[:, 2 * k + 1, None]
+        # Every second has nearly one value.
+        last = np.where(np.arange(len(ends))[:, None] % 2, last, first + 0.1 * (last - first))
+        vectors[:, columns] = first + np.linspace(0.0, 1.0, len(columns)) * (last - first)
+    return vectors
+
+
+def starts(problem: DesignProblem, several: int, most: int, seed: int) -> Iterator[Vector]:
+    """Yield starts, far from each other, the most promising first.
+
+    The first two are chosen from the robot as it is and a few drawn ones, by one batch. The others
+    are drawn when they are asked for: where the first two searches agree they are not needed.
+
+    Args:
+        problem: The problem.
+        several: Most starts.
+        most: Most robots that are drawn.
+        seed: Seed of the draws.
+    """
+    initial = problem.start
+    own = problem.evaluate(initial)
+    candidates = [] if own is None else [StartingPoint(initial, own)]
+    if several == 1 and own is not None:
+        problem.set_sizes([own])
+        yield initial
+        return
+    few = min(most, max(_FEW, 2 * problem.count))
+    half = max(1, most // 2)
+    drawn = np.stack([smooth(problem, half, seed), draw(half, problem.count, seed)], axis=1)
+    drawn = drawn.reshape(-1, problem.count)  # either kind in turn
+    used: list[StartingPoint] = []
+    for part, count in ((drawn[:few], min(2, several)), (drawn[few:], several)):
+        more = [StartingPoint(z, one) for z, one in evaluate_all(problem, part) if one is not None]
+        candidates += more
+        if candidates and not used:
+            problem.set_sizes([one.evaluation for one in candidates])
+        must = candidates[:1] if own is not None and not used else []
+        order = [one for one in ranked(problem, candidates) if one not in (*must, *used)]
+        chosen = spread_out(order, count, [*must, *used])[len(used) :]
+        used += chosen
+        yield from (one.z for one in ranked(problem, chosen))
+
+
+def evaluate_all(
+    problem: DesignProblem, vectors: Float[np.ndarray, "k v"]
+) -> list[tuple[Vector, DesignEvaluation | None]]:
+    """Evaluate many vectors by batches, without derivatives."""
+    solver = problem.solver
+    robots: list[Robot | None] = []
+    for z in vectors:
+        try:
+            robots.append(solver.variables.robot_at(problem.x(z)))
+        except InputError as error:
+            problem.failures[str(error)] = problem.failures.get(str(error), 0) + 1
+            robots.append(None)
+    valid = [number for number, robot in enumerate(robots) if robot is not None]
+    every = [robot for robot in robots if robot is not None]
+    arrays, converged = solved(solver, every, [problem.x(vectors[i]) for i in valid])
+    solver.counts["solves"] += len(valid)
+    evaluations: list[tuple[Vector, DesignEvaluation | None]] = [(z, None) for z in vectors]
+    for row, number in enumerate(valid):
+        robot = robots[number]
+        if robot is None or not converged[row]:
+            continue
+        own = {name: values[row] for name, values in arrays.items()}
+        point = Point(solver.variables, problem.x(vectors[number]), robot, solver.paths, own)
+        try:
+            evaluations[number] = vectors[number], problem.read(point, vectors[number])
+        except InputError as error:
+            problem.failures[str(error)] = problem.failures.get(str(error), 0) + 1
+    return evaluations
+
+
+def solved(
+    solver: Solver, robots: Sequence[Robot], vectors: Sequence[Vector]
+) -> tuple[dict[str, np.ndarray], Bool[np.ndarray, " robots"]]:
+    """Solve robots by batches.
+
+    Args:
+        solver: The solver.
+        robots: The robots.
+        vectors: The vector of each, or one for all, of which the loads are.
+
+    Returns:
+        Quantities of every step of all robots, and whether all their steps converged.
+    """
+    paths = solver.paths
+    if not len(robots) or not paths.pieces:
+        return {}, np.ones(len(robots), bool)
+    same = all(column.load is None for column in solver.variables.columns)
+    loads = [solver.path_at(x) for x in (vectors[:1] if same else vectors)]
+    pieces: list[dict[str, np.ndarray]] = []
+    start = 0
+    for length in paths.lengths:
+        parts: list[LoadPath] = [path[start : start + length] for path in loads]
+        names = solver.outputs
+        common = parts[0] if len(parts) == 1 else parts
+        pieces.append(dict(simulate_batch(robots, common, outputs=names)))
+        start += length
+    joined = {name: np.concatenate([one[name] for one in pieces], axis=1) for name in pieces[0]}
+    return joined, np.asarray(joined["converged"].all(axis=1))
+
+
+def ranked(problem: DesignProblem, candidates: Sequence[StartingPoint]) -> list[StartingPoint]:
+    """Sort candidates by penalised objective: the sum plus a penalty on violated limits."""
+    if not candidates:
+        return []
+    totals = np.array([one.evaluation.total for one in candidates])
+    spread = float(np.quantile(totals, 0.75) - np.quantile(totals, 0.25)) or 1.0
+    violation = np.array(
+        [np.minimum(np.abs(problem.violation(one.evaluation)), 1.0).sum() for one in candidates]
+    )
+    penalised_objective = (totals - totals.min()) / spread + _WEIGHT * violation
+    return [candidates[number] for number in np.argsort(penalised_objective, kind="stable")]
+
+
+def spread_out(
+    candidates: Sequence[StartingPoint], count: int, chosen: Sequence[StartingPoint]
+) -> list[StartingPoint]:
+    """Add to chosen candidates the best that are not too near to them and to each other."""
+    selected, rest = list(chosen), []
+    for one in candidates:
+        apart = _APART * np.sqrt(max(len(one.z), 1))
+        near = any(np.linalg.norm(one.z - other.z) < apart for other in selected)
+        (rest if near else selected).append(one)
+        if len(selected) >= count:
+            break
+    return [*selected, *rest][: max(count, len(chosen))]
+
+
+_EVALUATIONS = 60
+_INSIDE = 1e-10
+
+
+def nearest(
+    problem: DesignProblem, z: Vector, first: DesignEvaluation
+) -> tuple[Vector, DesignEvaluation]:
+    """Search for the smallest sum of squares of what constraints are missed by, in their sizes.
+
+    Args:
+        problem: The problem.
+        z: The start, scaled.
+        first: The robot there.
+
+    Returns:
+        The best robot met, and its vector.
+    """
+    span = problem.solver.variables.span
+    best = [z, first]
+    last: list[Any] = [z, first]
+
+    def at(vector: Vector) -> DesignEvaluation:
+        if not np.array_equal(vector, last[0]):
+            found = problem.evaluate(vector)
+            if found is None:
+                return last[1]
+            last[:] = [vector.copy(), found]
+            if problem.worst(found) < problem.worst(best[1]):  # pyright: ignore
+                best[:] = [vector.copy(), found]
+        return last[1]
+
+    def residuals(vector: Vector) -> np.ndarray:
+        found = at(vector)
+        penalty = 0.0 if np.array_equal(vector, last[0]) else 1e3
+        return problem.violation(found) + penalty
+
+    def jacobian(vector: Vector) -> np.ndarray:
+        found = at(vector)
+        full = problem.with_slopes(found, last[0])
+        if full is None:
+            return np.zeros((len(problem.rows), problem.count))
+        found = last[1] = full
+        missed = problem.violation(found) != 0.0
+        assert found.rows.slopes is not None
+        return np.where(missed[:, None], found.rows.slopes * span / problem.sizes[:, None], 0.0)
+
+    if problem.count and problem.rows:
+        least_squares(
+            residuals,
+            np.clip(z, _INSIDE, 1.0 - _INSIDE),
+            jacobian,  # pyright: ignore[reportArgumentType]
+            (np.zeros(problem.count), np.ones(problem.count)),
+            ftol=1e-10,
+            xtol=1e-10,
+            gtol=1e-12,
+            max_nfev=_EVALUATIONS,
+        )
+    full = problem.with_slopes(best[1], best[0])  # pyright: ignore
+    return (z, first) if full is None else (best[0], full)  # pyright: ignore
+
 
 # Largest violation of a robot from which another search starts.
 _MAX_VIOLATION = 1e-3
@@ -54,15 +293,22 @@ class Searches:
     Attributes:
         outcomes: Where they ended.
         interrupted: Whether they were stopped by Ctrl-C.
+        rounded: The best robot on a grid, where one was asked for.
     """
 
     outcomes: list[SearchResult] = field(default_factory=list[SearchResult])
     interrupted: bool = False
+    rounded: SearchResult | None = None
+
+    @property
+    def optimum(self) -> SearchResult:
+        """The best of all."""
+        return min(self.outcomes, key=lambda one: one.merit)
 
     @property
     def best(self) -> SearchResult:
-        """The best of all."""
-        return min(self.outcomes, key=lambda one: one.merit)
+        """The best on the grid, or of all."""
+        return self.rounded or self.optimum
 
     def of(self, number: int) -> list[SearchResult]:
         """Return where the searches of a form ended."""

@@ -2,37 +2,144 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from notchflex.export.document import Subject
-from notchflex.export.flat.drawing import DrawnLine, PatternDrawing, pattern_drawing
+from matplotlib.patches import Rectangle
+
+from notchflex import __version__
+from notchflex.export.flat.drawing import DrawnLine, pattern_drawing, plain, title_lines
 from notchflex.export.flat.pattern import FlatPattern, PatternCut, flat_pattern
-from notchflex.export.flat.title import plain_name, title_lines
-from notchflex.export.options import PatternOptions
-from notchflex.robot.tolerance import Tolerance
+from notchflex.export.formats import Document, Paper, PatternOptions, Subject
+from notchflex.plotting.drawings import dimension_lines as draw
+from notchflex.plotting.drawings.dimensioned import (
+    MM,
+    draw_row,
+    notch_rows,
+    paper,
+    scale_text,
+    usual_scale,
+)
+from notchflex.plotting.style import house_style
+from notchflex.results.state import robot_digest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_PAPER = 11.69, 8.27  # A4 across [in]
-_ROWS = 30  # of a table on one page
+
+SIZES: dict[str, tuple[float, float]] = {"a4": (297.0, 210.0), "a3": (420.0, 297.0)}
+"""Width and height of a sheet that lies across [mm]."""
+_LEFT, _EDGE = 20.0, 10.0  # margin for the file, and the others [mm]
+_CELL, _LINE = 75.0, 8.0  # width and height of an entry of the title block [mm]
+_MOST = 47  # letters of an entry
+_GAP = 3.0  # between frame, title block and what is drawn [mm]
+_WORD = 7.5  # size of notes, in points
+NOTE = 0.15
+"""Height of a line of notes [in]."""
+
+
+@dataclass(frozen=True)
+class DrawingPage:
+    """A page with its frame.
+
+    Args:
+        figure: The page.
+        axes: Axes on it, in inches of paper.
+        subject: What it shows.
+        scale: Its scale, as text.
+    """
+
+    figure: Figure
+    axes: Axes
+    subject: str
+    scale: str
+
+    def inset(self, left: float, low: float, right: float, top: float, **options: Any) -> Axes:
+        """Return axes in a part of the page [in]."""
+        width, height = self.figure.get_size_inches()
+        place = left / width, low / height, (right - left) / width, (top - low) / height
+        return self.figure.add_axes(place, **options)
+
+    def write(self, left: float, at: float, text: str, size: float = _WORD, **style: Any) -> None:
+        """Write a text, in lines of the height `NOTE`, below or at a height [in]."""
+        style = {"va": "top", "color": draw.INK, "parse_math": False} | style
+        self.axes.text(left, at, text, fontsize=size, linespacing=60.0 * NOTE / size, **style)
+
+
+def box_of(size: Paper) -> tuple[float, ...]:
+    """Return left, lower, right and upper end of the room for drawings on a page [in]."""
+    width, height = SIZES[size]
+    low = _EDGE + 4.0 * _LINE
+    ends = _LEFT + _GAP, low + _GAP, width - _EDGE - _GAP, height - _EDGE - _GAP
+    return tuple(MM * end for end in ends)
+
+
+def new_page(size: Paper, subject: str, scale: str) -> DrawingPage:
+    """Return an empty page with its frame."""
+    width, height = SIZES[size]
+    figure, axes = paper(MM * width, MM * height)
+    _frame(axes, _LEFT, _EDGE, width - _LEFT - _EDGE, height - 2.0 * _EDGE, 1.4)
+    return DrawingPage(figure, axes, subject, scale)
+
+
+def folded(lines: Sequence[str], width: float) -> list[str]:
+    """Return notes in lines that are not longer than a width [in]."""
+    letters = int(width / (draw.LETTER * _WORD / draw.TEXT))
+    return [part for line in lines for part in wrap(line, letters, subsequent_indent="    ")]
+
+
+def add_title_block(page: DrawingPage, pattern: FlatPattern, sheet: str) -> None:
+    """Write who made what, of which material, at which scale."""
+    robot, entries = pattern.robot, pattern.robot.drawing
+    cells = {
+        "drawing": page.subject,
+        "made by": f"notchflex {__version__}",
+        "robot file": robot_digest(robot),
+        "drawn": entries.drawn,
+        "date": entries.date,
+        "lengths": "mm",
+        "material": entries.material or f"{robot.material.kind} (of the model)",
+        "finish": entries.finish,
+        "scale": page.scale,
+        "part": entries.part or robot.name,
+        "revision": entries.revision,
+        "sheet": sheet,
+    }
+    width, _ = SIZES[pattern.options.paper]
+    for number, (label, value) in enumerate(cells.items()):
+        left = width - _EDGE - _CELL * (3 - number % 3)
+        low = _EDGE + _LINE * (number // 3)
+        _frame(page.axes, left, low, _CELL, _LINE, 0.7)
+        texts = (5.4, label, 5.5), (1.6, plain(value or "")[:_MOST], draw.TEXT)
+        for up, text, size in texts:
+            page.write(MM * (left + 1.0), MM * (low + up), text, size, va="baseline")
+
+
+def _frame(axes: Axes, left: float, low: float, width: float, height: float, line: float) -> None:
+    """Draw a frame [mm]."""
+    corner = MM * left, MM * low
+    axes.add_patch(Rectangle(corner, MM * width, MM * height, fill=False, lw=line, ec=draw.INK))
+
+
+_ROW, _HEAD = 0.2, 0.36  # heights in a table [in]
+_AXIS = 0.45  # room for the numbers along an axis of the pattern [in]
 _HEADS = (
-    "cut",
     "notch",
     "from\n[mm]",
     "to\n[mm]",
-    "width\n[mm]",
+    "height\n[mm]",
     "side\n[deg]",
     "arc cut\n[deg]",
     "arc left\n[mm]",
     "depth\n[mm]",
     "walls",
-    "width\nmeasured",
+    "height\nmeasured",
     "arc left\nmeasured",
 )
 _LOOKS: dict[str, dict[str, Any]] = {
@@ -42,90 +149,62 @@ _LOOKS: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True)
-class PatternSheet:
-    """Pages of a sheet."""
-
-    pattern: FlatPattern
-    pages: Sequence[Figure]
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences about the pattern."""
-        return self.pattern.warnings
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """Numbers about the pattern."""
-        return self.pattern.facts | {"pages": len(self.pages)}
-
-    def save(self, file: Path) -> None:
-        """Write the pages; without a date, so that the same robot gives the same file."""
-        from matplotlib.backends.backend_pdf import PdfPages
-
-        from notchflex.plotting.style import house_style
-
-        with house_style(), PdfPages(file, metadata={"CreationDate": None}) as pages:
-            for page in self.pages:
-                pages.savefig(page)
-
-
-def pattern_sheet(subject: Subject, options: PatternOptions) -> PatternSheet:
+def pattern_sheet(subject: Subject, options: PatternOptions) -> Document:
     """Make the sheet of a robot: its pattern, the table of its cuts, and its dimensioned drawing.
+
+    It is in mm, whatever the unit round the tube in other files.
 
     Raises:
         InputError: See `flat_pattern`; or a kind of notch has no dimensioned drawing.
     """
-    from notchflex.plotting.drawings.dimensioned import dimensioned_figure
-    from notchflex.plotting.style import house_style
-
-    pattern = flat_pattern(subject, options)
-    rows = [_row(pattern, one) for one in pattern.cuts]
+    pattern = flat_pattern(subject, dataclasses.replace(options, y_unit="mm"))
     with house_style():
-        pages = [_pattern_page(pattern_drawing(pattern))]
-        for start in range(0, len(rows), _ROWS):
-            pages.append(_table_page(pattern, rows[start : start + _ROWS]))
-        pages.append(dimensioned_figure(subject.robot.replace(name=plain_name(subject.robot))))
-    return PatternSheet(pattern, pages)
+        pages = [_pattern_page(pattern), *_table_pages(pattern), *_dimension_pages(pattern)]
+        for number, page in enumerate(pages, start=1):
+            add_title_block(page, pattern, f"{number} of {len(pages)}")
+    facts = pattern.facts | {"pages": len(pages)}
+    return Document([page.figure for page in pages], pattern.warnings, facts, _save)
 
 
-def _new_page(title: str) -> tuple[Figure, Axes]:
-    from matplotlib.figure import Figure
+def _save(pages: Sequence[Figure], file: Path) -> None:
+    """Write pages; without a date, so that the same robot gives the same file."""
+    from matplotlib.backends.backend_pdf import PdfPages
 
-    figure = Figure(figsize=_PAPER)
-    axes = figure.add_axes((0.06, 0.06, 0.88, 0.86))
-    figure.text(0.06, 0.945, title, fontsize=12.0, va="center", parse_math=False)
-    return figure, axes
+    with house_style(), PdfPages(file, metadata={"CreationDate": None}) as pdf:
+        for page in pages:
+            pdf.savefig(page)
 
 
-def _pattern_page(drawing: PatternDrawing) -> Figure:
-    """Draw the pattern to scale, with the numbers of its cuts and the title block below."""
-    pattern = drawing.pattern
-    figure, axes = _new_page(f"{plain_name(pattern.robot)}: flat pattern")
-    figure.delaxes(axes)
-    axes = figure.add_axes((0.08, 0.44, 0.86, 0.46))
+def _pattern_page(pattern: FlatPattern) -> DrawingPage:
+    """Draw the pattern to scale, with the numbers of its notches, and the notes below."""
+    drawing = pattern_drawing(pattern)
+    x, y = zip(*(point for line in drawing.lines for point in line.points), strict=True)
+    wide, high = max(x) - min(x), max(y) - min(y)
+    left, low, right, top = box_of(pattern.options.paper)
+    colours = "orange: cut; blue: cut off; grey, not cut: edges of the tube, sides of the tendons"
+    warnings = (f"WARNING: {text}" for text in pattern.warnings)
+    notes = folded([*title_lines(pattern)[1:-1], colours, *warnings], right - left)
+    words = low + NOTE * len(notes)
+    room = (right - left - _AXIS) / wide, (top - words - 2.0 * _AXIS) / high
+    scale = usual_scale(min(room))
+    page = new_page(pattern.options.paper, "Flat pattern", scale_text(scale))
+    page.write(left, words, "\n".join(notes))
+    wide, high = scale * wide, scale * high
+    left, top = left + _AXIS + 0.5 * (right - left - _AXIS - wide), top - 0.1
+    limits = {"xlim": (min(x), max(x)), "ylim": (min(y), max(y))}
+    axes = page.inset(left, top - high, left + wide, top, **limits)
     for line in drawing.lines:
-        axes.plot(*zip(*_ring(line), strict=True), **_LOOKS[line.layer])
+        axes.plot(*zip(*_ring(line), strict=True), clip_on=False, **_LOOKS[line.layer])
     for one in pattern.cuts:
-        x, y = one.middle
-        axes.text(x, pattern.y_factor * y, str(one.number), fontsize=7.0, ha="center", va="center")
-    if pattern.options.y_unit == "mm":
-        axes.set_aspect("equal")
-    axes.set_xlabel("along the tube [mm]")
-    axes.set_ylabel(f"round the tube [{pattern.options.y_unit}]")
-    lines = title_lines(pattern)
-    lines += [f"WARNING: {text}" for text in pattern.warnings]
-    tolerances = [f"{one.value} {_written(one)}" for one in pattern.robot.tolerance]
-    lines += [f"tolerances of the robot file: {', '.join(tolerances)}"] if tolerances else []
-    words = "\n".join(lines)
-    figure.text(0.06, 0.37, words, fontsize=8.0, va="top", wrap=True, parse_math=False)
-    return figure
-
-
-def _written(one: Tolerance) -> str:
-    """Return a tolerance as text."""
-    parts = {"standard deviation ": one.sd, "+": one.plus, "-": one.minus}
-    return " ".join(f"{name}{value}" for name, value in parts.items() if value is not None)
+        draw.label(axes, *one.middle, one.name, fontsize=6.5)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(labelsize=7.0)
+    axes.set_xlabel("along the tube [mm]", fontsize=7.0)
+    if high > 1.05:  # as long as the words
+        axes.set_ylabel("round the tube [mm]", fontsize=7.0)
+    else:
+        axes.set_yticks([])
+    return page
 
 
 def _ring(line: DrawnLine) -> Sequence[tuple[float, float]]:
@@ -136,11 +215,10 @@ def _row(pattern: FlatPattern, one: PatternCut) -> list[str]:
     """Return the nominal numbers of a cut, with room for measured ones."""
     ys = [y for _, y in one.nominal]
     arc = max(ys) - min(ys)
-    cut, radius = one.placed.cut, pattern.robot.tube.outer_radius
+    cut, radius = one.placed.cut, pattern.tube.outer_radius
     depth = radius - min(height for _, height in cut.corners)
     return [
-        str(one.number),
-        str(one.placed.notch),
+        one.name,
         f"{one.placed.start:.4f}",
         f"{one.placed.end:.4f}",
         f"{one.placed.end - one.placed.start:.4f}",
@@ -154,18 +232,54 @@ def _row(pattern: FlatPattern, one: PatternCut) -> list[str]:
     ]
 
 
-def _table_page(pattern: FlatPattern, rows: Sequence[Sequence[str]]) -> Figure:
-    figure, axes = _new_page(f"{plain_name(pattern.robot)}: cuts, nominal on the outer surface")
-    axes.set_axis_off()
-    table = axes.table(
-        cellText=[list(row) for row in rows], colLabels=list(_HEADS), loc="upper center"
-    )
-    table.auto_set_font_size(False)
-    table.set_fontsize(8.0)
-    for (row, _), cell in table.get_celld().items():
-        cell.set_height(0.052 if row == 0 else 0.028)
-        cell.set_linewidth(0.4)
-    foot = "Positions from the base of the robot. "
-    foot += "Arc left: wall beside the cut, measured round the outer surface."
-    figure.text(0.06, 0.03, foot, fontsize=7.5)
-    return figure
+def _table_pages(pattern: FlatPattern) -> list[DrawingPage]:
+    """Write the nominal numbers of every cut, from the base."""
+    rows = [_row(pattern, one) for one in sorted(pattern.cuts, key=lambda one: one.placed.start)]
+    state = "before polishing" if pattern.options.polishing else "as cut"
+    notes = [
+        f"Nominal on the outer surface, {state}. Positions from the base of the robot. Arc left: "
+        "wall beside the cut, round the outer surface."
+    ]
+    left, low, right, top = box_of(pattern.options.paper)
+    words = folded(notes, right - left)
+    low += NOTE * len(words)
+    count = int((top - low - _HEAD - NOTE) / _ROW)
+    pages: list[DrawingPage] = []
+    while rows:
+        page = new_page(pattern.options.paper, f"Table of the cuts, {state}", "none")
+        shown, rows = rows[:count], rows[count:]
+        high = _HEAD + _ROW * len(shown)
+        axes = page.inset(left, top - high, right, top)
+        axes.set_axis_off()
+        table = axes.table(cellText=shown, colLabels=_HEADS, loc="upper center")
+        table.auto_set_font_size(False)
+        table.set_fontsize(8.0)
+        for (row, _), cell in table.get_celld().items():
+            cell.set_height((_ROW if row else _HEAD) / high)
+            cell.set_linewidth(0.4)
+        page.write(left, low, "\n".join(words))
+        pages.append(page)
+    return pages
+
+
+def _dimension_pages(pattern: FlatPattern) -> list[DrawingPage]:
+    """Draw every shape of notch, as many on a page as fit."""
+    polishing, size = pattern.options.polishing, pattern.options.paper
+    left, low, right, top = box_of(size)
+    rows, notes = notch_rows(pattern.robot, right - left)
+    length = f"Length from the base to the tip {pattern.end - polishing:.9g}, "
+    notes = [f"{length}shank {-pattern.start - polishing:.6g}.", *notes]
+    words = folded(notes, right - left)
+    low += NOTE * len(words)
+    pages: list[DrawingPage] = []
+    while rows:
+        page = new_page(size, f"Dimensions{', finished' if polishing else ''}", "as stated")
+        page.write(left, low, "\n".join(words))
+        room = top - low
+        axes = page.inset(left, low, right, top, xlim=(0.0, right - left), ylim=(0.0, room))
+        axes.set_axis_off()
+        while rows and (room >= rows[0].height or not axes.texts):
+            draw_row(axes, rows[0], room)
+            room -= rows.pop(0).height
+        pages.append(page)
+    return pages

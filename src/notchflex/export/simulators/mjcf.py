@@ -14,8 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from notchflex.export.simulators.joint_model import JointModel
-from notchflex.export.simulators.springs import HingeSpring, potential_range
+from notchflex.export.simulators.joint_model import HingeSpring, JointModel
 from notchflex.export.simulators.text import (
     METRE,
     add,
@@ -49,12 +48,10 @@ class _Drum(NamedTuple):
 
 
 def _drum(spring: HingeSpring) -> _Drum | None:
-    moment = potential_range(spring)
-    if moment == 0.0:
+    if not (steepest := spring.largest_friction):
         return None
-    at = np.linspace(spring.low, spring.high, 201)
-    steepest = float(np.abs(spring.friction_moment(at)).max() / moment)
-    return _Drum(moment * METRE, [0.0, 0.0, *(spring.friction / moment)], steepest)
+    moment = spring.potential_range
+    return _Drum(moment * METRE, [0.0, 0.0, *(spring.friction / moment)], steepest / moment)
 
 
 def mjcf(model: JointModel, head: str = "", numbers: Mapping[str, float] | None = None) -> str:

@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.export.simulators.joint_model import JointModel
-from notchflex.export.simulators.samples import PullSamples
 
 _FIRST_WITH_YIELD = 4
 _LEVELS = 24  # up, and as many down
@@ -34,7 +33,8 @@ class SimulatorError:
     Attributes:
         tendon: The tendon, counted from 1.
         largest_tension: End of the range, N.
-        total_angle: Largest error of the total angle, as a part of its range.
+        total_angle: Largest error of the total angle, as a part of its range; a notch that turns
+            to the other side adds to it too.
         notch_angle: Largest error of any notch, as a part of the largest range of a notch.
         tip_position: Largest distance between the tips, as a part of the way of the tip.
         loop_area: Error of the area between loading and unloading, total angle over tension, as a
@@ -50,30 +50,14 @@ class SimulatorError:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers by name, with units, None for NaN."""
-        named = {
-            "largest_tension_N" if k == "largest_tension" else k: v for k, v in asdict(self).items()
-        }
-        return {name: None if value != value else value for name, value in named.items()}
-
-
-@dataclass(frozen=True)
-class SimulatedPull:
-    """Simulated loading and unloading of one tendon: s levels.
-
-    Attributes:
-        tension: Tension, N.
-        angle: Angles of the hinges, rad.
-        tip: Tip position, mm.
-    """
-
-    tension: Float[np.ndarray, " s"]
-    angle: Float[np.ndarray, "s n"]
-    tip: Float[np.ndarray, "s 3"]
+        names = {"largest_tension": "largest_tension_N"}
+        pairs = asdict(self).items()
+        return {names.get(name, name): None if one != one else one for name, one in pairs}
 
 
 def run_mujoco(
     text: str, tendon: int, tension: Float[np.ndarray, " s"], notches: int
-) -> SimulatedPull:
+) -> tuple[Float[np.ndarray, "s n"], Float[np.ndarray, "s 3"]]:
     """Pull one tendon of an MJCF model through levels of tension, each until it stands still.
 
     Args:
@@ -81,6 +65,9 @@ def run_mujoco(
         tendon: Which tendon, from 0.
         tension: The levels, N.
         notches: Number of notches.
+
+    Returns:
+        Angles of the hinges, rad, and positions of the tip, mm.
     """
     mujoco: Any = import_module("mujoco")  # it has no types
     model = mujoco.MjModel.from_xml_string(text)
@@ -101,7 +88,7 @@ def run_mujoco(
         before = level
         angle.append(data.qpos[at].copy())
         tip.append(1e3 * data.site_xpos[site])
-    return SimulatedPull(np.asarray(tension), np.array(angle), np.array(tip))
+    return np.array(angle), np.array(tip)
 
 
 def measure_errors(model: JointModel, text: str) -> list[SimulatorError]:
@@ -110,30 +97,22 @@ def measure_errors(model: JointModel, text: str) -> list[SimulatorError]:
     for one in model.pulls:
         levels = np.unique(np.linspace(0, len(one.tension) // 2 - 1, _LEVELS).round().astype(int))
         rows = np.concatenate([levels, len(one.tension) - 1 - levels[::-1]])
-        pull = run_mujoco(text, one.tendon, one.tension[rows], len(model.springs))
-        errors.append(_compare(model, one, rows, pull))
+        tension, known = one.tension[rows], one.angle[rows]
+        angle, tip = run_mujoco(text, one.tendon, tension, len(model.springs))
+        # Notches that open to opposite sides turn to both: each counts the way that it turns.
+        way = np.sign(one.angle[len(one.angle) // 2])
+        off = np.abs(angle - known).max() / np.ptp(one.angle, axis=0).max()
+        total, own = known @ way, angle @ way
+        area, own_area = np.abs(np.trapezoid([total, own], tension)).tolist()  # of the loops, N rad
+        has_loop = area > 1e-9 * model.top * np.ptp(total)
+        away = np.linalg.norm(tip - one.tip[rows], axis=1).max()
+        error = SimulatorError(
+            tendon=one.tendon + 1,
+            largest_tension=model.top,
+            total_angle=float(np.abs(own - total).max() / np.ptp(total)),
+            notch_angle=float(off),
+            tip_position=float(away / np.linalg.norm(one.tip - one.tip[0], axis=1).max()),
+            loop_area=abs(own_area / area - 1.0) if has_loop else float("nan"),
+        )
+        errors.append(error)
     return errors
-
-
-def _compare(
-    model: JointModel, one: PullSamples, rows: np.ndarray, pull: SimulatedPull
-) -> SimulatorError:
-    total, own = one.angle[rows].sum(axis=1), pull.angle.sum(axis=1)
-    moved = np.linalg.norm(one.tip - one.tip[0], axis=1).max()
-    area, own_area = loop_area(pull.tension, total), loop_area(pull.tension, own)
-    least = 1e-9 * model.top * np.ptp(total)
-    return SimulatorError(
-        tendon=one.tendon + 1,
-        largest_tension=model.top,
-        total_angle=float(np.abs(own - total).max() / np.ptp(total)),
-        notch_angle=float(
-            np.abs(pull.angle - one.angle[rows]).max() / np.ptp(one.angle, axis=0).max()
-        ),
-        tip_position=float(np.linalg.norm(pull.tip - one.tip[rows], axis=1).max() / moved),
-        loop_area=float(abs(own_area / area - 1.0)) if abs(area) > least else float("nan"),
-    )
-
-
-def loop_area(tension: Float[np.ndarray, " s"], angle: Float[np.ndarray, " s"]) -> float:
-    """Return the area between the two branches of a loop, N rad."""
-    return float(abs(np.trapezoid(angle, tension)))

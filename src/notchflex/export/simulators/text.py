@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from notchflex.export.simulators.joint_model import JointModel
 
@@ -71,18 +72,10 @@ def finished(root: ElementTree.Element) -> str:
 
 
 def quaternion(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, " 4"]:
-    """Return w, x, y, z of a rotation by less than half a turn."""
-    w = 0.5 * np.sqrt(max(1.0 + np.trace(rotation), 0.0))
-    return np.array([w, *(_skew(rotation) / (4.0 * w))])
+    """Return w, x, y, z of a rotation."""
+    return Rotation.from_matrix(rotation).as_quat(canonical=True, scalar_first=True)
 
 
 def roll_pitch_yaw(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, " 3"]:
     """Return the angles about the fixed axes x, y and z of a rotation, rad."""
-    r = rotation
-    pitch = np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0]))
-    return np.array([np.arctan2(r[2, 1], r[2, 2]), pitch, np.arctan2(r[1, 0], r[0, 0])])
-
-
-def _skew(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, " 3"]:
-    r = rotation
-    return np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
+    return Rotation.from_matrix(rotation).as_euler("xyz")

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
@@ -18,13 +17,16 @@ import numpy as np
 from notchflex import __version__
 from notchflex.errors import InputError
 from notchflex.export.cuts import RobotCuts, cuts_of
-from notchflex.export.document import Subject
-from notchflex.export.flat.title import plain_name
-from notchflex.export.options import SolidOptions
-from notchflex.export.solids.bent import DeformationMap, is_bent
-from notchflex.export.solids.checks import check_channels, check_one_piece, check_window
-from notchflex.export.tube_ends import TubeEnd, tube_end
-from notchflex.results.same_robot import robot_digest
+from notchflex.export.flat.drawing import plain_name
+from notchflex.export.formats import Document, SolidOptions, Subject
+from notchflex.export.solids.straight import (
+    DeformationMap,
+    channel_radius,
+    check_one_piece,
+    is_bent,
+    sector,
+)
+from notchflex.results.state import robot_digest
 from notchflex.robot import Robot
 from notchflex.robot.notches.cut import NotchCut
 from notchflex.robot.notches.profile import Line, pieces
@@ -37,51 +39,35 @@ _STAMP = "2000-01-01T00:00:00"
 """Instead of the time of writing: the same robot gives the same file."""
 
 
-@dataclass(frozen=True)
-class StepSolid:
-    """A solid of build123d."""
-
-    robot: Robot
-    solid: Any
-    warnings: tuple[str, ...]
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """Numbers about the solid."""
-        box = self.solid.bounding_box()
-        return {
-            "robot_hash": robot_digest(self.robot),
-            "volume_mm3": float(self.solid.volume),
-            "surface_mm2": float(self.solid.area),
-            "faces": len(self.solid.faces()),
-            "box_mm": [list(box.min), list(box.max)],
-        }
-
-    def save(self, file: Path) -> None:
-        """Write it."""
-        cad = import_module("build123d")
-        digest = robot_digest(self.robot)
-        self.solid.label = f"{plain_name(self.robot)}; notchflex {__version__}, robot {digest}"
-        if not cad.export_step(self.solid, file, timestamp=_STAMP):
-            raise OSError(f"build123d could not write {file}")
-
-
-def step_solid(subject: Subject, options: SolidOptions) -> StepSolid:
+def step_solid(subject: Subject, options: SolidOptions) -> Document:
     """Make the solid of a robot as STEP, straight as it is cut or bent as its state is.
 
     Raises:
         InputError: See `straight_solid`; or a strip across the tube is bent, which only STL has.
     """
     robot = subject.robot
-    bent = is_bent(subject)
+    bent = is_bent(subject, options.polishing)
     if bent:
         _check_spines(robot)
-    cuts = cuts_of(robot)
-    end = tube_end(robot, cuts)
-    solid = _straight(robot, cuts, end, options)
+    cuts = cuts_of(robot, options.shank, options.polishing)
+    solid = _straight(robot, cuts, options)
     check_one_piece(len(solid.solids()))
-    solid = _bent(solid, subject, cuts, end, options) if bent else solid.solids()[0]
-    return StepSolid(robot, solid, (end.warning,) if end.warning else ())
+    solid = _bent(solid, subject, cuts) if bent else solid.solids()[0]
+    digest, box = robot_digest(robot), solid.bounding_box()
+    solid.label = f"{plain_name(robot)}; notchflex {__version__}, robot {digest}"
+    facts = {
+        "robot_hash": digest,
+        "volume_mm3": float(solid.volume),
+        "surface_mm2": float(solid.area),
+        "faces": len(solid.faces()),
+        "box_mm": [list(box.min), list(box.max)],
+    }
+    return Document(solid, cuts.warnings, facts, _save)
+
+
+def _save(solid: Any, file: Path) -> None:
+    if not import_module("build123d").export_step(solid, file, timestamp=_STAMP):
+        raise OSError(f"build123d could not write {file}")
 
 
 def _check_spines(robot: Robot) -> None:
@@ -98,23 +84,22 @@ def _check_spines(robot: Robot) -> None:
         )
 
 
-def _straight(robot: Robot, cuts: RobotCuts, end: TubeEnd, options: SolidOptions) -> Any:
+def _straight(robot: Robot, cuts: RobotCuts, options: SolidOptions) -> Any:
     """Return the straight tube without cuts and channels."""
     cad = import_module("build123d")
-    base = cad.Plane((0.0, 0.0, -options.shank))
-    length = end.at + options.shank
+    base, tube = cad.Plane((0.0, 0.0, cuts.start)), cuts.tube
+    length = cuts.end - cuts.start
     outer, inner = (
         cad.Solid.make_cylinder(radius, length, base)
-        for radius in (robot.tube.outer_radius, robot.tube.inner_radius)
+        for radius in (tube.outer_radius, tube.inner_radius)
     )
-    removed = [inner, *(_removed(one.cut, robot.tube.outer_radius) for one in cuts.cuts)]
-    if options.channels:
-        check_channels(robot, options.channels)
+    removed = [inner, *(_removed(one.cut, tube.outer_radius) for one in cuts.cuts)]
+    if drill := channel_radius(robot, options):
         for tendon in robot.tendon:
             angle = math.radians(tendon.direction_deg)
             x, y = tendon.radius * math.cos(angle), tendon.radius * math.sin(angle)
-            plane = cad.Plane((x, y, -options.shank))
-            removed.append(cad.Solid.make_cylinder(0.5 * options.channels, length, plane))
+            plane = cad.Plane((x, y, cuts.start))
+            removed.append(cad.Solid.make_cylinder(drill, length, plane))
     return outer.cut(*removed)
 
 
@@ -124,11 +109,8 @@ def _removed(cut: NotchCut, outer: float) -> Any:
     view = math.radians(cut.side_deg)
     across = np.array([math.cos(view), math.sin(view), 0.0])
     if cut.radial:
-        start, end, half = check_window(cut, outer)
-        angles = np.linspace(view - half, view + half, 9)
-        arc = 2.0 * _RADIUS_FACTOR * outer * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        corners = [(0.0, 0.0, start), *((x, y, start) for x, y in arc)]
-        face = cad.Face(cad.Wire.make_polygon(corners))
+        start, end, points = sector(cut, outer, 9)
+        face = cad.Face(cad.Wire.make_polygon([(x, y, start) for x, y in points]))
         return cad.Solid.extrude(face, (0.0, 0.0, end - start))
     out = np.cross([0.0, 0.0, 1.0], across)
     depth = 2.0 * outer
@@ -155,9 +137,7 @@ def _removed(cut: NotchCut, outer: float) -> Any:
     return cad.Solid.extrude(face, tuple(2.0 * depth * out))
 
 
-def _bent(
-    straight: Any, subject: Subject, cuts: RobotCuts, end: TubeEnd, options: SolidOptions
-) -> Any:
+def _bent(straight: Any, subject: Subject, cuts: RobotCuts) -> Any:
     """Return rings at their poses, joined by spines through their bent sections.
 
     Raises:
@@ -165,7 +145,7 @@ def _bent(
     """
     cad = import_module("build123d")
     motion = DeformationMap(subject, cuts)
-    at = [-options.shank, *(z for one in cuts.cuts for z in (one.start, one.end)), end.at]
+    at = [cuts.start, *(z for one in cuts.cuts for z in (one.start, one.end)), cuts.end]
     parts: list[Any] = []
     for number, (low, high) in enumerate(pairwise(at)):
         if high - low <= 0.0:

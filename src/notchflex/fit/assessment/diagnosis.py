@@ -9,14 +9,15 @@ import numpy as np
 
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.intervals import NO_SOLUTION, Interval
-from notchflex.fit.model.branch_residuals import branch_words
-from notchflex.fit.model.rows import SENSOR
+from notchflex.fit.model.residuals import SENSOR, branch_words
 
 # A half-width of more than this part of the value is loose; constants more correlated than that
 # cannot be distinguished.
 _LOOSE, _ALIKE = 0.5, 0.95
 # So many standard deviations from its prior a constant contradicts it.
 _UNLIKE_PRIOR = 3.0
+# Probability below which a constant that is not fitted is named.
+_HELPS = 0.05
 # Distance from a limit that counts as at it, as a part of the scale of a constant.
 _AT_LIMIT = 1e-6
 
@@ -44,6 +45,7 @@ def with_unit(value: float, unit: str) -> str:
 def _sentences(calibration: Calibration) -> Iterator[str]:
     if not calibration.converged:
         yield f"The search did not settle: {calibration.reason}."
+    yield from _not_trusted(calibration)
     yield from _branches(calibration)
     yield from _limits(calibration)
     yield from _far(calibration)
@@ -54,6 +56,31 @@ def _sentences(calibration: Calibration) -> Iterator[str]:
     yield from _noise(calibration)
     if calibration.is_likelihood and not calibration.tells_no_noise:
         yield from _correlated_rows(calibration)
+
+
+_PATTERNS = {
+    "runs": "residuals of neighbouring loads are alike",
+    "notches": "residuals have a trend over the notches",
+    "missing": "a constant that is not fitted explains part of them",
+}
+
+
+def _not_trusted(calibration: Calibration) -> Iterator[str]:
+    """Patterns of the residuals that noise does not make, and what would explain them."""
+    tests = calibration.tests
+    if tests is None or not tests.rejected:
+        return
+    patterns = ", ".join(_PATTERNS[name] for name in tests.rejected)
+    yield (
+        f"Not trusted: {patterns}, which noise does not do. The model misses something: the "
+        "constants may lie far outside their intervals."
+    )
+    best = next(iter(tests.missing), None)
+    if best is not None and best.chance < _HELPS:
+        yield (
+            f"Try adding {best.name} to the fit: the misfit would fall by about "
+            f"{100.0 * best.share:.0f} %."
+        )
 
 
 def _branches(calibration: Calibration) -> Iterator[str]:
@@ -176,15 +203,10 @@ def _noise(calibration: Calibration) -> Iterator[str]:
 
 
 def _correlated_rows(calibration: Calibration) -> Iterator[str]:
-    wider = calibration.by_pulls.wider
-    wide = [name for name, one in zip(calibration.names, wider, strict=True) if one > 1.0]
+    by_pulls = calibration.by_pulls
+    wide = [name for name, counts in zip(calibration.names, by_pulls.counts, strict=True) if counts]
     if wide:
-        one = len(wide) == 1
         yield (
-            f"Residuals within a pull are correlated: judged by whole pulls "
-            f"({int(calibration.by_pulls.pulls.max())}), {', '.join(wide)} "
-            f"{'is' if one else 'are'} up to {float(np.max(wider)):.2g} times less certain than "
-            "independent rows would say. "
-            f"The {'interval is' if one else 'intervals are'} by pulls. More pulls "
-            "would help more than more rows."
+            f"By whole pulls, whose rows may err together: the interval of {' and '.join(wide)}. "
+            f"There are {int(by_pulls.pulls.max())}; more pulls narrow it more than more rows."
         )

@@ -19,7 +19,6 @@ from notchflex.fit.measurements.measurements import (
     OBSERVED,
     Measurements,
     check_quantities,
-    rows_of,
 )
 from notchflex.fit.measurements.simulated import modelled
 from notchflex.fit.model.residuals import Residuals
@@ -171,7 +170,7 @@ def _solved(
         return steps, None
     rows = Measurements(
         source="candidates",
-        load=rows_of(loads, steps),
+        load=loads[np.asarray(steps)],
         pull=tuple(map(str, steps)),
         from_rest=True,
         observed={name: one[steps] for name, one in modelled(model, observed, axis_at).items()},

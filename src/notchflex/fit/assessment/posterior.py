@@ -8,38 +8,53 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
 
 from notchflex._extras import need
 from notchflex._jax import jax, jnp
+from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import InputError
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.intervals import LEVEL
 from notchflex.fit.estimation.problem import Progress
+from notchflex.results.files.dataframe import frame
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 MIN_DRAWS = 4
 """With fewer draws the halves of a chain cannot be compared."""
 
 
-@dataclass(frozen=True, eq=False)
-class Posterior:
+@dataclass(frozen=True, eq=False, repr=False)
+class Posterior(Displayed):
     """Draws of the constants.
 
     Attributes:
         names: The constants.
         draws: Draws by chains, draws and constants, in the units of the robot file.
         effective: Number of independent draws they are worth, by constant.
-        unlike: Split R-hat, 1 if the chains agree, by constant.
+        r_hat: Split R-hat, 1 if the chains agree, by constant.
         divergent: Number of divergent steps of the sampler; more than a few are too many.
     """
 
     names: tuple[str, ...]
     draws: Float[np.ndarray, "c d k"]
     effective: dict[str, float]
-    unlike: dict[str, float]
+    r_hat: dict[str, float]
     divergent: int
+
+    def _summary(self) -> Summary:
+        chains, draws, _ = self.draws.shape
+        rows = [
+            (name, f"{short(self.means[name])}, 95 % in [{short(low)}; {short(high)}]")
+            for name, (low, high) in self.intervals.items()
+        ]
+        rows.append(("divergent steps", str(self.divergent)))
+        return Summary(f"Posterior of {chains} chains of {draws} draws", rows)
 
     @property
     def means(self) -> dict[str, float]:
@@ -58,6 +73,37 @@ class Posterior:
         ends = np.percentile(self.draws, [tail, 100.0 - tail], axis=(0, 1))
         every = zip(self.names, *ends.tolist(), strict=True)
         return {name: (lower, upper) for name, lower, upper in every}
+
+    def to_xarray(self) -> Dataset:
+        """Return the draws with the axes `chain` and `draw`, as ArviZ takes them.
+
+        `arviz.summary(posterior.to_xarray())` is its table; its plots take the same.
+
+        Raises:
+            InputError: xarray is not installed.
+        """
+        need("xarray", "data", "to_xarray")
+        import xarray
+
+        return xarray.Dataset(
+            {name: (("chain", "draw"), self.draws[..., i]) for i, name in enumerate(self.names)},
+            coords={"chain": range(len(self.draws)), "draw": range(self.draws.shape[1])},
+            attrs={"divergent": self.divergent},
+        )
+
+    def to_dataframe(self, library: str = "polars") -> Any:
+        """Return a row for each draw: chain and draw, from 0, and the constants.
+
+        Args:
+            library: "polars" or "pandas".
+
+        Raises:
+            InputError: The library is not installed, or there is no such library.
+        """
+        chain, draw = np.indices(self.draws.shape[:2])
+        constants = dict(zip(self.names, np.moveaxis(self.draws, -1, 0), strict=True))
+        columns = {"chain": chain, "draw": draw, **constants}
+        return frame({name: one.ravel() for name, one in columns.items()}, library)
 
 
 def sample_posterior(
@@ -121,8 +167,8 @@ def sample_posterior(
     drawn = np.stack(every)
     by_name = list(zip(found.names, np.moveaxis(drawn, -1, 0), strict=True))
     effective = {name: float(diagnostics.effective_sample_size(one)) for name, one in by_name}
-    unlike = {name: float(diagnostics.split_gelman_rubin(one)) for name, one in by_name}
-    return Posterior(found.names, drawn, effective, unlike, divergent)
+    r_hat = {name: float(diagnostics.split_gelman_rubin(one)) for name, one in by_name}
+    return Posterior(found.names, drawn, effective, r_hat, divergent)
 
 
 def _check(calibration: Calibration) -> None:

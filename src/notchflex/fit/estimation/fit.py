@@ -3,29 +3,156 @@
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.fit.estimation.calibration import Calibration
-from notchflex.fit.estimation.intervals import Interval
-from notchflex.fit.estimation.minimise import Cost, Minimum
-from notchflex.fit.estimation.noise import noise_left
-from notchflex.fit.estimation.objective import FitObjective, LeastSquares
-from notchflex.fit.estimation.problem import FitProblem, Progress, search
-from notchflex.fit.estimation.searches_in_pieces import search_in_pieces
+from notchflex.fit.estimation.intervals import Cost, Interval, Minimum
+from notchflex.fit.estimation.objective import FitObjective, LeastSquares, noise_left
+from notchflex.fit.estimation.problem import (
+    FitProblem,
+    Progress,
+    search,
+    search_from,
+    starting_points,
+)
 from notchflex.fit.measurements.measurements import Measurements
-from notchflex.fit.model.constant import Constant
-from notchflex.fit.model.constants import unknowns
+from notchflex.fit.model.constants import Constant, unknowns
+from notchflex.fit.model.drawing import deviations_of
 from notchflex.fit.model.samples import Samples
-from notchflex.pieces.options import PieceFolder
+from notchflex.pieces.folder import Manifest, Piece, Recipe, finished_head, plain
+from notchflex.pieces.run import PieceFolder
 from notchflex.robot import Robot
+from notchflex.robot.robot import to_table
 from notchflex.solver.newton import Settings
 
+KIND = "calibration"
+
+
+class SearchTask:
+    """Searches from starting points, each of which is a piece.
+
+    Args:
+        problem: The objective.
+        starts: Number of starting points that have a solution.
+        seed: Seed of the starting points.
+    """
+
+    def __init__(self, problem: FitProblem, starts: int, seed: int) -> None:
+        self.problem, self.starts, self.seed = problem, starts, seed
+        self.points = starting_points(problem, starts, seed)
+        samples = problem.samples
+        self._robots = {one.label: one.robot for one in samples.every}
+        self._settings = samples.every[0].settings
+        self.manifest = Manifest.made(
+            KIND,
+            len(self.points),
+            1,
+            robots={label: to_table(robot) for label, robot in self._robots.items()},
+            measurements=[[one.label, plain(one.measured)] for one in samples.every],
+            constants=plain(samples.unknowns),
+            objective=plain(problem.objective),
+            settings=plain(self._settings),
+            starts=starts,
+            seed=seed,
+        )
+
+    @property
+    def recipe(self) -> Recipe:
+        """How another process makes the same task."""
+        samples = self.problem.samples
+        data = {label: tuple(samples.of_robot(label)) for label in self._robots}
+        content = (self._robots, data, samples.unknowns, self._settings)
+        return Recipe(
+            search_task,
+            pickle.dumps((content, self.problem.objective, self.starts, self.seed)),
+        )
+
+    def prepare(self) -> None:
+        """Estimate the noise, as the first search does at the first point with a solution."""
+        for point in self.points:
+            if self.problem.noise is not None:
+                break
+            self.problem(point)
+
+    def piece(self, number: int) -> Piece:
+        """Search from one starting point."""
+        import polars
+
+        search = search_from(self.problem, self.points[number], number, self.starts, self.seed)
+        names = [one.name for one in self.problem.unknowns]
+        cost = np.nan if search.cost is None else search.cost.value
+        columns: dict[str, Any] = dict(zip(names, search.values[:, None], strict=True))
+        frame = {**columns, "objective": [cost], "converged": [search.converged]}
+        head = {
+            "codes": [1, 0, 0, 0] if search.cost is not None else [0, 0, 1, 0],
+            "values": search.values.tolist(),
+            **{name: getattr(search, name) for name in ("converged", "reason")},
+            **{name: int(getattr(search, name)) for name in ("iterations", "calls")},
+        }
+        return Piece(polars.DataFrame(frame), head)
+
+    def minimum(self, head: dict[str, Any]) -> Minimum:
+        """Return what a search found, from the head of its piece."""
+        values = np.array(head["values"])
+        cost = self.problem(values) if head["codes"][0] else None
+        rest = (head[name] for name in ("converged", "reason", "iterations", "calls"))
+        return Minimum(values, cost, *rest)
+
+
+def search_task(content: bytes) -> SearchTask:
+    """Make the task of another process again, from objects that it pickled."""
+    (robots, data, constants, settings), objective, starts, seed = pickle.loads(content)
+    samples = Samples.of(robots, data, constants, settings)
+    return SearchTask(FitProblem(samples, objective), starts, seed)
+
+
+def search_in_pieces(
+    problem: FitProblem, starts: int, seed: int, folder: PieceFolder, progress: Progress | None
+) -> tuple[Minimum, ...]:
+    """Search from several starts; another one replaces a start without a solution.
+
+    Args:
+        problem: The objective.
+        starts: Number of starting points.
+        seed: Their seed.
+        folder: Where searches are kept.
+        progress: As for `search`, which finds the same.
+
+    Raises:
+        InputError: The folder holds something else, or cannot be written.
+    """
+    task = SearchTask(problem, starts, seed)
+    task.prepare()
+    minima: list[Minimum] = []
+    done, last = 0, 0
+    while len(minima) < starts and last < task.manifest.pieces:
+        last = min(last + starts - len(minima), task.manifest.pieces)
+
+        def report(rows: int, *_: int, before: int = done) -> None:
+            if progress is not None:
+                progress("searching", min(before + rows, starts), starts)
+
+        folder.run(task, pieces=range(done, last), cores=1, progress=report)
+        for piece in range(done, last):
+            head = finished_head(folder.directory, task.manifest, piece)
+            if head["codes"][0] or not piece:
+                minima.append(task.minimum(head))
+        done = last
+    if all(one.cost is None for one in minima):
+        problem(task.points[0])  # tells where there is no solution
+    return tuple(minima)
+
+
 # How often noise and constants are estimated from each other.
-_ROUNDS = 6
+_ROUNDS = 10
+# Standard deviations by which the constants may still move in the last round.
+_SETTLED = 0.05
 
 Measured = Measurements | Sequence[Measurements]
 
@@ -36,6 +163,7 @@ def calibrate(
     fit: str | Sequence[str | Constant],
     *,
     objective: FitObjective | None = None,
+    priors: bool = True,
     starts: int = 4,
     seed: int = 0,
     intervals: bool = True,
@@ -54,6 +182,9 @@ def calibrate(
         fit: The constants, by name (see `Constant`), in the units of the robot file.
         objective: `LeastSquares()` by default, `SumOfRobotErrors()` (Pacheco 2021, eq. 17) or
             `SumOfDistances()` (Gao 2017, eq. 27).
+        priors: Whether what is not fitted may deviate from the robot files within their
+            tolerances, or those that `uncertain` assumes (linearised; of `LeastSquares` only, and
+            not if robots have constants of their own, `each:`).
         starts: Number of starting points; the first is the robots as they are. With two or more,
             every search looks again from points near its end.
         seed: Seed of the starting points.
@@ -87,6 +218,8 @@ def calibrate(
     data = _of_robots(named, measurements)
     samples = Samples.of(named, data, unknowns(named, fit), settings)
     problem = FitProblem(samples, objective or LeastSquares())
+    if priors and problem.objective.is_likelihood and not any(c.each for c in problem.unknowns):
+        problem.drawing = deviations_of(named, problem.unknowns)
     searches = None
     if folder is not None:
         searches = search_in_pieces(problem, starts, seed, PieceFolder.of(folder), progress)
@@ -191,19 +324,29 @@ def _no_start(samples: Samples) -> InputError:
 
 
 def _with_noise(problem: FitProblem, best: Minimum) -> tuple[Minimum, Cost]:
-    """Estimate unknown noise from the residuals, and fit again, until both agree."""
+    """Estimate unknown noise and deviations from the drawing, and fit again, until all agree."""
     cost, noise = best.cost, problem.noise
     assert cost is not None
+    robust = getattr(problem.objective, "huber", None) is not None
+    deviations = np.zeros(len(problem.drawing))
     for _ in range(_ROUNDS):
-        if noise is None or noise.is_known:
+        if noise is None or (noise.is_known and not problem.drawing):
             break
-        left = noise_left(noise, cost.residuals, len(problem.unknowns))
+        left = noise_left(noise, cost.residuals, len(problem.unknowns), robust=robust)
         settled = np.allclose(left.deviation, noise.deviation, rtol=1e-3, atol=0.0)
         problem.noise = noise = left
+        if problem.drawing:
+            try:
+                problem.linearise(best.values, deviations)
+            except InputError:
+                break
         again = problem.minimum(best.values)
         if again.cost is None:
             break
+        moved = again.values - best.values
+        settled &= float(moved @ again.cost.curvature @ moved) < _SETTLED**2
         best, cost = again, again.cost
+        deviations = problem.means + cost.deviations
         if settled:
             break
     return best, cost

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
 from notchflex.errors import InputError
-from notchflex.fit.estimation.intervals import unit_free
-from notchflex.fit.estimation.minimise import Cost, Minimum, Vector, minimise
-from notchflex.fit.estimation.noise import Noise, first_noise
-from notchflex.fit.estimation.objective import FitObjective
-from notchflex.fit.model.residuals import Residuals
+from notchflex.fit.estimation.intervals import Cost, Minimum, Vector, minimise, unit_free
+from notchflex.fit.estimation.objective import FitObjective, Noise, first_noise
+from notchflex.fit.model.constants import Unknown
 from notchflex.fit.model.samples import Samples
 
 Progress = Callable[[str, int, int], None]
@@ -33,19 +32,24 @@ class FitProblem:
         samples: The measurements.
         objective: The objective.
         unknowns: The constants.
+        drawing: What else may deviate, within the tolerances of the drawings (`deviations_of`).
         noise: Standard deviations of the measurements; None before the first call.
         lower: Least values allowed.
         upper: Greatest values allowed.
     """
 
-    def __init__(self, samples: Samples, objective: FitObjective) -> None:
+    def __init__(
+        self, samples: Samples, objective: FitObjective, drawing: tuple[Unknown, ...] = ()
+    ) -> None:
         objective.check(samples.quantities)
         if not objective.takes_priors and any(one.prior for one in samples.unknowns):
             raise InputError.UNSUPPORTED(
                 "a prior needs LeastSquares() or SumOfRobotErrors(); other objectives take none"
             )
         self.samples, self.objective, self.unknowns = samples, objective, samples.unknowns
+        self.drawing = drawing
         self.noise: Noise | None = None
+        self._spread: tuple[np.ndarray, np.ndarray] | None = None
         self.lower = np.array([one.lower for one in self.unknowns], float)
         self.upper = np.array([one.upper for one in self.unknowns], float)
 
@@ -58,6 +62,8 @@ class FitProblem:
             return None
         if self.noise is None:
             self.noise = first_noise(self.samples, residuals)
+        if self._spread is not None:
+            residuals = replace(residuals, spread=self._spread[0], expected=self._spread[1])
         cost = self.objective.cost(residuals, self.noise.deviation)
         for number, unknown in enumerate(self.unknowns):
             if unknown.prior is not None:  # as a measurement of the constant itself
@@ -66,16 +72,38 @@ class FitProblem:
                 off = (float(values[number]) - mean) / deviation
                 cost = cost._replace(value=cost.value + 0.5 * weight * off**2)
                 cost.gradient[number] += weight * off / deviation
-                cost.curvature[number, number] += weight / deviation**2
+                more = np.zeros_like(cost.curvature)
+                more[number, number] = weight / deviation**2
+                cost = cost._replace(
+                    curvature=cost.curvature + more,
+                    scatter=cost.scatter + weight * more,
+                    hessian=None if cost.hessian is None else cost.hessian + more,
+                )
         return cost
 
-    def scatter_of_priors(self, residuals: Residuals) -> Float[np.ndarray, " k"]:
-        """Return the variance of the gradient of the objective that corresponds to the priors."""
-        assert self.noise is not None
-        weight = self.objective.weight_of_one(residuals, self.noise.deviation)
-        return np.array(
-            [0.0 if one.prior is None else (weight / one.prior[1]) ** 2 for one in self.unknowns]
+    def linearise(self, values: Vector, deviations: Vector) -> None:
+        """Linearise the model about deviations from the drawings, at values of the constants.
+
+        Deviations by which the model cannot be varied are left out.
+
+        Raises:
+            InputError: No robot deviates so.
+        """
+        at = tuple(
+            replace(one, start=float(start))
+            for one, start in zip(self.drawing, deviations, strict=True)
         )
+        self.samples = self.samples.deviated(at)
+        slopes = [(one, self.samples.slopes_of(one, values)) for one in at]
+        self.drawing = tuple(one for one, by_one in slopes if by_one is not None)
+        spread = np.array([by_one for _, by_one in slopes if by_one is not None]).T
+        start = np.array([one.start for one in self.drawing])
+        self._spread = (spread, spread @ (self.means - start)) if self.drawing else None
+
+    @property
+    def means(self) -> Float[np.ndarray, " m"]:
+        """Means of the deviations from the drawings, in standard deviations."""
+        return np.array([one.prior[0] for one in self.drawing if one.prior is not None])
 
     def minimum(self, start: Vector) -> Minimum:
         """Return the minimum that a search from a start ends at."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -11,12 +12,14 @@ from numpy.typing import NDArray
 
 from notchflex.errors import InputError
 from notchflex.fit.friction_rig.two_weights import (
+    LAWS,
+    Law,
     coefficient_from_weights,
     impossible,
     slopes_of_coefficient,
 )
 from notchflex.fit.measurements.csv import check_deviation
-from notchflex.results.files.csv_reading import read_table
+from notchflex.results.files.csv_reading import read_data_table
 
 COLUMNS = {
     "weight_1": ("weight_1_g", "weight_1_sd_g"),
@@ -38,6 +41,7 @@ class FrictionReadings:
         turn_2: Turn over the second edge, rad, (N,).
         deviation: Standard deviations of these four, in their order and units, (N, 4); NaN if
             unknown. A reading without any is taken to be as accurate as the others.
+        law: The friction law of an edge, "capstan" or "corner" (Liu 2022).
         source: Where they come from.
         lines: Their lines in the file; empty if there is none.
         ignored: Columns of the file that were not used.
@@ -48,7 +52,7 @@ class FrictionReadings:
     Example:
         >>> rig = FrictionReadings([200.0, 300.0], [150.0, 221.0], [1.6, 1.6], [1.6, 1.6])
         >>> rig.coefficient.round(4).tolist()
-        [0.0697, 0.0741]
+        [0.0899, 0.0955]
     """
 
     weight_1: NDArray[np.float64]
@@ -56,12 +60,17 @@ class FrictionReadings:
     turn_1: NDArray[np.float64]
     turn_2: NDArray[np.float64]
     deviation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    law: Law = "capstan"
     source: str = "readings"
     lines: tuple[int, ...] = ()
     ignored: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the numbers, and convert them to arrays of floats."""
+        if self.law not in LAWS:
+            raise InputError.UNKNOWN_NAME(
+                f"there is no friction law {self.law!r} of a rig; allowed are {', '.join(LAWS)}"
+            )
         arrays = [np.array(getattr(self, name), float, ndmin=1) for name in COLUMNS]
         count = len(arrays[0])
         deviation = np.array(self.deviation, float)
@@ -80,7 +89,8 @@ class FrictionReadings:
         for name, value in zip(COLUMNS, arrays, strict=True):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "deviation", deviation)
-        wrong = impossible(*arrays)
+        first, second, *turns = arrays
+        wrong = impossible(first, second, turns[0], turns[1], self.law)
         if wrong is not None:
             raise InputError.OUT_OF_RANGE(f"{self.at(wrong[0])}: {wrong[1]}")
 
@@ -101,7 +111,9 @@ class FrictionReadings:
     @cached_property
     def coefficient(self) -> NDArray[np.float64]:
         """Coefficient of friction of every reading, (N,)."""
-        return coefficient_from_weights(self.weight_1, self.weight_2, self.turn_1, self.turn_2)
+        return coefficient_from_weights(
+            self.weight_1, self.weight_2, self.turn_1, self.turn_2, self.law
+        )
 
     @cached_property
     def coefficient_deviation(self) -> NDArray[np.float64]:
@@ -110,7 +122,7 @@ class FrictionReadings:
         To first order; those that are unknown count as 0.
         """
         slopes = slopes_of_coefficient(
-            self.coefficient, self.weight_1, self.weight_2, self.turn_1, self.turn_2
+            self.coefficient, self.weight_1, self.weight_2, self.turn_1, self.turn_2, self.law
         )
         is_given = ~np.isnan(self.deviation)
         part = slopes.T * np.where(is_given, self.deviation, 0.0)
@@ -122,7 +134,11 @@ class FrictionReadings:
         return self.turn_1 + self.turn_2
 
 
-def read_friction_rig(source: str | os.PathLike[str]) -> FrictionReadings:
+def read_friction_rig(
+    source: str | os.PathLike[str],
+    law: Law = "capstan",
+    columns: Mapping[str, str] | None = None,
+) -> FrictionReadings:
     r"""Read readings of the two-weight rig from a CSV.
 
     The file is UTF-8 with commas and its header first, with the columns `weight_1_g`,
@@ -131,6 +147,8 @@ def read_friction_rig(source: str | os.PathLike[str]) -> FrictionReadings:
 
     Args:
         source: Path of the file.
+        law: The friction law of an edge.
+        columns: Headers of the file for columns, such as `{"weight_1_g": "Gewicht"}`.
 
     Returns:
         The readings, in the order of the file.
@@ -144,9 +162,9 @@ def read_friction_rig(source: str | os.PathLike[str]) -> FrictionReadings:
         >>> text = "weight_1_g,weight_2_g,turn_1_deg,turn_2_deg\n200,150,90,90\n"
         >>> _ = Path("rig.csv").write_text(text)
         >>> read_friction_rig("rig.csv").coefficient.round(4).tolist()
-        [0.0718]
+        [0.0916]
     """
-    table = read_table(source)
+    table = read_data_table(source, columns)
     missing = [column for column, _ in COLUMNS.values() if column not in table.header]
     if missing:
         words = f"column{'s'[: len(missing) - 1]} {', '.join(missing)}"
@@ -168,7 +186,8 @@ def read_friction_rig(source: str | os.PathLike[str]) -> FrictionReadings:
     return FrictionReadings(
         **values,
         deviation=deviation,
+        law=law,
         source=table.name,
         lines=table.lines,
-        ignored=tuple(name for name in table.header if name not in used),
+        ignored=table.unused(used),
     )

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from notchflex import __version__
-from notchflex.fit.friction_rig.constancy import Constancy, constancy, design, known_variance
+from notchflex.errors import InputError
 from notchflex.fit.friction_rig.readings import COLUMNS, FrictionReadings
-from notchflex.fit.friction_rig.scattered import fit_line, mean_interval, outliers
+from notchflex.fit.friction_rig.scattered import (
+    Constancy,
+    constancy,
+    design,
+    fit_line,
+    known_variance,
+    mean_interval,
+    outliers,
+)
+from notchflex.fit.friction_rig.two_weights import LAWS
 from notchflex.results.quantities.registry import DEGREES
 
 # A larger coefficient of a tendon is more likely a wrong unit.
@@ -52,8 +61,33 @@ class FrictionRig:
         )
 
     @property
+    def by_law(self) -> dict[str, float]:
+        """Coefficient by each friction law, the mean for the other one; NaN where it has none."""
+        found = {self.readings.law: self.coefficient}
+        for law in LAWS:
+            if law not in found:
+                try:
+                    other = replace(self.readings, law=law)
+                    found[law] = float(np.mean(other.coefficient))
+                except InputError:  # a turn of half a turn or more
+                    found[law] = float("nan")
+        return found
+
+    @property
     def words(self) -> tuple[str, ...]:
         """The result in sentences."""
+        law = self.readings.law
+        ((other, value),) = ((one, at) for one, at in self.by_law.items() if one != law)
+        said = (
+            f"For friction.kind {law!r}; by {other!r} mu would be {value:.4g}."
+            if value == value
+            else f"For friction.kind {law!r}; {other!r} has no mu for turns of 180 deg or more."
+        )
+        first, *others = self._words
+        return first, said, *others
+
+    @property
+    def _words(self) -> tuple[str, ...]:
         low, high = self.interval
         count = len(self.readings)
         if np.isnan(low):
@@ -98,10 +132,11 @@ class FrictionRig:
 def friction_rig(readings: FrictionReadings) -> FrictionRig:
     """Estimate the coefficient of friction from readings of the two-weight rig.
 
-    Every reading has a coefficient by Liu's eq. 21. These are taken as Gaussian about one value,
-    with the variance from their standard deviations plus a common one, estimated from the readings:
-    rig and tendon differ from reading to reading. The maximum of the likelihood and its profile
-    give value and interval; without standard deviations these are mean and Student's interval.
+    Every reading has a coefficient by the friction law. These are taken as Gaussian about one
+    value, with the variance from their standard deviations plus a common one, estimated from the
+    readings: rig and tendon differ from reading to reading. The maximum of the likelihood and
+    its profile give value and interval; without standard deviations these are mean and
+    Student's interval.
 
     Args:
         readings: The readings.
@@ -112,7 +147,7 @@ def friction_rig(readings: FrictionReadings) -> FrictionRig:
     Example:
         >>> rig = FrictionReadings([200.0] * 3, [150.0, 151.0, 149.5], [1.6] * 3, [1.6] * 3)
         >>> friction_rig(rig)
-        <FrictionRig: mu = 0.06946 (0.06641 to 0.07251), 3 readings of readings>
+        <FrictionRig: mu = 0.08956 (0.08561 to 0.0935), 3 readings of readings>
     """
     y, variance = readings.coefficient, known_variance(readings)
     count, test = len(y), constancy(readings)
@@ -144,7 +179,8 @@ def friction_document(rig: FrictionRig) -> dict[str, Any]:
         rig: The estimate.
 
     Returns:
-        `coefficient`, `interval_95`, `standard_error`, `spread`, `scatter`, `outliers` (numbers of
+        `law`, `coefficient`, `coefficient_by_law`, `interval_95`, `standard_error`, `spread`,
+        `scatter`, `outliers` (numbers of
         readings from 1), `without_outliers`, `constant` (the test), the result in `words`, and
         every reading with its own coefficient.
     """
@@ -163,7 +199,9 @@ def friction_document(rig: FrictionRig) -> dict[str, Any]:
         "program": "notchflex",
         "version": __version__,
         "data": readings.source,
+        "law": readings.law,
         "coefficient": rig.coefficient,
+        "coefficient_by_law": rig.by_law,
         "interval_95": rig.interval,
         "standard_error": rig.standard_error,
         "spread": rig.spread,

@@ -1,7 +1,10 @@
-"""Friction from two weights on one string over two edges (Liu 2022, eq. 20-21).
+"""Friction from two weights on one string over two edges.
 
-The heavier weight m1 is just about to pull the string over edges at which it turns by a1 and a2,
-so that each takes the ratio of the corner law. With q = (m1 - m2)/(m1 + m2) and b = tan(a / 2),
+The heavier weight m1 is just about to pull the string over edges at which it turns by a1 and a2.
+Capstan friction, which robots have by default, gives mu = ln(m1 / m2) / (a1 + a2).
+
+By the corner law (Liu 2022, eq. 20-21) each edge takes its ratio. With q = (m1 - m2)/(m1 + m2) and
+b = tan(a / 2),
 
     q = mu (b1 + b2) / (1 + mu^2 b1 b2),
 
@@ -10,6 +13,8 @@ for equal weights too, where the printed form is 0 / 0.
 """
 
 from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -20,18 +25,27 @@ from notchflex.errors import InputError
 from notchflex.mechanics.friction import CornerLaw
 
 Readings = Float[np.ndarray, "*n"]
+Law = Literal["capstan", "corner"]
+LAWS: tuple[Law, ...] = ("capstan", "corner")
+"""Friction laws of an edge."""
 
 
 def coefficient_from_weights(
-    weight_1: ArrayLike, weight_2: ArrayLike, turn_1: ArrayLike, turn_2: ArrayLike
+    weight_1: ArrayLike,
+    weight_2: ArrayLike,
+    turn_1: ArrayLike,
+    turn_2: ArrayLike,
+    law: Law = "capstan",
 ) -> Readings:
-    """Return the coefficient of friction of readings of the two-weight rig (Liu 2022, eq. 21).
+    """Return the coefficient of friction of readings of the two-weight rig.
 
     Args:
         weight_1: Weight that pulls, in any unit, (n,).
         weight_2: Weight that is just about to be lifted, in the same unit; no more than the other.
-        turn_1: Turn of the string over the first edge, rad, 0 to less than pi, (n,).
+        turn_1: Turn of the string over the first edge or round the first rod, rad, (n,); for the
+            corner law less than pi.
         turn_2: Turn over the second edge, rad, (n,).
+        law: The friction law of an edge; "corner" is that of Liu 2022 (eq. 21).
 
     Returns:
         The coefficient, (n,).
@@ -42,12 +56,14 @@ def coefficient_from_weights(
     Example:
         >>> mu = coefficient_from_weights(200.0, [150.0, 200.0], 0.5 * np.pi, 0.5 * np.pi)
         >>> mu.round(4).tolist()
-        [0.0718, 0.0]
+        [0.0916, 0.0]
     """
     m1, m2, a1, a2 = _floats(weight_1, weight_2, turn_1, turn_2)
-    wrong = impossible(m1, m2, a1, a2)
+    wrong = impossible(m1, m2, a1, a2, law)
     if wrong is not None:
         raise InputError.OUT_OF_RANGE(f"reading {wrong[0] + 1}: {wrong[1]}")
+    if law == "capstan":
+        return np.log(m1 / m2) / (a1 + a2)
     b1, b2 = np.tan(0.5 * a1), np.tan(0.5 * a2)
     part = (m1 - m2) / (m1 + m2)
     total = b1 + b2
@@ -55,15 +71,22 @@ def coefficient_from_weights(
 
 
 def weight_held(
-    weight_1: ArrayLike, coefficient: ArrayLike, turn_1: ArrayLike, turn_2: ArrayLike
+    weight_1: ArrayLike,
+    coefficient: ArrayLike,
+    turn_1: ArrayLike,
+    turn_2: ArrayLike,
+    law: Law = "capstan",
 ) -> Readings:
-    """Return the weight that the larger one is just about to lift: the inverse of eq. 21.
+    """Return the weight that the larger one is just about to lift.
+
+    It is the inverse of `coefficient_from_weights`.
 
     Args:
         weight_1: Weight that pulls, in any unit, (n,).
         coefficient: Coefficient of friction, one or one a reading.
         turn_1: Turn of the string over the first edge, rad, (n,).
         turn_2: Turn over the second edge, rad, (n,).
+        law: The friction law of an edge.
 
     Returns:
         The weight, in the unit of the other, (n,).
@@ -73,16 +96,18 @@ def weight_held(
 
     Example:
         >>> print(f"{weight_held(200.0, 0.15, 1.5, 1.2):.3f} g")
-        122.858 g
+        133.395 g
     """
     m1, mu, a1, a2 = _floats(weight_1, coefficient, turn_1, turn_2)
-    law = CornerLaw(constant(mu))
-    if not np.asarray(law.valid(constant(a1), constant(a2))).all():
+    if law == "capstan":
+        return m1 * np.exp(-mu * (a1 + a2))
+    corner = CornerLaw(constant(mu))
+    if not np.asarray(corner.valid(constant(a1), constant(a2))).all():
         raise InputError.OUT_OF_RANGE(
             "an edge would hold any pull, because coefficient * tan(turn / 2) is 1 or more; give a "
             "smaller coefficient or turn"
         )
-    first, second = law.bounds(constant(a1), constant(a2))
+    first, second = corner.bounds(constant(a1), constant(a2))
     return m1 * np.exp(-np.asarray(first) - np.asarray(second))
 
 
@@ -92,11 +117,16 @@ def slopes_of_coefficient(
     weight_2: Readings,
     turn_1: Readings,
     turn_2: Readings,
+    law: Law = "capstan",
 ) -> Float[np.ndarray, "4 n"]:
     """Return derivatives of the coefficient by the weights, and by the turns per rad.
 
-    By the implicit function theorem from ln(m1 / m2) = 2 artanh(mu b1) + 2 artanh(mu b2).
+    Those of the corner law by the implicit function theorem from
+    ln(m1 / m2) = 2 artanh(mu b1) + 2 artanh(mu b2).
     """
+    if law == "capstan":
+        turn = turn_1 + turn_2
+        return np.stack([1.0 / weight_1, -1.0 / weight_2, -coefficient, -coefficient]) / turn
     b1, b2 = np.tan(0.5 * turn_1), np.tan(0.5 * turn_2)
     by_1, by_2 = 2.0 / (1.0 - (coefficient * b1) ** 2), 2.0 / (1.0 - (coefficient * b2) ** 2)
     by_coefficient = b1 * by_1 + b2 * by_2
@@ -109,15 +139,16 @@ def _floats(*values: ArrayLike) -> tuple[Readings, ...]:
 
 
 def impossible(
-    weight_1: Readings, weight_2: Readings, turn_1: Readings, turn_2: Readings
+    weight_1: Readings, weight_2: Readings, turn_1: Readings, turn_2: Readings, law: Law
 ) -> tuple[int, str] | None:
     """Return number (from 0) and reason of the first impossible reading; None if there is none."""
     m1, m2, a1, a2 = (np.ravel(value) for value in (weight_1, weight_2, turn_1, turn_2))
+    most, limit = (np.inf, "or more") if law == "capstan" else (np.pi, "to less than 180 deg")
     checks = (
         (~(m1 > 0.0) | ~(m2 > 0.0), "both weights must be above 0."),
         (
-            ~((a1 >= 0.0) & (a1 < np.pi) & (a2 >= 0.0) & (a2 < np.pi)),
-            "a string turns over an edge by 0 to less than 180 deg.",
+            ~((a1 >= 0.0) & (a1 < most) & (a2 >= 0.0) & (a2 < most)),
+            f"a string turns over an edge by 0 {limit} (friction law: {law}).",
         ),
         (
             m2 > m1,

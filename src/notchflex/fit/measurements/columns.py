@@ -12,6 +12,7 @@ from notchflex.results.quantities.registry import AXES, QUANTITIES
 
 PULL = ("pull", "trial")
 FROM_REST = "from_rest"
+DIRECTION = "direction"
 FOLLOWING = "following"
 TIP_MASS = "tip_mass_g"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -57,6 +57,7 @@ class Measurements:
         ignored: Columns of the file that were not used.
         order: How the order of the rows was understood if neither the file nor the caller says
             whether they are from rest; "" if there is nothing to say.
+        renamed: Columns that have another name in the file, to that name.
 
     Raises:
         InputError: Shapes that do not match, numbers that are not finite, a standard deviation
@@ -81,6 +82,7 @@ class Measurements:
     measured_tension: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     ignored: tuple[str, ...] = ()
     order: str = ""
+    renamed: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def __post_init__(self) -> None:
         """Check everything, and convert it to arrays of floats."""
@@ -232,7 +234,7 @@ class Measurements:
             raise InputError.NO_DATA(f"no row of {self.source} is left; take at least one")
         return replace(
             self,
-            load=rows_of(self.load, which),
+            load=self.load[which],
             pull=tuple(self.pull[row] for row in which),
             observed={name: value[which] for name, value in self.observed.items()},
             deviation={name: value[which] for name, value in self.deviation.items()},
@@ -251,13 +253,6 @@ class Measurements:
                 f"{self.source} has no pull {missing[0]!r}; it has {', '.join(self.pulls)}"
             )
         return self.taken([label in labels for label in self.pull])
-
-
-def rows_of(load: LoadPath, rows: Sequence[int] | NDArray[np.intp]) -> LoadPath:
-    """Return some of the steps of a load path, by their numbers from 0."""
-    which = np.asarray(rows)
-    external = tuple(load.external[row] for row in which)
-    return LoadPath(load.tension[which], load.stroke[which], load.base_rotation, external)
 
 
 def check_labels(labels: Sequence[str], count: int, what: str) -> None:

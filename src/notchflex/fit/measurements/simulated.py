@@ -15,7 +15,6 @@ from notchflex.fit.measurements.measurements import (
     Measurements,
     check_labels,
     check_quantities,
-    rows_of,
 )
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.load_path import load_path
@@ -106,7 +105,7 @@ def solved_rows(
     labels = np.array(pull)
     for label in dict.fromkeys(pull):
         rows = np.flatnonzero(labels == label)
-        for name, part in read(simulate(robot, rows_of(load, rows))).items():
+        for name, part in read(simulate(robot, load[rows])).items():
             empty = np.empty((len(load), *part.shape[1:]), part.dtype)
             results.setdefault(name, empty)[rows] = part
     return results

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,8 +12,8 @@ from jaxtyping import Float
 from notchflex.errors import InputError
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.constants import Unknown
-from notchflex.fit.model.residuals import Residuals, misfit
-from notchflex.fit.model.rows import Sample
+from notchflex.fit.model.drawing import deviated
+from notchflex.fit.model.residuals import Residuals, Sample, misfit
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
 
@@ -98,7 +98,32 @@ class Samples:
                 slopes.append(by_constants)
         if self.failed:
             return None
-        return Residuals(np.concatenate(residuals), np.concatenate(slopes), **self._layout)
+        values = np.concatenate(residuals)
+        none = np.zeros((len(values), 0))
+        return Residuals(values, np.concatenate(slopes), **self._layout, spread=none)
+
+    def deviated(self, deviations: Sequence[Unknown]) -> Samples:
+        """Return the same measurements of robots that deviate from their drawings.
+
+        Raises:
+            InputError: A robot cannot.
+        """
+        robots = {one.label: one.robot for one in self.every}
+        robots = {label: deviated(robot, label, deviations) for label, robot in robots.items()}
+        every = tuple(replace(one, robot=robots[one.label]) for one in self.every)
+        return replace(self, every=every)
+
+    def slopes_of(
+        self, more: Unknown, values: Float[np.ndarray, " k"]
+    ) -> Float[np.ndarray, " r"] | None:
+        """Return derivatives by one more constant at values of the others; None without any."""
+        robots = {one.label: one.robot for one in self.every}
+        data = {label: self.of_robot(label) for label in robots}
+        varied = Samples.of(robots, data, (*self.unknowns, more), self.every[0].settings)
+        residuals = varied.residuals(np.append(values, more.start))
+        if residuals is None or not np.isfinite(residuals.slopes[:, -1]).all():
+            return None
+        return residuals.slopes[:, -1]
 
     @cached_property
     def _layout(self) -> dict[str, np.ndarray]:

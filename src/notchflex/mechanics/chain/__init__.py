@@ -1,6 +1,6 @@
 """The chain: rigid bodies joined by flexures, as arrays, and how it moves."""
 
-from notchflex.mechanics.chain.arrays import Chain, flexure_states
+from notchflex.mechanics.chain.arrays import Chain, flexure_states, padded, structural
 from notchflex.mechanics.chain.assembly import (
     ChainTemplate,
     assemble,
@@ -9,10 +9,8 @@ from notchflex.mechanics.chain.assembly import (
     laws,
 )
 from notchflex.mechanics.chain.flexures import FlexureOf, flexure
-from notchflex.mechanics.chain.pad import padded
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
 from notchflex.mechanics.chain.sites import sites_of, unchecked_dimensions
-from notchflex.mechanics.chain.structure import structural
 
 __all__ = [
     "Chain",

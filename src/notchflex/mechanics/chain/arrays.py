@@ -1,22 +1,24 @@
-"""The chain: the solver's model of a robot, as one pytree of arrays."""
+"""The chain: the solver's model of a robot, as one pytree of arrays, its zeros and its padding.
+
+A mode that stretches a rod does not rotate it, whatever the rod's length and width. Such zeros
+remain when any number of the robot file changes, so programs omit the products with them. The zeros
+of a rod that happens to be straight are not structural.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import constant, jax, jnp
 from notchflex._pytree import Pytree, static
 from notchflex.mechanics.contact import ContactGroup
-from notchflex.mechanics.flexure import (
-    FlexureState,
-    Rod,
-    flexure_state,
-    in_space,
-)
+from notchflex.mechanics.flexure import FlexureState, Rod, flexure_state, in_space
 from notchflex.mechanics.friction import FrictionLaw
 from notchflex.mechanics.material import SectionLaw
 from notchflex.mechanics.tendon import TendonGroup
@@ -131,3 +133,129 @@ def flexure_states(
     response = law.respond_all(strain, rods.section, memory)
     state = partial(flexure_state, with_pose=with_pose)
     return jax.vmap(state, in_axes=(0, None, 0, 0, 0))(rods, law, memory, modes, response)
+
+
+def structural(chain: Chain) -> Chain:
+    """Mark the numbers of a chain that may be constants of a program.
+
+    They are the strains, rotations and displacements of a rod by its modes, the stiffness between
+    modes, counts and flags. The mask of padding flexures is not: chains of other lengths share the
+    program.
+    """
+
+    def counts(leaf: Any) -> Any:
+        return np.full(np.shape(leaf), np.asarray(leaf).dtype.kind != "f")
+
+    plain: Chain = jax.tree.map(counts, chain)
+    rods = chain.rods
+    pairs = None
+    if rods.turn_pair is not None:
+        pairs = _of_modes(rods.turn_pair) & np.swapaxes(_of_modes(rods.turn_pair), -1, -2)
+    return replace(
+        plain,
+        rods=replace(
+            plain.rods,
+            basis=_all(rods.basis),
+            node_reach=_all(rods.node_reach),
+            turn=_of_modes(rods.turn),
+            turn_pair=pairs,
+            step=_of_modes(rods.step),
+            node_turn=_of_modes(rods.node_turn),
+        ),
+        elastic=None if chain.elastic is None else _all(chain.elastic),
+    )
+
+
+def _all(leaf: Array) -> Any:
+    return np.full(np.shape(leaf), True)
+
+
+def _of_modes(leaf: Array) -> Any:
+    """Mark the entries over the modes of an array over (1, modes)."""
+    return np.broadcast_to(np.arange(np.shape(leaf)[-1]) > 0, np.shape(leaf))
+
+
+_ROTATIONS = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")
+_NOTHING = (
+    "start_offset",
+    "curve_offset",
+    "end_offset",
+    "node_offset",
+    "reference_strain",
+    "basis",
+    "turn",
+    "turn_pair",
+    "step",
+    "node_turn",
+    "has_closure",
+    "chord",
+)
+
+
+def padded(chain: Chain, flexures: int, edges: int) -> Chain:
+    """Pad a chain with flexures beyond its tip, and with entries for contact edges.
+
+    The added flexures are stiff, straight, of zero length and without tendons: the last body's
+    frame is then the tip, and no other number of the robot changes.
+
+    Args:
+        chain: The chain, as plain arrays.
+        flexures: Number of flexures of the result, at least that of the chain.
+        edges: Number of entries for the contact edges of a tendon.
+    """
+    more = flexures - chain.flexures
+    contacts = np.pad(
+        chain.contacts, ((0, 0), (0, edges - chain.contacts.shape[1])), constant_values=-1
+    )
+    if more == 0:
+        return dataclasses.replace(chain, contacts=contacts)
+
+    def longer(leaf: Any) -> Array:
+        return np.concatenate([leaf, np.repeat(leaf[-1:], more, axis=0)])  # pyright: ignore
+
+    def changed(part: Any, **values: Any) -> Any:
+        """Return a part whose added entries have other values."""
+        wider = jax.tree.map(longer, part)
+        own = {name: getattr(wider, name).copy() for name in values}
+        for name, value in values.items():
+            own[name][-more:] = value
+        return dataclasses.replace(wider, **own)
+
+    def with_nothing(values: Any) -> Array:
+        return constant(np.pad(values, [(0, more)] + [(0, 0)] * (np.ndim(values) - 1)))
+
+    return dataclasses.replace(
+        chain,
+        rods=_rods(chain, changed),
+        groups=tuple(
+            changed(group, present=0.0, visits=0.0, ends=0.0, back=1, body_length=0.0)
+            for group in chain.groups
+        ),
+        contact_pairs=tuple(
+            changed(group, has_contact=0.0, back=1) for group in chain.contact_pairs
+        ),
+        body_length=with_nothing(chain.body_length),
+        body_mass=with_nothing(chain.body_mass),
+        body_centre=with_nothing(chain.body_centre),
+        stiffness=np.concatenate([chain.stiffness, np.ones((more, chain.stiffness.shape[1]))]),
+        elastic=None if chain.elastic is None else _elastic(chain.elastic, more),
+        contact_stiffness=longer(chain.contact_stiffness),
+        contact_flexibility=jax.tree.map(longer, chain.contact_flexibility),
+        notch_frame=longer(chain.notch_frame),
+        contacts=contacts,
+    )
+
+
+def _rods(chain: Chain, changed: Any) -> Rod:
+    rods = chain.rods
+    values = {name: 0.0 for name in _NOTHING if getattr(rods, name) is not None}
+    values |= {name: np.eye(getattr(rods, name).shape[-1]) for name in _ROTATIONS}
+    wider: Rod = changed(rods, padding_mask=1.0, **values)
+    # The first added flexure begins at the tip, at the end of the last body.
+    wider.start_offset[chain.flexures, -1] = chain.body_length[-1]  # pyright: ignore
+    return wider
+
+
+def _elastic(elastic: Any, more: int) -> Array:
+    idle = np.broadcast_to(np.eye(elastic.shape[-1]), (more, *elastic.shape[1:]))
+    return np.concatenate([elastic, idle])  # pyright: ignore

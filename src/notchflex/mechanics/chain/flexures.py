@@ -1,15 +1,33 @@
-"""One flexure of a chain: the rod of a notch with the modes that the loads need."""
+"""One flexure of a chain: the rod of a notch with the modes that the loads need, and its fibres."""
 
 from __future__ import annotations
 
+import dataclasses
 from functools import lru_cache
-from typing import Protocol
+from typing import Any, Protocol
 
-from notchflex.mechanics.chain.fibres import with_fibres
-from notchflex.mechanics.flexure import Rod, Site, free_pose, rod_at, with_level
+import numpy as np
+
+from notchflex._jax import constant
+from notchflex.mechanics.flexure import Rod, Site, free_pose, rod_at, section_fibres, with_level
+from notchflex.mechanics.material import Fibres
 from notchflex.mechanics.motion import Motion
+from notchflex.mechanics.section.fibres import FIBRES, fitted
 from notchflex.robot import Tube
 from notchflex.robot.kinds import Notch
+
+
+def with_fibres(rod: Rod, notch: Any, tube: Tube, refinement: int = 0) -> Rod:
+    """Return the rod of a notch with the fibres of its sections; refinement takes more of them."""
+    count = FIBRES * (1 + refinement)
+    points_at, section = section_fibres(notch, tube), rod.section
+    numbers = section.edge_near, section.edge_spine, section.area, section.second_moment_weak
+    every = [
+        fitted(points_at(near, spine, count), area, second_moment)
+        for near, spine, area, second_moment in np.stack(numbers, axis=-1)
+    ]
+    arm, area = (constant(np.stack(part)) for part in zip(*every, strict=True))
+    return dataclasses.replace(rod, section=dataclasses.replace(section, fibres=Fibres(arm, area)))
 
 
 class FlexureOf(Protocol):
@@ -43,8 +61,6 @@ def flexure(
         by_fibres: Whether the material needs the fibres of sections.
     """
     rod = with_level(rod_at(site, notch, tube, refinement), level)
-    rod = with_fibres(rod, notch, tube) if by_fibres else rod
-    return rod, free_pose(rod)
-
-
-__all__ = ["FlexureOf", "flexure"]
+    rod = with_fibres(rod, notch, tube, refinement) if by_fibres else rod
+    section = rod.section.stiffened(notch.stiffness_factor)
+    return dataclasses.replace(rod, section=section), free_pose(rod)

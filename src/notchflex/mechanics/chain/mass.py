@@ -48,7 +48,8 @@ def body_masses(
     length = body_lengths(robot.tube, robot.notches)
     wall = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2)
     piece = wall * length
-    half = 0.5 * np.sum(np.asarray(rods.section.area) * np.asarray(rods.length), axis=-1)
+    stiffer = np.array([notch.stiffness_factor for notch in notches])
+    half = 0.5 * np.sum(np.asarray(rods.section.area) * np.asarray(rods.length), axis=-1) / stiffer
     start = np.asarray(rods.start_offset)
     end = -np.einsum("nba,nb->na", np.asarray(rods.end_rotation), np.asarray(rods.end_offset))
     volume = piece.copy()
@@ -59,6 +60,3 @@ def body_masses(
     centre[1:] += half[:, None] * end
     # Every body has a volume: where no tube is left between two notches, half of each flexure.
     return _GRAMS * density * volume, centre / volume[:, None]
-
-
-__all__ = ["body_masses"]

@@ -32,6 +32,3 @@ def tendons_in_plane(robot: Robot) -> bool:
     return bool(
         (np.abs(np.cos(direction) * normal[0] + np.sin(direction) * normal[1]) < 1e-9).all()
     )
-
-
-__all__ = ["bending_normal", "tendons_in_plane"]

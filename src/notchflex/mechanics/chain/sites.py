@@ -50,21 +50,31 @@ def _is_turned(notch: Notch, other: Notch) -> bool:
 
 
 def unchecked_dimensions(robot: Robot) -> list[str]:
-    """List where dimensions of notches with elastic ends leave the range that was checked.
+    """Say where dimensions of notches with elastic ends leave the range that was checked.
 
     Args:
         robot: The robot.
 
     Returns:
-        One sentence for each dimension, with the notches that it belongs to; none where all lie
-        inside, or the ends are rigid.
+        One sentence with each dimension, the notches that it belongs to, and what to do; none where
+        all lie inside, or the ends are rigid.
     """
-    notches_of_sentence: dict[str, list[str]] = {}
-    for number, (notch, site) in enumerate(zip(robot.notches, sites_of(robot), strict=True), 1):
+    notches_of: dict[str, list[str]] = {}
+    sites = sites_of(robot)
+    for number, (notch, site) in enumerate(zip(robot.notches, sites, strict=True), 1):
         if site is not None:
-            for sentence in validity_warnings(notch, robot.tube, site):
-                notches_of_sentence.setdefault(sentence, []).append(str(number))
+            for found in validity_warnings(notch, robot.tube, site):
+                notches_of.setdefault(found, []).append(str(number))
+    if not notches_of:
+        return []
+    every = [f"{found} ({_numbered(numbers, len(sites))})" for found, numbers in notches_of.items()]
     return [
-        f"notch{'es' if len(notches) > 1 else ''} {', '.join(notches)}: {sentence}."
-        for sentence, notches in notches_of_sentence.items()
+        f"finite elements did not check all dimensions of this robot: {'; '.join(every)}. Widen "
+        "the band by a tolerance of `notch.stiffness_factor`, or check a notch by `export`."
     ]
+
+
+def _numbered(numbers: list[str], count: int) -> str:
+    if len(numbers) == count > 1:
+        return "all notches"
+    return f"notch{'es' if len(numbers) > 1 else ''} {', '.join(numbers)}"

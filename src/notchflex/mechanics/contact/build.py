@@ -33,7 +33,7 @@ def build_contacts(
     if np.any(rods.has_closure):
         has_contact = rods.has_closure[:, None]
         groups.append(SpineContact(has_contact, cast("Array", np.ones(has_contact.shape, int))))
-    sides = sorted({side % 360.0 for side in _sides(notches)})
+    sides = _sides(notches)
     if sides:
         line = passages(notches, body_length, sides)
         angle = np.radians(sides)
@@ -61,12 +61,13 @@ def build_contacts(
 
 
 def _sides(notches: Sequence[Notch]) -> list[float]:
-    """List the sides on which a notch without a spine opens the wall."""
-    neighbours = [None, *notches, None]
-    return [
-        opening.side_deg
-        for before, notch, after in zip(neighbours, neighbours[1:], neighbours[2:], strict=False)
-        if notch is not None
-        for opening in notch.openings(before, after)
-        if opening.side_deg is not None
-    ]
+    """List the sides on which a notch without a spine opens the wall, once each but for rounding.
+
+    Two edges on one side would share the force that presses there, in no determined way.
+    """
+    neighbours, sides = [None, *notches, None], list[float]()
+    for before, notch, after in zip(neighbours, neighbours[1:], neighbours[2:], strict=False):
+        for opening in () if notch is None else notch.openings(before, after):
+            if opening.side_deg is not None and not any(map(opening.faces, sides)):
+                sides.append(opening.side_deg % 360.0)
+    return sorted(sides)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
-from notchflex.mechanics.ends.edge_loads import arc_of, end_compliance
+import numpy as np
+
+from notchflex.mechanics.ends.edge_loads import WallSector, arc_of, end_compliance
 from notchflex.mechanics.ends.flattening import edge_and_brazier, flattening_numbers
 from notchflex.mechanics.ends.shear import shear_compliances
 from notchflex.mechanics.ends.side import Side
@@ -16,6 +18,10 @@ from notchflex.mechanics.section import SECTION_OF_CUT
 # first contact over h/(r_o + ȳ), and stiffness 1 to 3° beyond over E t r², the same for both cuts.
 _CLOSING_FACTOR = {"on-axis": 1.0248, "off-axis": 1.0203}
 _CLOSED_STIFFNESS = 0.354
+
+# Reach of the edge of a ring, in r √(r/t). Beyond it an added length changes by less than 0.1 % of
+# the diameter, for walls of 0.08 to 0.47 mean radii (tests/mechanics/ends/test_ring.py).
+_REACH = 3.33
 
 
 class NotchStiffness(NamedTuple):
@@ -59,6 +65,14 @@ class NotchStiffness(NamedTuple):
     closed_ratio: float
 
 
+def reach_of(arc: WallSector) -> float:
+    """Return how far along a ring the effects of its edge reach, mm.
+
+    The ovalising load reaches farthest; it decays over a length that grows with r √(r/t).
+    """
+    return float(_REACH * arc.radius * np.sqrt(arc.radius / arc.wall))
+
+
 @lru_cache(maxsize=1024)
 def notch_stiffness(
     outer_radius: float,
@@ -90,9 +104,12 @@ def notch_stiffness(
         >>> round(notch_stiffness(0.81, 0.70, "on-axis", 1.4, 0.8, 0.33, ring, ring).weak, 3)
         1.291
     """
-    sides = (proximal, distal)
     section = SECTION_OF_CUT[cut](outer_radius, inner_radius, depth)
     arc = arc_of(outer_radius, inner_radius, section)
+    sides: list[Side] = []
+    for side in (proximal, distal):  # cut where the effects of the edge have died out
+        longest = reach_of(arc) * (2.0 if side.boundary == "between" else 1.0)
+        sides.append(side._replace(length=min(side.length, longest)))
     added = [end_compliance(outer_radius, inner_radius, arc, side, poisson_ratio) for side in sides]
     weak, strong, axial, coupling = (sum(each) for each in zip(*added, strict=True))
     length = height + weak

@@ -15,6 +15,8 @@ which a constant moment closes the notch at once.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from notchflex.mechanics.ends.side import Side
@@ -35,7 +37,7 @@ def _imposed(factor: float, decay: float, length: float, radius: float) -> float
     return -factor * np.expm1(-((length / (decay * radius)) ** 2))
 
 
-def edge_and_brazier(radius: float, sides: tuple[Side, Side]) -> tuple[float, float]:
+def edge_and_brazier(radius: float, sides: Sequence[Side]) -> tuple[float, float]:
     """Compute the mean k of the two sides, and the factor c_b on Brazier's flattening.
 
     Args:

@@ -1,7 +1,6 @@
 """Flexures: one notch becomes a short rod with a few strain modes."""
 
 from notchflex._packages import import_all
-from notchflex.mechanics.flexure.build import LEVELS, MAX_REFINEMENT, stack, with_level
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
 from notchflex.mechanics.flexure.geometric_stiffness import geometric_stiffness
 from notchflex.mechanics.flexure.registry import (
@@ -11,7 +10,14 @@ from notchflex.mechanics.flexure.registry import (
     section_fibres,
     validity_warnings,
 )
-from notchflex.mechanics.flexure.rod import Rod, flattened
+from notchflex.mechanics.flexure.rod import (
+    LEVELS,
+    MAX_REFINEMENT,
+    Rod,
+    flattened,
+    stack,
+    with_level,
+)
 from notchflex.mechanics.flexure.rod_kinematics import (
     free_pose,
     relative_pose,

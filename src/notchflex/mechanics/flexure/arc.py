@@ -29,9 +29,9 @@ from notchflex.mechanics.flexure.notch_rod import (
     legendre_modes,
     shifted,
 )
-from notchflex.mechanics.flexure.quadrature import rod_quadrature
 from notchflex.mechanics.flexure.registry import Site, rod, section_fibres, validity_warnings
 from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod_kinematics import rod_quadrature
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.section import SECTION_OF_CUT, Section
 from notchflex.mechanics.section.fibres import FibresAt, cut_fibres
@@ -129,8 +129,7 @@ def _ends(
 @section_fibres.register
 def _(notch: ArcNotch, tube: Tube) -> FibresAt:
     shape = tube.outer_radius, tube.inner_radius, notch.section_depth(tube)
-    points = cut_fibres(notch.cut, *shape)
-    return lambda _near, _spine: points
+    return lambda _near, _spine, count: cut_fibres(notch.cut, *shape, count)
 
 
 @validity_warnings.register

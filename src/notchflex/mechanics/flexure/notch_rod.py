@@ -17,8 +17,8 @@ from numpy.polynomial.legendre import legvander
 from numpy.typing import ArrayLike
 
 from notchflex._jax import constant, jax
-from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
 from notchflex.mechanics.material import FibreSection
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import Section
@@ -124,6 +124,9 @@ def about_neutral_axis(section: Section, torsion_constant: ArrayLike | None = No
         shear_centre=section.shear_centre - section.centroid,
         edge_spine=section.edge_spine,
         edge_near=section.edge_near,
+        edge_across=section.edge_across,
+        outer_radius=section.outer_radius,
+        half_angle=section.half_angle,
     )
 
 

@@ -72,7 +72,7 @@ def section_fibres(notch: Any, tube: Tube) -> FibresAt:
 
     Returns:
         The fibres about any axis, as a function of the distances of the edges of the section
-        from its neutral axis (`edge_near`, `edge_spine`), mm.
+        from its neutral axis (`edge_near`, `edge_spine`), mm, and of their number.
 
     Raises:
         TypeError: The fibres of this kind of notch are not stated.

@@ -21,9 +21,9 @@ from notchflex.mechanics.flexure.notch_rod import (
     build_rod,
     legendre_modes,
 )
-from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.registry import Site, rod, section_fibres, validity_warnings
 from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
 from notchflex.mechanics.flexure.roots import (
     CheckedRange,
     left_ranges,

@@ -48,5 +48,5 @@ def _(friction: Capstan) -> CapstanLaw:
     return CapstanLaw(
         coefficient=constant(friction.coefficient),
         moved_to_exit=constant(1.0 if friction.wrap == "whole-before" else 0.0),
-        loss=None if friction.constant_loss is None else constant(friction.constant_loss),
+        loss=constant(friction.constant_loss) if friction.constant_loss else None,
     )

@@ -16,10 +16,8 @@ from notchflex._jax import jnp
 from notchflex._pytree import Pytree
 from notchflex.mechanics.registration import unregistered
 
-MIN_TENSION_RATIO = 1e-12
-"""Smallest tension, as a fraction of a constant loss; below its loss a contact holds 1e12 to 1."""
-
-_MIN_LOSS = 1e-100  # N; keeps the formulas finite where the loss is zero
+# N; keeps the formulas finite where the loss is zero.
+_MIN_LOSS = 1e-100
 
 
 class FrictionLaw(Pytree, ABC):
@@ -54,9 +52,6 @@ class FrictionLaw(Pytree, ABC):
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]] | None:
         """State the tension that sliding costs beside the ratio of `bounds`, N.
 
-        With a loss proportional to the turning, tensions are undetermined where a tendon is
-        released to 0 N: release it to a small tension.
-
         Args:
             exit_turning: As for `bounds`.
             entry_turning: As for `bounds`.
@@ -66,26 +61,14 @@ class FrictionLaw(Pytree, ABC):
         """
         del exit_turning, entry_turning
 
-    def minimum_tension(
-        self,
-        tension: Float[Array, " t"],
-        exit_turning: Float[Array, "n t"],
-        entry_turning: Float[Array, "n t"],
-    ) -> Float[Array, " t"]:
-        """Bound base tensions from below where contacts have a constant loss, N.
+    def offset(self) -> Float[Array, ""] | float:
+        """Return what is added to tensions in their ratios, N: the loss at a turning of 1 rad.
 
-        Tension that friction locks in beyond a released tendon has no finite ratio to 0 N: released
-        tendons count as having 1e-12 of the largest loss.
-
-        Args:
-            tension: Base tensions, N.
-            exit_turning: As for `bounds`, at all gaps.
-            entry_turning: As for `bounds`, at all gaps.
+        With a constant loss the tension beyond a contact may be 0 N, and is not 0 N beyond a
+        released one. Ratios of tensions that are raised by a loss are finite.
         """
-        losses = self.constant_loss(exit_turning, entry_turning)
-        if losses is None:
-            return tension
-        return jnp.maximum(tension, MIN_TENSION_RATIO * jnp.max(jnp.maximum(*losses), axis=0))
+        losses = self.constant_loss(jnp.ones(()), jnp.ones(()))
+        return 0.0 if losses is None else jnp.maximum(jnp.maximum(*losses), _MIN_LOSS)
 
     def limits(
         self,
@@ -96,15 +79,15 @@ class FrictionLaw(Pytree, ABC):
     ) -> Float[Array, "*t 2"]:
         """Compute the largest |ln(tension ratio)| at both edges, constant losses included.
 
-        With the tension T on the base side and T' on the tip side the limit of loading,
-        T = e^b T' + F, is ln(T/T') = b - ln(1 - F/T), and that of unloading, T' = e^b T + F, is
-        ln(T'/T) = ln(e^b + F/T). Where T <= F the contact holds a ratio of 1e12.
+        With the tension T on the base side, T' on the tip side and the offset a, the ratio is
+        (T + a) / (T' + a). At the limit of loading T = e^b T' + F, or T' = 0 where T is below the
+        loss F; at that of unloading T' = e^b T + F.
 
         Args:
             exit_turning: As for `bounds`.
             entry_turning: As for `bounds`.
             tension: Tension on the base side of the exit edge and of the entry edge, N.
-            log_ratio: ln(T/T') there; its sign is the direction in which the contact would slide.
+            log_ratio: Logarithm of the ratio; its sign is the direction of sliding.
 
         Returns:
             The limits, as last axis the edges.
@@ -114,9 +97,11 @@ class FrictionLaw(Pytree, ABC):
         if losses is None:
             return ratio
         loss, before = jnp.stack(losses, axis=-1), jnp.stack(tension, axis=-1)
-        relative_loss = loss / jnp.maximum(before, MIN_TENSION_RATIO * jnp.maximum(loss, _MIN_LOSS))
-        loading = ratio - jnp.log(jnp.maximum(1.0 - relative_loss, MIN_TENSION_RATIO))
-        unloading = jnp.log(jnp.exp(ratio) + relative_loss)
+        before, offset = jnp.maximum(before, 0.0), self.offset()
+        lowest = jnp.exp(-ratio) * jnp.maximum(before - loss, 0.0)
+        highest = jnp.exp(ratio) * before + loss
+        loading = jnp.log((before + offset) / (lowest + offset))
+        unloading = jnp.log((highest + offset) / (before + offset))
         return jnp.where(log_ratio >= 0.0, loading, unloading)
 
     def valid(

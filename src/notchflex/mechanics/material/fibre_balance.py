@@ -14,7 +14,9 @@ from notchflex._jax import jax, jnp
 from notchflex.mechanics.material.fibre_section import Fibres
 
 # Newton's method stops at this imbalance relative to the bending strain, or at this iteration.
-_BALANCED, _MAX_ITERATIONS = 1e-13, 16
+_BALANCED, _MAX_ITERATIONS = 1e-13, 60
+# Longest step relative to the bending strain: with all fibres on a plateau it would be endless.
+_LONGEST, _TINY = 0.2, 1e-300
 
 
 class FibreSums(NamedTuple):
@@ -83,12 +85,11 @@ def _settle(
 
     One condition stops the iteration of all sections; they may have leading axes.
     """
+    bending_strain = scale[0] * jnp.abs(joint.reduced)
 
     def proceed(search: tuple[Array, ...]) -> Array:
         *_, imbalance, iterations = search
-        return jnp.any(imbalance > _BALANCED * scale[0] * jnp.abs(joint.reduced)) & (
-            iterations < _MAX_ITERATIONS
-        )
+        return jnp.any(imbalance > _BALANCED * bending_strain) & (iterations < _MAX_ITERATIONS)
 
     def improve(search: tuple[Any, ...]) -> tuple[Any, ...]:
         """Try a step: take it where the imbalance falls, halve it elsewhere."""
@@ -97,7 +98,10 @@ def _settle(
         trial_sums = law.sum_fibres(fibres, memory, *trial)
         size = joint.size(trial[1], trial_sums, scale)
         falls = size < imbalance
-        new = *trial, *joint.step(trial[1], trial_sums, trial_sums), trial_sums, size
+        step = joint.step(trial[1], trial_sums, trial_sums)
+        longest = _LONGEST * bending_strain / jnp.maximum(jnp.abs(step[0]), _TINY)
+        by = [jnp.minimum(longest, 1.0) * part for part in step]
+        new = *trial, *by, trial_sums, size
         old = strain, curvature, 0.5 * by_strain, 0.5 * by_curvature, sums, imbalance
         return *jax.tree.map(lambda *pair: jnp.where(falls, *pair), new, old), iterations + 1
 

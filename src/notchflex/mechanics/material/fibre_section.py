@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._jax import constant
 from notchflex._pytree import Pytree
 
 
@@ -82,6 +85,9 @@ class FibreSection(Pytree):
         edge_near: Distance of the farthest fibre on the cut side, mm.
         ends: Compliance of the ends of the notch; None where no flexure of a chain has any.
         fibres: Its fibres; None where the material does not use them.
+        edge_across: Distance from the line of symmetry to the farthest fibre on the cut side, mm.
+        outer_radius: Radius of the arc that bounds the spine, mm; 0 for a straight line.
+        half_angle: Half angle of that arc, rad.
     """
 
     area: Float[Array, "*shape"]
@@ -93,6 +99,20 @@ class FibreSection(Pytree):
     edge_near: Float[Array, "*shape"]
     ends: NotchEnds | None = None
     fibres: Fibres | None = None
+    edge_across: Float[Array, "*shape"] | float = 0.0
+    outer_radius: Float[Array, "*shape"] | float = 0.0
+    half_angle: Float[Array, "*shape"] | float = 0.0
+
+    def stiffened(self, factor: float) -> FibreSection:
+        """Multiply the stiffness in all directions; for plain arrays. Strains stay as they are."""
+        names = ("area", "second_moment_weak", "second_moment_strong", "torsion_constant")
+        moments = {name: constant(factor * getattr(self, name)) for name in names}
+        ends, fibres = self.ends, self.fibres
+        if ends is not None:
+            ends = dataclasses.replace(ends, oblique=constant(factor * ends.oblique))
+        if fibres is not None:
+            fibres = dataclasses.replace(fibres, area=constant(factor * fibres.area))
+        return dataclasses.replace(self, **moments, ends=ends, fibres=fibres)
 
     @property
     def softens(self) -> bool:

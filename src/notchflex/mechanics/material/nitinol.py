@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from notchflex._jax import constant
-from notchflex.mechanics.material.fibre_law import FibreLaw
+from notchflex.mechanics.material.fibre_law import FLATTEST, FibreLaw
 from notchflex.mechanics.material.law import section_law
 from notchflex.robot import Nitinol
 
 
 @section_law.register
 def _(material: Nitinol) -> FibreLaw:
-    modulus, hardening = material.elastic_modulus, material.plateau_modulus
+    modulus = material.elastic_modulus
     loading, ratio = material.plateau_stress / modulus, material.compression_ratio
     # A fibre does not fall below loading in tension, nor below unloading in compression.
     tension, compression = [loading], [-ratio * loading]
@@ -20,7 +20,7 @@ def _(material: Nitinol) -> FibreLaw:
         unloading = material.unloading_stress / modulus
         tension, compression = [loading, unloading], [-ratio * unloading, -ratio * loading]
     low, high = np.array(compression)[:, None], np.array(tension)[:, None]
-    change = np.array([1.0 - hardening / modulus])
+    change = np.array([1.0 - max(material.plateau_modulus / modulus, FLATTEST)])
     if material.transformation_strain is not None:
         length = material.transformation_strain - loading
         low, high = np.hstack([low, low - length]), np.hstack([high, high + length])

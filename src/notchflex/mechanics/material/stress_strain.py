@@ -2,43 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from notchflex._jax import constant
-from notchflex.mechanics.material.fibre_law import FibreLaw
+from notchflex.mechanics.material.fibre_law import FLATTEST, FibreLaw
 from notchflex.mechanics.material.law import section_law
 from notchflex.robot import StressStrain
 
 # A strain that no fibre reaches.
 _NEVER = 1e6
+# How far a curve through fewer points may lie off, of its largest stress.
+_OFF = 1e-6
 
 
 @section_law.register
 def _(material: StressStrain) -> FibreLaw:
     modulus = material.elastic_modulus
-    high, change = _kinks(material.strain, material.stress, modulus)
+    high, change = _kinks(*material.in_tension, modulus)
     low = -high
-    if material.compression_strain is not None and material.compression_stress is not None:
-        at, by = _kinks(material.compression_strain, material.compression_stress, modulus)
+    if material.in_compression is not None:
+        at, by = _kinks(*material.in_compression, modulus)
         low = np.append(np.full(len(high), -_NEVER), -at)
         high = np.append(high, np.full(len(at), _NEVER))
         change = np.append(change, by)
+    # Numbers of kinks are powers of two, so that curves share programs.
+    spare = (0, (1 << (len(change) - 1).bit_length()) - len(change))
     return FibreLaw(
         elastic_modulus=constant(modulus),
         shear_modulus=constant(modulus / (2.0 * (1.0 + material.poisson_ratio))),
-        low=constant(low[None]),
-        high=constant(high[None]),
-        change=constant(change),
+        low=constant(np.pad(low, spare, constant_values=-_NEVER)[None]),
+        high=constant(np.pad(high, spare, constant_values=_NEVER)[None]),
+        change=constant(np.pad(change, spare)),
     )
 
 
+@lru_cache(maxsize=64)
 def _kinks(
-    strain: Sequence[float], stress: Sequence[float], modulus: float
+    strain: tuple[float, ...], stress: tuple[float, ...], modulus: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """List the kinks of a curve, and the fall of slope there over Young's modulus."""
-    slope = np.diff(stress, prepend=0.0) / np.diff(strain, prepend=0.0) / modulus
-    at, change = np.append(0.0, strain[:-1]), -np.diff(slope, prepend=1.0)
+    at, value = _few_points(np.append(0.0, strain), np.append(0.0, stress))
+    slope = np.maximum(np.diff(value) / np.diff(at) / modulus, FLATTEST)
+    change = -np.diff(slope, prepend=1.0)
     turns = np.abs(change) > 1e-12  # at zero only where compression begins with another slope
-    return at[turns], change[turns]
+    return (at[:-1][turns], change[turns]) if turns.any() else (at[:1], change[:1])
+
+
+def _few_points(strain: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Keep the first point, the last and few between them; chords pass the others closely."""
+    off = _OFF * stress[-1]
+    kept, last = [0], len(strain) - 1
+    while kept[-1] < last:
+        begin = kept[-1]
+        least, most, reached = -np.inf, np.inf, begin + 1
+        for point in range(begin + 1, last + 1):
+            run, rise = strain[point] - strain[begin], stress[point] - stress[begin]
+            if least <= rise / run <= most:
+                reached = point
+            least, most = max(least, (rise - off) / run), min(most, (rise + off) / run)
+            if least > most:
+                break
+        kept.append(reached)
+    return strain[kept], stress[kept]

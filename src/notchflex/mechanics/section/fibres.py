@@ -26,19 +26,20 @@ Strips = Float[np.ndarray, " strips"]
 Points = tuple[Float[np.ndarray, " fibres"], Float[np.ndarray, " fibres"]]
 """Arms (mm) and areas (mm^2)."""
 
-FibresAt = Callable[[float, float], Points]
-"""Fibres of a section by the distances of its edges, near and spine, from its neutral axis, mm."""
+FibresAt = Callable[[float, float, int], Points]
+"""Fibres of a section by the distances of its edges, near and spine, from its neutral axis, mm,
+and their number."""
 
 
-def two_walls_fibres(near: float, spine: float) -> Points:
+def two_walls_fibres(near: float, spine: float, count: int) -> Points:
     """Few fibres of walls of constant width (`two_walls`, or any rectangle)."""
-    return reduced(rectangle_fibres(near, spine))
+    return gauss_rule(*rectangle_fibres(near, spine), count)
 
 
 @lru_cache(maxsize=1024)  # the same for all sites and heights
-def cut_fibres(cut: str, outer: float, inner: float, depth: float) -> Points:
+def cut_fibres(cut: str, outer: float, inner: float, depth: float, count: int) -> Points:
     """Few fibres of what a cut leaves of a tube."""
-    return reduced(_FIBRES_OF_CUT[cut](outer, inner, depth))
+    return gauss_rule(*_FIBRES_OF_CUT[cut](outer, inner, depth), count)
 
 
 def rectangle_fibres(near: float, spine: float) -> Points:
@@ -87,11 +88,6 @@ _FIBRES_OF_CUT = {"on-axis": sector_fibres, "off-axis": segment_fibres}
 def _between(first: float, last: float, count: int) -> tuple[np.ndarray, np.ndarray]:
     points, weights = leggauss(count)
     return 0.5 * (first + last) + 0.5 * (last - first) * points, 0.5 * (last - first) * weights
-
-
-def reduced(points: Points) -> Points:
-    """Reduce many fibres to an equivalent few."""
-    return gauss_rule(*points, FIBRES)
 
 
 def fitted(points: Points, area: float, second_moment: float) -> Points:

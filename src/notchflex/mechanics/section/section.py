@@ -33,6 +33,11 @@ class Section(NamedTuple):
         edge_near: Distance from the neutral axis to the farthest fibre on the side of the cut,
             mm.
         edge_spine: Distance from the neutral axis to the outer fibre of the spine, mm.
+        edge_across: Distance from the line of symmetry to the farthest fibre on the side of the
+            cut, mm.
+        outer_radius: Radius of the arc that bounds the spine, about the tube axis, mm; 0 where the
+            spine ends in a line as wide as the side of the cut.
+        half_angle: Half angle of that arc, rad.
     """
 
     area: jax.Array
@@ -43,6 +48,9 @@ class Section(NamedTuple):
     shear_centre: jax.Array
     edge_near: jax.Array
     edge_spine: jax.Array
+    edge_across: jax.Array
+    outer_radius: jax.Array
+    half_angle: jax.Array
 
 
 def plain_or_compiled(

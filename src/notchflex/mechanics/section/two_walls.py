@@ -51,6 +51,9 @@ def two_walls(width: ArrayLike, thickness: ArrayLike, middle: ArrayLike) -> Sect
         shear_centre=constant(nought),
         edge_near=constant(0.5 * h),
         edge_spine=constant(0.5 * h),
+        edge_across=constant(c + 0.5 * b),
+        outer_radius=constant(nought),
+        half_angle=constant(nought),
     )
 
 

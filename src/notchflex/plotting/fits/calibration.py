@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from notchflex.plotting.fits.calibration_rows import (
-    MEASURED,
-    MODEL,
-    band,
-    data_panels,
-    residual_entries,
-    residual_panel,
-)
 from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import (
     DASHED,
     DOTTED,
+    MARKERS,
     Area,
     Correlations,
     Curve,
@@ -30,10 +25,175 @@ from notchflex.plotting.sheet import (
     dots,
     grid,
 )
-from notchflex.plotting.style import BLUE, GREY, VERMILLION
+from notchflex.plotting.style import BLUE, GREY, VERMILLION, sequence_colours
+from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:
     from notchflex.fit import Calibration
+
+
+MEASURED, MODEL, BAND = "measured", "model", "band"
+"""Groups of marks in all panels."""
+MAX_NOTCHES = 6
+"""Of a robot with more notches some are drawn."""
+MAX_NAMED = 8
+"""Of so many notches a legend has the first and the last colour only."""
+
+_OTHERS = dots([], GREY, 3.5, marker="X", name="residuals of others", group="others")
+_NOTCHES = ("notch_angle", "edge_angle")
+_KINDS = dict.fromkeys((*_NOTCHES, "total_angle", "total_edge_angle", "tip_rotation"), "angle") | {
+    "tip_tension": "tension"
+}
+
+
+def data_panels(fit: Calibration, label: str) -> Iterator[Panel]:
+    """Yield the panels of a robot: some notches, and every other measured number."""
+    from notchflex.fit.measurements.measurements import OBSERVED
+
+    for quantity in OBSERVED:
+        if quantity == "axis_points":  # thirty points and more: only their residuals
+            continue
+        components = np.unique(fit.residuals.part[_rows_of(fit, label, quantity)])
+        if len(components) > MAX_NOTCHES:
+            spread = np.linspace(0, len(components) - 1, MAX_NOTCHES).round().astype(int)
+            components = components[spread]
+        for component in components.tolist():
+            yield data_panel(fit, label, quantity, component)
+
+
+def data_panel(fit: Calibration, label: str, quantity: str, component: int) -> Panel:
+    """Return one number over the load: measured, model, and the band of the model."""
+    from notchflex.fit.assessment.errors_of_parts import edge, part_title
+
+    residuals = fit.residuals
+    name, unit, scale = edge(quantity)
+    x, x_label = _abscissa(fit, label)
+    half = fit.half_width(residuals.slopes) * scale
+    items: list[Mark] = []
+    drawn = np.flatnonzero(_rows_of(fit, label, quantity) & (residuals.part == component))
+    for number, rows in _lines(fit, drawn, x):
+        sample = fit.problem.samples.every[number].measured
+        table = sample.observed[quantity]
+        measured = table.reshape(len(table), -1)[residuals.row[rows], component]
+        model = (measured + residuals.values[rows]) * scale
+        if np.isfinite(half[rows]).all():
+            ends = [np.stack([x[rows], model + way * half[rows]], axis=1) for way in (-1.0, 1.0)]
+            items.append(band([np.concatenate([ends[0], ends[1][::-1]])]))
+        curve = np.stack([x[rows], model], axis=1)
+        items.append(Curve(curve, BLUE, group=MODEL, layer=3, hover=True))
+        for pull in dict.fromkeys(residuals.pull[rows].tolist()):
+            of_pull = residuals.pull[rows] == pull
+            points = np.stack([x[rows][of_pull], measured[of_pull] * scale], axis=1)
+            title = f"{MEASURED}, pull {sample.pull[residuals.row[rows][of_pull][0]]}"
+            style: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "hollow": True}
+            style |= {"name": title, "group": MEASURED, "layer": 4, "hover": True}
+            items.append(dots(points, GREY, 3.2, **style))
+    if quantity in ("tip_position", "tip_rotation"):
+        title = f"{name}, {'xyz'[component]}"
+    else:
+        title = part_title(quantity, 0 if quantity.startswith("total_") else component + 1)
+    y_label = f"{_KINDS.get(quantity, 'position')} [{unit}]"
+    return Panel(items, x_label, y_label, title=_titled(fit, label, title))
+
+
+def band(polygons: Sequence[NDArray[np.float64]], name: str = "") -> Area:
+    """Return the 95 % band of the model."""
+    return Area(polygons, BLUE, BLUE, 0.25, 0.0, name=name, group=BAND)
+
+
+def residual_panel(fit: Calibration, label: str) -> Panel:
+    """Return the residuals of a robot over their noise, notches by colour.
+
+    A total angle that is the sum of the notches has no noise of its own and is not drawn.
+    """
+    residuals, noise = fit.residuals, fit.noise.deviation
+    x, x_label = _abscissa(fit, label)
+    points = np.stack([x, residuals.values / noise], axis=1)
+    angles = _rows_of(fit, label, *_NOTCHES) & np.isfinite(noise)
+    others = _rows_of(fit, label) & np.isfinite(noise) & ~angles
+    items: list[Mark] = [Span("y", -1.96, 1.96, GREY, opacity=0.15), Span("y", 0.0, 0.0, GREY)]
+    if others.any():
+        items.append(replace(_OTHERS, points=points[others], hover=True, layer=1))
+    for notch, entry in _notch_entries(fit).items():
+        of_notch = angles & (residuals.part == notch)
+        if of_notch.any():
+            items.append(replace(entry, points=points[of_notch], hover=True, layer=3))
+    title = _titled(fit, label, "model less measured")
+    return Panel(items, x_label, "residual / its noise [-]", title=title)
+
+
+def residual_entries(fit: Calibration) -> list[Curve]:
+    """Return the legend entries of the residuals: colours of notches, marks of all others."""
+    notches = list(_notch_entries(fit).values())
+    return [*(notches if len(notches) < MAX_NAMED else [notches[0], notches[-1]]), _OTHERS]
+
+
+def _notch_entries(fit: Calibration) -> dict[int, Curve]:
+    """Return the marker of every notch (from 0), the same for all robots."""
+    angles = np.any([_rows_of(fit, label, *_NOTCHES) for label in fit.given], axis=0)
+    notches = np.unique(fit.residuals.part[angles]).tolist()
+    entries: dict[int, Curve] = {}
+    for notch, colour in zip(notches, sequence_colours(len(notches)), strict=True):
+        name = f"residuals of notch {notch + 1}"
+        entries[notch] = dots([], colour, name=name, group=name)
+    return entries
+
+
+def _titled(fit: Calibration, label: str, title: str) -> str:
+    return f"{label}: {title}" if len(fit.given) > 1 else title
+
+
+def _rows_of(fit: Calibration, label: str, *quantities: str) -> NDArray[np.bool_]:
+    """Return which residuals belong to a robot, and to some of its quantities."""
+    from notchflex.fit.measurements.measurements import OBSERVED
+
+    of_robot = fit.residuals.robot == list(fit.given).index(label)
+    if not quantities:
+        return of_robot
+    return of_robot & np.isin(fit.residuals.quantity, [OBSERVED.index(one) for one in quantities])
+
+
+def _lines(
+    fit: Calibration, drawn: NDArray[np.intp], x: NDArray[np.float64]
+) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Yield the sample and the residuals of each line: by load if from rest, else by pull."""
+    residuals = fit.residuals
+    for number in np.unique(residuals.sample[drawn]).tolist():
+        rows = drawn[residuals.sample[drawn] == number]
+        if fit.problem.samples.every[number].measured.from_rest:
+            yield number, rows[np.argsort(x[rows], kind="stable")]
+        else:
+            for pull in np.unique(residuals.pull[rows]):
+                yield number, rows[residuals.pull[rows] == pull]
+
+
+def _abscissa(fit: Calibration, label: str) -> tuple[NDArray[np.float64], str]:
+    """Return tension or stroke of a tendon at every residual of a robot, and its label."""
+    residuals = fit.residuals
+    x = np.full(len(residuals), np.nan)
+    samples = {
+        number: one.measured.load
+        for number, one in enumerate(fit.problem.samples.every)
+        if one.label == label
+    }
+    for name in ("tension", "stroke"):
+        tables = {number: getattr(load, name) for number, load in samples.items()}
+        count = next(iter(tables.values())).shape[1]
+        for tendon in range(count):
+            varied = np.concatenate([table[:, tendon] for table in tables.values()])
+            if not np.isfinite(varied).all() or np.ptp(varied) == 0.0:
+                continue
+            for number, table in tables.items():
+                of_sample = residuals.sample == number
+                x[of_sample] = table[residuals.row[of_sample], tendon]
+            quantity = QUANTITIES[name]
+            title = quantity.title + (f" {tendon + 1}" if count > 1 else "")
+            return x, quantity.label.replace(quantity.title, title, 1)
+    for number in samples:
+        of_sample = residuals.sample == number
+        x[of_sample] = residuals.row[of_sample] + 1
+    return x, "row [number]"
+
 
 COLUMNS = 4
 END = "end of the interval"

@@ -65,8 +65,8 @@ def comparison_picture(
     if others:
         panels.append(_errors(models))
     columns = min(5, math.ceil(len(panels) / 2))
-    error = f"tip {comparison.tip_rmse:.2f} mm"
-    if math.isnan(comparison.tip_rmse):
+    error = f"tip {comparison.rmse_tip:.2f} mm"
+    if math.isnan(comparison.rmse_tip):
         error = f"total {comparison.rmse_total * DEGREES:.2f}°"
     legend = list(_trials(comparison).values())[: len(MARKERS)]
     legend += [
@@ -198,7 +198,7 @@ def _representative_points(comparison: Comparison) -> list[int]:
 
 def _errors(models: Mapping[str, Comparison]) -> Panel:
     """Return the tip error of every model as a bar, or of the total angle if no tip is known."""
-    values = [one.tip_rmse for one in models.values()]
+    values = [one.rmse_tip for one in models.values()]
     label, title = "tip error [mm]", "tip error, rms"
     if np.isnan(values).all():
         values = [one.rmse_total * DEGREES for one in models.values()]

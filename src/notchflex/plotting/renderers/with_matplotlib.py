@@ -13,7 +13,6 @@ from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from notchflex.plotting.labels import for_paper, heading_lines
 from notchflex.plotting.sheet import (
     BELOW,
     BESIDE,
@@ -28,7 +27,14 @@ from notchflex.plotting.sheet import (
     Sheet,
     Span,
 )
-from notchflex.plotting.style import DIVERGING, house_style, new_figure, rgb
+from notchflex.plotting.style import (
+    DIVERGING,
+    for_paper,
+    heading_lines,
+    house_style,
+    new_figure,
+    rgb,
+)
 
 ELEVATION, AZIMUTH = 18.0, -60.0
 

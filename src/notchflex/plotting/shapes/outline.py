@@ -1,4 +1,4 @@
-"""The outline of a bent robot, to scale, as seen from the side.
+"""The outline of a bent robot, to scale, and the solids that its bodies are made of.
 
 The horizontal axis of a view is a direction across the base, the vertical axis is the tube axis of
 the base. A body is drawn as its walls on both sides and what joins them, a flexure as a bent strip
@@ -7,14 +7,21 @@ with the thickness of its section.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.plotting.shapes.robot_shape import HELD, UP, RobotShape
 from notchflex.robot import Robot
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+    from notchflex.robot import Tube
+
 
 Wall = tuple[float, float] | None
 _CLAMP = 1.7  # half the width of the clamp, in outer radii
@@ -148,3 +155,50 @@ def _body(
     upper = [(outer, right[1]), (reach[0], right[1]), *top, (-reach[1], left[1]), (-outer, left[1])]
     lower = [(-outer, left[0]), (-reach[1], left[0]), *foot, (reach[0], right[0])]
     return [(outer, right[0]), *upper, *lower]
+
+
+Points = NDArray[np.float64]
+
+
+def tube_wall(tube: Tube, ends: tuple[float, float], sides: int, *, fair: bool = False) -> Manifold:
+    """Return the wall of a tube along z.
+
+    Args:
+        tube: The tube.
+        ends: Its lower and its upper end [mm].
+        sides: Flat sides of each surface.
+        fair: Whether the sides lie half inside and half outside the round surface, so that the
+            volume is that of the round tube; otherwise their corners lie on it.
+    """
+    from manifold3d import Manifold
+
+    grown = fair_growth(sides) if fair else 1.0
+    outer, inner = (
+        Manifold.cylinder(ends[1] - ends[0], grown * radius, circular_segments=sides)
+        for radius in (tube.outer_radius, tube.inner_radius)
+    )
+    return (outer - inner).translate((0.0, 0.0, ends[0]))
+
+
+def fair_growth(sides: int) -> float:
+    """Return the factor by which a polygon's corners lie outside the circle of equal area."""
+    part = 2.0 * math.pi / sides
+    return math.sqrt(part / math.sin(part))
+
+
+def prism(polygon: Points, view: float, depth: float) -> Manifold:
+    """Return the prism of a polygon (across, along) seen from the side.
+
+    Args:
+        polygon: Corners [mm], (k, 2): across toward the direction `view`, and along z.
+        view: Direction about z that the first coordinate has [rad].
+        depth: Length of the prism across that plane, half of it on each side [mm].
+    """
+    from manifold3d import CrossSection, FillRule, Manifold
+
+    solid = Manifold.extrude(CrossSection([polygon], FillRule.NonZero), depth)
+    across = np.array([math.cos(view), math.sin(view), 0.0])
+    along = np.array([0.0, 0.0, 1.0])
+    axes = np.stack([across, along, np.cross(across, along)], axis=1)
+    middle = axes @ np.array([0.0, 0.0, -0.5 * depth])
+    return solid.transform(np.concatenate([axes, middle[:, None]], axis=1))

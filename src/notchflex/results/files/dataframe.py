@@ -6,6 +6,7 @@ The head of a Parquet table also holds the record that reads the path back.
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 from collections.abc import Generator, Mapping, Sequence
 from importlib import import_module
@@ -29,12 +30,17 @@ _KEY = "notchflex"
 
 def dataframe_of(path: EquilibriumPath, library: str = "polars") -> Any:
     """Return a path as a data frame; see `EquilibriumPath.to_dataframe`."""
+    return frame(path_columns(path), library)
+
+
+def frame(columns: Mapping[str, Any], library: str) -> Any:
+    """Return columns as a data frame of "polars" or "pandas"."""
     if library not in LIBRARIES:
         raise InputError.UNKNOWN_NAME(
             f"to_dataframe makes a table of polars or pandas; got {library!r}"
         )
     need(library, "data", f"to_dataframe({library!r})")  # xarray, of the same extra, needs pandas
-    columns = {name: np.asarray(values) for name, values in path_columns(path).items()}
+    columns = {name: np.asarray(values) for name, values in columns.items()}
     if library == "polars":
         import polars
 
@@ -51,8 +57,10 @@ def write_parquet(target: str | FilePath, path: EquilibriumPath) -> None:
     need("polars", "data", "Parquet")
     table = dataframe_of(path)
     head = {_KEY: json.dumps(encoded(record_of(path)))}
+    buffer = io.BytesIO()  # polars has errors of its own where a disk is full
+    table.write_parquet(buffer, metadata=head)
     with replacing(target) as temporary:
-        table.write_parquet(temporary, metadata=head)
+        temporary.write_bytes(buffer.getbuffer())
 
 
 def read_columns(file: str | FilePath) -> Mapping[str, Sequence[Any]]:

@@ -7,7 +7,9 @@ to the frame of a base that is turned.
 
 from __future__ import annotations
 
+import io
 import json
+from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -87,9 +89,26 @@ def write_netcdf(target: str | FilePath, path: EquilibriumPath) -> None:
     """
     _need_netcdf()
     data, record = dataset_of(path), record_dataset(path)
+    write_groups(target, {None: data, _GROUP: record})
+
+
+def write_groups(target: str | FilePath, groups: Mapping[str | None, Dataset]) -> None:
+    """Write data sets as the groups of one NetCDF file, whole or not at all.
+
+    The file is made in memory: HDF5 itself ends the process where a disk is full.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    buffer = io.BytesIO()
+    with h5netcdf.File(buffer, "w") as file:
+        for group, data in groups.items():
+            data.dump_to_store(H5NetCDFStore(file, group=group))
     with replacing(target) as temporary:
-        data.to_netcdf(temporary, engine="h5netcdf")
-        record.to_netcdf(temporary, engine="h5netcdf", group=_GROUP, mode="a")
+        temporary.write_bytes(buffer.getbuffer())
 
 
 def read_netcdf(file: str | FilePath) -> EquilibriumPath:

@@ -23,7 +23,6 @@ from notchflex.errors import InputError
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
     from notchflex.results.recorded import Recorded
-    from notchflex.robot import Robot
     from notchflex.solver.programs.prepare import PreparedChain
 
 FORMAT = "notchflex path 1"
@@ -51,6 +50,8 @@ class Record:
 
 def record_of(path: EquilibriumPath) -> Record:
     """Return the record of a path."""
+    from notchflex.robot import robot_text
+
     chain = path.chain
     # The external loads: each different one, and which of them every step has.
     external = {
@@ -61,7 +62,7 @@ def record_of(path: EquilibriumPath) -> Record:
         "format": FORMAT,
         "program": "notchflex",
         "version": __version__,
-        "robot": robot_of(path.robot),
+        "robot": robot_text(path.robot),
         "level": chain.level,
         "loaded": chain.loaded,
         "refinement": chain.refinement,
@@ -72,14 +73,6 @@ def record_of(path: EquilibriumPath) -> Record:
         "external": json.dumps(external),
     }
     return Record(facts, dict(_arrays_of(path)))
-
-
-def robot_of(robot: Robot) -> str:
-    """Return the robot file of a robot, with the comments of the one that it was read from."""
-    from notchflex.robot.robot import source_of
-    from notchflex.robot.writing import robot_text
-
-    return robot_text(robot, source_of(robot))
 
 
 def path_of(record: Record, source: str) -> EquilibriumPath:

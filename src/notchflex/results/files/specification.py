@@ -62,6 +62,3 @@ def robot_named(name: str, folder: Path) -> Robot:
     """
     is_file = name.endswith(".toml") or os.sep in name
     return load_robot(folder / name if is_file else name)
-
-
-__all__ = ["read_specification", "robot_named", "validated"]

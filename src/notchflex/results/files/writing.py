@@ -1,16 +1,57 @@
-"""Where results go: paths are checked before anything is computed."""
+"""Where results go: paths are checked before anything is computed; standard output.
+
+Also what to do with a stream that can no longer be written: later text goes nowhere, so that the
+rest of the work (files, warnings, the exit code) is done as if nobody had been listening.
+"""
 
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TextIO
 
 from notchflex._extras import need
 from notchflex._replacing import is_replaceable, replacing
 from notchflex.errors import InputError
-from notchflex.results.files.streams import write_document
+from notchflex.robot.reading import bounded_text
+
+
+def write_document(text: str) -> None:
+    """Write a document (JSON, CSV) to standard output, as UTF-8 whatever the terminal takes.
+
+    A reader that has gone (`notchflex schema | head`) is not a failure.
+
+    Args:
+        text: What to write.
+    """
+    stream = sys.stdout
+    try:
+        stream.flush()
+        buffer = getattr(stream, "buffer", None)
+        if buffer is None:  # a StringIO in its place
+            stream.write(text)
+        else:
+            buffer.write(text.encode("utf-8", errors="replace"))
+        stream.flush()
+    except BrokenPipeError:
+        let_go(stream)
+
+
+def let_go(stream: TextIO) -> None:
+    """Send what a stream still holds, and all that is written to it later, nowhere.
+
+    Python would otherwise complain once more when it flushes the stream at exit.
+
+    Args:
+        stream: Standard output or standard error.
+    """
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
 
 STANDARD_OUTPUT = "-"
 PAPER = (".png", ".svg", ".pdf")
@@ -181,7 +222,7 @@ def read_text(source: str | os.PathLike[str], kind: str) -> str:
         InputError: It is missing, a folder, no text or cannot be read.
     """
     try:
-        return Path(source).read_text(encoding="utf-8-sig")
+        return bounded_text(source)
     except FileNotFoundError:
         raise InputError.FILE_NOT_FOUND(f"{source}: there is no such file.") from None
     except IsADirectoryError:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex._quantity import Quantity
-from notchflex.solver.derived.reported import believable
+from notchflex._quantity import REGISTERED, Quantity
+from notchflex.solver.derived.quantities import believable
 
 if TYPE_CHECKING:  # for the type only: a path evaluates these
     from notchflex.results.path import EquilibriumPath
@@ -38,13 +38,13 @@ def total_chord_angle(path: EquilibriumPath) -> np.ndarray:
 
 
 @Quantity("path", "dissipation", "D_i", "N mm", per=("tendon", "contact"), after="contact_bound",
+          work_of=("span_tension", "contact_slid"),
           note="Integrated by the trapezoid rule from step to step, as is the tendon work, so the "
           "two balance with the stored energy as the steps get small. A few coarse steps across a "
           "reversal give a rough value, which may even decrease.")  # fmt: skip
 def dissipation(path: EquilibriumPath) -> np.ndarray:
     """Work that a friction contact has turned to heat since the start of the path."""
-    # The tension drop at every contact over the slid length.
-    return _accumulated(path, "span_tension", "contact_slid")
+    return _accumulated(path, *REGISTERED["dissipation"].work_of)
 
 
 @Quantity("path", "dissipation of the material", "D_j", "N mm", per=("notch",),
@@ -87,10 +87,11 @@ def front_eta(path: EquilibriumPath) -> np.ndarray:
 
 
 @Quantity("path", "tendon work", "W", "N mm", key="tendon_work_Nmm",
-          column="tendon{tendon}_work_Nmm", per=("tendon",))  # fmt: skip
+          column="tendon{tendon}_work_Nmm", per=("tendon",),
+          work_of=("tension", "stroke"))  # fmt: skip
 def tendon_work(path: EquilibriumPath) -> np.ndarray:
     """Work done on a tendon at the base since the start of the path."""
-    return _accumulated(path, "tension", "stroke")
+    return _accumulated(path, *REGISTERED["tendon_work"].work_of)
 
 
 @Quantity("path", "converged", key="converged", column="converged", kind=bool,
@@ -128,7 +129,10 @@ def smallest_eigenvalue(path: EquilibriumPath) -> np.ndarray:
 
 @Quantity("path", "sign of the determinant")
 def determinant_sign(path: EquilibriumPath) -> np.ndarray:
-    """Sign of the determinant of that stiffness; +1 at every stable state."""
+    """Sign of the determinant of that stiffness; +1 at every stable state, 0 without one answer.
+
+    It is 0 where the strokes of inextensible tendons depend on each other and fix no tensions.
+    """
     return path.stability[1]
 
 
@@ -155,15 +159,23 @@ def iterations(path: EquilibriumPath) -> np.ndarray:
 
 
 def _accumulated(path: EquilibriumPath, force: str, length: str) -> np.ndarray:
-    """Integrate a force over a length by the trapezoid rule, from the state before the path on."""
-    pairs: list[tuple[np.ndarray, ...]] = []
-    for name in (force, length):
-        pairs.append(_before_and_after(path, path.solver_quantity(name), name))
-    if force == "span_tension":  # what a contact takes is the drop from span to span
-        pairs[0] = tuple(value[..., :-1] - value[..., 1:] for value in pairs[0])
-    (force_before, force_after), (length_before, length_after) = pairs
-    work = 0.5 * (force_before + force_after) * (length_after - length_before)
+    """Integrate a force over a length, from the state before the path on."""
+    pairs = (_before_and_after(path, path.solver_quantity(name), name) for name in (force, length))
+    work = work_of_steps(*pairs)
     return work if path.each_from_rest else np.cumsum(work, axis=0)
+
+
+def work_of_steps(
+    force: tuple[np.ndarray, np.ndarray], length: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Return the work of a force, before and after every step, by the trapezoid rule.
+
+    A contact between two spans takes the drop of the tension from one to the other.
+    """
+    mean, change = 0.5 * (force[0] + force[1]), length[1] - length[0]
+    if mean.shape[-1] > change.shape[-1]:
+        mean = mean[..., :-1] - mean[..., 1:]
+    return mean * change
 
 
 def _before_and_after(

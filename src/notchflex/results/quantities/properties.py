@@ -21,8 +21,11 @@ _Many = TypeVar("_Many")
 _One = TypeVar("_One")
 
 
-class _Property(Generic[_Many, _One]):
-    """A quantity as property: values of every step of a path, or the value of one equilibrium."""
+class _Property(property, Generic[_Many, _One]):
+    """A quantity as property: values of every step of a path, or the value of one equilibrium.
+
+    A property of Python, so that help on `path.tension` tells what it is, not what an array is.
+    """
 
     def __set_name__(self, owner: type, name: str) -> None:
         one = QUANTITIES[name]
@@ -34,7 +37,9 @@ class _Property(Generic[_Many, _One]):
     def __get__(self, thing: PathQuantities, owner: type) -> _Many: ...
     @overload
     def __get__(self, thing: EquilibriumQuantities, owner: type) -> _One: ...
-    def __get__(self, thing: _Quantities | None, owner: type) -> Any:
+    def __get__(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, thing: _Quantities | None, owner: type
+    ) -> Any:
         return self if thing is None else thing.quantity(self._name)
 
     def __set__(self, thing: _Quantities, value: object) -> NoReturn:
@@ -87,6 +92,8 @@ class _Quantities:
     """Total chord angle, rad."""
     total_angle = Number()
     """Total bending angle, rad."""
+    tip_axis_angle = Number()
+    """Angle between the axes of base and tip, rad."""
     tip_position = Array()
     """Tip position, mm, shape (3)."""
     tip_rotation = Array()

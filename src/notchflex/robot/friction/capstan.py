@@ -1,11 +1,11 @@
 """Capstan friction at the edges of the notches."""
 
 from dataclasses import KW_ONLY
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from notchflex.robot.kinds import Friction
+from notchflex.robot.kinds import PACHECO, Friction
 from notchflex.robot.part import Float, part, quantity
 
 
@@ -31,7 +31,7 @@ class Capstan(Friction):
         'geometric'
     """
 
-    coefficient: Annotated[Float, quantity("", "coefficient of friction", at_least=0)]
+    coefficient: Annotated[Float, quantity("", "coefficient of friction", at_least=0, usual=(0, 2))]
     wrap: Annotated[
         Literal["geometric", "whole-before"],
         Field(
@@ -45,3 +45,4 @@ class Capstan(Friction):
     ] = None
     _: KW_ONLY
     kind: Literal["capstan"] = "capstan"
+    papers: ClassVar = (PACHECO,)

@@ -1,11 +1,11 @@
 """Friction of a tendon over a sharp edge, as in Gao 2017 and Liu 2022."""
 
 from dataclasses import KW_ONLY
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from notchflex.robot.kinds import Friction
+from notchflex.robot.kinds import GAO, LIU, Friction
 from notchflex.robot.part import Float, part, quantity
 
 
@@ -32,7 +32,7 @@ class Corner(Friction):
         'slope'
     """
 
-    coefficient: Annotated[Float, quantity("", "coefficient of friction", at_least=0)]
+    coefficient: Annotated[Float, quantity("", "coefficient of friction", at_least=0, usual=(0, 2))]
     turning: Annotated[
         Literal["slope", "chord"],
         Field(
@@ -42,6 +42,7 @@ class Corner(Friction):
     ] = "slope"
     _: KW_ONLY
     kind: Literal["corner"] = "corner"
+    papers: ClassVar = (GAO, LIU)
 
     @property
     def turns_with_chord(self) -> bool:

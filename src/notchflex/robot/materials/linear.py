@@ -25,6 +25,8 @@ class Linear(Material):
         60000.0
     """
 
-    elastic_modulus: Annotated[Float, quantity("MPa", "Young's modulus", above=0)]
+    elastic_modulus: Annotated[
+        Float, quantity("MPa", "Young's modulus", above=0, usual=(200, 300_000))
+    ]
     _: KW_ONLY
     kind: Literal["linear"] = "linear"

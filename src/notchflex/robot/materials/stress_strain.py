@@ -10,16 +10,17 @@ from pydantic import Field, model_validator
 from notchflex.robot.kinds import Material
 from notchflex.robot.part import MOST_STRAIN, Float, ProblemError, part, quantity
 
-_MIN_POINTS, _MAX_POINTS = 2, 40
-# Where a curve is flatter than this part of Young's modulus the sums over fibres have jumps.
-_MIN_RELATIVE_SLOPE = 0.01
+_MIN_POINTS, _MAX_POINTS = 2, 10_000
+
+Points = tuple[tuple[float, ...], tuple[float, ...]]
+"""Strains, and the stress at each [MPa]."""
 
 Strains = Annotated[
-    tuple[Annotated[Float, quantity("", "strain", above=0, at_most=MOST_STRAIN)], ...],
+    tuple[Annotated[Float, quantity("", "strain", at_least=0, at_most=MOST_STRAIN)], ...],
     Field(min_length=_MIN_POINTS, max_length=_MAX_POINTS),
 ]
 Stresses = Annotated[
-    tuple[Annotated[Float, quantity("MPa", "stress", above=0)], ...],
+    tuple[Annotated[Float, quantity("MPa", "stress", at_least=0)], ...],
     Field(min_length=_MIN_POINTS, max_length=_MAX_POINTS),
 ]
 
@@ -29,11 +30,12 @@ class StressStrain(Material):
     """A measured curve of stress over strain, in every fibre of the section; without memory.
 
     The curve runs straight from zero through the points, and beyond the last one as between the
-    last two. Its first piece gives Young's modulus. Stress must rise from point to point.
+    last two. Its first piece gives Young's modulus. Stress may stay equal, but not fall. A solve
+    takes as many of the points as keep the curve to 1e-6 of its largest stress.
 
     Args:
-        strain: Strains in tension, without zero, rising.
-        stress: Stress at each of them [MPa], rising.
+        strain: Strains in tension, rising.
+        stress: Stress at each of them [MPa]; 0 only at strain 0, which may be left out.
         compression_strain: Strains in compression, as positive numbers; None takes the curve in
             tension.
         compression_stress: Stress at each of them, as positive numbers [MPa].
@@ -42,14 +44,14 @@ class StressStrain(Material):
         allowed_strain: Strain beyond which a simulation warns.
 
     Raises:
-        InputError: A value is not allowed, the lists have unlike lengths, or a curve does not rise.
+        InputError: A value is not allowed, the lists have unlike lengths, or a curve falls.
 
     Example:
         >>> StressStrain(strain=(0.01, 0.06), stress=(400.0, 500.0)).elastic_modulus
         40000.0
     """
 
-    strain: Annotated[Strains, Field(description="strains in tension, without zero, rising")]
+    strain: Annotated[Strains, Field(description="strains in tension, rising")]
     stress: Annotated[
         Stresses,
         Field(description="stress at each strain", json_schema_extra={"unit": "MPa"}),
@@ -72,14 +74,26 @@ class StressStrain(Material):
     @property
     def elastic_modulus(self) -> float:
         """Young's modulus: the slope of the first piece in tension [MPa]."""
-        return self.stress[0] / self.strain[0]
+        (strain, *_), (stress, *_) = self.in_tension
+        return stress / strain
+
+    @property
+    def in_tension(self) -> Points:
+        """The curve in tension, without zero."""
+        return _without_zero(self.strain, self.stress)
+
+    @property
+    def in_compression(self) -> Points | None:
+        """The curve in compression, as positive numbers without zero; None if that in tension."""
+        strain, stress = self.compression_strain, self.compression_stress
+        return None if strain is None or stress is None else _without_zero(strain, stress)
 
     @model_validator(mode="after")
     def _curves_rise(self) -> "StressStrain":
-        problems = list(self._problems(self.strain, self.stress, ""))
+        problems = list(_problems(self.strain, self.stress, ""))
         strain, stress = self.compression_strain, self.compression_stress
         if strain is not None and stress is not None:
-            problems += self._problems(strain, stress, "compression_")
+            problems += _problems(strain, stress, "compression_")
         elif strain is not None or stress is not None:
             missing = "stress" if stress is None else "strain"
             problems.append(
@@ -92,31 +106,44 @@ class StressStrain(Material):
             raise ProblemError(problems)
         return self
 
-    def _problems(
-        self, strain: tuple[float, ...], stress: tuple[float, ...], of: str
-    ) -> Iterator[tuple[str, str]]:
-        if len(strain) != len(stress):
+
+def _without_zero(strain: tuple[float, ...], stress: tuple[float, ...]) -> Points:
+    first = int(strain[0] == 0.0)
+    return strain[first:], stress[first:]
+
+
+def _problems(
+    strain: tuple[float, ...], stress: tuple[float, ...], of: str
+) -> Iterator[tuple[str, str]]:
+    if len(strain) != len(stress):
+        yield (
+            f"{of}stress",
+            f"has {len(stress)} values and `{of}strain` {len(strain)}; give one stress for "
+            "each strain.",
+        )
+        return
+    for number, (at, value) in enumerate(zip(strain, stress, strict=True), start=1):
+        if (at == 0.0) != (value == 0.0):
             yield (
                 f"{of}stress",
-                f"has {len(stress)} values and `{of}strain` {len(strain)}; give one stress for "
-                "each strain.",
+                f"is {value:g} MPa at the strain {at:g} (number {number}); it is 0 at the strain 0 "
+                "and nowhere else.",
             )
             return
-        min_slope = _MIN_RELATIVE_SLOPE * self.elastic_modulus
-        for number, ((first, low), (second, high)) in enumerate(
-            pairwise(zip((0.0, *strain), (0.0, *stress), strict=True)), start=1
-        ):
-            if second <= first:
-                yield (
-                    f"{of}strain",
-                    f"has {second:g} behind {first:g} (number {number}); strains must rise.",
-                )
-                return
-            if not (high - low) / (second - first) >= min_slope:
-                yield (
-                    f"{of}stress",
-                    f"rises from {low:g} to {high:g} MPa (number {number}) over the strains "
-                    f"{first:g} to {second:g}; it must rise by at least a hundredth of Young's "
-                    f"modulus, {min_slope:g} MPa per strain.",
-                )
-                return
+    for number, ((first, low), (second, high)) in enumerate(
+        pairwise(zip(strain, stress, strict=True)), start=2
+    ):
+        if second <= first:
+            yield (
+                f"{of}strain",
+                f"has {second:g} behind {first:g} (number {number}); strains must rise.",
+            )
+            return
+        if high < low:
+            yield (
+                f"{of}stress",
+                f"falls from {low:g} to {high:g} MPa (number {number}) over the strains {first:g} "
+                f"to {second:g}; it must rise or stay equal: a falling piece has no unique "
+                "equilibrium. Smooth a noisy curve first.",
+            )
+            return

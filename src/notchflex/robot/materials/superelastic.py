@@ -1,11 +1,11 @@
 """The superelastic material of Pacheco 2021."""
 
 from dataclasses import KW_ONLY
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import model_validator
 
-from notchflex.robot.kinds import Material
+from notchflex.robot.kinds import PACHECO, Material
 from notchflex.robot.part import MOST_STRAIN, Float, ProblemError, part, quantity
 
 
@@ -37,7 +37,9 @@ class Superelastic(Material):
         0.1
     """
 
-    elastic_modulus: Annotated[Float, quantity("MPa", "modulus of the elastic branch", above=0)]
+    elastic_modulus: Annotated[
+        Float, quantity("MPa", "modulus of the elastic branch", above=0, usual=(200, 300_000))
+    ]
     superelastic_modulus: Annotated[
         Float, quantity("MPa", "modulus of the superelastic branch", above=0)
     ]
@@ -56,6 +58,7 @@ class Superelastic(Material):
     ] = -0.01
     _: KW_ONLY
     kind: Literal["superelastic"] = "superelastic"
+    papers: ClassVar = (PACHECO,)
 
     @model_validator(mode="after")
     def _branches_in_order(self) -> "Superelastic":

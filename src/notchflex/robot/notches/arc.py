@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from notchflex.robot.kinds import Notch
+from notchflex.robot.kinds import PACHECO, YORK, Notch
 from notchflex.robot.notches.cut import CutLayout, slot
 from notchflex.robot.part import Float, part, quantity
 from notchflex.robot.tube import Tube
@@ -52,9 +52,14 @@ class ArcNotch(Notch):
         ),
     ]
     depth: Annotated[
-        Float, quantity("mm", "depth of the cut, from the surface opposite the spine", above=0)
+        Float,
+        quantity(
+            "mm", "depth of the cut, from the surface opposite the spine", above=0, usual=(0.01, 50)
+        ),
     ]
-    height: Annotated[Float, quantity("mm", "height of the notch along the tube", above=0)]
+    height: Annotated[
+        Float, quantity("mm", "height of the notch along the tube", above=0, usual=(0.01, 50))
+    ]
     _: KW_ONLY
     kind: Literal["arc"] = "arc"
     ends: Annotated[
@@ -81,6 +86,11 @@ class ArcNotch(Notch):
     ] = "rigid"
 
     @property
+    def papers(self) -> tuple[str, ...]:
+        """Papers to cite for its model."""
+        return (PACHECO, YORK) if self.cut == "off-axis" else (PACHECO,)
+
+    @property
     def spine_cut(self) -> tuple[float, bool]:
         """Depth of the cut [mm], and whether its edges are radial."""
         return self.depth, self.cut == "on-axis"
@@ -89,6 +99,11 @@ class ArcNotch(Notch):
     def has_elastic_ends(self) -> bool:
         """Whether its stiffness depends on the rings beside it."""
         return self.ends == "shell" or self.closing == "elastic"
+
+    @property
+    def law_errors(self) -> tuple[float, float]:
+        """Relative errors of its stiffness: root mean square over wrists that were not fitted."""
+        return (0.014, 0.054) if self.ends == "shell" else (0.0, 0.0)
 
     def section_depth(self, tube: Tube) -> float:
         """Return the depth at the outer surface that gives the same section [mm]."""

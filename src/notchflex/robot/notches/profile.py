@@ -1,7 +1,12 @@
-"""Lines and arcs of a cut's profile: corners joined by lines, each rounded by its radius."""
+"""Lines and arcs of a cut's profile: corners joined by lines, each rounded by its radius.
+
+Both move into the waste for a beam, which may be wider along the tube than round it: each by the
+distance of an ellipse's tangent from its centre, so that the ellipse rolls on the profile.
+"""
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from notchflex.errors import InputError
@@ -9,6 +14,8 @@ from notchflex.robot.notches.cut import NotchCut, Point
 
 _ROUNDING = 1e-9
 """Lengths that differ by less than this are equal [mm]: far below any laser, above rounding."""
+_STRAIGHT = 1e-12
+"""Sine of the angle between two lines that are one."""
 
 
 class Line(NamedTuple):
@@ -24,52 +31,105 @@ class Line(NamedTuple):
 
 
 class Arc(NamedTuple):
-    """A circular piece from an angle [rad] on, counter-clockwise for a positive `sweep`."""
+    """A circular piece from an angle [rad] on, counter-clockwise for a positive `sweep`.
+
+    Its points move to its left by the semi-axes `inside` of an ellipse.
+    """
 
     centre: Point
     radius: float
     start_angle: float
     sweep: float
+    inside: Point
 
     def at(self, part: float) -> Point:
         """Return the point at a part of its length, 0 to 1."""
         angle = self.start_angle + part * self.sweep
-        x, y = self.centre
-        return x + self.radius * math.cos(angle), y + self.radius * math.sin(angle)
+        cosine, sine = math.cos(angle), math.sin(angle)
+        (x, y), (along, across) = self.centre, self.inside
+        # The point of an ellipse with this normal: its squared semi-axes times the normal over the
+        # distance of the tangent.
+        scale = math.copysign(math.hypot(along * cosine, across * sine) or 1.0, self.sweep)
+        return (
+            x + (self.radius - along**2 / scale) * cosine,
+            y + (self.radius - across**2 / scale) * sine,
+        )
 
 
-def pieces(corners: Sequence[Point], radii: Sequence[float]) -> list[Line | Arc]:
+def pieces(
+    corners: Sequence[Point], radii: Sequence[float], inside: Point = (0.0, 0.0)
+) -> list[Line | Arc]:
     """Return the lines and arcs of an open line of corners.
 
     Args:
-        corners: Corners from first to last [mm].
+        corners: Corners from first to last [mm]; both at one height.
         radii: Radius of each corner [mm]; those of the first and the last have no effect.
+        inside: How far pieces along y and pieces along x move to their left [mm].
 
     Raises:
-        InputError: A radius is too large for the lines beside it.
+        InputError: A radius is too large for the lines beside it, or `inside` for the profile.
     """
     outline: list[Line | Arc] = []
+    moved = shrunk(corners, inside, corners[0][1])
     used = 0.0  # length of the line before a corner that the corner before it takes
-    last = corners[0]
-    for before, corner, after, radius in zip(
-        corners[:-2], corners[1:-1], corners[2:], radii[1:-1], strict=True
+    last = moved[0]
+    for before, corner, after, radius, sharp in zip(
+        corners[:-2], corners[1:-1], corners[2:], radii[1:-1], moved[1:-1], strict=True
     ):
-        tangent, arc = _fillet(before, corner, after, radius)
+        tangent, arc = _fillet(before, corner, after, radius, inside)
         available = min(math.dist(before, corner) - used, math.dist(corner, after))
         if tangent > available + _ROUNDING:
             raise InputError.OUT_OF_RANGE(
                 f"a corner radius of {radius:.6g} mm does not fit the cut: its arc takes "
                 f"{tangent:.6g} mm of a line of {available:.6g} mm; give a smaller radius."
             )
-        start, end = (corner, corner) if arc is None else (arc.at(0.0), arc.at(1.0))
+        start, end = (sharp, sharp) if arc is None else (arc.at(0.0), arc.at(1.0))
         outline += [Line(last, start)] if math.dist(last, start) > _ROUNDING else []
         outline += [] if arc is None else [arc]
         last, used = end, tangent
-    outline.append(Line(last, corners[-1]))
+    outline.append(Line(last, moved[-1]))
     return outline
 
 
-def _fillet(before: Point, corner: Point, after: Point, radius: float) -> tuple[float, Arc | None]:
+def shrunk(corners: Sequence[Point], inside: Point, top: float) -> list[Point]:
+    """Return the corners of a profile whose lines have moved into the waste, to their left.
+
+    Args:
+        corners: Corners [mm].
+        inside: How far lines along y and lines along x move [mm].
+        top: Height at which the profile is then open, where its first and its last line end.
+
+    Raises:
+        InputError: The cut is too narrow.
+    """
+    lines: list[tuple[Point, float]] = []  # their normals, and how far they move
+    for (x, y), (u, v) in pairwise(corners):
+        length = math.dist((x, y), (u, v))
+        normal = (y - v) / length, (u - x) / length
+        lines.append((normal, math.hypot(inside[0] * normal[0], inside[1] * normal[1])))
+    first, last = (((0.0, 1.0), top - y) for _, y in (corners[0], corners[-1]))
+    points: list[Point] = []
+    for (x, y), (one, far), (two, away) in zip(
+        corners, [first, *lines], [*lines, last], strict=True
+    ):
+        turn = one[0] * two[1] - one[1] * two[0]
+        if abs(turn) < _STRAIGHT:
+            points.append((x + far * one[0], y + far * one[1]))
+        else:
+            across = far * two[1] - away * one[1], away * one[0] - far * two[0]
+            points.append((x + across[0] / turn, y + across[1] / turn))
+    for ((x, y), (u, v)), ((a, b), (c, d)) in zip(pairwise(points), pairwise(corners), strict=True):
+        if (u - x) * (c - a) + (v - y) * (d - b) <= 0.0:
+            raise InputError.OUT_OF_RANGE(
+                f"a path {max(inside):.6g} mm inside the edges does not fit into it; give a "
+                "smaller kerf, less polishing or a larger cut."
+            )
+    return points
+
+
+def _fillet(
+    before: Point, corner: Point, after: Point, radius: float, inside: Point
+) -> tuple[float, Arc | None]:
     """Return the length that a fillet takes of both lines, and its arc; none where it is sharp."""
     first = math.atan2(corner[1] - before[1], corner[0] - before[0])
     second = math.atan2(after[1] - corner[1], after[0] - corner[0])
@@ -83,7 +143,7 @@ def _fillet(before: Point, corner: Point, after: Point, radius: float) -> tuple[
         start[0] - side * radius * math.sin(first),
         start[1] + side * radius * math.cos(first),
     )
-    return tangent, Arc(centre, radius, first - side * 0.5 * math.pi, turn)
+    return tangent, Arc(centre, radius, first - side * 0.5 * math.pi, turn, inside)
 
 
 def outline(cut: NotchCut, chord: float) -> list[Point]:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from notchflex.robot.kinds import Notch
+from notchflex.robot.kinds import LIU, Notch
 from notchflex.robot.notches.cut import CutLayout, NotchCut
 from notchflex.robot.notches.opening import Opening
 from notchflex.robot.part import Float, part, quantity
@@ -87,6 +87,11 @@ class StripNotch(Notch):
     uncut_length: Annotated[
         Float, quantity("mm", "uncut length behind the pair, toward the tip", at_least=0)
     ] = 0.0
+
+    @property
+    def papers(self) -> tuple[str, ...]:
+        """Papers to cite for its model."""
+        return (LIU,)
 
     @property
     def has_elastic_ends(self) -> bool:

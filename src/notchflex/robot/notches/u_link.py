@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from notchflex.robot.kinds import Notch
+from notchflex.robot.kinds import GAO, Notch
 from notchflex.robot.notches.cut import CutLayout, slot
 from notchflex.robot.notches.opening import Opening
 from notchflex.robot.part import Float, part, quantity
@@ -80,6 +80,11 @@ class ULink(Notch):
     uncut_length: Annotated[
         Float, quantity("mm", "uncut length beyond the last slot of the row", at_least=0)
     ] = 0.0
+
+    @property
+    def papers(self) -> tuple[str, ...]:
+        """Papers to cite for its model."""
+        return (GAO,)
 
     @property
     def has_elastic_ends(self) -> bool:

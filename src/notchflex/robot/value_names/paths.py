@@ -8,6 +8,7 @@ from notchflex.errors import InputError
 from notchflex.robot.error_messages import nearest
 from notchflex.robot.fields import fields_of
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
+from notchflex.robot.robot import Drawing
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 
@@ -17,6 +18,7 @@ SECTIONS: dict[str, type] = {
     "tendon": Tendon,
     "material": Material,
     "friction": Friction,
+    "drawing": Drawing,
 }
 EXAMPLES = "write it like material.elastic_modulus, notch[2].depth or notch[*].depth"
 
@@ -66,7 +68,7 @@ def parse_path(path: str) -> ValuePath:
 
 def tables_at(table: dict[str, Any], target: ValuePath) -> list[dict[str, Any]]:
     """Find the tables that a path means; a single notch is first split from its group."""
-    tables = table[target.section]
+    tables = table.setdefault(target.section, {})
     if isinstance(tables, dict):
         return [tables]
     if target.number is None:

@@ -47,14 +47,20 @@ def set_values(
     Raises:
         InputError: A path is not known or given twice, or a value is not allowed.
     """
-    pairs: Iterable[tuple[str, object]] = (
-        cast("Mapping[str, object]", values).items() if isinstance(values, Mapping) else values
-    )
-    pairs = list(pairs)
+    table = to_table(robot)
+    dropped = change_table(table, values)
+    return Changed(remember_source(from_table(table), source_of(robot)), dropped)
+
+
+def change_table(
+    table: dict[str, Any], values: Mapping[str, object] | Iterable[tuple[str, object]]
+) -> tuple[str, ...]:
+    """Set values in the plain table of a robot; return the paths that a change of kind dropped."""
+    given = cast("Mapping[str, object]", values).items() if isinstance(values, Mapping) else values
+    pairs = [(str(path), value) for path, value in given]
     tolerances = {path: value for path, value in pairs if path.strip().startswith(_TOLERANCE)}
     targets = [(parse_path(path), value) for path, value in pairs if path not in tolerances]
     targets.sort(key=lambda item: (item[0].key != "kind", item[0].number is not None))
-    table = to_table(robot)
     for path, value in tolerances.items():
         table.setdefault("tolerance", {})[path.strip().removeprefix(_TOLERANCE)] = value
     dropped: list[str] = []
@@ -71,7 +77,7 @@ def set_values(
             _set_key(table, target, value)
     for path in dropped:
         table.get("tolerance", {}).pop(path, None)
-    return Changed(remember_source(from_table(table), source_of(robot)), tuple(dropped))
+    return tuple(dropped)
 
 
 def parse_assignment(text: str) -> tuple[str, object]:
@@ -127,7 +133,7 @@ def _set_key(table: dict[str, Any], target: ValuePath, value: object) -> None:
 def _set_kind(table: dict[str, Any], target: ValuePath, value: object) -> list[str]:
     """Replace a kind: keep the keys that both kinds share, and return the paths of the others."""
     base = SECTIONS[target.section]
-    if target.section in ("tube", "tendon"):
+    if target.section in ("tube", "tendon", "drawing"):
         raise InputError.UNKNOWN_NAME(unknown_key(target.path, "kind", fields_of(base)))
     kinds = kinds_of(base)
     if value not in kinds:

@@ -50,7 +50,7 @@ def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Fl
         at = evaluate(chain, point, before.memory, after.applied)
         resistance = jnp.sum(at.flexure.internal * change, axis=-1)
         missing = jnp.sum(at.residual.modes * chain.stiffness * change, axis=-1)
-        drive = _own_friction(at, unknowns, slid) * (resistance - missing)
+        drive = _own_friction(at, unknowns, slid, chain.friction.offset()) * (resistance - missing)
         apart = jnp.ones(chain.flexures)
         for group, response in zip(chain.contact_pairs, at.contacts, strict=True):
             touches = (response.gap <= 0.0) & (group.has_contact > 0.0)
@@ -75,7 +75,10 @@ def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Fl
 
 
 def _own_friction(
-    at: Evaluation, unknowns: Unknowns, slid: tuple[Float[Array, "n t 2"], ...]
+    at: Evaluation,
+    unknowns: Unknowns,
+    slid: tuple[Float[Array, "n t 2"], ...],
+    offset: Float[Array, ""] | float,
 ) -> Float[Array, " n"]:
     """Compute the drive of each notch with the friction of its own edge, relative to the end.
 
@@ -85,6 +88,7 @@ def _own_friction(
     left, all_tension = jnp.zeros(()), jnp.zeros(())
     for span, last, slip in zip(at.spans, unknowns.log_ratio, slid, strict=True):
         log_ratio = jnp.sign(slip[..., 0]) * span.bound[..., 0]
-        left = left + jnp.sum(span.gap_tension * jnp.exp(last[..., 0] - log_ratio), axis=-1)
+        raised = (span.gap_tension + offset) * jnp.exp(last[..., 0] - log_ratio)
+        left = left + jnp.sum(jnp.where(span.gap_tension > 0.0, raised - offset, 0.0), axis=-1)
         all_tension = all_tension + jnp.sum(span.gap_tension, axis=-1)
     return jnp.where(all_tension > 0.0, left / jnp.where(all_tension > 0.0, all_tension, 1.0), 1.0)

@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from jaxtyping import Array
 
-from notchflex._jax import jax, jnp
-from notchflex._quantity import Quantity
+from notchflex._jax import array_module, jax, jnp
+from notchflex._quantity import REGISTERED, Quantity
+from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import in_space, rotation_error_estimate
-from notchflex.solver.derived.moments import moment_error as error_of_modes
+from notchflex.mechanics.material import peak_strain as peak_strain_of_section
 from notchflex.solver.derived.solved_state import (
     SolvedState,
     along_contacts,
     along_edges,
-    bending_angle,
     largest_moment,
     notch_angles,
     paired,
 )
+from notchflex.solver.derived.solved_state import moment_error as error_of_modes
 from notchflex.solver.element import bound_side
+from notchflex.solver.programs.static_structure import PytreeLayout
+from notchflex.solver.solver_state import SolverState
 
 # States with a larger moment error count as not converged.
 MAX_MOMENT_ERROR = 0.35
 # Fraction of the end compliance of a notch beyond its faces: from finite elements, middle notches
 # of wrists A and B at every load (3.0 % and 4.1 % of the angle).
 _BEYOND_FACES = 0.086
+# Rounding of the cosine between the directions of two notches.
+_ROUNDING = 1e-15
 # States with a larger error of rotation count as not converged, rad.
 _MAX_ROTATION_ERROR = 2e-6
 
@@ -86,13 +95,17 @@ def chord_angle(state: SolvedState) -> Array:
 @Quantity("solve", "total bending angle", r"\theta", "deg", key="total_angle_deg",
           column="total_deg")  # fmt: skip
 def total_angle(state: SolvedState) -> Array:
-    """Bending angle of the robot.
+    """Turning of the tube axis about the bending axis of the first notch, over all notches.
 
-    Where all notches bend in one plane it is the sum of their angles, positive toward the bend of
-    the first; otherwise the angle between the axes of base and tip.
+    It is the sum of the notch angles, each times the cosine of the angle between the directions of
+    that notch and of the first. In one plane that is the sum of the angles, those of notches on
+    the other side negative.
     """
-    angles, tip = state.quantity("notch_angle"), state.bodies.rotation[-1]
-    return bending_angle(state.chain.notch_frame, angles, tip)
+    side = state.chain.notch_frame[:, :, 0]
+    cosine = side @ side[0]
+    whole = jnp.round(cosine)  # 1 or -1 to rounding where all notches lie in one plane
+    weight = jnp.where(jnp.abs(cosine - whole) < _ROUNDING, whole, cosine)
+    return state.quantity("notch_angle") @ weight
 
 
 @Quantity("solve", "body position", "p_b", "mm", per=("body", "axis"), in_world=True)
@@ -125,6 +138,20 @@ def tip_rotation(state: SolvedState) -> Array:
     return state.quantity("body_rotation")[..., -1, :, :]
 
 
+@Quantity("derived", "angle between the axes of base and tip", r"\alpha", "deg",
+          key="tip_axis_angle_deg", column="tip_axis_deg", after="total_angle")  # fmt: skip
+def tip_axis_angle(state: SolvedState) -> Array:
+    """Angle between the axis of the base and that of the tip, from 0 to half a turn.
+
+    It has a kink, and no derivative, where both are parallel.
+    """
+    axes = state.quantity("body_rotation")[..., :, 2]
+    base, tip = axes[..., 0, :], axes[..., -1, :]
+    xp = array_module(base)
+    between = xp.linalg.norm(tip - base, axis=-1), xp.linalg.norm(tip + base, axis=-1)
+    return 2.0 * xp.arctan2(*between)
+
+
 @Quantity("solve", kind=bool)
 def friction_holds(state: SolvedState) -> Array:
     """Whether no tendon turns so sharply at an edge that its friction would hold any pull."""
@@ -152,15 +179,17 @@ def notch_moment(state: SolvedState) -> Array:
 @Quantity("state", "outer strain", r"\varepsilon_j", key="outer_strain",
           column="notch_{notch}_outer_strain", per=("notch",))  # fmt: skip
 def outer_strain(state: SolvedState) -> Array:
-    """Bending strain of the outer fibre of the spine (Pacheco 2021, eq. 16)."""
-    return jnp.max(state.curvature * state.chain.rods.section.edge_spine, axis=-1)
+    """Strain of the outer fibre in the middle of the spine (Pacheco 2021, eq. 16)."""
+    strain = state.section_strain
+    spine = state.chain.rods.section.edge_spine
+    return jnp.max(strain.stretch + strain.curvature * spine, axis=-1)
 
 
 @Quantity("state", "peak strain", r"\varepsilon_\mathrm{max}", key="peak_strain",
           column="notch_{notch}_peak_strain", per=("notch",))  # fmt: skip
 def peak_strain(state: SolvedState) -> Array:
-    """Largest bending strain of a notch, in the fibre farthest from its neutral axis."""
-    return jnp.max(state.fibre_strain, axis=-1)
+    """Largest strain of any fibre of a notch: bending both ways and stretch, no shear."""
+    return jnp.max(peak_strain_of_section(state.section_strain, state.chain.rods.section), axis=-1)
 
 
 @Quantity("state", "notch gap", "g_j", "mm", key="gap_mm", column="notch_{notch}_gap_mm",
@@ -173,10 +202,8 @@ def gap(state: SolvedState) -> Array:
 @Quantity("derived", "closed", key="closed", column="notch_{notch}_closed", per=("notch",),
           kind=bool)  # fmt: skip
 def closed(state: SolvedState) -> Array:
-    """True where the lips of a notch touch."""
-    # Contact force or gap is zero, but for rounding.
-    force, gap = state.quantity("contact_force"), state.quantity("gap")
-    return force > gap * state.chain.contact_stiffness
+    """True where the lips of a notch press on each other."""
+    return state.quantity("contact_force") > 0.0
 
 
 @Quantity("state", "contact force", "N_j", "N", key="contact_force_N",
@@ -189,7 +216,10 @@ def contact_force(state: SolvedState) -> Array:
 @Quantity("state", "tension ratio over a contact", "x_i", key="contacts.log_ratio",
           per=("tendon", "contact"))  # fmt: skip
 def contact_log_ratio(state: SolvedState) -> Array:
-    """ln(tension on the base side / tension on the tip side) of a friction contact."""
+    """ln(tension on the base side / tension on the tip side) of a friction contact.
+
+    With a `constant_loss` both tensions are raised by it.
+    """
     pairs = [(own[..., 0], own[..., 1]) for own in state.solved.point.unknowns.log_ratio]
     return along_contacts(state.chain, *paired(state.chain, pairs))
 
@@ -216,7 +246,13 @@ def contact_turning(state: SolvedState) -> Array:
           note="0 sticks, +1 slips toward the base, -1 slips toward the tip.")  # fmt: skip
 def contact_state(state: SolvedState) -> Array:
     """What a friction contact does: "stick", "slip toward base" or "slip toward tip"."""
-    return bound_side(state.quantity("contact_log_ratio"), state.quantity("contact_bound"))
+    side = bound_side(state.quantity("contact_log_ratio"), state.quantity("contact_bound"))
+    losses = state.chain.friction.constant_loss(*state.turning)
+    if losses is None:
+        return side
+    # Below its loss a tension draws nothing over the contact, though none is left behind it.
+    before = state.quantity("span_tension")[:, :-1]
+    return jnp.where((side > 0) & (before < along_contacts(state.chain, *losses)), 0, side)
 
 
 @Quantity("state", "largest tension ratio over a contact", "b_i", per=("tendon", "contact"))
@@ -262,7 +298,10 @@ def bend_possible(state: SolvedState) -> Array:
     chain, modes = state.chain, state.solved.point.unknowns.modes
     below_half_turn = jnp.sum(state.at.flexure.bend**2, axis=-1) < np.pi**2
     accurate = jax.vmap(rotation_error_estimate)(chain.rods, modes) < _MAX_ROTATION_ERROR
-    return jnp.all(below_half_turn & accurate) & jnp.all(state.fibre_strain < 1.0)
+    section = chain.rods.section
+    farthest = jnp.maximum(section.edge_spine, section.edge_near)
+    bending = jnp.abs(in_space(state.at.flexure.strain)[..., 1]) * farthest
+    return jnp.all(below_half_turn & accurate) & jnp.all(bending < 1.0)
 
 
 @Quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",
@@ -298,3 +337,72 @@ def flattening(state: SolvedState) -> Array:
         return jnp.zeros((len(length), 3, 1))
     _, at = state.stored_energy_density
     return jnp.stack([at.path, length * at.transformed, length * at.by_transformation], axis=1)
+
+
+def reported(source: str) -> tuple[str, ...]:
+    """Return the names of the quantities that a program computes: "solve", or "state" after it."""
+    return tuple(name for name, one in REGISTERED.items() if one.source == source)
+
+
+class Shape(namedtuple("Shape", reported("solve"))):  # pyright: ignore[reportUntypedNamedTuple]
+    """Quantities that the program of a solve reports, of one state or many (leading axis)."""
+
+    __slots__ = ()
+
+    @staticmethod
+    def form(flexures: int, tendons: int) -> PytreeLayout:
+        """Return its layout for a number of flexures and tendons."""
+        sizes = {"tendon": tendons, "notch": flexures, "body": flexures + 1, "row": 3, "axis": 3}
+        own = (REGISTERED[name] for name in Shape._fields)
+        return PytreeLayout.of(
+            Shape(*(np.zeros([sizes[axis] for axis in q.per], q.kind) for q in own))
+        )
+
+
+def shape(chain: Chain, solved: SolverState) -> Shape:
+    """Compute the quantities that the program of a solve reports."""
+    state = SolvedState(chain, solved)
+    return Shape(*(state.quantity(name) for name in Shape._fields))
+
+
+def quantities(chain: Chain, solved: SolverState) -> dict[str, Array]:
+    """Compute all other reported quantities of a solved state, in the frame of the base."""
+    state = SolvedState(chain, solved)
+    return {name: state.quantity(name) for name in reported("state")}
+
+
+def believable(value: Callable[[str], Any]) -> Any:
+    """Return whether states lie within the range of friction law, modes and geometry.
+
+    Args:
+        value: Gives the values of a quantity by its name.
+    """
+    return (
+        value("friction_holds")
+        & (value("moment_error") < MAX_MOMENT_ERROR)
+        & value("bend_possible")
+    )
+
+
+def unpad_quantity(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
+    """Select the values of a chain from those of its padded chain with contacts at all edges.
+
+    Args:
+        chain: The chain.
+        name: Name of the quantity.
+        values: Values of the padded chain, with any leading axes.
+    """
+    per = REGISTERED[name].per
+    if per[:1] in (("notch",), ("body",)):
+        own = slice(chain.flexures + (per[0] == "body"))
+        return values[(..., own, *(slice(None),) * (len(per) - 1))]
+    if per[1:] not in (("span",), ("contact",)):
+        return values
+    contacts = np.asarray(chain.contacts)
+    first = int(per[1] == "span")  # the proximal span comes before the first edge
+    tendons = np.arange(len(contacts))[:, None]
+    beyond = 0 if REGISTERED[name].kind is int else np.nan
+    own_values = np.where(
+        contacts[:, 1:] >= 0, values[..., tendons, contacts[:, :-1] + first], beyond
+    )
+    return np.concatenate([values[..., :first], own_values], axis=-1)

@@ -1,26 +1,36 @@
-"""A solved state in the frame of the base, with intermediate results for the quantities."""
+"""A solved state in the frame of the base, with intermediate results for the quantities.
+
+The modes satisfy equilibrium only in a weighted mean along a flexure. The largest local error,
+|M_internal - M_required| over the largest |M|, shows whether there are enough modes.
+"""
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, partial
 
+import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
-from notchflex.loads.applied import BodyLoads, body_wrench
+from notchflex.loads.command import BodyLoads, body_wrench
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.flexure import FlexureState, in_space, relative_pose
-from notchflex.mechanics.material import Flattening
+from notchflex.mechanics.flexure import (
+    FlexureState,
+    Rod,
+    fibre_stretch,
+    in_space,
+    of_rod,
+    relative_pose,
+)
+from notchflex.mechanics.flexure.rod_kinematics import node_poses, rod_end
+from notchflex.mechanics.material import Flattening, SectionStrain, section_strain
 from notchflex.mechanics.motion import IN_PLANE, Motion, wrench_at
 from notchflex.solver.body_poses import body_poses
-from notchflex.solver.element import Unknowns
+from notchflex.solver.element import Unknowns, is_active
 from notchflex.solver.residual import BaseReaction, Evaluation, evaluate
 from notchflex.solver.solver_state import SolverState
 from notchflex.solver.tendon_spans import in_tendon_order
-
-# Tolerance of the cosine between the directions of two notches: less than 0.3 degrees.
-_IN_PLANE = 1e-5
 
 
 class SolvedState:
@@ -60,16 +70,11 @@ class SolvedState:
         return _in_space(self.chain, body_poses(self.relative))
 
     @cached_property
-    def fibre_strain(self) -> Float[Array, "n nodes"]:
-        """Strain of the fibre farthest from the neutral axis at every node, its magnitude."""
-        section = self.chain.rods.section
-        farthest = jnp.maximum(section.edge_spine, section.edge_near)
-        return jnp.abs(self.curvature) * farthest
-
-    @cached_property
-    def curvature(self) -> Float[Array, "n nodes"]:
-        """Curvature in the plane of every notch."""
-        return in_space(self.at.flexure.strain)[..., 1]
+    def section_strain(self) -> SectionStrain:
+        """Strains of the section at every node of every notch."""
+        strain, memory = in_space(self.at.flexure.strain), self.solved.memory.material
+        of_section = partial(section_strain, self.chain.law)
+        return jax.vmap(jax.vmap(of_section))(strain, self.chain.rods.section, memory)
 
     @cached_property
     def stored_energy_density(self) -> tuple[Float[Array, "n nodes"], Flattening]:
@@ -115,25 +120,6 @@ class SolvedState:
         )
 
 
-def bending_angle(
-    notch_frame: Float[Array, "n 3 3"],
-    notch_angle: Float[Array, "*s n"],
-    tip_rotation: Float[Array, "*s 3 3"],
-) -> Float[Array, "*s"]:
-    """Compute the bending angle of a whole robot, rad.
-
-    Where all notches bend in one plane, the sum of their angles, toward the first one's bend
-    positive; otherwise the angle between the axes of base and tip.
-    """
-    along = notch_frame[:, :, 0] @ notch_frame[0, :, 0]
-    in_plane = jnp.all(jnp.abs(jnp.abs(along) - 1.0) <= _IN_PLANE)
-    across = tip_rotation[..., 0, 2] ** 2 + tip_rotation[..., 1, 2] ** 2
-    straight = across == 0.0  # where the angle has a kink, and no derivative
-    sine = jnp.where(straight, 0.0, jnp.sqrt(jnp.where(straight, 1.0, across)))
-    between = jnp.arctan2(sine, tip_rotation[..., 2, 2])
-    return jnp.where(in_plane, notch_angle @ jnp.sign(along), between)
-
-
 def notch_contact(
     chain: Chain, unknowns: Unknowns, at: Evaluation
 ) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
@@ -143,10 +129,12 @@ def notch_contact(
     for group, own, contact in zip(
         chain.contact_pairs, unknowns.contact_force, at.contacts, strict=True
     ):
-        force = force + jnp.sum(own * group.has_contact, axis=-1)
-        gap = jnp.minimum(
-            gap, jnp.min(jnp.where(group.has_contact > 0.0, contact.gap, jnp.inf), axis=-1)
-        )
+        force = force + jnp.sum(own, axis=-1)
+        # Gaps of contacts that touch are rounding errors.
+        touches = is_active(chain, group, own, contact.gap) | (contact.gap <= 0.0)
+        left = jnp.where(touches, 0.0, contact.gap)
+        left = jnp.where(group.has_contact > 0.0, left, jnp.inf)
+        gap = jnp.minimum(gap, jnp.min(left, axis=-1))
     return force, jnp.where(jnp.isinf(gap), jnp.nan, gap)
 
 
@@ -221,3 +209,76 @@ def along_contacts(
 ) -> Float[Array, "t contacts"]:
     """Return the values at the contacts of each tendon, base to tip; NaN beyond its end."""
     return along_edges(chain, exit_value, entry_value)[:, :-1]
+
+
+# Smaller moments do not count, as a fraction of the largest stiffness of a mode (per rad).
+_MIN_RELATIVE_MOMENT = 1e-12
+
+
+def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, ""]:
+    """Return the largest imbalance of bending moment at any node, over the largest moment."""
+    # Bending about x and y in space, about y in the plane.
+    bending = np.array([0, 1]) if chain.frame is None else np.array([0])
+    internal = at.flexure.resultants[..., bending]
+    required = _along_wall(chain, unknowns, at)
+    if at.wrenches is not None:
+        required = required + jax.vmap(_required)(
+            chain.rods, unknowns.modes, at.flexure, at.wrenches.resultant
+        )
+    real = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
+    has_length = (real[:, None] & (chain.rods.length > 0.0))[..., None]
+    carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
+    error = jnp.max(jnp.abs(internal - required[..., bending]) * has_length * carried)
+    largest = jnp.max(jnp.abs(required[..., bending]) * has_length)
+    # Smaller moments are rounding errors.
+    bends = largest > _MIN_RELATIVE_MOMENT * jnp.max(chain.stiffness)
+    return jnp.where(bends, error / jnp.where(bends, largest, 1.0), 0.0)
+
+
+def _required(
+    rod: Rod, modes: Float[Array, " modes"], flexure: FlexureState, wrench: Float[Array, " w"]
+) -> Float[Array, "nodes w"]:
+    """Compute the wrench on all bodies beyond each node, about the node, in its section's axes."""
+    assert flexure.pose is not None  # wrenches act on bodies
+    assert flexure.configuration is not None
+    body, nodes = flexure.pose, node_poses(rod, modes, flexure.configuration)
+    if rod.linear_kinematics is not None:
+        # Moments of a linear beam are taken on the free shape, under forces in the body's frame.
+        is_small = rod.linear_kinematics > 0.0
+        shapes = (body, nodes), (_about_free_end(rod, modes), _free_nodes(rod))
+        body, nodes = jax.tree.map(lambda large, small: jnp.where(is_small, small, large), *shapes)
+
+    def at_node(node: Motion) -> Array:
+        across = node.rotation.T @ body.rotation
+        offset = (body.translation - node.translation) @ node.rotation
+        return Motion(across, offset).wrench(wrench)
+
+    return jax.vmap(at_node)(nodes)
+
+
+def _about_free_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
+    """Compute the pose of the distal body, rotated by the modes but not displaced."""
+    end = Motion(rod_end(rod, modes).rotation, rod.curve_offset)
+    start = Motion(rod.start_rotation, rod.start_offset)
+    return start.then(end).then(Motion(rod.end_rotation, rod.end_offset))
+
+
+def _free_nodes(rod: Rod) -> Motion:
+    """Compute the section poses at the nodes of the free rod, in the proximal frame."""
+    start = Motion(rod.start_rotation, rod.start_offset)
+    return jax.vmap(start.then)(Motion(rod.node_rotation, rod.node_offset))
+
+
+def _along_wall(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, "n nodes w"]:
+    """Compute the resultants required by tendons and contacts that act along the wall."""
+    acting = jnp.zeros((chain.flexures, chain.rods.basis.shape[-2]))
+    for group, span in zip(chain.groups, at.spans, strict=True):
+        if group.fibre is not None:
+            weights = of_rod(chain.rods, fibre_stretch(group.fibre))
+            acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
+    for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
+        fibre = group.fibre(chain.rods)
+        if fibre is not None:
+            weights = of_rod(chain.rods, fibre_stretch(fibre))
+            acting = acting + (force * group.has_contact) * weights
+    return jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)

@@ -28,7 +28,7 @@ from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual, command_slopes
 from notchflex.solver.element import Iterate, Memory
 from notchflex.solver.linear_step.linearisation import linearise
-from notchflex.solver.linear_step.row_layout import RowLayout, row_layout
+from notchflex.solver.linear_step.rows import RowLayout, row_layout
 from notchflex.solver.residual import BaseReaction, Evaluation
 
 # Slopes of a stroke below the second count as zero; the first is added to their pivots.

@@ -23,7 +23,7 @@ from typing import NamedTuple
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
-from notchflex.loads.applied import BodyLoads
+from notchflex.loads.command import BodyLoads
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import geometric_stiffness, material_tangent
 from notchflex.solver.element import (
@@ -34,12 +34,12 @@ from notchflex.solver.element import (
     notch_heights,
     trial_log_ratio,
 )
-from notchflex.solver.linear_step.row_layout import RowLayout
-from notchflex.solver.linear_step.tendon_jacobian import (
+from notchflex.solver.linear_step.rows import (
+    RowLayout,
     StateJacobians,
     state_jacobians,
+    wrench_rows,
 )
-from notchflex.solver.linear_step.wrench_rows import wrench_rows
 from notchflex.solver.residual import Evaluation
 from notchflex.solver.tendon_spans import slip_mask
 
@@ -167,9 +167,7 @@ def _contact_rows(jacobians: StateJacobians) -> list[Array]:
         jacobians.contacts,
         strict=True,
     ):
-        active = is_active(chain.contact_stiffness, group.has_contact, force, response.gap)[
-            ..., None
-        ]
+        active = is_active(chain, group, force, response.gap)[..., None]
         closing = jacobians.unit.spread(contact.gap)
         if chain.contact_flexibility is not None:
             closing = closing + chain.contact_flexibility[:, None, None] * unit_force[None]
@@ -181,7 +179,8 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     """Compute the rows of the friction law at both edges, for the k-th group."""
     chain, span, tendon = jacobians.chain, jacobians.at.spans[k], jacobians.tendons[k]
     log_ratio, group = jacobians.unknowns.log_ratio[k], jacobians.chain.groups[k]
-    crossing, tension_before = span.crossing, span.gap_tension / span.tension_ratio[..., 0]
+    crossing, offset = span.crossing, chain.friction.offset()
+    tension_before = (span.gap_tension + offset) / span.tension_ratio[..., 0] - offset
     turning, tension = (
         (crossing.exit_turning, crossing.entry_turning),
         (tension_before, span.gap_tension),

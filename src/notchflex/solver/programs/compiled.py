@@ -7,7 +7,9 @@
 from __future__ import annotations
 
 import json
+import os
 import threading
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial, update_wrapper
@@ -17,8 +19,50 @@ import numpy as np
 
 from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code, target
 from notchflex._jax import jax, jit, jnp
+from notchflex.errors import InputError
 from notchflex.solver.programs import shipped, store
-from notchflex.solver.programs.backend import backend, optimisation_level, warn_of_xla
+
+BACKEND = "NOTCHFLEX_BACKEND"
+"""Environment variable: `native` (lanewise, the default) or `xla` compiles the programs."""
+
+_COMPILERS = ("native", "xla")
+_warned: set[str] = set()
+
+
+def backend() -> str:
+    """Return the compiler of programs, "native" or "xla".
+
+    Raises:
+        InputError: `NOTCHFLEX_BACKEND` has another value.
+    """
+    value = os.environ.get(BACKEND) or _COMPILERS[0]
+    if value not in _COMPILERS:
+        raise InputError.UNKNOWN_NAME(
+            f"the environment variable {BACKEND} is {value!r}; allowed are "
+            f"{', '.join(_COMPILERS)}. Set it to one of them, or unset it for {_COMPILERS[0]!r}."
+        )
+    return value
+
+
+def warn_of_xla(function: str, error: UnsupportedPrimitiveError, stacklevel: int = 2) -> None:
+    """Warn once for each unsupported primitive that XLA compiles a function.
+
+    Args:
+        function: Name of the function.
+        error: What lanewise does not support.
+        stacklevel: Callers between the warning and the code that it should name.
+    """
+    reason = error.primitive or str(error)
+    if reason in _warned:
+        return
+    _warned.add(reason)
+    warnings.warn(
+        f"XLA compiles {function}, which makes it some ten times slower: lanewise does not support "
+        f"{error}",
+        RuntimeWarning,
+        stacklevel=stacklevel + 1,
+    )
+
 
 # Batch sizes of XLA's programs; larger batches are split, smaller ones padded.
 _BATCH_SIZES = (64, 256, 1024)
@@ -192,8 +236,7 @@ class Native:
         if backend() == "xla":
             return None
         key = repr((self._name, how, by_row, shapes, others))
-        level = optimisation_level()
-        on_processor = f"{key} {target()} {level}"
+        on_processor = f"{key} {target()}"
         content = store.read(on_processor)
         if content is None:
             text = shipped.read(key) or self._trace(key, how, by_row, shapes, others)
@@ -201,6 +244,8 @@ class Native:
                 return None
             Native.compiled += 1
             head, body = _parts(text)
+            # A program that is recorded for a wheel runs once.
+            level = 0 if shipped.recording() else 2
             content = _content(head, machine_code(body.decode(), level))
             store.write(on_processor, content)
         return CompiledFunction(content)
@@ -265,6 +310,3 @@ def native(
 ) -> Callable[[Callable[..., Any]], Native]:
     """Decorate a function to be compiled; see `Native`."""
     return lambda function: Native(function, vectors, lanes)
-
-
-__all__ = ["CompiledFunction", "Native", "native"]

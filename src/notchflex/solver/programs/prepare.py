@@ -13,12 +13,16 @@ from jaxtyping import Float, Int
 
 from notchflex._jax import constant, jax
 from notchflex.loads.command import Command
+from notchflex.loads.plausibility import usual_loads
 from notchflex.mechanics.chain import Chain, assemble, padded
 from notchflex.robot import Robot
-from notchflex.solver.derived.reported import Shape
-from notchflex.solver.programs.capacity import capacity, pad_rows
-from notchflex.solver.programs.pytree_layout import PytreeLayout
-from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.derived.quantities import Shape
+from notchflex.solver.programs.static_structure import (
+    PytreeLayout,
+    StaticStructure,
+    capacity,
+    pad_rows,
+)
 from notchflex.solver.solver_state import SolverState, at_rest, unloaded
 
 
@@ -45,7 +49,7 @@ class PreparedChain:
     @cached_property
     def static_structure(self) -> StaticStructure:
         """Numbers of the chain that are compiled in, and the layout of the others."""
-        return StaticStructure.of(self.chain_layout, [self.chain], self.vector[None])
+        return StaticStructure.of(self.chain, self.chain_layout, self.vector)
 
     @cached_property
     def dynamic_vector(self) -> Float[np.ndarray, " dynamic"]:
@@ -123,6 +127,11 @@ class PreparedChain:
         """Layout of the shape of a state."""
         return Shape.form(self.chain.flexures, self.chain.tendons)
 
+    @cached_property
+    def usual_loads(self) -> dict[str, tuple[float, str]]:
+        """The largest usual size of each kind of load, and its unit."""
+        return usual_loads(self.chain)
+
     def command_layout(self, commands: Command) -> PytreeLayout:
         """Return the layout of one load: tensions alone, or some strokes."""
         return self._stroke_layout if commands.by_stroke is not None else self._tension_layout
@@ -175,11 +184,3 @@ def prepare(
     return PreparedChain(
         assemble(robot, level, loaded=loaded, follows=follows, refinement=refinement, flat=flat)
     )
-
-
-def pad_prepared(ready: PreparedChain, flexures: int, edges: int) -> PreparedChain:
-    """Pad a robot to the size of longer ones; for the arguments see `chain.padded`."""
-    chain = ready.chain
-    if (chain.flexures, chain.contacts.shape[1]) == (flexures, edges):
-        return ready
-    return PreparedChain(padded(chain, flexures, edges))

@@ -19,14 +19,20 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
 from notchflex.solver.derived.limit_points import snapped_notches
-from notchflex.solver.derived.reported import Shape, quantities, shape, unpad_quantity
+from notchflex.solver.derived.quantities import Shape, quantities, shape, unpad_quantity
+from notchflex.solver.derived.solved_state import notch_contact
 from notchflex.solver.held_stiffness import stability, stable
 from notchflex.solver.newton import Settings
-from notchflex.solver.programs.capacity import pad_rows, padded_indices
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
-from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.programs.static_structure import (
+    PytreeLayout,
+    StaticStructure,
+    lane_sizes,
+    pad_rows,
+    padded_indices,
+)
+from notchflex.solver.residual import evaluate
 from notchflex.solver.solver_state import SolverState
 
 # Columns behind the two states and the shape, see `_status`.
@@ -77,10 +83,15 @@ class SolverRun:
         self._prepared, self.first, self.table = prepared, first, table
         self.from_start = from_start
 
-    def only(self, row: int) -> SolverRun:
-        """Return one of the loads alone; all of them began at the same state."""
-        rows = slice(row, row + 1)
-        return SolverRun(self._prepared, self.first, self.table[rows], self.from_start[rows])
+    def rows(self, some: slice) -> SolverRun:
+        """Return some of the loads, each with the state that it was solved from."""
+        # Rows of loads that were not tried are empty: they repeat the last that was.
+        last = np.maximum.accumulate(np.where(self.tried, np.arange(len(self.table)), 0))
+        table, before = self.table[last[some]], self.states_before[some]
+        table[:, -_STATUS:] = self.table[some, -_STATUS:]
+        run = SolverRun(self._prepared, before[0], table, self.from_start[some])
+        run.states_before = before
+        return run
 
     @cached_property
     def states(self) -> Float[np.ndarray, "s state"]:
@@ -272,3 +283,44 @@ def _snapped(
     """Find the notches that snapped between two states."""
     states = (state_layout.unpack(state) for state in (before, after))
     return carried, snapped_notches(chain_layout.unpack(vector), *states)
+
+
+def solve_contacts(
+    prepared: PreparedChain, commands: Command, start: SolverState, settings: Settings
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find contact forces (N) and gaps (mm) of all notches, each load from the same state.
+
+    A small program beside `run`, for searches that ask only whether the notches are closed.
+
+    Returns:
+        Contact forces and gaps, loads by notches, and which loads converged.
+    """
+    long = prepared.long
+    packed, form = prepared.padded_commands(commands)
+    before = pad_rows(np.asarray(prepared.state.pack(start)), prepared.state, long.state)
+    vectors = (np.zeros(1), long.dynamic_vector, packed, before, np.array(settings.numbers))
+    force, gap, converged = _solve_contacts.along(
+        (False, False, True, False, False), *vectors, long.static_structure, form, long.state
+    )
+    own = prepared.chain.flexures
+    return force[:, :own], gap[:, :own], converged
+
+
+@native(5, lane_sizes)
+def _solve_contacts(
+    carried: Float[Array, " one"],
+    vector: Float[Array, " chain"],
+    load: Float[Array, " command"],
+    start: Float[Array, " state"],
+    numbers: Float[Array, " settings"],
+    chain_layout: StaticStructure,
+    command_layout: PytreeLayout,
+    state_layout: PytreeLayout,
+) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Compute contact forces and gaps of one load, and whether it converged."""
+    chain, settings = chain_layout.unpack(vector), Settings.of(numbers)
+    command, last = command_layout.unpack(load), state_layout.unpack(start)
+    result = solve_load_step(chain, command, last, settings)
+    point, memory, _, applied = result.solved
+    at = evaluate(chain, point, memory, applied)
+    return carried, (*notch_contact(chain, point.unknowns, at), result.converged)

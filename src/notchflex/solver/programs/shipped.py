@@ -28,10 +28,15 @@ def read(key: str) -> bytes | None:
         return None
 
 
+def recording() -> bool:
+    """Return whether a wheel is being built."""
+    return bool(os.environ.get(RECORD))
+
+
 def record(key: str, content: bytes) -> None:
     """Record content under a key while a wheel is built."""
-    folder = os.environ.get(RECORD)
-    if folder:
+    if recording():
+        folder = os.environ[RECORD]
         (Path(folder) / _name(key)).write_bytes(lzma.compress(content, preset=2))
 
 
@@ -43,6 +48,3 @@ def count() -> int:
 def _name(key: str) -> str:
     digest = hashlib.sha256(f"{store.code_digest()} {key}".encode())
     return f"{digest.hexdigest()[:32]}.xz"
-
-
-__all__ = ["FOLDER", "RECORD", "count", "read", "record"]

@@ -1,21 +1,104 @@
-"""Structural constants of a chain, folded into its program when it is compiled.
+"""Layout of a chain as one vector: its arrays, padding, and constants folded into programs.
+
+A chain has some sixty arrays. Passing them one by one takes longer than solving a small robot; one
+vector costs nothing, and a batch of robots is a table of vectors.
 
 A linear step contains mostly zeros, as do the arrays of a rod, whose modes each bend, twist, shear
 or stretch it. A program in which these zeros are constants omits the products with them. A chain
 with other numbers there needs another program.
+
+A program serves all chains of up to its number of flexures; a shorter chain is padded with inert
+flexures. With the base body they fill the processor's vectors: within a vector the added flexures
+cost nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
+from lanewise import WIDTH
 from notchflex._jax import array_module, jax
 from notchflex.mechanics.chain import Chain, structural
-from notchflex.solver.programs.pytree_layout import PytreeLayout, as_kind
+
+
+class PytreeLayout:
+    """Layout of a tree of arrays in a vector of floats, leaf after leaf.
+
+    Layouts are cached: trees of the same structure share one object, so that compiled programs
+    distinguish them by identity.
+    """
+
+    _known: ClassVar[dict[Any, PytreeLayout]] = {}
+
+    def __init__(self, structure: Any, shapes: tuple[Any, ...], kinds: tuple[str, ...]) -> None:
+        """Lay out leaves of these shapes and kinds of numbers."""
+        self.structure, self.shapes, self.kinds = structure, shapes, kinds
+        self._ends = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes)]).tolist()
+        self.size: int = self._ends[-1]
+
+    @cached_property
+    def indices(self) -> list[np.ndarray]:
+        """Indices of the numbers of every leaf in a vector, in the shape of the leaf."""
+        parts = np.split(np.arange(self.size), self._ends[1:-1])
+        return [part.reshape(shape) for part, shape in zip(parts, self.shapes, strict=True)]
+
+    def __repr__(self) -> str:
+        """Return the full content: the key of stored programs."""
+        return f"PytreeLayout({self.structure}, {self.shapes}, {self.kinds})"
+
+    @classmethod
+    def of(cls, tree: Any) -> PytreeLayout:
+        """Return the layout of a tree."""
+        leaves, structure = jax.tree.flatten(tree)
+        shapes = tuple(np.shape(leaf) for leaf in leaves)
+        kinds = tuple(np.dtype(leaf.dtype).kind for leaf in leaves)
+        key = (structure, shapes, kinds)
+        if key not in cls._known:
+            cls._known[key] = cls(*key)
+        return cls._known[key]
+
+    def pack(self, tree: Any, leading: int = 0) -> Any:
+        """Return the leaves of a tree as one vector, with a number of leading axes.
+
+        It is a NumPy vector where all leaves are NumPy arrays.
+        """
+        leaves = self.structure.flatten_up_to(tree)
+        xp = array_module(*leaves)
+        arrays = [xp.asarray(leaf) for leaf in leaves]
+        flat = [array.reshape(*array.shape[:leading], -1) for array in arrays]
+        if len(flat) == 1 and flat[0].dtype == float:
+            return flat[0]
+        return xp.concatenate(flat, axis=-1, dtype=float)
+
+    def unpack(self, vector: Any) -> Any:
+        """Return the tree of a vector (NumPy or JAX), with the vector's leading axes."""
+        leaves = [self.leaf(vector, number) for number in range(len(self.shapes))]
+        return jax.tree.unflatten(self.structure, leaves)
+
+    def leaf(self, vector: Any, number: int) -> Any:
+        """Return one leaf of the tree of a vector, by its number."""
+        part = vector[..., self._ends[number] : self._ends[number + 1]]
+        shape = (*vector.shape[:-1], *self.shapes[number])
+        return as_kind(part.reshape(shape), self.kinds[number])
+
+
+def lane_sizes(chain_layout: PytreeLayout, *_others: Any) -> tuple[int, int]:
+    """Return the sizes of the axes that run along the chain: its flexures, and its bodies."""
+    one = jax.ShapeDtypeStruct((chain_layout.size,), float)
+    chain = jax.eval_shape(chain_layout.unpack, one)
+    return chain.flexures, chain.flexures + 1
+
+
+def as_kind(values: Array, kind: str) -> Array:
+    """Return floats as numbers of a kind of NumPy's."""
+    if kind == "b":
+        return values != 0.0
+    return values.astype(int) if kind in "iu" else values
+
 
 # Padding at the end of the vector, so that programs may read whole SIMD vectors up to its end.
 _PADDING = 8
@@ -28,14 +111,15 @@ class StaticStructure:
     (`mechanics/chain/structure.py`), and whole numbers and flags that are the same at every
     flexure. The others are laid out flexure after flexure, as programs read them.
 
-    Structures are cached, like those of `PytreeLayout`.
+    The structure depends on the chain alone, so a chain has the same program whatever was solved
+    before, and in whatever batch.
 
     Attributes:
         form: Layout of the whole chain.
         size: Numbers in a vector.
     """
 
-    _structures: ClassVar[dict[PytreeLayout, list[StaticStructure]]] = {}
+    _structures: ClassVar[dict[tuple[PytreeLayout, bytes, bytes], StaticStructure]] = {}
 
     def __init__(
         self,
@@ -45,7 +129,7 @@ class StaticStructure:
         numbers: Float[np.ndarray, " chain"],
     ) -> None:
         """Store which numbers of a whole chain are constants, and those numbers."""
-        self.form, self._constant, self._numbers = form, constant, np.where(constant, numbers, 0.0)
+        self.form, self._constant, self._numbers = form, constant, numbers
         rows = [_by_flexure(indices, flexures) for indices in form.indices]
         order = np.concatenate([row.T.ravel() for row in rows])
         self._taken: Int[np.ndarray, " dynamic"] = order[~constant[order]]
@@ -60,37 +144,29 @@ class StaticStructure:
 
     @classmethod
     def of(
-        cls, form: PytreeLayout, chains: Sequence[Chain], numbers: Float[np.ndarray, "k chain"]
+        cls, chain: Chain, form: PytreeLayout, numbers: Float[np.ndarray, " chain"]
     ) -> StaticStructure:
-        """Return a structure that fits some chains, a cached one if possible.
-
-        A new structure has only constants that the cached ones share, so it fits their chains as
-        well: robots that differ a little soon share a program.
+        """Return the structure of a chain; chains with equal structures share one object.
 
         Args:
-            form: Layout of the whole chains.
-            chains: The chains.
-            numbers: The chains, packed whole.
+            chain: The chain.
+            form: Its layout, whole.
+            numbers: The chain, packed whole.
         """
-        others = cls._structures.setdefault(form, [])
-        fitting = [one for one in others if one._fits(numbers)]
-        if not fitting:
-            flexures = chains[0].flexures
-            constant = form.pack(structural(chains[0])) > 0.0
-            for indices, kind in zip(form.indices, form.kinds, strict=True):
-                rows = _by_flexure(indices, flexures)
-                constant[rows] &= _same(numbers[:, rows], kind)
-            for one in others:
-                constant &= one._constant & (one._numbers == numbers[0])
-            if others:
-                for indices, kind in zip(form.indices, form.kinds, strict=True):
-                    if kind != "f":  # integer tables that differ are constant nowhere
-                        constant[indices] = constant[indices].all()
-            fitting = [cls(form, flexures, constant, numbers[0])]
-            others += fitting
-        return min(fitting, key=lambda one: one.size)
+        constant = form.pack(structural(chain)) > 0.0
+        for indices, kind in zip(form.indices, form.kinds, strict=True):
+            rows = _by_flexure(indices, chain.flexures)
+            constant[rows] &= _same(numbers[rows], kind)
+            if kind != "f":  # so few structures: a table of whole numbers is constant as a whole
+                constant[indices] = constant[indices].all()
+        kept = np.where(constant, numbers, 0.0)
+        key = (form, constant.tobytes(), kept.tobytes())
+        if key not in cls._structures:
+            cls._structures[key] = cls(form, chain.flexures, constant, kept)
+        return cls._structures[key]
 
-    def _fits(self, numbers: Float[np.ndarray, "k chain"]) -> bool:
+    def fits(self, numbers: Float[np.ndarray, "k chain"]) -> bool:
+        """Return whether packed chains have the constants of this structure."""
         return bool((numbers[:, self._constant] == self._numbers[self._constant]).all())
 
     def pack(self, numbers: Any) -> Any:
@@ -119,10 +195,10 @@ class StaticStructure:
         return xp.where(constant, self._numbers[indices], values) if constant.any() else values
 
 
-def _same(values: Float[np.ndarray, "k rows columns"], kind: str) -> Bool[np.ndarray, " columns"]:
-    """Return which numbers are equal at every flexure of every chain; for floats, which are 0."""
-    same = (values == values[:1, :1]).all(axis=(0, 1))
-    return same & (values[0, 0] == 0.0) if kind == "f" else same
+def _same(values: Float[np.ndarray, "rows columns"], kind: str) -> Bool[np.ndarray, " columns"]:
+    """Return which numbers are equal at every flexure; for floats, which are 0."""
+    same = (values == values[:1]).all(axis=0)
+    return same & (values[0] == 0.0) if kind == "f" else same
 
 
 def _by_flexure(indices: np.ndarray, flexures: int) -> np.ndarray:
@@ -131,4 +207,46 @@ def _by_flexure(indices: np.ndarray, flexures: int) -> np.ndarray:
     return indices.reshape(len(indices) if along else 1, -1)
 
 
-__all__ = ["StaticStructure"]
+# Above a number of bodies (left), numbers of bodies are multiples of the right number.
+_STEPS = ((0, WIDTH), (2 * WIDTH, 2 * WIDTH), (16 * WIDTH, 4 * WIDTH), (32 * WIDTH, 8 * WIDTH))
+
+
+def capacity(flexures: int) -> int:
+    """Return the number of flexures that a program for some flexures is compiled for.
+
+    Args:
+        flexures: Number of flexures of the chain.
+
+    Example:
+        >>> [capacity(flexures) for flexures in (1, 5, 8, 27, 40, 100)]
+        [7, 7, 15, 31, 47, 111]
+    """
+    bodies = flexures + 1
+    step = max(multiple for start, multiple in _STEPS if bodies > start)
+    return -(-bodies // step) * step - 1
+
+
+@lru_cache(maxsize=256)
+def padded_indices(own: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, " own"]:
+    """Return where the numbers of a layout are in that of a longer chain.
+
+    Args:
+        own: A layout of arrays with flexures or bodies as leading axis.
+        long: The same of a chain with more flexures beyond the tip.
+    """
+    indices = [
+        padded[tuple(slice(size) for size in part.shape)].ravel()
+        for part, padded in zip(own.indices, long.indices, strict=True)
+    ]
+    return np.concatenate([np.zeros(0, int), *indices])
+
+
+def pad_rows(
+    rows: Float[np.ndarray, "*s own"], own: PytreeLayout, long: PytreeLayout
+) -> Float[np.ndarray, "*s long"]:
+    """Return rows of a layout as those of a longer chain, 0 for the flexures added."""
+    if own is long:
+        return rows
+    padded = np.zeros((*rows.shape[:-1], long.size))
+    padded[..., padded_indices(own, long)] = rows
+    return padded

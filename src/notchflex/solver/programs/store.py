@@ -250,7 +250,3 @@ def _machine() -> str:
     except OSError:
         pass
     return hashlib.sha256("\n".join(facts).encode()).hexdigest()[:12]
-
-
-__all__ = ["MAX_BYTES", "PACKAGE", "VARIABLE", "Usage", "chosen_folder", "clear", "code_digest"]
-__all__ += ["made_from", "program_folder", "read", "usage", "write"]

@@ -57,6 +57,3 @@ def on_cores(
         for one in begun:
             one.cancel()
         wait(begun)
-
-
-__all__ = ["number_of_cores", "on_cores"]

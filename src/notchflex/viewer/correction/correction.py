@@ -13,9 +13,9 @@ import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.photographs.board.layout import Board
-from notchflex.photographs.board.ruler import Ruler
-from notchflex.photographs.chain.axis_points import straight_chain
+from notchflex.photographs.board.sighting import Ruler
 from notchflex.photographs.chain.chain_table import chain_table
+from notchflex.photographs.chain.outline import straight_chain
 from notchflex.photographs.judging import UNCERTAINTY
 from notchflex.photographs.measure import (
     checked_uncertainty,
@@ -26,7 +26,7 @@ from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotograp
 from notchflex.photographs.reading import read_photograph
 from notchflex.viewer.correction.picture_plane import PicturePlane
 from notchflex.viewer.page.readout import notice
-from notchflex.viewer.server import HOST, PORT, bracketed, check_host, check_installed, serve
+from notchflex.viewer.server import HOST, PORT, check_host, check_installed, serve
 from notchflex.viewer.tasks import Tasks
 
 LEFT_OUT = "left out by hand"
@@ -75,7 +75,7 @@ class Correction:
         self._table = chain_table(measured.robot)
         self._tasks = Tasks()
         self._dragged, self.message = False, ""
-        self.server = serve(host, port)
+        self.server, self.address = serve(host, port)
         gui = self.server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
         gui.set_panel_label(measured.robot.name)
@@ -90,11 +90,6 @@ class Correction:
         self._look.on_click(lambda _: self._ask(self.look))
         gui.add_html(f"<p style='margin: 0 1em; font-size: 12px'>{_HELP}</p>")
         self._show()
-
-    @property
-    def address(self) -> str:
-        """The address for a browser."""
-        return f"http://{bracketed(self.server.get_host())}:{self.server.get_port()}"
 
     @property
     def done(self) -> bool:

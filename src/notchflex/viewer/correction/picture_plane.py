@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from notchflex.photographs.measured import MeasuredPhotograph
 from notchflex.photographs.overlay import LONGEST
-from notchflex.viewer.scene.camera import CameraPose, framed
+from notchflex.viewer.scene.scene import CameraPose, framed
 
 Numbers = NDArray[np.float64]
 

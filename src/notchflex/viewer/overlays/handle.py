@@ -42,10 +42,14 @@ class TipHandle:
 
     def update(self, tip: Float[np.ndarray, " 3"], shown: bool) -> None:
         """Show or hide it, and move it to the tip unless it is dragged."""
-        if self._node.visible != shown:
-            self._node.visible = shown
+        self.show(shown)
         if shown and not self._dragged and not np.array_equal(self._node.position, tip):
             self._node.position = tip
+
+    def show(self, shown: bool) -> None:
+        """Show or hide it."""
+        if self._node.visible != shown:
+            self._node.visible = shown
 
     def remove(self) -> None:
         """Remove it."""

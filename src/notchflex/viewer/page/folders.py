@@ -2,18 +2,137 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from notchflex.errors import InputError
 from notchflex.robot import Robot, list_robots, load_robot, robot_from_text
-from notchflex.viewer import parts
 from notchflex.viewer.controls import POINTING, STROKE, TENSION, Controls
 from notchflex.viewer.page import saving
-from notchflex.viewer.page.sliders import Dropdown, NumberField, Slider, add_button
+from notchflex.viewer.session import kinds, numbers
+from notchflex.viewer.tasks import PAUSE, Task
 
 if TYPE_CHECKING:
     from notchflex.viewer.viewer import Viewer
+
+
+_FINE = 200  # steps of a slider from end to end
+_JUMP = 0.03  # a larger part of the slider at once was typed or clicked, not dragged
+_DIGITS = 3  # of the smallest step that a field shows, at least
+
+
+class NumberField:
+    """A field of viser (`handle`); `act` gets a typed number in the solver thread, after a pause.
+
+    The event loop receives what a person sets, the solver thread shows the current value. A value
+    from the page is therefore first queued and then noted as shown: `put`, which reads in the
+    opposite order, cannot overwrite a number while it is being typed. viser's own `handle.value`
+    changes earlier than that, so it is not compared.
+    """
+
+    def __init__(
+        self, viewer: Viewer, handle: Any, key: tuple[str, str], act: Callable[[float], None]
+    ) -> None:
+        self._viewer, self._handle, self._key, self._act = viewer, handle, key, act
+        self._shown = float(handle.value)
+
+        @handle.on_update
+        async def _(event: Any) -> None:
+            if event.client is not None:
+                self._changed(float(handle.value))
+
+    def _changed(self, value: float) -> None:
+        self._send(value, PAUSE)
+
+    def _send(self, value: float, pause: float, now: Task | None = None) -> None:
+        self._viewer.tasks.add(lambda: self._act(value), self._key, pause, now)
+        self._shown = value
+
+    def put(self, value: float) -> None:
+        """Show a number, unless one from the page waits."""
+        shown = self._shown
+        if not self._viewer.tasks.has(self._key) and abs(shown - value) > 1e-9:
+            self._handle.value = self._shown = float(value)
+
+    def show(self, visible: bool) -> None:
+        """Show or hide it."""
+        self._handle.visible = visible
+
+
+class Slider(NumberField):
+    """A slider for one of the `Controls.numbers`, always in the unit of its label."""
+
+    def __init__(
+        self,
+        viewer: Viewer,
+        number: int,
+        label: str,
+        ends: tuple[float, float],
+        act: Callable[[float], None],
+    ) -> None:
+        self._number, (low, high) = number, ends
+        handle = viewer.server.gui.add_slider(label, low, high, (high - low) / _FINE, 0.0)
+        super().__init__(viewer, handle, ("slider", label), act)
+        self._divide()
+
+    def _divide(self) -> None:
+        """Set steps, and decimals that resolve them."""
+        low, high = self._handle.min, self._handle.max
+        self._handle.step = (high - low) / _FINE
+        self._handle.precision = max(4, _DIGITS - math.floor(math.log10(high)))
+
+    def _changed(self, value: float) -> None:
+        low, high = float(self._handle.min), float(self._handle.max)
+        before = self._shown
+        if value == min(max(before, low), high) != before:
+            self._shown = value
+            return  # when it is left, the page itself resets what was typed beyond an end
+        jump = abs(value - before) > _JUMP * (high - low)
+        if not jump:
+            self._send(value, 0.0)
+        else:  # the robot holds at once, though the new value may still be typed
+            self._send(value, PAUSE, lambda: self._viewer.targets.hold(self._number))
+
+    def stretch(self, ends: tuple[float, float]) -> None:
+        """Change its ends."""
+        if (self._handle.min, self._handle.max) != ends:
+            self._handle.min, self._handle.max = ends
+            self._divide()
+
+    def put(self, value: float) -> None:
+        """Show a value within its ends, unless one from the page waits."""
+        super().put(min(max(float(value), float(self._handle.min)), float(self._handle.max)))
+
+
+class Dropdown:
+    """A drop-down list; `act` gets what a person selects of it, in the event loop."""
+
+    def __init__(
+        self, gui: Any, label: str, options: tuple[str, ...], act: Callable[[str], None],
+        value: str | None = None, **more: Any,
+    ) -> None:  # fmt: skip
+        self.handle = gui.add_dropdown(label, options, initial_value=value, **more)
+
+        @self.handle.on_update
+        async def _(event: Any) -> None:
+            value = str(self.handle.value)
+            if event.client is not None and value in self.handle.options:
+                act(value)
+
+    def put(self, value: str) -> None:
+        """Show a selection."""
+        if self.handle.value != value:
+            self.handle.value = value
+
+
+def add_button(gui: Any, label: str, act: Callable[[Any], None], hint: str | None = None) -> None:
+    """Add a button; `act` is called with the browser's handle, in the event loop."""
+
+    @gui.add_button(label, hint=hint).on_click
+    async def _(event: Any) -> None:
+        act(event.client)
+
 
 _BY = {TENSION: "tension [N]", STROKE: "stroke [mm]"}
 _AT_TIP = ("force x [N]", "force y [N]", "force z [N]", "hung weight [g]")
@@ -167,8 +286,8 @@ class PartControls:
             section.capitalize(), order=order, expand_by_default=section == "friction"
         )
         with self.folder:
-            kinds, kind = tuple(parts.kinds(section)), getattr(robot, section).kind
-            self.kind = Dropdown(gui, "law", kinds, self._choose, kind)
+            laws, kind = tuple(kinds(section)), getattr(robot, section).kind
+            self.kind = Dropdown(gui, "law", laws, self._choose, kind)
         self.follow(robot)
 
     def _choose(self, kind: str) -> None:
@@ -188,14 +307,14 @@ class PartControls:
         if not self._viewer.tasks.has(self._key):
             self.kind.put(getattr(robot, self._section).kind)
         with self.folder:
-            numbers = {number.key: number for number in parts.numbers(robot, self._section)}
-            for key, number in numbers.items():
+            shown = {number.key: number for number in numbers(robot, self._section)}
+            for key, number in shown.items():
                 if key not in self._fields:
                     self._fields[key] = self._field(*number)
         for key, field in self._fields.items():
-            field.show(key in numbers)
-            if key in numbers:
-                field.put(numbers[key].value)
+            field.show(key in shown)
+            if key in shown:
+                field.put(shown[key].value)
 
 
 def add_robot_folders(viewer: Viewer) -> list[Any]:

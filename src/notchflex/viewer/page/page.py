@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from notchflex.viewer import parts
 from notchflex.viewer.page.chart import loop_chart, tendon_chart
 from notchflex.viewer.page.folders import LoadControls, PartControls, add_robot_folders
 from notchflex.viewer.page.readout import legend_html, notice, readout
+from notchflex.viewer.session import SECTIONS
 
 if TYPE_CHECKING:
     from notchflex.viewer.viewer import Viewer
@@ -15,12 +15,13 @@ if TYPE_CHECKING:
 CHARTS_WIDTH, CONTROLS_WIDTH = 280, 290
 
 # viser's messages, such as that there is no graphics card, cover the scene until they are closed.
-# This makes them small, at the lower edge.
+# This makes them small, at the lower edge. Numbers and charts are grey while others are awaited.
 STYLE = """<style>
 .mantine-Notifications-root { top: auto !important; bottom: 0.5em !important; max-width: 16em; }
 .mantine-Notification-root { padding: 2px 6px 2px 16px; }
 .mantine-Notification-title { font-size: 11px; margin: 0; }
 .mantine-Notification-root:not(:hover) .mantine-Notification-description { display: none; }
+body:has([data-waiting]) :is(table, svg[role=img]) { opacity: 0.3; }
 </style>"""
 
 
@@ -57,7 +58,7 @@ class Page:
         self.loads = LoadControls(viewer)
         self.parts = {
             section: PartControls(viewer, section, order)
-            for order, section in enumerate(parts.SECTIONS, start=3)
+            for order, section in enumerate(SECTIONS, start=3)
         }
         folders = [part.folder for part in self.parts.values()]
         self._folders = [*self.loads.folders, *folders, *add_robot_folders(viewer)]

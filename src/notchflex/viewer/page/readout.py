@@ -100,13 +100,15 @@ def fixed(value: float, digits: int) -> str:
 
 
 def notice(text: str, waiting: bool = False) -> str:
-    """Return a sentence as a framed note; an empty one for no sentence."""
+    """Return a sentence as a note over the scene, where no panel scrolls; an empty one for none."""
     if not text:
         return '<div data-name="notice" role="status"></div>'
-    colour, role = (BLUE, "status") if waiting else (VERMILLION, "alert")
+    colour, role = (BLUE, 'status" data-waiting="true') if waiting else (VERMILLION, "alert")
     return (
         f'<div data-name="notice" role="{role}" style="border-left:4px solid {colour};'
-        'padding:4px 8px;margin:4px;font-size:13px;white-space:pre-wrap;overflow-wrap:anywhere">'
+        "position:fixed;top:8px;left:50%;transform:translateX(-50%);max-width:40vw;z-index:100;"
+        "pointer-events:none;background:white;box-shadow:0 1px 6px #0006;"
+        'padding:4px 8px;font-size:13px;white-space:pre-wrap;overflow-wrap:anywhere">'
         f"{escape(text)}</div>"
     )
 

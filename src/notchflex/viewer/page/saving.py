@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from notchflex.errors import InputError
 from notchflex.plotting.renderers.with_matplotlib import draw_panel
-from notchflex.plotting.shapes.applied_loads import applied_loads
+from notchflex.plotting.shapes.panel import applied_loads
 from notchflex.plotting.shapes.robot_shape import shape_at
 from notchflex.plotting.style import house_style
 from notchflex.results.files.csv import write_path_csv
 from notchflex.robot import robot_text
 from notchflex.viewer.page.chart import loop
 from notchflex.viewer.page.readout import BALL, entries, rows, strain_scale
-from notchflex.viewer.scene.camera import quaternions
+from notchflex.viewer.scene.scene import quaternions
 from notchflex.viewer.session import Session
 
 if TYPE_CHECKING:
@@ -68,7 +68,9 @@ def send_picture(client: viser.ClientHandle, viewer: Viewer) -> None:
     height, width = _SHAPE
     toward = client.camera.position - client.camera.look_at
     eye = viewer.scene.picture_eye(toward, _FOV, width / height)
+    handle = viewer.overlays.handle
     try:
+        handle.show(False)
         view = client.get_render(
             height,
             width,
@@ -82,6 +84,8 @@ def send_picture(client: viser.ClientHandle, viewer: Viewer) -> None:
         raise InputError.NO_CONNECTION(
             "the browser sent no picture; bring its window to the front"
         ) from None
+    finally:
+        handle.show(viewer.shown.handle)
     content = picture(viewer.session, view, viewer.page.loads.active)
     _send(client, viewer.session.robot.name, "png", content)
 

@@ -1,27 +1,272 @@
 """The robot in the scene of a browser: solids are sent once and moved from then on.
 
+Cuts go straight through the tube, so a body is its outline from the side, extruded across the tube
+and intersected with the wall, without the flexures across the tube. The surface of a spine is one
+piece of the wall; that of a strip across the tube is two, one on each side of the bore.
+
 All nodes are children of one node with the direction of the tube, in the frame of the base [mm].
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.applied_loads import AppliedLoad, applied_loads
-from notchflex.plotting.shapes.interpolation import rotation_of
-from notchflex.plotting.shapes.robot_shape import HELD, RobotShape, shape_at
+from notchflex.plotting.shapes.outline import body_corners, prism, tube_wall
+from notchflex.plotting.shapes.panel import AppliedLoad, applied_loads
+from notchflex.plotting.shapes.robot_shape import (
+    HELD,
+    FlexureShape,
+    RobotShape,
+    rotation_of,
+    shape_at,
+    shape_from_angles,
+)
 from notchflex.results import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.viewer.controls import GRAVITY, POINTING, ControlRanges, Controls, round_up
-from notchflex.viewer.scene.camera import CameraPose, first_eye, framed, quaternions
 from notchflex.viewer.scene.marks import LOAD, METAL, Marks, Shown, linear, strain_colour
-from notchflex.viewer.scene.solids import PIECES, FlexureSurface, at_rest, body_solids, skins
 
 if TYPE_CHECKING:
     import viser
+    from manifold3d import Manifold
+
+
+Points = NDArray[np.float64]
+Triangles = NDArray[np.int64]
+
+ROUND = 96  # flat sides of the tube
+PIECES = 12  # straight pieces of a bent flexure, at least
+_SPINE = 12  # flat pieces of a spine, as seen along the tube
+_ACROSS = 3  # corners of a strip across its thickness
+_END_MARGIN = 1.0  # extra length of the tube at both ends of a body [mm]
+
+
+def body_solids(rest: RobotShape) -> list[tuple[Points, Triangles]]:
+    """Return the rigid bodies of a robot at rest, base first, each in its own frame.
+
+    Each is a closed surface: vertices [mm], (v, 3), and corners of triangles, counter-clockwise as
+    seen from outside, (f, 3).
+    """
+    return [_body(rest, body) for body in range(len(rest.position))]
+
+
+def _body(rest: RobotShape, body: int) -> tuple[Points, Triangles]:
+    notch = rest.robot.notches[max(body - 1, 0)]
+    view = float(np.radians(notch.direction_deg))
+    corners = np.array(body_corners(rest, body, view))
+    solid = _through(corners, view, rest) ^ _tube(rest, corners[:, 1])
+    spine = np.asarray(rest.chain.rods.has_closure) > 0.0
+    for flexure in (body - 1, body):
+        # A flexure on a spine lies between the bodies; one across the tube overlaps with them.
+        if 0 <= flexure < len(rest.flexures) and not spine[flexure]:
+            one = rest.flexures[flexure]
+            line = np.concatenate([one.fibre(-one.spine), one.fibre(one.near)[::-1]])
+            local = (line - rest.position[body]) @ rest.rotation[body]
+            corners = np.stack([local @ _across(view), local[:, 2]], axis=-1)
+            solid = solid - _through(corners, view, rest)
+    mesh = solid.to_mesh64()
+    return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64)
+
+
+def _across(view: float) -> Points:
+    return np.array([np.cos(view), np.sin(view), 0.0])
+
+
+def _tube(rest: RobotShape, along: Points) -> Manifold:
+    """Return the wall of the tube, longer than the body."""
+    ends = float(along.min()) - _END_MARGIN, float(along.max()) + _END_MARGIN
+    return tube_wall(rest.robot.tube, ends, ROUND)
+
+
+def _through(polygon: Points, view: float, rest: RobotShape) -> Manifold:
+    """Return the prism of a polygon (across, along) seen from the side."""
+    return prism(polygon, view, 2.0 * rest.robot.tube.outer_diameter)
+
+
+@dataclass(frozen=True)
+class FlexureSurface:
+    """The surface of a flexure with k sections: fixed triangles whose c corners move.
+
+    `across` and `out` are the coordinates of every corner along the first and the second axis of
+    its section [mm], (c, k). `faces` are corners of triangles, counter-clockwise as seen from
+    outside, (f, 3); corners are counted section by section.
+    """
+
+    across: Points
+    out: Points
+    faces: Triangles
+
+    def at(self, sections: FlexureShape) -> Points:
+        """Return all corners of a bent flexure [mm], (k c, 3)."""
+        x, y = self.across.T[..., None], self.out.T[..., None]
+        rotation = sections.rotation[:, None]
+        points = sections.position[:, None] + x * rotation[..., 0] + y * rotation[..., 1]
+        return points.reshape(-1, 3)
+
+
+def at_rest(robot: Robot, level: str = "tendons") -> RobotShape:
+    """Return the shape of a robot without loads, with `PIECES`; `level` is that of its chain."""
+    free = np.radians([notch.precurvature_deg for notch in robot.notches])
+    return shape_from_angles(robot, free, PIECES, level)
+
+
+def skins(rest: RobotShape) -> list[FlexureSurface]:
+    """Return the surfaces of all flexures, base to tip, of the shape from `at_rest`."""
+    spine = np.asarray(rest.chain.rods.has_closure) > 0.0
+    return [
+        _spine(rest, notch) if spine[notch] else _strip(rest, notch)
+        for notch in range(len(rest.flexures))
+    ]
+
+
+def _spine(rest: RobotShape, notch: int) -> FlexureSurface:
+    """Return a piece of the wall between radial edges, or beside one straight cut."""
+    one, tube = rest.flexures[notch], rest.robot.tube
+    outer, inner = tube.outer_radius, tube.inner_radius
+    description = rest.robot.notches[notch]
+    axis = outer - one.spine  # from the neutral axis to the axis of the tube
+    # Where the cut meets the outer surface; radial edges continue to the axis.
+    depth, radial = description.spine_cut or (outer - float(one.near[0] - axis[0]), False)
+    cut = outer - depth
+    half_outer = float(np.arccos(np.clip(-cut / outer, -1.0, 1.0)))
+    half_inner = half_outer if radial else float(np.arccos(np.clip(-cut / inner, -1.0, 1.0)))
+    part = np.linspace(-1.0, 1.0, _SPINE + 1)
+    outside = np.stack([-outer * np.cos(part * half_outer), -outer * np.sin(part * half_outer)])
+    if radial or cut > -inner:
+        angle = part * half_inner
+        inside = np.stack([-inner * np.cos(angle), -inner * np.sin(angle)])
+    else:  # less than the wall is left
+        inside = np.stack([np.full(len(part), cut), -outer * np.sin(half_outer) * part])
+    corners = np.stack([outside, inside], axis=1)  # (2, layers, angles)
+    across = corners[0].reshape(-1, 1) + axis[None]
+    out = np.broadcast_to(corners[1].reshape(-1, 1), across.shape)
+    return FlexureSurface(across, out, _box(len(axis), _SPINE + 1))
+
+
+def _strip(rest: RobotShape, notch: int) -> FlexureSurface:
+    """Return a strip across the tube, as wide as the wall of the tube."""
+    one, tube = rest.flexures[notch], rest.robot.tube
+    direction = _across(np.radians(rest.robot.notches[notch].direction_deg))
+    position = np.linspace(0.0, 1.0, _ACROSS)[:, None] * (one.spine + one.near) - one.spine
+    outside, inside = [], []
+    for row in position:
+        local = (one.fibre(row) - rest.position[notch]) @ rest.rotation[notch] @ direction
+        beside = np.minimum(np.abs(local), tube.outer_radius)
+        outside.append(np.sqrt(tube.outer_radius**2 - beside**2))
+        inside.append(np.sqrt(np.maximum(tube.inner_radius**2 - beside**2, 0.0)))
+    count = len(one.area)
+    walls = np.stack([np.stack(outside), np.stack(inside)])  # (layers, across, sections)
+    # The other wall is the mirror image, with reversed triangles.
+    across = np.concatenate([np.tile(position, (2, 1))] * 2)
+    out = np.concatenate([walls.reshape(-1, count), -walls.reshape(-1, count)])
+    box = _box(count, _ACROSS)
+    corners = 2 * _ACROSS
+    first = box + box // corners * corners
+    second = first + corners
+    return FlexureSurface(across, out, np.concatenate([first[:, ::-1], second]))
+
+
+def _box(sections: int, row: int) -> Triangles:
+    """Return the triangles of a curved box with two rows of corners, outer first, per section."""
+    ring = np.concatenate([np.arange(row), np.arange(2 * row - 1, row - 1, -1)])
+    following = np.roll(ring, -1)
+    faces: list[Triangles] = []
+    for at in range(sections - 1):
+        lower, upper = at * 2 * row, (at + 1) * 2 * row
+        a, b, c, d = ring + lower, following + lower, following + upper, ring + upper
+        faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    first = np.arange(row - 1)
+    a, b, c, d = first, first + 1, first + 1 + row, first + row
+    cap = np.concatenate([np.stack([a, c, b], axis=1), np.stack([a, d, c], axis=1)])
+    last = (sections - 1) * 2 * row
+    return np.concatenate([*faces, cap, cap[:, ::-1] + last])
+
+
+Vector = NDArray[np.float64]
+
+FOV = np.radians(75.0)
+"""Vertical angle of view of viser [rad]."""
+
+
+class CameraPose(NamedTuple):
+    """Position of a camera and the point in the centre of its picture [mm]."""
+
+    position: Vector
+    target: Vector
+
+    @property
+    def rotation(self) -> Vector:
+        """Its axes as columns: right, down, forward; z of the world is up."""
+        forward, right, up = _axes(self.position - self.target)
+        return np.stack([right, -up, forward], axis=1)
+
+
+def framed(
+    points: Vector, toward: Vector, aspect: float, fov: float = FOV, room: float = 1.0
+) -> CameraPose:
+    """Return a camera that shows points [mm], (p, 3), as large as possible.
+
+    It stands in the direction `toward`, not along z, and has a vertical angle of view `fov` [rad]
+    and a picture with width / height `aspect`; `room` is the size of the picture in that of the
+    points.
+
+    Example:
+        >>> wall = np.array([[-1.0, 0.0, -1.0], [1.0, 0.0, 1.0]])
+        >>> framed(wall, np.array([0.0, -1.0, 0.0]), 1.0, np.pi / 2).position.round(9) + 0.0
+        array([ 0., -1.,  0.])
+    """
+    forward, right, up = _axes(toward)
+    axes = np.stack([right, up, forward])
+    projected = points @ axes.T
+    middle = 0.5 * (projected.min(axis=0) + projected.max(axis=0))
+    x, y, depth = (projected - middle).T
+    slope = np.tan(0.5 * fov)
+    # Near points must lie inside the edges of the picture too.
+    away = room * np.maximum(np.abs(x) / (slope * aspect), np.abs(y) / slope) - depth
+    return CameraPose(
+        (middle - float(away.max()) * np.array([0.0, 0.0, 1.0])) @ axes, middle @ axes
+    )
+
+
+def first_eye(
+    direction_deg: float, length: float, turn: Vector, side: bool, aspect: float
+) -> CameraPose:
+    """Return a camera for a robot at rest of a length [mm], with room to bend in a direction.
+
+    `turn` is the rotation of its base. With `side` it looks normal to the plane in which the robot
+    bends, else a little from above.
+    """
+    angle = np.radians(direction_deg)
+    across = np.array([np.cos(angle), np.sin(angle), 0.0])
+    along = np.array([0.0, 0.0, 1.0])
+    # To either side it is about half as wide as it is long.
+    corners = [across * x + along * z for x in (-0.2, 0.75) for z in (-0.15, 1.05)]
+    toward = turn @ np.cross(across, along)
+    if abs(toward[2]) > 0.9:  # its plane is level: from the front
+        toward = np.array([0.0, -1.0, 0.0])
+    if not side:
+        toward = toward + 0.3 * np.cross(along, toward) + 0.35 * along
+    return framed(length * np.stack(corners) @ turn.T, toward, aspect, room=1.15)
+
+
+def quaternions(rotation: Vector) -> Vector:
+    """Return rotations (r, 3, 3) as (w, x, y, z)."""
+    import viser.transforms as transforms
+
+    return np.asarray(transforms.SO3.from_matrix(rotation).wxyz, np.float64)
+
+
+def _axes(toward: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return forward, right and up of a camera that looks against `toward`."""
+    forward = -toward / np.linalg.norm(toward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right = right / np.linalg.norm(right)
+    return forward, right, np.cross(right, forward)
+
 
 # In outer radii of the tube.
 _FRAME = 2.2

@@ -24,7 +24,7 @@ DEVELOPMENT = ("test", "dev", "docs", "all")
 """Extras for developers, or of all others together."""
 
 _BACKENDS = {
-    "native": "native: lanewise and LLVM {llvm} at level {optimisation} compile for {processor}",
+    "native": "native: lanewise and LLVM {llvm} compile for {processor}",
     "xla": "xla: NOTCHFLEX_BACKEND asks for it; programs are some ten times slower",
 }
 
@@ -75,9 +75,8 @@ def examination() -> dict[str, Any]:
     from lanewise import target
     from notchflex._canary import canary
     from notchflex._jax import jax
-    from notchflex.solver.programs.backend import backend, optimisation_level
+    from notchflex.solver.programs.compiled import backend
 
-    chosen, level = backend(), optimisation_level()
     llvm, processor, _ = target().split(" ", 2)
     sum_of_squares = canary()
     folder, kept = store.program_folder(), store.usage()
@@ -95,10 +94,9 @@ def examination() -> dict[str, Any]:
             "x64": bool(jax.config.jax_enable_x64),  # pyright: ignore[reportAttributeAccessIssue]
         },
         "backend": {
-            "name": chosen,
+            "name": backend(),
             "llvm": llvm,
             "processor": processor,
-            "optimisation": level,
         },
         "canary": {"expected": sum_of_squares.expected, "computed": sum_of_squares.computed},
         "extras": _extras(),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -11,10 +12,10 @@ from typing import Annotated, NamedTuple
 from cyclopts import Group, Parameter
 
 from notchflex.cli.arguments.conversion import flag
+from notchflex.cli.arguments.robots import warn_unlikely
 from notchflex.cli.interview.ask import Interview
-from notchflex.cli.interview.questions import interviewed
-from notchflex.cli.interview.wordings import commented
-from notchflex.errors import InputError
+from notchflex.cli.interview.questions import commented, interviewed
+from notchflex.errors import InputError, InputWarning
 from notchflex.results.files.writing import check_output, read_text, write_text
 from notchflex.robot.writing import robot_text
 
@@ -34,13 +35,11 @@ class Template(NamedTuple):
 
 _PACKAGE = Path(__file__).parents[3]
 TEMPLATES = {
-    "--design": Template(
-        "designing/specification/template.toml", "design file", "notchflex design {} -o FOLDER"
-    ),
+    "--design": Template("designing/template.toml", "design file", "notchflex design {} -o FOLDER"),
     "--tolerance": Template(
         "tolerancing/template.toml", "file of tolerances", "notchflex tolerance ROBOT {}"
     ),
-    "--sweep": Template("sweeping/plan/template.toml", "plan file", "notchflex sweep {} -o FOLDER"),
+    "--sweep": Template("sweeping/template.toml", "plan file", "notchflex sweep {} -o FOLDER"),
 }
 
 _SECTIONS = ("notch", "tendon", "material", "friction")
@@ -169,7 +168,10 @@ def new(
     settings = dict(map(_setting, set_ or ()))
     options = {f"--{key.replace('_', '-')}": answer for key, answer in vars(answers).items()}
     interview = Interview(settings | options, accept_defaults=yes)
-    robot = interview.conduct(lambda interview: interviewed(interview, path.stem))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)
+        robot = interview.conduct(lambda interview: interviewed(interview, path.stem))
+    warn_unlikely(robot)
     if unused := [option for option in settings if option not in interview.used]:
         raise InputError.UNKNOWN_NAME(
             f"{unused[0]}: no part of this robot asks for it, or another option does."

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from notchflex.cli.arguments.conversion import flag
 from notchflex.errors import InputError
-from notchflex.results.files.streams import write_document
+from notchflex.results.files.writing import write_document
 from notchflex.robot import json_schema
 
 
@@ -20,11 +20,11 @@ def schema(
     if design and sweep:
         raise InputError.CONFLICT("--design and --sweep exclude each other; give one of them.")
     if sweep:
-        from notchflex.sweeping.plan.schema import plan_schema
+        from notchflex.sweeping.plan import plan_schema
 
         document = plan_schema()
     elif design:
-        from notchflex.designing.specification.schema import design_schema
+        from notchflex.designing.specification import design_schema
 
         document = design_schema()
     else:

@@ -58,9 +58,9 @@ def show(
     for sentence in unchecked_dimensions(chosen):
         terminal.warn(sentence)
     if plot is not None:
-        from notchflex.plotting.drawings.dimensioned import save_dimensioned
+        from notchflex.plotting import dimensioned_figure, save
 
-        save_dimensioned(chosen, plot)
+        save(dimensioned_figure(chosen), plot)
     if outputs.prints_tables:
         from notchflex.cli.tables.notch_tables import print_robot
 
@@ -75,6 +75,6 @@ def show(
     more = {} if bands is None else {"tolerances": closing_document(bands)}
     outputs.write_json(lambda: {**document_head(chosen), "notches": notches, **more})
     if bands is not None and outputs.prints_tables:
-        from notchflex.cli.tables.tolerance_lines import closing_lines
+        from notchflex.cli.tables.tolerance_tables import closing_lines
 
         terminal.output().print("\n" + "\n".join(closing_lines(chosen, bands)))

@@ -15,16 +15,16 @@ from notchflex.mechanics.flexure.notch_rod import (
     build_rod,
     shifted,
 )
-from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.roots.rooted_strip import RootedStrip
-from notchflex.mechanics.flexure.roots.sideways import (
+from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
+from notchflex.mechanics.flexure.roots.rooted_strip import (
+    RootedStrip,
     Walls,
     plane_compliance,
+    strip_sections,
     turned_compliance,
     with_sideways,
 )
-from notchflex.mechanics.flexure.roots.strip_sections import strip_sections
 from notchflex.mechanics.flexure.wrench_modes import wrench_modes
 from notchflex.mechanics.motion import Motion, rotation_about
 from notchflex.robot import Tube

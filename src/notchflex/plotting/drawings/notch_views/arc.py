@@ -49,8 +49,8 @@ def _(notch: ArcNotch, robot: Robot, first: bool, following: Notch | None) -> No
         cuts=cuts,
         across=[
             [
-                Dimension(corner, outer, f"depth\n{notch.depth:.4g}"),
-                Dimension(-outer, corner, f"remaining\n{left:.4g}"),
+                Dimension(corner, outer, f"depth\n{line.sized('depth', notch.depth)}"),
+                Dimension(-outer, corner, f"remaining\n{left:.6g}"),
             ]
         ],
         projected=[(float(cuts[-1].edge[0, 0]), corner, 0)],

@@ -41,14 +41,20 @@ def _(notch: StripNotch, robot: Robot, first: bool, following: Notch | None) -> 
         cuts=cuts,
         across=[
             [
-                Dimension(-corner, outer, f"depth\n{notch.depth:.4g}"),
-                Dimension(-outer, -corner, f"remaining\n{left:.4g}"),
+                Dimension(-corner, outer, f"depth\n{line.sized('depth', notch.depth)}"),
+                Dimension(-outer, -corner, f"remaining\n{left:.6g}"),
             ],
-            [Dimension(-0.5 * length, 0.5 * length, f"strip\nlength\n{length:.4g}")],
+            [
+                Dimension(
+                    -0.5 * length,
+                    0.5 * length,
+                    f"strip\nlength\n{line.sized('strip_length', length)}",
+                )
+            ],
         ],
         projected=[(vertex, -corner, 0), (line.at, 0.5 * length, 1), (line.at, -0.5 * length, 1)],
         section_at=float(cuts[1].edge[0, 0]),
         section_from=corner,
         toward=True,
-        notes=[f"wall width (both walls together) {walls:.4g}"],
+        notes=[f"wall width (both walls together) {line.sized('wall_width', walls)}"],
     )

@@ -49,11 +49,15 @@ def _(notch: ULink, robot: Robot, first: bool, following: Notch | None) -> Notch
         tip=following is None,
         cuts=cuts,
         across=[
-            [Dimension(-half, half, f"strip\nlength\n{notch.strip_length:.4g}")],
-            [Dimension(corner, outer, f"depth\n{depth:.4g}")],
+            [
+                Dimension(
+                    -half, half, f"strip\nlength\n{line.sized('strip_length', notch.strip_length)}"
+                )
+            ],
+            [Dimension(corner, outer, f"depth\n{depth:.6g}")],
         ],
         projected=[*((at, height, 0) for at, height in ends), (section_at, corner, 1)],
         section_at=section_at,
         section_from=corner,
-        notes=[f"slot radius {radius:.4g}, half the slot width"],
+        notes=[f"slot radius {line.sized('slot_radius', radius)}, half the slot width"],
     )

@@ -20,6 +20,7 @@ from notchflex.robot import Robot
 from notchflex.robot.kinds import Notch
 from notchflex.robot.notches.cut import NotchCut
 from notchflex.robot.notches.profile import outline
+from notchflex.robot.tolerance import with_limits
 
 Points = NDArray[np.float64]
 
@@ -95,23 +96,29 @@ class SideView:
     """A side view that is drawn from the base or the body before toward the tip."""
 
     def __init__(self, robot: Robot, first: bool) -> None:
+        self.robot = robot
         self.diameter, self.held, self.at = robot.tube.outer_diameter, first, 0.0
         self.breaks: list[float] = []
         self.along: list[Dimension] = []
         self.absent: list[str] = []
         if first:
-            self.piece(robot.tube.base_length, "base length")
+            self.piece(robot.tube.base_length, "base length", "tube")
         else:
             self.stub()
 
-    def piece(self, length: float, name: str = "") -> tuple[float, float]:
+    def sized(self, key: str, length: float, part: str = "notch") -> str:
+        """Return a length with the tolerance of a key of the robot file."""
+        return with_limits(self.robot.tolerance, f"{part}.{key}", length)
+
+    def piece(self, length: float, name: str = "", part: str = "notch") -> tuple[float, float]:
         """Add a piece, broken if it is too long; return its ends in the drawing."""
         start, most = self.at, LONGEST * self.diameter
         self.at += min(length, most)
         if length > most:
             self.breaks.append(0.5 * (start + self.at))
         if name and length > 0.0:
-            self.along.append(Dimension(start, self.at, f"{name} {length:.4g}"))
+            text = self.sized(name.replace(" ", "_"), length, part)
+            self.along.append(Dimension(start, self.at, f"{name} {text}"))
         elif name:
             self.absent.append(name)
         return start, self.at

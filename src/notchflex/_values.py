@@ -1,0 +1,56 @@
+"""Arrays that nobody can change, and objects that are equal where their values are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any, cast
+
+import numpy as np
+
+
+class ByValue:
+    """Base of records that are equal where all that `_value` returns is."""
+
+    def _value(self) -> Any:
+        """Return what is compared: the fields of a dataclass."""
+        return tuple(getattr(self, one.name) for one in fields(cast("Any", self)))
+
+    def __eq__(self, other: object) -> bool:
+        """Compare by value with a record of the same type."""
+        if not isinstance(other, ByValue) or type(self) is not type(other):
+            return NotImplemented
+        return self is other or same_values(self._value(), other._value())
+
+    def __hash__(self) -> int:
+        """Return a hash that equal records share: arrays are compared only where it is equal."""
+        return hash((type(self), len(cast("Any", self)) if hasattr(self, "__len__") else 0))
+
+
+def read_only(values: Any) -> np.ndarray:
+    """Return a copy of an array that cannot be written to."""
+    copy = np.array(values)
+    copy.setflags(write=False)
+    return copy
+
+
+def frozen(values: Any) -> Any:
+    """Return an array as a view that cannot be written to; other values as they are."""
+    if not isinstance(values, np.ndarray):
+        return values
+    view = values.view()
+    view.setflags(write=False)
+    return view
+
+
+def same_values(one: Any, other: Any) -> bool:
+    """Return whether two values are equal, arrays entry by entry; NaN equals NaN."""
+    if hasattr(one, "__array__") or hasattr(other, "__array__"):
+        exact = np.asarray(one).dtype.kind not in "fc"
+        return np.array_equal(one, other, equal_nan=not exact)
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(same_values(one[k], other[k]) for k in one)
+    if isinstance(one, Sequence) and isinstance(other, Sequence) and not isinstance(one, str):
+        pairs = zip(one, other, strict=False)
+        return len(one) == len(other) and all(same_values(*pair) for pair in pairs)
+    return one is other or bool(one == other)

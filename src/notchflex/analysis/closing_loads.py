@@ -1,0 +1,458 @@
+"""Loads and angles at which notches close, of one robot or of many that differ by a few numbers.
+
+The overlap, contact force / stiffness - gap, rises with the tension and goes through zero where
+the notch closes. Many notches are searched at once; a solve that does not converge gives NaN, and
+costs a notch one trial, not its result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from notchflex._jax import jax, jit, jnp
+from notchflex._summary import Displayed, Summary, short
+from notchflex.analysis.outputs import follow_row
+from notchflex.analysis.varied import VariedChains, varied_chains
+from notchflex.loads import LoadPath
+from notchflex.loads.command import tension_commands
+from notchflex.mechanics.chain import Chain, assemble
+from notchflex.mechanics.contact import closing_angles, free_angle
+from notchflex.mechanics.material import FibreSection, SectionLaw, peak_strain, section_strain
+from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.robot import Robot
+from notchflex.robot.value_names.varied import VariedRobots
+from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.programs.prepare import PreparedChain, prepare
+from notchflex.solver.programs.run import run, solve_contacts
+from notchflex.solver.programs.threads import on_cores
+
+Overlap = Callable[[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]], Float[np.ndarray, " m"]]
+"""From one tension per notch, and which notches are asked for, to their overlaps (mm).
+
+NaN where the solve did not converge. What it gives of the other notches is not read.
+"""
+
+
+class ClosingStatus(StrEnum):
+    """Whether a notch closes under its tendon, pulled alone from rest.
+
+    Attributes:
+        CLOSES: "closes": the tension is known.
+        NEVER: "never": the largest tension tried leaves it open.
+        NOT_FOUND: "not found": the solver did not converge at the tensions in question.
+    """
+
+    CLOSES = "closes"
+    NEVER = "never"
+    NOT_FOUND = "not found"
+
+
+# A tension of this many times the first guess that leaves a notch open is taken as "never".
+_DOUBLINGS = 6
+# Trials between a tension that leaves a notch open and one where the solver fails.
+_TRIALS = 12
+PRECISION = 1e-11
+"""Relative precision of a tension."""
+
+# A notch that snaps shut has no root but a jump, next to which the solver need not converge.
+_AT_SNAP = 1e-3
+# Enough to bisect every fifth time, which is what a jump takes.
+_ROUNDS = 200
+
+
+def closing_tensions(
+    overlap: Overlap, guess: Float[np.ndarray, " m"], precision: float = PRECISION
+) -> tuple[Float[np.ndarray, " m"], np.ndarray]:
+    """Find the tension that closes each notch, and a status for each.
+
+    Args:
+        overlap: The overlap of all notches, each at its own tension.
+        guess: Tensions to begin from, N; 2 ** 6 times that is the largest one tried.
+        precision: Relative precision of a tension.
+
+    Returns:
+        Tensions (N), NaN where none was found, and statuses (`ClosingStatus`).
+    """
+    low, high, failed = _bracket(overlap, guess)
+    bracketed = np.isfinite(high)
+    tension, precise = find_roots(overlap, low, np.where(bracketed, high, low), precision)
+    closes = bracketed & precise
+    return np.where(closes, tension, np.nan), statuses(closes, ~bracketed & ~failed)
+
+
+def statuses(closes: Bool[np.ndarray, " m"], never: Bool[np.ndarray, " m"]) -> np.ndarray:
+    """Return a `ClosingStatus` for every notch: where neither holds, it was not found."""
+    status = np.full(len(closes), ClosingStatus.NOT_FOUND, dtype=object)
+    status[closes], status[never] = ClosingStatus.CLOSES, ClosingStatus.NEVER
+    return status
+
+
+def _bracket(
+    overlap: Overlap, guess: Float[np.ndarray, " m"]
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
+    """A tension that leaves each notch open, one that closes it (NaN: none), and failures met."""
+    low, high = np.zeros_like(guess), np.full_like(guess, np.nan)
+    failing = np.full_like(guess, np.nan)  # smallest tension above `low` that failed
+    trial = guess
+    for number in range(1 + _DOUBLINGS + _TRIALS):
+        doubling = number <= _DOUBLINGS
+        searched = np.isnan(high) & (doubling | np.isfinite(failing))
+        if not searched.any():
+            break
+        value = overlap(trial, searched)
+        high = np.where(searched & (value > 0.0), trial, high)
+        low = np.where(searched & (value <= 0.0), trial, low)
+        failing = np.where(searched & np.isnan(value), np.fmin(failing, trial), failing)
+        failing = np.where(failing > low, failing, np.nan)
+        # Beyond the largest tension there is nothing to try, but before the first that failed.
+        trial = 2.0 * trial if number < _DOUBLINGS else 0.5 * (low + np.fmax(low, failing))
+    return low, high, np.isfinite(failing)
+
+
+def find_roots(
+    overlap: Overlap,
+    low: Float[np.ndarray, " m"],
+    high: Float[np.ndarray, " m"],
+    precision: float = PRECISION,
+) -> tuple[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
+    """Find roots by false position, bisecting where that stalls.
+
+    After a failed solve the next trials are elsewhere in the bracket, ever closer to its lower end.
+
+    Args:
+        overlap: The overlap of all notches, each at its own tension.
+        low: Tensions (N) that leave the notches open; of one that is not searched, `high`.
+        high: Tensions (N) that close them.
+        precision: Relative precision of a root.
+
+    Returns:
+        The roots, and whether each is known: to that precision, or to 1e-3 where the solver
+        fails nearby.
+    """
+    # `scipy.optimize.elementwise.find_root` gives a notch up at its first NaN. Of 9 ready robots it
+    # solves 2221 states for the same roots, this one 1274 (wrist A: 281 and 67; York: 242 and 433).
+    searched = low < high
+    at_low, at_high = overlap(low, searched), overlap(high, searched)
+    width, misses = high - low, np.zeros(low.shape, int)
+    side, slow = np.zeros(low.shape, int), np.zeros(low.shape, int)
+    for _ in range(_ROUNDS):
+        open_still = (high - low > precision * high) & (misses < _TRIALS)
+        if not open_still.any():
+            break
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = at_low / (at_low - at_high)
+        part = np.where((slow > 3) | ~((part > 0.0) & (part < 1.0)), 0.5, part)
+        part = np.where(misses > 0, 0.6 ** np.maximum(misses, 1), part)
+        trial = low + part * (high - low)
+        value = np.where(open_still, overlap(trial, open_still), np.nan)
+        up, down = value > 0.0, value <= 0.0
+        # The end that stays a second time counts less, by what the other one has changed: a slope
+        # that differs beyond the root does not keep it from being reached (Anderson, Björck).
+        with np.errstate(divide="ignore", invalid="ignore"):
+            less_low, less_high = 1.0 - value / at_high, 1.0 - value / at_low
+        less_low, less_high = (np.where(m > 0.0, m, 0.5) for m in (less_low, less_high))
+        high, at_high = np.where(up, trial, high), np.where(up, value, at_high)
+        low, at_low = np.where(down, trial, low), np.where(down, value, at_low)
+        at_low = np.where(up & (side > 0), less_low * at_low, at_low)
+        at_high = np.where(down & (side < 0), less_high * at_high, at_high)
+        side = np.where(up, 1, np.where(down, -1, side))
+        misses = np.where(up | down, 0, misses + open_still)
+        slow = np.where(high - low > 0.5 * width, slow + 1, 0)
+        width = high - low
+    reached = np.where(misses >= _TRIALS, _AT_SNAP, precision)
+    return 0.5 * (low + high), high - low <= reached * high
+
+
+_ANGLE = QUANTITIES["total_angle"]
+_MAX_ROWS = 12
+# Number of steps of the first pull, and its end over the tension that would close the softest notch
+# if it were linear and alone; notches that do not close by then are reported as never closing.
+_STEPS, _BEYOND_LINEAR = 40, 2.0
+
+
+@dataclass(frozen=True, repr=False)
+class Closing(Displayed):
+    """Closing of every notch, base to tip.
+
+    Attributes:
+        angle: Notch angle at which its edges touch, precurvature included, rad.
+        tension: Base tension that closes it, N, loading from rest; NaN where none was found.
+        status: A `ClosingStatus`: "closes"; "never", no tension up to 64 times the one that
+            would close a linear notch alone (twice that of the softest for slots); or "not found",
+            the solver did not converge at the tensions in question.
+        tendon: The tendon pulled for it, counted from 1: the one with the longest lever.
+        outer_strain: Strain of the outer fibre on the spine when closed (Pacheco 2021, eq. 16).
+        peak_strain: Largest strain of any fibre when closed.
+    """
+
+    angle: Float[np.ndarray, " n"]
+    tension: Float[np.ndarray, " n"]
+    status: np.ndarray
+    tendon: np.ndarray
+    outer_strain: Float[np.ndarray, " n"]
+    peak_strain: Float[np.ndarray, " n"]
+
+    def _summary(self) -> Summary:
+        rows = [
+            (
+                f"notch {notch + 1}",
+                f"{short(float(angle) * _ANGLE.scale)} {_ANGLE.unit}, "
+                + (f"{short(float(tension))} N" if tension == tension else "no tension found"),
+            )
+            for notch, (angle, tension) in enumerate(zip(self.angle, self.tension, strict=True))
+        ]
+        left = len(rows) - _MAX_ROWS
+        hint = f"and {left} more notches" if left > 0 else ""
+        return Summary("Closing of every notch", rows[:_MAX_ROWS], hint)
+
+
+def closing(robot: Robot) -> Closing:
+    """Find the angle, tension and strain at which every notch closes.
+
+    The tension is found on the solver itself, with friction and all other notches: the root of
+    contact force / stiffness - gap, which rises through zero where a notch closes.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        The closing of every notch.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> table = closing(load_robot("pacheco2021-a"))
+        >>> print(f"{np.degrees(table.angle[0]):.2f} deg, {table.tension[0]:.3f} N")
+        30.63 deg, 1.615 N
+    """
+    chain = assemble(robot, flat=False)
+    rods = chain.rods
+    closing_angle, free = closing_angles(rods), free_angle(rods)
+    height = np.asarray(rods.length.sum(-1))
+    section = rods.section
+    arm = moment_arms(chain)
+    tendon = np.argmax(arm, axis=1)
+    longest = arm[np.arange(len(arm)), tendon]
+    if np.isfinite(closing_angle).all():
+        tension, status = _tensions(prepare(robot), tendon, longest, closing_angle)
+        contact_angle = closing_angle
+    else:
+        tension, contact_angle, status = _edge_closing(prepare(robot), tendon, longest)
+    has_spine = np.isfinite(closing_angle)
+    elastic = np.where(has_spine, closing_angle / height, np.nan)
+    first = jax.tree.map(lambda leaf: leaf[:, 0], section)
+    outer, peak = _strains(chain.law, first, elastic, chain.law.rest(first))
+    return Closing(
+        angle=np.where(has_spine, closing_angle + free, contact_angle),
+        tension=tension,
+        status=status,
+        tendon=tendon + 1,
+        outer_strain=np.asarray(outer),
+        peak_strain=np.asarray(peak),
+    )
+
+
+@jit
+def _strains(law: SectionLaw, sections: FibreSection, curvature: Any, memory: Any) -> Any:
+    """Return the strain of the outer fibre and the largest one, of sections that are bent."""
+    bending = jnp.where(jnp.arange(6) == 1, curvature[:, None], 0.0)
+    strain = jax.vmap(partial(section_strain, law))(bending, sections, memory)
+    outer = strain.stretch + strain.curvature * sections.edge_spine
+    return outer, peak_strain(strain, sections)
+
+
+def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
+    """Compute the moment arm of every tendon about the neutral axis of every notch at rest, mm.
+
+    Positive where it bends the notch toward its direction; 0 where it does not run. The chain must
+    be assembled with `flat=False`.
+    """
+    entry_x = np.einsum("nba,tb->nta", chain.notch_frame, chain.tendon_entry)[..., 0]
+    spine = np.where(np.asarray(chain.rods.has_closure) > 0.0, chain.rods.end_offset[:, 0], 0.0)
+    arm = np.zeros((chain.flexures, chain.tendons))
+    for group in chain.groups:
+        tendons = list(group.numbers)
+        arm[:, tendons] = np.asarray(group.present) * (entry_x[:, tendons] + spine[:, None])
+    return arm
+
+
+def _tensions(
+    ready: PreparedChain,
+    tendon: np.ndarray,
+    arm: Float[np.ndarray, " n"],
+    closing_angle: Float[np.ndarray, " n"],
+) -> tuple[Float[np.ndarray, " n"], np.ndarray]:
+    """Find the base tension that closes every notch against its spine, and its status."""
+    chain = ready.chain
+    tension = np.full(chain.flexures, np.nan)
+    status = np.full(chain.flexures, ClosingStatus.NEVER, dtype=object)
+    notches = np.flatnonzero((arm > 0.0) & (closing_angle > 0.0))
+    if len(notches) == 0:
+        return tension, status
+    stiffness = np.asarray(chain.contact_stiffness)
+    # As many rows as notches, whichever are searched: one compiled program.
+    which, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
+
+    def overlap(tension: Float[np.ndarray, " m"], _: Bool[np.ndarray, " m"]) -> np.ndarray:
+        value = np.zeros((chain.flexures, chain.tendons))
+        value[rows, tendon[which]] = np.resize(tension, chain.flexures)
+        force, gap, converged = solve_contacts(
+            ready, tension_commands(value), ready.rest, Settings()
+        )
+        overlap = force[rows, which] / stiffness[which] - gap[rows, which]
+        return np.where(converged, overlap, np.nan)[: len(notches)]
+
+    linear = np.asarray(chain.stiffness)[notches, 0] * closing_angle[notches] / arm[notches]
+    tension[notches], status[notches] = closing_tensions(overlap, linear)
+    return tension, status
+
+
+def _edge_closing(
+    ready: PreparedChain, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], np.ndarray]:
+    """Find tension, angle and status of closing for notches with edges on rigid pieces.
+
+    The tendon is pulled in steps from rest, which brackets the tension where an edge touches.
+    """
+    tension, angle = (np.full(ready.chain.flexures, np.nan) for _ in range(2))
+    status = np.full(ready.chain.flexures, ClosingStatus.NEVER, dtype=object)
+    for number in np.unique(tendon):
+        pulled = np.flatnonzero((tendon == number) & (arm > 0.0))
+        if len(pulled):
+            tension[pulled], angle[pulled], status[pulled] = _by_one_tendon(
+                ready, int(number), pulled
+            )
+    return tension, angle, status
+
+
+def _by_one_tendon(
+    ready: PreparedChain, tendon: int, notches: np.ndarray
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], np.ndarray]:
+    """Find them for some notches, pulling one tendon."""
+    free, _ = _pull(ready, tendon, np.zeros(1))
+    reach = -free[0, notches]  # the gap at rest: an edge so far from closing
+    # Tendon and edges are about as far from the axis.
+    linear = np.asarray(ready.chain.contact_stiffness)[notches] * reach
+    steps = np.linspace(0.0, _BEYOND_LINEAR * linear.max(), _STEPS + 1)
+    overlap, _ = _pull(ready, tendon, steps)
+    touching = overlap[:, notches] > 0.0
+    closes = touching.any(axis=0)
+    after = np.maximum(touching.argmax(axis=0), 1)
+
+    def at(tension: Float[np.ndarray, " m"]) -> tuple[np.ndarray, np.ndarray]:
+        """Compute overlap and angle of every notch, each at its own tension, on one path."""
+        order = np.argsort(tension)
+        back = np.argsort(order)
+        overlap, angle = _pull(ready, tendon, tension[order])
+        return overlap[back, notches], angle[back, notches]
+
+    low, high = (np.where(closes, steps[step], steps[-1]) for step in (after - 1, after))
+    tension, precise = find_roots(lambda tension, _: at(tension)[0], low, high)
+    _, angle = at(tension)
+    closed = closes & precise & np.isfinite(angle)
+    failed = ~np.isfinite(overlap[:, notches]).all(axis=0)
+    status = statuses(closed, np.asarray(~closes & ~failed))
+    return np.where(closed, tension, np.nan), np.where(closed, angle, np.nan), status
+
+
+def _pull(
+    ready: PreparedChain, tendon: int, tensions: Float[np.ndarray, " s"]
+) -> tuple[Float[np.ndarray, "s n"], Float[np.ndarray, "s n"]]:
+    """Compute every notch's overlap (contact force / stiffness - gap, mm) and angle (rad)."""
+    value = np.zeros((len(tensions), ready.chain.tendons))
+    value[:, tendon] = tensions
+    states = run(ready, tension_commands(value), ready.rest, Settings(), each_from_start=False)
+    stiffness = np.asarray(ready.chain.contact_stiffness)
+    overlap = states.quantity("contact_force") / stiffness - states.quantity("gap")
+    converged = states.converged[:, None]
+    angle = states.quantity("notch_angle")
+    return np.where(converged, overlap, np.nan), np.where(converged, angle, np.nan)
+
+
+# Number of rows in one call of the program.
+_BATCH = 1024
+# First tension, relative to that of the robot that is varied.
+_FIRST = 1.05
+# Relative precision of a tension: limits are compared to 1e-6.
+_PRECISION = 1e-9
+_OUTPUTS = ("contact_force", "gap", "converged")
+
+
+def closing_tensions_of(robots: VariedRobots) -> Float[np.ndarray, "robots n"]:
+    """Find the tension that closes every notch of many robots, as `closing` does for one.
+
+    Args:
+        robots: The robots, all of them valid.
+
+    Returns:
+        Base tensions, N; NaN where none was found.
+    """
+    own = closing(robots.robot)
+    chain = assemble(robots.robot, flat=False)
+    closing_angle, arm = closing_angles(chain.rods), moment_arms(chain)
+    unit = np.eye(chain.tendons)[own.tendon - 1]
+    load = LoadPath(np.ones((1, chain.tendons)))
+    chains = varied_chains(robots, load, 0) if np.isfinite(closing_angle).all() else None
+    if chains is None:  # edges of rigid pieces, or no polynomial: one robot after the other
+        return np.reshape([closing(one).tension for one in robots], (len(robots), -1))
+    longest = arm[np.arange(len(arm)), own.tendon - 1]
+    notches = np.flatnonzero((longest > 0.0) & (np.asarray(closing_angle) > 0.0))
+    tension = np.full((len(robots), chain.flexures), np.nan)
+    if len(notches) == 0:
+        return tension
+    with np.errstate(divide="ignore"):
+        linear = np.asarray(chain.stiffness)[:, 0] * np.asarray(closing_angle) / longest
+    guess = np.where(np.isfinite(own.tension), _FIRST * own.tension, linear)[notches]
+    search = _Rows(chains, notches, unit[notches], np.asarray(chain.contact_stiffness)[notches])
+    closing_tension, _ = closing_tensions(search.overlap, np.tile(guess, len(robots)), _PRECISION)
+    tension[:, notches] = closing_tension.reshape(len(robots), -1)
+    return tension
+
+
+class _Rows:
+    """Rows of a batch: one per robot and notch to close."""
+
+    def __init__(
+        self,
+        chains: VariedChains,
+        notches: Int[np.ndarray, " k"],
+        unit: Float[np.ndarray, "k t"],
+        stiffness: Float[np.ndarray, " k"],
+    ) -> None:
+        """Store chains, notches to close, unit tensions that pull them, and their stiffness."""
+        self.chains, self.notches, self.unit, self.stiffness = chains, notches, unit, stiffness
+        self.robots = chains.rows(slice(None))[0]
+
+    def overlap(
+        self, tension: Float[np.ndarray, " rows"], mask: Bool[np.ndarray, " rows"]
+    ) -> Float[np.ndarray, " rows"]:
+        """Compute contact force / stiffness - gap of the masked rows, mm; NaN for others."""
+        rows = np.flatnonzero(mask)
+        values_of_rows = np.full(len(tension), np.nan)
+        pieces = [rows[k : k + _BATCH] for k in range(0, len(rows), _BATCH)]
+        solving = on_cores(lambda one: self._overlap(one, tension[one]), pieces)
+        for piece, values in zip(pieces, solving, strict=True):
+            values_of_rows[piece] = values
+        return values_of_rows
+
+    def _overlap(
+        self, rows: Int[np.ndarray, " m"], tension: Float[np.ndarray, " m"]
+    ) -> Float[np.ndarray, " m"]:
+        robot, notch = np.divmod(rows, len(self.notches))
+        commands = tension_commands(tension[:, None] * self.unit[notch])
+        layout = self.chains.ready.command_layout(commands)
+        packed = layout.pack(commands, leading=1)[:, None]
+        settings = np.array(DEFAULT.numbers)
+        layouts = (self.chains.structure, layout, _OUTPUTS)
+        by_row = (True, True, False)
+        states = follow_row.rows(by_row, self.robots[robot], packed, settings, *layouts)
+        own = np.arange(len(rows)), 0, self.notches[notch]
+        # The root does not depend on the stiffness: that of one robot serves for all.
+        overlap = states["contact_force"][own] / self.stiffness[notch] - states["gap"][own]
+        return np.where(states["converged"][:, 0], overlap, np.nan)

@@ -1,1 +1,0 @@
-"""Loads and angles at which notches close."""

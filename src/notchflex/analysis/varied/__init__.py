@@ -1,1 +1,0 @@
-"""Many robots that differ by a few numbers, as tables of chains."""

@@ -1,1 +1,0 @@
-"""The specification of a design: the file, its checks and its schema."""

@@ -1,0 +1,240 @@
+"""Tests of residuals: patterns that noise does not make, and the constants that would explain them.
+
+The fit at its minimum is a linear regression: rows are the measured numbers over their noise, the
+deviations from the drawing and the priors; columns are the constants, these deviations and, where
+two or more pulls were measured, a shift of each pull. All tests are of what this leaves, and so
+count the numbers fitted. They take the noise from the residuals themselves, and hold for few rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import f, norm
+
+from notchflex.errors import InputError
+from notchflex.fit.estimation.calibration import Calibration
+from notchflex.fit.measurements.measurements import OBSERVED
+from notchflex.fit.model.constants import Unknown, unknowns
+from notchflex.fit.model.drawing import numbers_set
+from notchflex.fit.model.residuals import SENSOR
+from notchflex.robot.fields import fields_of
+
+# Probability below which noise does not make a pattern; of constants for all of them together.
+_UNLIKELY = 0.01
+# What remains of a column that the others nearly contain, as a part of it, is rounding.
+_ROUNDING = 1e-4
+# With fewer degrees of freedom nothing is tested.
+_FEWEST = 5
+_OF_NOTCHES = [OBSERVED.index(name) for name in ("notch_angle", "edge_angle")]
+
+
+class Missing(NamedTuple):
+    """A constant that was not fitted, and what a fit of it would gain.
+
+    Attributes:
+        name: Name of the constant.
+        gain: By how much twice the misfit would fall, with the model linearised.
+        share: The same as a part of twice the misfit.
+        chance: Probability of such a gain if the constant is right as it is.
+    """
+
+    name: str
+    gain: float
+    share: float
+    chance: float
+
+
+@dataclass(frozen=True)
+class ResidualTests:
+    """Tests of the residuals of a fit.
+
+    Attributes:
+        runs: Probability that residuals of neighbouring loads are as alike (Moran's I of a
+            regression, Cliff and Ord 1972); NaN if too few follow each other.
+        notches: Probability of such a trend over the notches, and of its change with the load (F
+            test); NaN if fewer than three notches were measured.
+        missing: What fits of other constants would gain, the most likely one first (score tests,
+            Rao 1948).
+    """
+
+    runs: float
+    notches: float
+    missing: tuple[Missing, ...]
+
+    @cached_property
+    def rejected(self) -> tuple[str, ...]:
+        """Which of "runs", "notches" and "missing" noise does not explain."""
+        chance = {"runs": self.runs, "notches": self.notches}
+        if self.missing:
+            chance["missing"] = len(self.missing) * self.missing[0].chance
+        return tuple(name for name, value in chance.items() if value < _UNLIKELY)
+
+
+def residual_tests(found: Calibration) -> ResidualTests | None:
+    """Test the residuals of a fit; None if there are too few, or it is of no likelihood.
+
+    Args:
+        found: The fit.
+    """
+    if not found.is_likelihood or found.tells_no_noise:
+        return None
+    regression = _Regression.of(found)
+    if regression.freedom < _FEWEST:
+        return None
+    residuals = found.residuals
+    part = np.where(np.isin(residuals.quantity, _OF_NOTCHES), residuals.part, 0)
+    notches = float("nan")
+    if len(np.unique(part)) > 2:
+        centred = np.where(np.isin(residuals.quantity, _OF_NOTCHES), part - 0.5 * part.max(), 0.0)
+        trend = np.stack([centred, centred * _load(found)], axis=1) / found.noise.deviation[:, None]
+        notches = regression.chance(trend)[-1]
+    tests = [
+        Missing(one.name, *regression.chance(slopes[:, None] / found.noise.deviation[:, None]))
+        for one in _candidates(found)
+        if (slopes := found.problem.samples.slopes_of(one, found.best.values)) is not None
+    ]
+    known = [one for one in tests if np.isfinite(one.chance)]
+    return ResidualTests(
+        regression.runs(_neighbours(found)), notches, tuple(sorted(known, key=lambda one: one[3]))
+    )
+
+
+class _Regression(NamedTuple):
+    """What a fit leaves, orthogonal to `basis`."""
+
+    left: Float[np.ndarray, " n"]
+    basis: Float[np.ndarray, "n q"]
+
+    @classmethod
+    def of(cls, calibration: Calibration) -> _Regression:
+        residuals, reached = calibration.residuals, calibration.reached
+        noise, unknown = calibration.noise.deviation, calibration.problem.unknowns
+        most = getattr(calibration.problem.objective, "huber", None) or np.inf
+        counted = np.isfinite(noise)
+        own = [(n, c.prior) for n, c in enumerate(unknown) if c.prior is not None]
+        priors = np.zeros((len(own), len(unknown)))
+        off = np.zeros(len(own))
+        for row, (number, (mean, deviation)) in enumerate(own):
+            priors[row, number] = 1.0 / deviation
+            off[row] = (calibration.best.values[number] - mean) / deviation
+        pulls, shift = np.unique(residuals.pull, return_inverse=True)
+        groups = np.stack([shift, residuals.quantity], axis=1)
+        _, group = np.unique(groups, axis=0, return_inverse=True)
+        shifts = np.eye(group.max() + 1)[group] if len(pulls) > 1 else np.zeros((len(group), 0))
+        spread = residuals.spread
+        columns = np.concatenate([residuals.slopes, spread, shifts], axis=1) / noise[:, None]
+        deviations = np.eye(spread.shape[1], columns.shape[1], residuals.slopes.shape[1])
+        below = np.pad(priors, ((0, 0), (0, columns.shape[1] - len(unknown))))
+        left = np.where(counted, np.clip(residuals.values / noise, -most, most), 0.0)
+        basis = _orthonormal(np.concatenate([columns, deviations, below]))
+        every = np.concatenate([left, reached.deviations, off])
+        return cls(every - basis @ (basis.T @ every), basis)
+
+    @property
+    def freedom(self) -> int:
+        rows = np.abs(self.basis).any(axis=1) | (self.left != 0.0)
+        return int(rows.sum()) - self.basis.shape[1]
+
+    def chance(self, columns: Float[np.ndarray, "r c"]) -> tuple[float, float, float]:
+        """Gain of more columns, as a part of all too, and its probability by chance (F test)."""
+        more = np.pad(columns, ((0, len(self.left) - len(columns)), (0, 0)))
+        size = np.linalg.norm(more, axis=0)
+        rest = more - self.basis @ (self.basis.T @ more)
+        rest -= self.basis @ (self.basis.T @ rest)
+        rest = rest[:, np.linalg.norm(rest, axis=0) > _ROUNDING * size]
+        basis = _orthonormal(rest)
+        count, all_left = basis.shape[1], float(self.left @ self.left)
+        if not count or not all_left:
+            return 0.0, 0.0, float("nan")
+        gain = float(np.sum((basis.T @ self.left) ** 2))
+        freedom = self.freedom - count
+        ratio = (gain / count) / (max(all_left - gain, 1e-300) / freedom)
+        return gain, gain / all_left, float(f.sf(ratio, count, freedom))
+
+    def runs(self, pairs: tuple[np.ndarray, np.ndarray]) -> float:
+        """Probability that neighbours are as alike by chance."""
+        first, second = pairs
+        freedom, basis = self.freedom, self.basis
+        if len(first) < _FEWEST or not self.left.any():
+            return float("nan")
+        alike = float(self.left[first] @ self.left[second]) / float(self.left @ self.left)
+        beside = np.zeros_like(basis)  # neighbours of the rows of the basis
+        np.add.at(beside, first, 0.5 * basis[second])
+        np.add.at(beside, second, 0.5 * basis[first])
+        within = basis.T @ beside
+        trace = -float(np.trace(within))
+        squares = 0.5 * len(first) - 2.0 * float(np.sum(beside**2)) + float(np.sum(within**2))
+        mean = trace / freedom
+        variance = 2.0 * (freedom * squares - trace**2) / (freedom**2 * (freedom + 2.0))
+        return float(norm.sf((alike - mean) / np.sqrt(variance)))
+
+
+def _orthonormal(columns: Float[np.ndarray, "n c"]) -> Float[np.ndarray, "n q"]:
+    """Basis of what columns span."""
+    size = np.linalg.norm(columns, axis=0)
+    left, sizes, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+    return left[:, sizes > 1e-9 * sizes.max(initial=0.0)]
+
+
+def _load(calibration: Calibration) -> Float[np.ndarray, " r"]:
+    """The command of every measured number, 1 at the largest."""
+    residuals, load = calibration.residuals, np.zeros(len(calibration.residuals))
+    for number, sample in enumerate(calibration.problem.samples.every):
+        measured, mine = sample.measured, residuals.sample == number
+        command = np.nansum(np.fmax(measured.measured_tension, measured.load.stroke), axis=1)
+        load[mine] = (command / max(np.abs(command).max(), 1e-300))[residuals.row[mine]]
+    return load
+
+
+def _neighbours(calibration: Calibration) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers whose loads follow each other in a pull: in its rows, or by load if from rest."""
+    residuals = calibration.residuals
+    from_rest = np.array([one.measured.from_rest for one in calibration.problem.samples.every])
+    along = np.where(from_rest[residuals.sample], _load(calibration), residuals.row)
+    series = (residuals.sample, residuals.quantity, residuals.part, residuals.pull)
+    order = np.lexsort((along, *series))
+    order = order[np.isfinite(calibration.noise.deviation[order])]
+    labels = np.stack(series, axis=1)[order]
+    follow = (labels[1:] == labels[:-1]).all(axis=1)
+    return order[:-1][follow], order[1:][follow]
+
+
+def _candidates(calibration: Calibration) -> list[Unknown]:
+    """All constants that could be fitted besides."""
+    fitted = calibration.problem.unknowns
+    robots = {one.label: one.robot for one in calibration.problem.samples.every}
+    names = [f"tube.{name}" for name in ("inner_diameter",)]
+    for robot in robots.values():
+        for section, rule, units in (
+            ("notch", "offset:", ("mm", "deg")),
+            ("material", "", ("MPa", "")),
+            ("friction", "", ("",)),
+        ):
+            parts = robot.notch if section == "notch" else [getattr(robot, section)]
+            for part in parts:
+                for name, field in fields_of(type(part)).items():
+                    unit = (field.json_schema_extra or {}).get("unit", "")
+                    if unit in units and name not in _LEFT_OUT:
+                        names.append(f"{rule}{section}.{name}")
+    taken = numbers_set(robots, fitted)
+    candidates: list[Unknown] = []
+    for name in dict.fromkeys([*names, *SENSOR]):
+        try:
+            (one,) = unknowns(robots, name)
+            if not taken & numbers_set(robots, (one,)):
+                candidates.append(one)
+        except (InputError, ValueError):  # no number, 0, or not in all robots
+            continue
+    return candidates
+
+
+# Of no effect on what is measured, or none before a notch is destroyed.
+_LEFT_OUT = (
+    "direction_deg", "uncut_length", "poisson_ratio", "density", "allowed_strain",
+    "plastic_modulus", "plastic_strain", "plastic_exponent",
+)  # fmt: skip

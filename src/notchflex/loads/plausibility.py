@@ -1,0 +1,58 @@
+"""Loads that were probably not meant, such as mN typed as N."""
+
+from collections.abc import Iterator, Mapping
+from math import hypot
+
+import numpy as np
+
+from notchflex.errors import InputWarning
+from notchflex.loads.external import HANGING, NO_VECTOR, NOTHING
+from notchflex.loads.load_path import LoadPath
+from notchflex.mechanics.chain import Chain
+from notchflex.robot.problems import unlikely
+
+# Largest usual forces in forces that close a notch, and strokes in lengths of the robot: far more
+# than any use, and less than a slip of the unit. What is less has a reason if it fails.
+_MOST_FORCES, _MOST_LENGTHS = 100.0, 5.0
+_MOST_GRAVITY = 100.0  # m/s2
+
+
+def usual_loads(chain: Chain) -> dict[str, tuple[float, str]]:
+    """Return the largest usual size of each kind of load, and its unit."""
+    force = _MOST_FORCES * float(chain.closing_force)
+    length = float(np.sum(chain.body_length) + np.sum(chain.rods.length))
+    mass = 1e3 * force / abs(HANGING[2])
+    return {
+        "tension": (force, "N"),
+        "stroke": (_MOST_LENGTHS * length, "mm"),
+        "tip_force": (force, "N"),
+        "tip_moment": (force * length, "N mm"),
+        "body_forces": (force, "N"),
+        "tip_mass": (mass, "g"),
+        "gravity": (_MOST_GRAVITY, "m/s2"),
+    }
+
+
+def unlikely_loads(
+    load: LoadPath, by_stroke: bool, usual: Mapping[str, tuple[float, str]]
+) -> Iterator[InputWarning]:
+    """Yield a warning for each kind of load that is far beyond a robot (`usual_loads`)."""
+    # Every solve comes by: one number where tensions alone are given; NaN is never above a limit.
+    largest = {"tension": np.fmax.reduce(load.tension, axis=None)}
+    if by_stroke:
+        largest["stroke"] = np.fmax.reduce(np.abs(load.stroke), axis=None)
+    for one in load.different:
+        if one is not NOTHING:
+            sizes = {
+                "tip_force": hypot(*one.tip_force),
+                "tip_moment": hypot(*one.tip_moment),
+                "body_forces": max((hypot(*each.force) for each in one.body_forces), default=0.0),
+                "tip_mass": one.tip_mass,
+                "gravity": hypot(*(one.gravity or NO_VECTOR)),
+            }
+            for name, size in sizes.items():
+                largest[name] = max(largest.get(name, 0.0), size)
+    for name, size in largest.items():
+        most, unit = usual[name]
+        if size > most:
+            yield unlikely(name, float(size), (0.0, float(f"{most:.1g}")), unit)

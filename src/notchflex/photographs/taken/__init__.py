@@ -1,1 +1,0 @@
-"""Circumstances of photographs: the loads, and the texts in their EXIF."""

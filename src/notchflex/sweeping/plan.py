@@ -1,0 +1,303 @@
+"""The plan of a sweep: the tables of its file, their reading and their schema."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import KW_ONLY
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, TypeAdapter, model_validator
+
+from notchflex.errors import InputError
+from notchflex.results.files.specification import read_specification, robot_named, validated
+from notchflex.robot.part import Float, Int, ProblemError, part
+from notchflex.robot.robot import Robot
+from notchflex.robot.schema import schema_of
+from notchflex.tolerancing.spec import LOAD_KEYS
+
+_REFUSE = InputError.INVALID_SPECIFICATION
+_MAX_VALUES = 10_000_000
+MAX_ROWS = 10**12
+"""Rows of a sweep at most: a month of 32 cores, and four million files."""
+_MAX_PIECES = 4_000_000
+_MAX_POINTS = 10**11
+"""Points at most: the way to the last one of a Sobol sequence takes minutes."""
+
+
+@part(kw_only=True, refuse=_REFUSE)
+class SweepVariable:
+    """A number of the robot file that is varied.
+
+    With `values`, or with `lower`, `upper` and `count`, it is one axis of a grid; with `lower` and
+    `upper` alone it is sampled.
+
+    Args:
+        value: Path of the robot file, such as `notch.depth`.
+        values: List of values.
+        lower: Least value, in the unit of the robot file.
+        upper: Greatest value.
+        count: Number of values from `lower` to `upper`.
+        spacing: "linear", or "log" for equal ratios.
+    """
+
+    value: Annotated[str, Field(min_length=1, description="path of the robot file")]
+    values: Annotated[
+        tuple[Float, ...] | None,
+        Field(min_length=1, max_length=_MAX_VALUES, description="list of values"),
+    ] = None
+    lower: Annotated[Float | None, Field(description="least value")] = None
+    upper: Annotated[Float | None, Field(description="greatest value")] = None
+    count: Annotated[
+        Int | None, Field(ge=2, le=_MAX_VALUES, description="number of values of a grid")
+    ] = None
+    spacing: Annotated[
+        Literal["linear", "log"], Field(description='"linear", or "log" for equal ratios')
+    ] = "linear"
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether its values are sampled, and not those of a grid."""
+        return self.values is None and self.count is None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> SweepVariable:
+        limits = (self.lower is not None, self.upper is not None)
+        if self.values is not None:
+            if any(limits) or self.count is not None:
+                text = "excludes `lower`, `upper` and `count`; give one or the other."
+                raise ProblemError([("values", text)])
+            if len(set(self.values)) != len(self.values):
+                raise ProblemError([("values", "has a value twice; give each once.")])
+            return self
+        if not all(limits):
+            text = "or `lower` and `upper` are needed; give one or the other."
+            raise ProblemError([("values", text)])
+        assert self.lower is not None
+        assert self.upper is not None
+        if not self.lower < self.upper:
+            text = f"is {self.lower:g}, not less than `upper`, {self.upper:g}; exchange them."
+            raise ProblemError([("lower", text)])
+        if self.spacing == "log" and self.lower <= 0.0:
+            text = f'is {self.lower:g}; spacing = "log" needs values above 0.'
+            raise ProblemError([("lower", text)])
+        return self
+
+
+@part(kw_only=True, refuse=_REFUSE)
+class Sampling:
+    """Sampling of variables without `count` or `values`.
+
+    Args:
+        method: "sobol" (scrambled) or "latin-hypercube".
+        points: Number of points; each is combined with the whole grid of the other variables.
+        seed: The same seed samples the same points.
+    """
+
+    method: Annotated[
+        Literal["sobol", "latin-hypercube"], Field(description='"sobol" or "latin-hypercube"')
+    ] = "sobol"
+    points: Annotated[Int, Field(ge=1, le=_MAX_POINTS, description="number of points")]
+    seed: Annotated[Int, Field(ge=0, le=2**63 - 1, description="seed of the points")] = 0
+
+
+@part(kw_only=True, refuse=_REFUSE)
+class KeptQuantity:
+    """A quantity that is kept, and within which limits a robot is accepted.
+
+    Args:
+        quantity: Name of a quantity, such as "total_angle".
+        load: Name of the load; not needed if there is one.
+        step: Step of the load, from 1; the last where not given.
+        notch: Only this notch, from 1.
+        tendon: Only this tendon, from 1.
+        body: Only this body, 0 for the base.
+        span: Only this span of a tendon, from 1.
+        contact: Only this contact of a tendon, from 1.
+        axis: Only this coordinate.
+        lower: Least value that is accepted, in mm, N, MPa and deg.
+        upper: Greatest value that is accepted.
+    """
+
+    quantity: Annotated[str, Field(description="name of a quantity")]
+    load: Annotated[str | None, Field(description="name of the load")] = None
+    step: Annotated[Int | None, Field(ge=1, description="step of the load, from 1")] = None
+    notch: Annotated[Int | None, Field(ge=1, description="only this notch, from 1")] = None
+    tendon: Annotated[Int | None, Field(ge=1, description="only this tendon, from 1")] = None
+    body: Annotated[Int | None, Field(ge=0, description="only this body, 0 for the base")] = None
+    span: Annotated[Int | None, Field(ge=1, description="only this span, from 1")] = None
+    contact: Annotated[Int | None, Field(ge=1, description="only this contact, from 1")] = None
+    axis: Annotated[
+        Literal["x", "y", "z"] | None, Field(description='only this coordinate: "x", "y" or "z"')
+    ] = None
+    lower: Annotated[Float | None, Field(description="least value that is accepted")] = None
+    upper: Annotated[Float | None, Field(description="greatest value that is accepted")] = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> KeptQuantity:
+        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
+            text = f"is {self.lower:g}, not less than `upper`, {self.upper:g}; exchange them."
+            raise ProblemError([("lower", text)])
+        return self
+
+
+@part(kw_only=True, refuse=_REFUSE)
+class SweepOutput:
+    """Selection of what is written to files.
+
+    Args:
+        rows: Whether all rows are kept; if not, only those that `extremes` and `failures` keep.
+        extremes: Of every kept quantity, so many rows with the smallest and as many with the
+            largest values.
+        failures: So many of the first rows without a result.
+        bins: Number of bins of the histogram of every kept quantity; 0 for none.
+        quantiles: Quantiles of every kept quantity, between 0 and 1.
+    """
+
+    rows: Annotated[bool, Field(strict=True, description="whether all rows are kept")] = True
+    extremes: Annotated[
+        Int, Field(ge=0, le=10_000, description="rows with the smallest and largest values")
+    ] = 10
+    failures: Annotated[
+        Int, Field(ge=0, le=1_000_000, description="first rows without a result")
+    ] = 100
+    bins: Annotated[Int, Field(ge=0, le=1000, description="bins of histograms")] = 50
+    quantiles: Annotated[
+        tuple[Annotated[Float, Field(ge=0.0, le=1.0)], ...],
+        Field(max_length=1000, description="quantiles, between 0 and 1"),
+    ] = (0.025, 0.25, 0.5, 0.75, 0.975)
+
+
+@part(refuse=_REFUSE, kw_only=True)
+class SweepPlan:
+    """Plan of a sweep.
+
+    Args:
+        robot: Name of a ready robot, or path of a robot file beside the plan.
+        name: What tables and pictures call the sweep.
+        refinement: More strain modes and fibres in every notch, as for `simulate`.
+        piece: Rows of a piece, which is one file; chosen where not given.
+        variable: What is varied.
+        sampling: How variables without `count` or `values` are sampled.
+        load: By name, the loads; the keys are the options of `notchflex simulate`.
+        keep: The quantities that are kept.
+        output: What of all rows goes into files.
+    """
+
+    _: KW_ONLY
+    robot: Annotated[str, Field(min_length=1, description="ready robot, or robot file")]
+    name: Annotated[str, Field(min_length=1, max_length=200, description="name of the sweep")] = (
+        "sweep"
+    )
+    refinement: Annotated[Int, Field(ge=0, le=3, description="more strain modes and fibres")] = 0
+    piece: Annotated[
+        Int | None, Field(ge=16, le=2**22, description="rows of a piece, which is one file")
+    ] = None
+    variable: Annotated[
+        tuple[SweepVariable, ...], Field(min_length=1, max_length=500, description="what is varied")
+    ]
+    sampling: Annotated[
+        Sampling | None, Field(description="how variables without count or values are sampled")
+    ] = None
+    load: Annotated[
+        dict[str, dict[str, Any]], Field(min_length=1, max_length=100, description="loads by name")
+    ]
+    keep: Annotated[
+        tuple[KeptQuantity, ...],
+        Field(min_length=1, max_length=500, description="quantities that are kept"),
+    ]
+    output: Annotated[SweepOutput, Field(description="what goes into files")] = SweepOutput()
+
+    @property
+    def grid(self) -> tuple[SweepVariable, ...]:
+        """The variables of the grid, the last of which changes fastest."""
+        return tuple(one for one in self.variable if not one.is_sampled)
+
+    @property
+    def sampled(self) -> tuple[SweepVariable, ...]:
+        """The variables that are sampled."""
+        return tuple(one for one in self.variable if one.is_sampled)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows: the grid times the points."""
+        count = 1 if self.sampling is None else self.sampling.points
+        for one in self.grid:
+            count *= len(one.values) if one.values is not None else (one.count or 1)
+        return count
+
+    @model_validator(mode="after")
+    def _fits(self) -> SweepPlan:
+        if self.sampled and self.sampling is None:
+            name = self.sampled[0].value
+            text = f"is missing, but `{name}` has no `count`; write [sampling] with points = 1000, "
+            raise ProblemError([("sampling", f"{text}or give it a count.")])
+        if self.sampling is not None and not self.sampled:
+            text = "samples nothing: every variable has `count` or `values`; leave one out."
+            raise ProblemError([("sampling", text)])
+        names = [one.value.strip() for one in self.variable]
+        twice = [name for name in names if names.count(name) > 1]
+        if twice:
+            raise ProblemError([("variable", f"has `{twice[0]}` twice; vary it once.")])
+        if self.rows > MAX_ROWS:
+            raise ProblemError([("variable", f"makes {self.rows:.3g} rows; give at most 1e12.")])
+        if self.piece is not None and self.rows / self.piece > _MAX_PIECES:
+            text = f"is {self.piece}, which makes {self.rows / self.piece:.3g} files; give "
+            raise ProblemError([("piece", f"{text}{-(-self.rows // _MAX_PIECES)} or more.")])
+        return self
+
+
+def read_plan(path: str | os.PathLike[str]) -> tuple[SweepPlan, Robot]:
+    """Read a plan file and the robot that it names.
+
+    Args:
+        path: The TOML file, in mm, N, MPa and deg.
+
+    Returns:
+        What is swept, and the robot that is varied.
+
+    Raises:
+        InputError: The file or its robot cannot be read, or a value in it is not allowed.
+    """
+    plan = read_specification(path, "plan file", plan_from_table)
+    return plan, robot_named(plan.robot, Path(path).parent)
+
+
+def plan_from_table(table: Mapping[str, Any]) -> SweepPlan:
+    """Make a plan from the plain table of a plan file.
+
+    Raises:
+        InputError: A key is missing, not known, or its value is not allowed.
+
+    Example:
+        >>> depth = {"value": "notch.depth", "lower": 1.36, "upper": 1.42, "count": 7}
+        >>> load, keep = {"pulled": {"tension": 1.0}}, [{"quantity": "total_angle"}]
+        >>> table = {"robot": "pacheco2021-a", "variable": [depth], "load": load, "keep": keep}
+        >>> plan_from_table(table).rows
+        7
+    """
+    return validated(SweepPlan, table)
+
+
+def plan_table(plan: SweepPlan) -> dict[str, Any]:
+    """Return a plan as a plain table, which `plan_from_table` reads back."""
+    table = TypeAdapter(SweepPlan).dump_python(plan, mode="json", exclude_none=True)
+    return {key: value for key, value in table.items() if value is not None}
+
+
+def plan_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a plan file (draft 2020-12).
+
+    Example:
+        >>> plan_schema()["required"]
+        ['robot', 'variable', 'load', 'keep']
+    """
+    text = "Which numbers of a robot are varied, and what is kept, in mm, N, MPa and deg."
+    schema = schema_of(SweepPlan, "notchflex plan file of a sweep", text)
+    schema["properties"]["load"]["additionalProperties"] = {
+        "type": "object",
+        "properties": {key: {} for key in LOAD_KEYS},
+        "additionalProperties": False,
+    }
+    return schema
