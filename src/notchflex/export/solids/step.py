@@ -66,8 +66,13 @@ def step_solid(subject: Subject, options: SolidOptions) -> Document:
 
 
 def _save(solid: Any, file: Path) -> None:
-    if not import_module("build123d").export_step(solid, file, timestamp=_STAMP):
-        raise OSError(f"build123d could not write {file}")
+    # Older versions of build123d return False for what newer ones raise; neither says why.
+    try:
+        written = import_module("build123d").export_step(solid, file, timestamp=_STAMP)
+    except RuntimeError:
+        written = False
+    if not written:
+        raise OSError("build123d could not write it; is there room on the disk?")
 
 
 def _check_spines(robot: Robot) -> None:
