@@ -1,5 +1,6 @@
 """Values that were probably not meant: what warns, what is refused, what is silent."""
 
+import math
 import warnings
 
 import pytest
@@ -106,6 +107,7 @@ def test_set_may_take_back_what_would_warn(tmp_path, capsys):
         (nf.Load(tension=1.0, tip_moment=(0.0, 1e4, 0.0)), "tip_moment", 10.0),
         (nf.Load(body_forces=[nf.BodyForce(5, (300.0, 0.0, 0.0))]), "body_forces", 0.3),
         (nf.Load(tension=1.0, gravity=(0.0, 0.0, -9810.0)), "gravity", 9.81),
+        (nf.Load(tension=1.0, base_rotation=(0.0, 90.0, 0.0)), "base_rotation", math.pi / 2),
     ],
 )
 def test_loads_in_another_unit_are_asked_about(load, name, meant):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from math import hypot, isfinite, isnan, nan, pi
+from math import hypot, isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from notchflex.errors import InputError
 from notchflex.loads.external import NO_VECTOR, ExternalLoad
 from notchflex.loads.validation import check_number, check_vector, short_repr
 
-_ONE_TURN = 2.0 * pi * (1.0 + 1e-9)  # and what rounding adds
+_LARGEST_TURN = 1e6  # rad; of more, rounding leaves an angle worse than 1e-10 rad
 
 _PER_TENDON = "a number, or one entry per tendon with None where nothing is commanded"
 
@@ -43,8 +43,8 @@ class Load(ExternalLoad):
 
     Raises:
         InputError: A number that is not finite, text, an invalid external load, or a base turned
-            by more than one turn; the number of tendons and the signs are checked when the robot
-            is known.
+            by more than 1e6 rad; the number of tendons and the signs are checked when the robot is
+            known.
 
     Example:
         >>> Load(tension=2.0, tip_force=(0.0, 0.1, 0.0))
@@ -111,13 +111,12 @@ def _finite(value: Any, what: str) -> float:
 
 
 def check_turn(value: Any) -> tuple[float, float, float]:
-    """Return the rotation vector of a base, at most one turn long: more is rather degrees."""
+    """Return the rotation vector of a base, short enough for its angle to be known."""
     turn = check_vector(value, "base_rotation", "rotation vector, rad")
-    angle = hypot(*turn)
-    if angle > _ONE_TURN:
+    if hypot(*turn) > _LARGEST_TURN:
         raise InputError.OUT_OF_RANGE(
-            f"base_rotation turns by {angle:.4g} rad ({angle * 180.0 / pi:.4g} deg); a rotation "
-            "vector is at most one turn long, 2 pi rad or 360 deg: look at its unit"
+            f"base_rotation turns by {hypot(*turn):.4g} rad; give a rotation vector of at most "
+            f"{_LARGEST_TURN:g} rad, of which one turn is 6.283"
         )
     return turn
 

@@ -1,7 +1,7 @@
 """Loads that were probably not meant, such as mN typed as N."""
 
 from collections.abc import Iterator, Mapping
-from math import hypot
+from math import hypot, pi
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from notchflex.robot.problems import unlikely
 # than any use, and less than a slip of the unit. What is less has a reason if it fails.
 _MOST_FORCES, _MOST_LENGTHS = 100.0, 5.0
 _MOST_GRAVITY = 100.0  # m/s2
+_ONE_TURN = 2.0 * pi * (1.0 + 1e-9)  # rad, and what rounding adds
 
 
 def usual_loads(chain: Chain) -> dict[str, tuple[float, str]]:
@@ -30,6 +31,7 @@ def usual_loads(chain: Chain) -> dict[str, tuple[float, str]]:
         "body_forces": (force, "N"),
         "tip_mass": (mass, "g"),
         "gravity": (_MOST_GRAVITY, "m/s2"),
+        "base_rotation": (_ONE_TURN, "rad"),
     }
 
 
@@ -39,6 +41,7 @@ def unlikely_loads(
     """Yield a warning for each kind of load that is far beyond a robot (`usual_loads`)."""
     # Every solve comes by: one number where tensions alone are given; NaN is never above a limit.
     largest = {"tension": np.fmax.reduce(load.tension, axis=None)}
+    largest["base_rotation"] = hypot(*load.base_rotation)
     if by_stroke:
         largest["stroke"] = np.fmax.reduce(np.abs(load.stroke), axis=None)
     for one in load.different:
@@ -55,4 +58,4 @@ def unlikely_loads(
     for name, size in largest.items():
         most, unit = usual[name]
         if size > most:
-            yield unlikely(name, float(size), (0.0, float(f"{most:.1g}")), unit)
+            yield unlikely(name, float(size), (0.0, float(f"{most:.2g}")), unit)

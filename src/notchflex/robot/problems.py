@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Iterator
+from math import pi
 from typing import TYPE_CHECKING, Any
 
 from notchflex.errors import InputWarning
@@ -22,6 +23,7 @@ _OTHER_UNITS = {
     "N mm": {"mN mm": 1e-3},
     "g": {"mg": 1e-3},
     "m/s2": {"mm/s2": 1e-3},
+    "rad": {"deg": pi / 180.0},
     "kg/m3": {"g/cm3": 1e3},
     "": {"%": 0.01},
 }

@@ -28,6 +28,8 @@ from notchflex.solver.newton import Settings
 
 LEVELS = (0.05, 0.50, 0.95)
 """Quantiles of the draws at the low end, the middle and the high end of a band."""
+_FEWEST = 20
+"""Draws of which 5 % is one at each end."""
 
 DRAWS = 256
 
@@ -161,6 +163,11 @@ class Bands(Displayed, Mapping[str, Band]):
             sentences.append(
                 f"{self.redrawn} of {self.draws} draws made no valid robot and were drawn again: "
                 "the tolerances reach beyond what the tube allows."
+            )
+        if self.draws < _FEWEST:
+            sentences.append(
+                f"{self.draws} draws have no 5 in a hundred at an end: the bands are narrower than "
+                f"5 to 95 %; give {_FEWEST} draws or more."
             )
         return sentences
 
