@@ -16,7 +16,7 @@ further error. Where no polynomial is accurate enough, every robot is assembled.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.loads.command import Command, make_commands
-from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.chain import Chain, stiffened
 from notchflex.robot import Robot
 from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.solver.programs.prepare import PreparedChain
@@ -122,7 +122,6 @@ class SparsePolynomial(NamedTuple):
         entries: Indices in the vector of the entries that vary.
         which: Index of each of these among the distinct entries, block after block.
         base: The vector in the middle.
-        nodes: Exact vectors at all points that were evaluated, (points, m).
         error: Largest measured error, relative to the scale.
     """
 
@@ -133,7 +132,6 @@ class SparsePolynomial(NamedTuple):
     entries: Int[np.ndarray, " v"]
     which: Int[np.ndarray, " v"]
     base: Float[np.ndarray, " m"]
-    nodes: Float[np.ndarray, "points m"]
     error: float = np.inf
 
     def covers(self, numbers: Float[np.ndarray, "rows d"]) -> bool:
@@ -324,9 +322,7 @@ def _solved(
         own = coefficients[block_of == block]
         used = np.flatnonzero((own != 0.0).any(axis=0))
         blocks.append(CoefficientBlock(used, np.ascontiguousarray(own[:, used])))
-    return SparsePolynomial(
-        middle, half, terms, blocks, entries, position[which.ravel()], base, nodes
-    )
+    return SparsePolynomial(middle, half, terms, blocks, entries, position[which.ravel()], base)
 
 
 def _errors(
@@ -380,9 +376,10 @@ class VariedChains:
     """Chains and commands of varied robots, as the rows of a batch.
 
     Attributes:
-        numbers: The numbers of every robot.
+        numbers: The numbers of every robot that the polynomial is of.
+        stiffness_factor: Factor on the stiffness of each notch of every robot.
         ready: The chain of the robot that is varied.
-        polynomial: Chain and commands from the numbers.
+        polynomial: Chain and commands from the numbers, where no notch has a factor.
         structure: Layout of chains for programs.
         command: Layout of one load.
         steps: Loads of each robot.
@@ -390,12 +387,20 @@ class VariedChains:
     """
 
     numbers: Float[np.ndarray, "robots d"]
+    stiffness_factor: Float[np.ndarray, "robots n"]
     ready: PreparedChain
     polynomial: SparsePolynomial
     structure: StaticStructure
     command: PytreeLayout
     steps: int
     turn: Float[np.ndarray, "3 3"] | None
+
+    def of(self, robots: VariedRobots) -> VariedChains | None:
+        """Return the chains of other robots by the same names; None beyond the polynomial."""
+        factor, robots = _without_factors(robots)
+        if not self.polynomial.covers(robots.table):
+            return None
+        return replace(self, numbers=robots.table, stiffness_factor=factor)
 
     def rows(
         self, index: slice
@@ -405,11 +410,11 @@ class VariedChains:
         size = self.ready.chain_layout.size
         in_chain = self.polynomial.entries < size
         chain, load = np.split(self.polynomial.base, [size])
-        chains = np.tile(self.structure.pack(chain), (values.shape[1], 1))
-        positions = self.structure.indices_of(self.polynomial.entries[in_chain])
-        moves = positions < self.structure.size - 1  # else compiled in, the same for all nodes
-        chains[:, positions[moves]] = values[in_chain][moves].T
-        commands = np.tile(load, (values.shape[1], 1))
+        chains, commands = (np.tile(one, (values.shape[1], 1)) for one in (chain, load))
+        chains[:, self.polynomial.entries[in_chain]] = values[in_chain].T
+        layout = self.ready.chain_layout
+        stiff = stiffened(layout.unpack(chains), self.stiffness_factor[index])
+        chains = self.structure.pack(layout.pack(stiff, leading=1))
         commands[:, self.polynomial.entries[~in_chain] - size] = values[~in_chain].T
         return chains, commands.reshape(len(chains), self.steps, self.command.size)
 
@@ -425,32 +430,62 @@ def varied_chains(robots: VariedRobots, load: LoadPath, refinement: int) -> Vari
     Returns:
         The chains; None where each robot must be assembled by itself.
     """
-    table = robots.table
+    # A factor multiplies all that the other numbers make of a notch: in a polynomial it would
+    # multiply the number of terms.
+    factor, robots = _without_factors(robots)
     ready = prepare_for(robots.robot, load, None, refinement)
     commands = make_commands(load, robots.robot, ready.chain)
     form = _Form(ready.chain_layout, ready.command_layout(commands), len(load))
-    polynomial = _fitted(robots, load, refinement, form, _accuracies(robots))
+    ends = (tuple(one.tolist()) for one in robots.box)
+    polynomial = _fitted(robots.robot, robots.names, *ends, load, refinement, _accuracies(robots))
     if polynomial is None:
         return None
-    structure = ready.static_structure
-    if not structure.fits(polynomial.nodes[:, : form.chain.size]):
+    structure, varies = ready.static_structure, polynomial.base.copy()
+    varies[polynomial.entries] = np.nan
+    if not structure.fits(varies[None, : form.chain.size]):
         return None
     layouts = structure, form.command
-    return VariedChains(table, ready, polynomial, *layouts, form.steps, load.base_to_world)
+    return VariedChains(
+        robots.table, factor, ready, polynomial, *layouts, form.steps, load.base_to_world
+    )
 
 
+_FACTOR = "stiffness_factor"
+
+
+def _without_factors(robots: VariedRobots) -> tuple[Float[np.ndarray, "k n"], VariedRobots]:
+    """Return the factor on the stiffness of each notch, and the robots without these factors."""
+    own = [notch.stiffness_factor for notch in robots.robot.notches]
+    factor, others = np.tile(own, (len(robots), 1)), dict(robots.values)
+    for notch, name in zip(robots.notch_of, robots.names, strict=True):
+        if name.endswith(_FACTOR):
+            notches = slice(None) if notch is None else slice(notch - 1, notch)
+            factor[:, notches] = others.pop(name)[:, None]
+    plain = robots.robot.with_value(f"notch.{_FACTOR}", 1.0)
+    return factor, VariedRobots(
+        plain, others or {f"notch.{_FACTOR}": np.ones(len(robots))}, robots.ranges
+    )
+
+
+@lru_cache(maxsize=8)
 def _fitted(
-    robots: VariedRobots,
+    robot: Robot,
+    names: tuple[str, ...],
+    low: tuple[float, ...],
+    high: tuple[float, ...],
     load: LoadPath,
     refinement: int,
-    form: _Form,
-    accuracies: Sequence[PolynomialAccuracy],
+    accuracies: tuple[PolynomialAccuracy, ...],
 ) -> SparsePolynomial | None:
-    names, table = robots.names, robots.table
+    """Fit chain and commands between the ends of numbers; of the arguments alone, and cached.
+
+    A tolerance analysis asks for the same polynomial ten times.
+    """
+    box = VariedRobots(robot, dict(zip(names, zip(low, high, strict=True), strict=True)))
 
     def vector_of(numbers: Float[np.ndarray, " d"]) -> Float[np.ndarray, " m"]:
         try:
-            robot: Robot = robots.at(dict(zip(names, numbers, strict=True)))
+            robot = box.at(dict(zip(names, numbers, strict=True)))
             ready = prepare_for(robot, load, None, refinement)
             commands = make_commands(load, robot, ready.chain)
         except InputError:
@@ -467,47 +502,45 @@ def _fitted(
         return np.concatenate([ready.vector, loads])
 
     # An inextensible tendon, for example, has infinite stiffness, whatever else varies.
-    own = prepare_for(robots.robot, load, None, refinement)
-    reference = packed(own, make_commands(load, robots.robot, own.chain))
+    own = prepare_for(robot, load, None, refinement)
+    commands = make_commands(load, robot, own.chain)
+    form = _Form(own.chain_layout, own.command_layout(commands), len(load))
+    reference = packed(own, commands)
     infinite = ~np.isfinite(reference)
     weightless = np.zeros(len(reference), bool)
     if not any(one.gravity is not None for one in load.different):  # masses are of no effect
         positions: Chain = jax.tree.unflatten(form.chain.structure, form.chain.indices)
         weightless[np.append(positions.body_mass, positions.body_centre)] = True
-    low, high = robots.box
-    middle = 0.5 * (low + high)
-    half = np.maximum(0.5 * (high - low), 1e-9 * np.maximum(np.abs(middle), 1e-3))
-    rows = np.linspace(0, len(table) - 1, _CHECKS).astype(int)
+    middle, half = 0.5 * np.add(high, low), 0.5 * np.subtract(high, low)
+    half = np.maximum(half, 1e-9 * np.maximum(np.abs(middle), 1e-3))
+    checks = np.random.default_rng(0).uniform(middle - half, middle + half, (_CHECKS, len(names)))
     try:
         result = fit_polynomial(
             vector_of,
             middle - half,
             middle + half,
-            list(robots.cliques()),
+            list(box.cliques()),
             lambda sizes: _scale(sizes, form),
             form.parts,
             accuracies=accuracies,
-            checks=table[rows],
+            checks=checks,
         )
     except _AnotherFormError:
         return None
     if result is None:
         return None
-    base, nodes = (
-        np.where(infinite | weightless, reference, one) for one in (result.base, result.nodes)
-    )
-    return result._replace(base=base, nodes=nodes)
+    return result._replace(base=np.where(infinite | weightless, reference, result.base))
 
 
-def _accuracies(robots: VariedRobots) -> list[PolynomialAccuracy]:
+def _accuracies(robots: VariedRobots) -> tuple[PolynomialAccuracy, ...]:
     """Return the accuracies, with at most as many nodes as robots unless other batches follow."""
     count = len(robots)
     follows = robots.ranges is not None and count >= _MIN_ROBOTS
     usual, fine = TOLERANCES
-    return [
+    return (
         PolynomialAccuracy(usual, _MAX_NODES if follows else min(_MAX_NODES, count // 2)),
         PolynomialAccuracy(fine, _MAX_NODES if follows else min(_MAX_NODES, count)),
-    ]
+    )
 
 
 def _scale(sizes: Float[np.ndarray, " m"], form: _Form) -> Float[np.ndarray, " m"]:

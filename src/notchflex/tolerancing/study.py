@@ -301,10 +301,11 @@ class PieceStudy(Study):
     ) -> Batch:
         """Follow a load with all robots, in the calling thread."""
         del part
-        chains = self.chains[name]
+        known = self.chains[name]
+        chains = None if known is None else known.of(robots)
         options: dict[str, Any] = {"outputs": outputs, "settings": self.settings}
-        if chains is not None and chains.polynomial.covers(robots.table):
-            return simulate_varied(dataclasses.replace(chains, numbers=robots.table), **options)
+        if chains is not None:
+            return simulate_varied(chains, **options)
         parts = [
             simulate_batch(
                 list(robots[start : start + _EACH]),

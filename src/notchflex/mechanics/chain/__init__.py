@@ -7,6 +7,7 @@ from notchflex.mechanics.chain.assembly import (
     chain_averages,
     chain_template,
     laws,
+    stiffened,
 )
 from notchflex.mechanics.chain.flexures import FlexureOf, flexure
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
@@ -25,6 +26,7 @@ __all__ = [
     "laws",
     "padded",
     "sites_of",
+    "stiffened",
     "structural",
     "tendons_in_plane",
     "unchecked_dimensions",

@@ -69,7 +69,7 @@ def assemble(
     body_mass, body_centre = body_masses(robot, rods)
     tendons = robot.tendon
     chain = Chain(
-        rods=rods,
+        rods=stiffened_rods(rods, template.stiffness_factor),
         groups=routed.groups,
         contact_pairs=template.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
@@ -113,18 +113,48 @@ def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
     stop = template.rods.stop_flexibility
     linear = law.is_linear and not template.distinct_rods.section.softens
     contact_stiffness = 1.0 / np.sum(template.contact_motion / stiffness, axis=-1)
+    soft = {
+        "stiffness": stiffness,
+        "elastic": elastic if linear else None,
+        "contact_stiffness": contact_stiffness,
+        "contact_flexibility": None if stop is None else stop / contact_stiffness,
+    }
+    return {"law": law, **_stiffened_laws(soft, template.stiffness_factor, template.height)}
+
+
+def stiffened(chain: Chain, factor: Float[np.ndarray, "*rows n"]) -> Chain:
+    """Multiply the stiffness of every notch in all directions; leading axes are of both."""
+    soft = {name: getattr(chain, name) for name in _STIFFNESSES}
+    fields = _stiffened_laws(soft, factor, np.sum(chain.rods.length, axis=-1))
+    return dataclasses.replace(chain, rods=stiffened_rods(chain.rods, factor), **fields)
+
+
+def stiffened_rods(rods: Rod, factor: Float[np.ndarray, "*rows n"]) -> Rod:
+    """Multiply the stiffness of the sections of every flexure."""
+    return dataclasses.replace(rods, section=rods.section.stiffened(factor[..., None]))
+
+
+_STIFFNESSES = ("stiffness", "elastic", "contact_stiffness", "contact_flexibility")
+
+
+def _stiffened_laws(
+    soft: dict[str, Any], factor: Float[np.ndarray, "*rows n"], height: Float[np.ndarray, "*rows n"]
+) -> dict[str, Any]:
+    """Multiply the stiffnesses of a chain (`_STIFFNESSES`), and return its averages with them."""
+    stiffness, elastic, at_contact, flexibility = (soft[name] for name in _STIFFNESSES)
+    factor = constant(factor)
+    at_contact = factor * at_contact
     return {
-        "law": law,
-        "stiffness": constant(stiffness),
-        "elastic": constant(elastic) if linear else None,
-        "contact_stiffness": constant(contact_stiffness),
-        "contact_flexibility": None if stop is None else constant(stop / contact_stiffness),
-        **chain_averages(contact_stiffness, template.height),
+        "stiffness": factor[..., None] * stiffness,
+        "elastic": None if elastic is None else factor[..., None, None] * elastic,
+        "contact_stiffness": at_contact,
+        "contact_flexibility": None if flexibility is None else flexibility / factor,
+        **chain_averages(at_contact, height),
     }
 
 
 def chain_averages(
-    contact_stiffness: Float[np.ndarray, " n"], height: Float[np.ndarray, " n"]
+    contact_stiffness: Float[np.ndarray, "*rows n"], height: Float[np.ndarray, "*rows n"]
 ) -> dict[str, Any]:
     """Return the fields of a chain that are averages over the notches, linear in each argument.
 
@@ -132,10 +162,10 @@ def chain_averages(
         contact_stiffness: Stiffness of every notch against closing, N/mm.
         height: Length of the neutral axis of every flexure, mm.
     """
-    count = len(contact_stiffness)
+    count = contact_stiffness.shape[-1]
     return {
-        "closing_force": constant(contact_stiffness @ height / count),
-        "stroke_stiffness": constant(contact_stiffness.sum() / count**2),
+        "closing_force": constant(np.sum(contact_stiffness * height, axis=-1) / count),
+        "stroke_stiffness": constant(np.sum(contact_stiffness, axis=-1) / count**2),
     }
 
 
@@ -152,6 +182,7 @@ class ChainTemplate(NamedTuple):
         notch_frame: Rotation from the frame of every notch to the tube.
         height: Length of the neutral axis of every flexure, mm.
         contact_motion: Square of the motion of each notch's contact by every mode, mm^2.
+        stiffness_factor: Factor on the stiffness of each notch, which the rods are without.
     """
 
     distinct_rods: Rod
@@ -163,6 +194,7 @@ class ChainTemplate(NamedTuple):
     notch_frame: Array
     height: Float[np.ndarray, " n"]
     contact_motion: Float[np.ndarray, "n modes"]
+    stiffness_factor: Float[np.ndarray, " n"]
 
 
 def chain_template(
@@ -186,7 +218,10 @@ def _build_template(
     by_fibres: bool,
     flexures: FlexureOf = flexure,
 ) -> ChainTemplate:
-    # Equal notches are built once.
+    # Notches that are equal but for their factor are built once.
+    factor = np.array([notch.stiffness_factor for notch in notches])
+    if (factor != 1.0).any():
+        notches = tuple(dataclasses.replace(notch, stiffness_factor=1.0) for notch in notches)
     sited_notches = tuple(zip(notches, sites, strict=True))
     different = dict.fromkeys(sited_notches)
     built = {each: flexures(*each, tube, level, refinement, by_fibres) for each in different}
@@ -216,6 +251,7 @@ def _build_template(
         constant(np.stack([directions[notch.direction_deg] for notch in notches])),
         np.sum(rods.length, axis=-1),
         _squared_contact_motion(rods, tube.outer_radius),
+        factor,
     )
 
 

@@ -50,7 +50,7 @@ class FlexureOf(Protocol):
 def flexure(
     notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int, by_fibres: bool
 ) -> tuple[Rod, Motion]:
-    """Make a flexure, and its pose in the free robot; the last ones are cached.
+    """Make a flexure without its factor on stiffness, and its pose in the free robot; cached.
 
     Args:
         notch: The notch.
@@ -62,5 +62,4 @@ def flexure(
     """
     rod = with_level(rod_at(site, notch, tube, refinement), level)
     rod = with_fibres(rod, notch, tube, refinement) if by_fibres else rod
-    section = rod.section.stiffened(notch.stiffness_factor)
-    return dataclasses.replace(rod, section=section), free_pose(rod)
+    return rod, free_pose(rod)

@@ -34,7 +34,7 @@ def body_masses(
 
     Args:
         robot: The robot, n notches.
-        rods: Its flexures as they stand in the chain, each starting from the proximal body.
+        rods: Its flexures, each starting from the proximal body, without factors on stiffness.
 
     Returns:
         Masses (g, (n + 1,)), base first, and centres (mm, (n + 1, 3)) in the frames of the
@@ -48,8 +48,7 @@ def body_masses(
     length = body_lengths(robot.tube, robot.notches)
     wall = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2)
     piece = wall * length
-    stiffer = np.array([notch.stiffness_factor for notch in notches])
-    half = 0.5 * np.sum(np.asarray(rods.section.area) * np.asarray(rods.length), axis=-1) / stiffer
+    half = 0.5 * np.sum(np.asarray(rods.section.area) * np.asarray(rods.length), axis=-1)
     start = np.asarray(rods.start_offset)
     end = -np.einsum("nba,nb->na", np.asarray(rods.end_rotation), np.asarray(rods.end_offset))
     volume = piece.copy()

@@ -103,7 +103,7 @@ class FibreSection(Pytree):
     outer_radius: Float[Array, "*shape"] | float = 0.0
     half_angle: Float[Array, "*shape"] | float = 0.0
 
-    def stiffened(self, factor: float) -> FibreSection:
+    def stiffened(self, factor: Float[np.ndarray, "*shape"]) -> FibreSection:
         """Multiply the stiffness in all directions; for plain arrays. Strains stay as they are."""
         names = ("area", "second_moment_weak", "second_moment_strong", "torsion_constant")
         moments = {name: constant(factor * getattr(self, name)) for name in names}
@@ -111,7 +111,7 @@ class FibreSection(Pytree):
         if ends is not None:
             ends = dataclasses.replace(ends, oblique=constant(factor * ends.oblique))
         if fibres is not None:
-            fibres = dataclasses.replace(fibres, area=constant(factor * fibres.area))
+            fibres = dataclasses.replace(fibres, area=constant(factor[..., None] * fibres.area))
         return dataclasses.replace(self, **moments, ends=ends, fibres=fibres)
 
     @property
