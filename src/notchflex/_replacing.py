@@ -41,11 +41,8 @@ def replacing(target: str | os.PathLike[str]) -> Generator[Path]:
         InputError: The file cannot be written.
     """
     if not is_replaceable(Path(target)):  # not its real path: /dev/stdout may be a link to no name
-        try:
+        with unwritable(f"{target} cannot be written"):
             yield Path(target)
-        except OSError as problem:
-            words = problem.strerror or problem
-            raise InputError.FILE_UNWRITABLE(f"{target} cannot be written: {words}.") from None
         return
     try:
         destination = Path(os.path.realpath(target))
@@ -63,17 +60,28 @@ def replacing(target: str | os.PathLike[str]) -> Generator[Path]:
         if not _lock(handle):
             os.close(handle)
             handle = -1
-        yield temporary
-        temporary.chmod(_mode_for(destination))
-        os.replace(temporary, destination)
-    except OSError as problem:
-        raise InputError.FILE_UNWRITABLE(
-            f"{target} cannot be written: {problem.strerror or problem}."
-        ) from None
+        with unwritable(f"{target} cannot be written"):
+            yield temporary
+            temporary.chmod(_mode_for(destination))
+            os.replace(temporary, destination)
     finally:
         if handle >= 0:
             os.close(handle)
         temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def unwritable(what: str) -> Generator[None]:
+    """Add what cannot be done to an error of the system.
+
+    Raises:
+        InputError: In place of an `OSError`.
+    """
+    try:
+        yield
+    except OSError as problem:
+        words = problem.strerror or problem
+        raise InputError.FILE_UNWRITABLE(f"{what}: {words}.") from None
 
 
 def _lock(handle: int) -> bool:

@@ -24,7 +24,13 @@ def test_an_angle_falls_by_the_factor(wrist: nf.Robot, margin):
     margin.within("angle", nf.solve(stiff, load).notch_angle / expected - 1.0, 1e-12)
 
 
-@pytest.mark.parametrize("name", ["pacheco2021-a-true", "liu2022", "gao2017"])
+LONG = [
+    pytest.param(name, marks=pytest.mark.nightly)
+    for name in ("pacheco2021-a-true", "liu2022", "gao2017")
+]
+
+
+@pytest.mark.parametrize("name", ["pacheco2021-a", *LONG])
 def test_a_stiffer_robot_is_the_same_under_larger_loads(name: str, margin):
     """In every direction, with nitinol and friction: all forces grow in proportion."""
     robot = nf.load_robot(name)

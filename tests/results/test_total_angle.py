@@ -74,6 +74,7 @@ def test_a_wrist_of_two_sides_keeps_its_sign(wrist: nf.Robot):
     assert second < -0.01
 
 
+@pytest.mark.nightly
 def test_its_slopes_at_rest_in_space(margin):
     """A norm would have no slope where the robot is straight."""
     robot, load = nf.load_robot("two-axis-wrist"), nf.Load(tip_moment=(0.0, 0.0, 0.0))

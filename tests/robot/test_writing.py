@@ -170,7 +170,7 @@ def test_what_cannot_be_written(tmp_path: Path):
         nf.save_robot(robot, tmp_path)
     with refused("FILE_UNWRITABLE", error=nf.RobotFileError):
         nf.save_robot(robot, tmp_path / "a\0.toml")
-    with refused("FILE_UNREADABLE", "none.toml", error=nf.RobotFileError):
+    with refused("FILE_NOT_FOUND", "none.toml", error=nf.RobotFileError):
         nf.save_robot(robot, tmp_path / "a.toml", template=tmp_path / "none.toml")
     assert list(tmp_path.iterdir()) == []
 

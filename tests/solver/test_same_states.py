@@ -38,6 +38,7 @@ def assert_same_states(reference: nf.EquilibriumPath, path: nf.EquilibriumPath) 
     np.testing.assert_array_equal(path.closed, reference.closed)
 
 
+@pytest.mark.nightly
 def test_edges_on_one_side_but_for_rounding_are_one_contact():
     robot = nf.load_robot(CASES / "links_and_strips.toml")
     turned, hanging = np.array([-0.55, 0.54, 1.87]), nf.Load(tip_mass=25.0)

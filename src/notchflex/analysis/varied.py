@@ -455,8 +455,8 @@ _FACTOR = "stiffness_factor"
 
 def _without_factors(robots: VariedRobots) -> tuple[Float[np.ndarray, "k n"], VariedRobots]:
     """Return the factor on the stiffness of each notch, and the robots without these factors."""
-    own = [notch.stiffness_factor for notch in robots.robot.notches]
-    factor, others = np.tile(own, (len(robots), 1)), dict(robots.values)
+    factor = np.tile([one.stiffness_factor for one in robots.robot.notches], (len(robots), 1))
+    others = dict(robots.values)
     for notch, name in zip(robots.notch_of, robots.names, strict=True):
         if name.endswith(_FACTOR):
             notches = slice(None) if notch is None else slice(notch - 1, notch)
@@ -471,8 +471,8 @@ def _without_factors(robots: VariedRobots) -> tuple[Float[np.ndarray, "k n"], Va
 def _fitted(
     robot: Robot,
     names: tuple[str, ...],
-    low: tuple[float, ...],
-    high: tuple[float, ...],
+    low: Sequence[float],
+    high: Sequence[float],
     load: LoadPath,
     refinement: int,
     accuracies: tuple[PolynomialAccuracy, ...],

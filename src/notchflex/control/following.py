@@ -73,11 +73,8 @@ class Following(Displayed):
     @cached_property
     def path(self) -> EquilibriumPath:
         """All states in order, simulated anew from the loads; those of overshoots included."""
-        return simulate(self.robot, self.load, from_state=self.start, refinement=self._refinement)
-
-    @property
-    def _refinement(self) -> int:
-        return 0 if self.start is None else self.start.refinement
+        refinement = 0 if self.start is None else self.start.refinement
+        return simulate(self.robot, self.load, from_state=self.start, refinement=refinement)
 
     @property
     def reached(self) -> Bool[np.ndarray, " k"]:

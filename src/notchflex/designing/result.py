@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from notchflex._replacing import unwritable
 from notchflex._summary import Displayed, Summary, short
 from notchflex.designing.explanation import yield_sentences
 from notchflex.designing.model.wishes import Wish
@@ -17,7 +18,7 @@ from notchflex.designing.search.problem import DesignProblem
 from notchflex.designing.search.robust import YieldOf
 from notchflex.designing.search.search import SearchResult
 from notchflex.designing.specification import DesignConstraint, DesignObjective, DesignSpec
-from notchflex.errors import ConvergenceError, InputError
+from notchflex.errors import ConvergenceError
 from notchflex.results.files.csv import write_csv
 from notchflex.results.files.json import document_head, write_json
 from notchflex.results.files.writing import check_folder, write_text
@@ -328,11 +329,8 @@ def make_folder(folder: str | os.PathLike[str]) -> None:
     Raises:
         InputError: It cannot be made.
     """
-    try:
+    with unwritable(f"-o {folder} cannot be made"):
         Path(folder).mkdir(exist_ok=True)
-    except OSError as problem:
-        words = problem.strerror or problem
-        raise InputError.FILE_UNWRITABLE(f"-o {folder} cannot be made: {words}.") from None
 
 
 def designed_text(made: Design) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from notchflex import __version__
+from notchflex._replacing import unwritable
 from notchflex.errors import InputError
 from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose, with_unit
 from notchflex.fit.assessment.errors_of_parts import edge, errors_of_parts
@@ -372,12 +373,8 @@ def write_fitted(
                 f"{target}: this would replace the file that {label} was read from; choose "
                 "another folder."
             )
-    try:
+    with unwritable(f"the folder {folder} cannot be made"):
         Path(folder).mkdir(exist_ok=True)
-    except OSError as problem:
-        raise InputError.FILE_UNWRITABLE(
-            f"the folder {folder} cannot be made: {problem.strerror}."
-        ) from None
     for label, target in targets.items():
         robot = found.robots[label]
         notes = {

@@ -19,11 +19,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 import numpy as np
 
 from notchflex import __version__
-from notchflex._replacing import replacing
+from notchflex._replacing import replacing, unwritable
 from notchflex.errors import InputError
 from notchflex.pieces import checksum
 from notchflex.pieces.checksum import is_whole
-from notchflex.results.files.writing import check_folder, read_text, write_text
+from notchflex.results.files.writing import check_folder, write_text
+from notchflex.robot.reading import read_text
 from notchflex.solver.programs.compiled import backend
 
 if TYPE_CHECKING:
@@ -408,12 +409,9 @@ def prepare_folder(folder: str | os.PathLike[str], manifest: Manifest) -> None:
     file = manifest_file(folder, kind)
     if file.exists():
         manifest.check_same(manifest_in(path, kind), str(folder))
-    try:
+    with unwritable(f"{folder} cannot be made"):
         (path / PIECES).mkdir(parents=True, exist_ok=True)
         lock = open(path / LOCK, "ab")  # noqa: SIM115 - held below
-    except OSError as problem:
-        words = problem.strerror or problem
-        raise InputError.FILE_UNWRITABLE(f"{folder} cannot be made: {words}.") from None
     with lock:  # of two clients that begin at once the second finds the manifest of the first
         _lock(lock, _OF_MANIFEST, 1, wait=True)
         if file.exists():
@@ -437,11 +435,8 @@ def locked(folder: str | os.PathLike[str], first: int, last: int) -> Generator[N
     )
     if any(p == path and first < b and a < last for p, a, b in _Held.ranges):
         raise taken
-    try:
+    with unwritable(f"{folder} cannot be locked"):
         file = open(path / LOCK, "ab")  # noqa: SIM115 - held below
-    except OSError as problem:
-        words = problem.strerror or problem
-        raise InputError.FILE_UNWRITABLE(f"{folder} cannot be locked: {words}.") from None
     mine = (path, first, last)
     try:
         try:

@@ -21,7 +21,7 @@ from notchflex.loads.validation import short_repr
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
 from notchflex.robot import Robot
-from notchflex.robot.reading import bounded_text
+from notchflex.robot.reading import read_text
 from notchflex.robot.robot import to_table
 from notchflex.solver.solver_state import SolverState, at_rest
 
@@ -202,14 +202,12 @@ class State(ByValue, Displayed):
             raise InputError.MISSING_VALUE(
                 "the name of the state file is empty; give that of a saved state"
             )
+        text = read_text(path, "state file")
         try:
-            content = json.loads(bounded_text(path))
-        except FileNotFoundError:
-            raise InputError.FILE_NOT_FOUND(f"there is no state file {path}") from None
-        except (OSError, ValueError, RecursionError) as error:
-            reason = getattr(error, "strerror", None) or error
+            content = json.loads(text)
+        except (ValueError, RecursionError) as error:
             raise InputError.FILE_UNREADABLE(
-                f"{path} cannot be read as a state: {reason}; give a file written by --save-state"
+                f"{path} cannot be read as a state: {error}; give a file written by --save-state"
             ) from None
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
             raise InputError.FILE_FORMAT(

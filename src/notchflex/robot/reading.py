@@ -61,7 +61,7 @@ def load_changed(
     """
     path = _find(name_or_path)
     shown = path.stem if path.parent == READY else str(path)
-    text = _read_text(path, shown)
+    text = read_text(path, "robot file", shown, RobotFileError)
     table = parse_toml(text, shown)
     try:
         robot, dropped = from_table(table), ()
@@ -125,16 +125,6 @@ def _find(name_or_path: str | os.PathLike[str]) -> Path:
     )
 
 
-def bounded_text(path: str | os.PathLike[str]) -> str:
-    """Read a text file in UTF-8, without a byte order mark.
-
-    Raises:
-        OSError: As `bounded_bytes`.
-        UnicodeDecodeError: It is no text in UTF-8.
-    """
-    return io.TextIOWrapper(io.BytesIO(bounded_bytes(path)), "utf-8-sig").read()
-
-
 def bounded_bytes(path: str | os.PathLike[str], most: int = _LARGEST) -> bytes:
     """Read a file; a device may have no end, and a pipe nobody who writes into it.
 
@@ -165,23 +155,38 @@ def _at_once(path: str, flags: int) -> int:
     return os.open(path, flags | (os.O_NONBLOCK if pipe else 0))
 
 
-def _read_text(path: Path, shown: str) -> str:
+def read_text(
+    source: str | os.PathLike[str],
+    kind: str,
+    shown: str | None = None,
+    error_class: type[InputError] = InputError,
+) -> str:
+    """Read a text file in UTF-8, without the byte-order mark that spreadsheets put before it.
+
+    Args:
+        source: Path of the file.
+        kind: What kind of file it is, for messages.
+        shown: What messages call it; its path if not given.
+        error_class: The class of the error.
+
+    Raises:
+        InputError: It is missing, a folder, no text or cannot be read.
+    """
+    shown = shown or str(source)
     try:
-        return bounded_text(path)
+        return io.TextIOWrapper(io.BytesIO(bounded_bytes(source)), "utf-8-sig").read()
     except FileNotFoundError:
-        raise RobotFileError.FILE_NOT_FOUND(f"{shown}: there is no such file.") from None
+        raise error_class.FILE_NOT_FOUND(f"{shown}: there is no such file.") from None
     except IsADirectoryError:
-        raise RobotFileError.FILE_UNREADABLE(
-            f"{shown} is a folder; give the robot file in it."
-        ) from None
-    except UnicodeDecodeError as error:
-        raise RobotFileError.FILE_UNREADABLE(
-            f"{shown} is not UTF-8 text (byte {error.start}); a robot file is a TOML text file, "
-            "saved as UTF-8."
-        ) from None
-    except (OSError, ValueError) as error:  # ValueError: a null character in the name
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise RobotFileError.FILE_UNREADABLE(f"{shown} cannot be read: {reason}.") from None
+        raise error_class.FILE_UNREADABLE(f"{shown} is a folder; name a {kind}.") from None
+    except UnicodeDecodeError:
+        form = kind.removesuffix(" file")  # such as "CSV file"
+        form = form if form[0].isupper() else "text"
+        saved = f"save it as {form} in UTF-8"
+        raise error_class.FILE_UNREADABLE(f"{shown} is not text in UTF-8; {saved}.") from None
+    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
+        words = getattr(problem, "strerror", None) or problem
+        raise error_class.FILE_UNREADABLE(f"{shown} cannot be read: {words}.") from None
 
 
 def parse_toml(

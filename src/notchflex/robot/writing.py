@@ -5,7 +5,6 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, cast
 
 import tomlkit
@@ -15,7 +14,7 @@ from notchflex._replacing import replacing
 from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.comments import FITTED_TO, add_note, set_value
 from notchflex.robot.fields import fields_of, is_unsaid
-from notchflex.robot.reading import robot_from_text
+from notchflex.robot.reading import read_text, robot_from_text
 from notchflex.robot.robot import Robot, source_of, to_table
 from notchflex.robot.tolerance import read_tolerances
 from notchflex.robot.value_names import defaults_of
@@ -58,11 +57,7 @@ def save_robot(
     """
     source: str | None = None
     if template is not None:
-        try:
-            source = Path(template).read_text(encoding="utf-8-sig")
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-            raise RobotFileError.FILE_UNREADABLE(f"{template} cannot be read: {reason}.") from None
+        source = read_text(template, "robot file", error_class=RobotFileError)
     try:
         with replacing(path) as temporary:
             temporary.write_text(robot_text(robot, source, fitted), encoding="utf-8", newline="\n")

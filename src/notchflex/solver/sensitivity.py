@@ -104,7 +104,7 @@ def _attach_to_substep(
     drawn = stroke(chain, evaluation.base)
     varied_state = SolverState(point, memory, drawn, command.applied)
     return jax.tree.map(
-        lambda value, varied: _with_tangent_of(value, varied, reached),
+        lambda value, varied: value + _zero_with_tangent(reached, varied),
         _stop_gradient(solved),
         varied_state,
     )
@@ -114,14 +114,9 @@ def _stop_gradient(tree: Any) -> Any:
     return jax.tree.map(jax.lax.stop_gradient, tree)
 
 
-def _with_tangent_of(value: Array, varied: Array, known: Bool[Array, ""]) -> Array:
-    """Return a value with the tangent of another, NaN where that is not known."""
-    return value + _zero_with_tangent(known, varied)
-
-
 @jax.custom_jvp
 def _zero_with_tangent(known: Array, varied: Array) -> Array:
-    """Return zeros with the tangent of a value."""
+    """Return zeros with the tangent of a value, NaN where that is not known."""
     del known
     return jnp.zeros_like(varied)
 

@@ -369,7 +369,10 @@ def tolerance_analysis(
     if not study.sources:
         raise InputError.NO_DATA("nothing deviates: all tolerances are 0; give one that is not.")
     effects = linear_effects(study)
-    report = {name: _reporter(progress, name) for name in ("drawing", "sensitivity", "tolerances")}
+    report = {
+        name: None if progress is None else partial(progress, name)
+        for name in ("drawing", "sensitivity", "tolerances")
+    }
     if folder is None:
         drawn = _draw(study, draws, seed, report["drawing"])
     else:
@@ -412,10 +415,6 @@ def tolerances_for(
     if asked.tolerances is None:
         return tolerances_of(robot)
     return robot.replace(tolerance=asked.tolerances).tolerance, ()
-
-
-def _reporter(progress: Stage | None, stage: str) -> Callable[[int, int], None] | None:
-    return None if progress is None else partial(progress, stage)
 
 
 def _of_pieces(report: Callable[[int, int], None] | None) -> Progress | None:

@@ -17,12 +17,11 @@ from notchflex.analysis.outputs import OUTPUTS
 from notchflex.errors import InputError
 from notchflex.loads import BodyForce, Load, LoadPath
 from notchflex.loads.validation import check_integer, check_number, short_repr
-from notchflex.results.files.writing import read_text
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities.registry import holds
 from notchflex.robot import Robot
 from notchflex.robot.error_messages import nearest, unknown_key
-from notchflex.robot.reading import parse_toml
+from notchflex.robot.reading import parse_toml, read_text
 
 INDICES = ("tendon", "notch", "body", "axis", "span", "contact")
 """Keys of a limit that say which entry of a quantity is meant."""

@@ -95,7 +95,10 @@ def test_slopes_are_finite_at_every_tension(tension: float, sign: float) -> None
         np.testing.assert_allclose(slopes[1][0], (high - low) / (2 * step), rtol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["pacheco2021-a", "two-axis-wrist", "liu2022"])
+LONG = [pytest.param(name, marks=pytest.mark.nightly) for name in ("two-axis-wrist", "liu2022")]
+
+
+@pytest.mark.parametrize("name", ["pacheco2021-a", *LONG])
 @pytest.mark.parametrize("first", ["force", "stroke", "together"])
 def test_loads_of_every_kind_are_solved_from_rest(name: str, first: str) -> None:
     robot = nf.load_robot(name).replace(friction=nf.Capstan(MU, constant_loss=0.02))

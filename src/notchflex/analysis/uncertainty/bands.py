@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -77,11 +76,7 @@ class Bands(Displayed, Mapping[str, Band]):
 
     def __getitem__(self, name: str) -> Band:
         """Return the band of a quantity."""
-        return self._bands_by_name[name]
-
-    @cached_property
-    def _bands_by_name(self) -> dict[str, Band]:
-        return {name: band(samples) for name, samples in self.samples.items()}
+        return band(self.samples[name])
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of the quantities."""

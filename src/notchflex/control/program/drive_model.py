@@ -176,7 +176,7 @@ class DriveModel:
     ) -> tuple[Response, np.ndarray, np.ndarray]:
         chain, settings = self.prepared.long.dynamic_vector, self._numbers
         state, values, slopes, sticks, drive, status = search_drives(
-            chain, before, self._packed_load, task, settings, self._layouts
+            chain, before, self._commands[0][0], task, settings, self._layouts
         )
         own = self._own
         jacobian = slopes[:, own].T
@@ -282,10 +282,6 @@ class DriveModel:
     @cached_property
     def _own(self) -> np.ndarray:
         return np.concatenate([entries for _, entries in self._selected.values()])
-
-    @cached_property
-    def _packed_load(self) -> np.ndarray:
-        return self._commands[0][0]
 
     @cached_property
     def _commands(self) -> tuple[np.ndarray, Any]:

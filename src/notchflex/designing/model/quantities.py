@@ -316,7 +316,7 @@ def _nearest(
     robot: Robot, bodies: Bodies, points: Float[np.ndarray, "m 3"]
 ) -> Float[np.ndarray, " m"]:
     """Return how far from the base, along the straight robot, the nearest points lie."""
-    total = float(_straight_length(robot))
+    total = float(OF_ROBOTS["length"].formula(robot)[0])
     low, high = np.zeros(len(points)), np.full(len(points), total)
     for number in range(_ROUNDS):
         count = _STATIONS if number == 0 else 21
@@ -335,8 +335,3 @@ def _nearest(
 
 def _axis(places: AxisPlaces, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     return np.asarray(points_on_axis(places, constant(position), constant(rotation)))
-
-
-def _straight_length(robot: Robot) -> float:
-
-    return float(OF_ROBOTS["length"].formula(robot)[0])

@@ -259,7 +259,9 @@ def met_by(
     robots = drawn.take(valid)
     met = np.zeros((len(levels), len(numbers)), bool)
     every = [(k, problem.constraints[number]) for k, number in enumerate(numbers)]
-    of_states = [one for one in every if _depends_on_states(one[1])]
+    of_states = [
+        (k, wish) for k, wish in every if wish.asked.state is not None or wish.curve is not None
+    ]
     if of_states:
         arrays, converged = solved(solver, robots, [x])
         with_curves = any(one.curve is not None for _, one in of_states)
@@ -296,10 +298,6 @@ def _of_closings(
         return Point(solver.variables, x, robots.robot, solver.paths, {}, kept=overrides)
 
     return _rows(wishes, map(at, closing_tensions_of(robots)))
-
-
-def _depends_on_states(wish: Wish) -> bool:
-    return wish.asked.state is not None or wish.curve is not None
 
 
 def _of_robots(

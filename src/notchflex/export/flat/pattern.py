@@ -202,15 +202,12 @@ def smallest_web(
                 break
             for turn in (1.0,) if first == second else (-1.0, 0.0, 1.0):
                 moved = other + turn * shift
-                width = 0.0 if _overlap(edge, moved) else _width_of_web(edge, moved)
+                # Two closed lines that do not cross are nearest at a corner of one.
+                width = min(_to_line(edge, moved), _to_line(moved, edge))
+                width = 0.0 if _overlap(edge, moved) else width
                 if width < best.width:
                     best = Web(width, (names[first], names[second]))
     return best
-
-
-def _width_of_web(one: Points, two: Points) -> float:
-    """Return the least distance of two closed lines that do not cross: at a corner of one."""
-    return min(_to_line(one, two), _to_line(two, one))
 
 
 def _to_line(points: Points, line: Points) -> float:

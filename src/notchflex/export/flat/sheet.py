@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.patches import Rectangle
 
 from notchflex import __version__
-from notchflex.export.flat.drawing import DrawnLine, pattern_drawing, plain, title_lines
+from notchflex.export.flat.drawing import pattern_drawing, plain, title_lines
 from notchflex.export.flat.pattern import FlatPattern, PatternCut, flat_pattern
 from notchflex.export.formats import Document, Paper, PatternOptions, Subject
 from notchflex.plotting.drawings import dimension_lines as draw
@@ -194,7 +194,8 @@ def _pattern_page(pattern: FlatPattern) -> DrawingPage:
     limits = {"xlim": (min(x), max(x)), "ylim": (min(y), max(y))}
     axes = page.inset(left, top - high, left + wide, top, **limits)
     for line in drawing.lines:
-        axes.plot(*zip(*_ring(line), strict=True), clip_on=False, **_LOOKS[line.layer])
+        closing = line.points[:1] if line.closed else ()
+        axes.plot(*zip(*line.points, *closing, strict=True), clip_on=False, **_LOOKS[line.layer])
     for one in pattern.cuts:
         draw.label(axes, *one.middle, one.name, fontsize=6.5)
     axes.spines[:].set_visible(False)
@@ -205,10 +206,6 @@ def _pattern_page(pattern: FlatPattern) -> DrawingPage:
     else:
         axes.set_yticks([])
     return page
-
-
-def _ring(line: DrawnLine) -> Sequence[tuple[float, float]]:
-    return [*line.points, line.points[0]] if line.closed else line.points
 
 
 def _row(pattern: FlatPattern, one: PatternCut) -> list[str]:

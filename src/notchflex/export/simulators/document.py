@@ -183,7 +183,12 @@ def mjcf_document(subject: Subject, options: SimulatorOptions) -> Document:
     head = _head(model, *about, *(_sentence(error) for error in errors))
     return Document(
         mjcf(model, head, numbers),
-        _large(errors),
+        tuple(
+            f"The MJCF model misses the total angle under tendon {error.tendon} by "
+            f"{error.total_angle:.1%} of its range; a smaller largest tension brings it closer."
+            for error in errors
+            if not error.total_angle <= _MAX_ERROR
+        ),
         {**facts, "errors": [error.as_dict() for error in errors]},
     )
 
@@ -199,15 +204,6 @@ def _sentence(error: SimulatorError) -> str:
 
 _MAX_ERROR = 0.02
 """Error of the total angle, as a part of its range, beyond which the user is warned."""
-
-
-def _large(errors: list[SimulatorError]) -> tuple[str, ...]:
-    return tuple(
-        f"The MJCF model misses the total angle under tendon {error.tendon} by "
-        f"{error.total_angle:.1%} of its range; a smaller largest tension brings it closer."
-        for error in errors
-        if not error.total_angle <= _MAX_ERROR
-    )
 
 
 def urdf_document(subject: Subject, options: SimulatorOptions) -> Document:

@@ -67,9 +67,10 @@ def assemble(
     template = chain_template(robot, level, refinement, flexures)
     rods, routed, body_length = template.rods, template.routed_tendons, template.body_length
     body_mass, body_centre = body_masses(robot, rods)
+    section = rods.section.stiffened(template.stiffness_factor[:, None])
     tendons = robot.tendon
     chain = Chain(
-        rods=stiffened_rods(rods, template.stiffness_factor),
+        rods=dataclasses.replace(rods, section=section),
         groups=routed.groups,
         contact_pairs=template.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
@@ -109,48 +110,35 @@ def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
         return {"friction": friction_law(part)}
     law = section_law(part)
     elastic = _elastic(template.distinct_rods, law)[template.rod_index]
+    elastic = template.stiffness_factor[:, None, None] * elastic
     stiffness = np.einsum("nmm->nm", elastic)
     stop = template.rods.stop_flexibility
     linear = law.is_linear and not template.distinct_rods.section.softens
     contact_stiffness = 1.0 / np.sum(template.contact_motion / stiffness, axis=-1)
-    soft = {
-        "stiffness": stiffness,
-        "elastic": elastic if linear else None,
-        "contact_stiffness": contact_stiffness,
-        "contact_flexibility": None if stop is None else stop / contact_stiffness,
+    return {
+        "law": law,
+        "stiffness": constant(stiffness),
+        "elastic": constant(elastic) if linear else None,
+        "contact_stiffness": constant(contact_stiffness),
+        "contact_flexibility": None if stop is None else constant(stop / contact_stiffness),
+        **chain_averages(contact_stiffness, template.height),
     }
-    return {"law": law, **_stiffened_laws(soft, template.stiffness_factor, template.height)}
 
 
 def stiffened(chain: Chain, factor: Float[np.ndarray, "*rows n"]) -> Chain:
     """Multiply the stiffness of every notch in all directions; leading axes are of both."""
-    soft = {name: getattr(chain, name) for name in _STIFFNESSES}
-    fields = _stiffened_laws(soft, factor, np.sum(chain.rods.length, axis=-1))
-    return dataclasses.replace(chain, rods=stiffened_rods(chain.rods, factor), **fields)
-
-
-def stiffened_rods(rods: Rod, factor: Float[np.ndarray, "*rows n"]) -> Rod:
-    """Multiply the stiffness of the sections of every flexure."""
-    return dataclasses.replace(rods, section=rods.section.stiffened(factor[..., None]))
-
-
-_STIFFNESSES = ("stiffness", "elastic", "contact_stiffness", "contact_flexibility")
-
-
-def _stiffened_laws(
-    soft: dict[str, Any], factor: Float[np.ndarray, "*rows n"], height: Float[np.ndarray, "*rows n"]
-) -> dict[str, Any]:
-    """Multiply the stiffnesses of a chain (`_STIFFNESSES`), and return its averages with them."""
-    stiffness, elastic, at_contact, flexibility = (soft[name] for name in _STIFFNESSES)
-    factor = constant(factor)
-    at_contact = factor * at_contact
-    return {
-        "stiffness": factor[..., None] * stiffness,
-        "elastic": None if elastic is None else factor[..., None, None] * elastic,
-        "contact_stiffness": at_contact,
-        "contact_flexibility": None if flexibility is None else flexibility / factor,
-        **chain_averages(at_contact, height),
-    }
+    contact_stiffness = factor * chain.contact_stiffness
+    elastic, flexibility = chain.elastic, chain.contact_flexibility
+    section = chain.rods.section.stiffened(factor[..., None])
+    return dataclasses.replace(
+        chain,
+        rods=dataclasses.replace(chain.rods, section=section),
+        stiffness=constant(factor[..., None] * chain.stiffness),
+        elastic=None if elastic is None else constant(factor[..., None, None] * elastic),
+        contact_stiffness=constant(contact_stiffness),
+        contact_flexibility=None if flexibility is None else constant(flexibility / factor),
+        **chain_averages(contact_stiffness, np.sum(chain.rods.length, axis=-1)),
+    )
 
 
 def chain_averages(

@@ -32,11 +32,6 @@ _BRAZIER = 0.97
 _EDGE_OF_SPECIMEN, _BRAZIER_OF_SPECIMEN = (0.465, 1.51), 0.74
 
 
-def _imposed(factor: float, decay: float, length: float, radius: float) -> float:
-    """Compute the flattening k that a ring of some length imposes at the edge of the notch."""
-    return -factor * np.expm1(-((length / (decay * radius)) ** 2))
-
-
 def edge_and_brazier(radius: float, sides: Sequence[Side]) -> tuple[float, float]:
     """Compute the mean k of the two sides, and the factor c_b on Brazier's flattening.
 
@@ -48,8 +43,9 @@ def edge_and_brazier(radius: float, sides: Sequence[Side]) -> tuple[float, float
         k and c_b.
     """
     specimen = all(side.boundary == "clamped" for side in sides)
-    edge = _EDGE_OF_SPECIMEN if specimen else _EDGE
-    both = [_imposed(*edge, side.length, radius) for side in sides]
+    factor, decay = _EDGE_OF_SPECIMEN if specimen else _EDGE
+    # The flattening k that a ring of some length imposes at the edge of the notch.
+    both = [-factor * np.expm1(-((side.length / (decay * radius)) ** 2)) for side in sides]
     return 0.5 * (both[0] + both[1]), _BRAZIER_OF_SPECIMEN if specimen else _BRAZIER
 
 

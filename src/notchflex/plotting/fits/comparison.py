@@ -88,7 +88,10 @@ def _angle_panels(comparison: Comparison, models: Mapping[str, Comparison]) -> I
     x, x_label = _abscissa(comparison)
     trial = np.array(comparison.measured.pull)
     for notch in (*range(comparison.robot.number_of_notches), None):
-        measured = _measured(comparison, notch)
+        if notch is None:
+            measured = comparison.measured_total_angle
+        else:
+            measured = comparison.measured_notch_angle[:, notch]
         if np.isnan(measured).all():
             continue
         items: list[Mark] = []
@@ -113,11 +116,6 @@ def _angle_panels(comparison: Comparison, models: Mapping[str, Comparison]) -> I
             y_range=(0.0, None) if np.nanmin(drawn, initial=0.0) >= 0.0 else None,
             shared="x",
         )
-
-
-def _measured(one: Comparison, notch: int | None) -> NDArray[np.float64]:
-    """Return the measured angles of a notch (from 0); of the whole robot for None."""
-    return one.measured_total_angle if notch is None else one.measured_notch_angle[:, notch]
 
 
 def _computed(one: Comparison, notch: int | None) -> NDArray[np.float64]:

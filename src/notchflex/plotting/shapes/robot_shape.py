@@ -252,14 +252,12 @@ def shape_from_modes(
         turned, points = interpolate_poses(axes[row, kept], line[row, kept], parts)
         at_node = np.arange(points.shape[1]) / parts - 1.0
         section = rods.section
-        stiffer = np.array([notch.stiffness_factor for notch in robot.notches])
-        cut_area = section.area / stiffer[:, None]
         for j, nodes_there, frames, places_there in zip(
             same_count, with_length, turned, points, strict=True
         ):
             spine, near, area = (
                 np.interp(at_node, np.arange(count), values[j, nodes_there])
-                for values in (section.edge_spine, section.edge_near, cut_area)
+                for values in (section.edge_spine, section.edge_near, section.area)
             )
             flexures[int(j)] = FlexureShape(frames, places_there, spine, near, area)
     return RobotShape(robot, chain, rotation, position, [flexures[j] for j in range(len(counts))])

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.errors import InputError
-from notchflex.results.files.writing import read_text
 from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.robot.reading import read_text
 
 TOLD_COLUMNS = (
     "give tension, stroke, total, notch_1 or the usual name of a column with its unit, such as "

@@ -10,9 +10,8 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from notchflex.errors import InputError
-from notchflex.results.files.writing import read_text
 from notchflex.robot.error_messages import sentences
-from notchflex.robot.reading import load_robot, parse_toml
+from notchflex.robot.reading import load_robot, parse_toml, read_text
 from notchflex.robot.robot import Robot
 
 Asked = TypeVar("Asked")

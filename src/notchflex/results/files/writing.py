@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import TextIO
 
 from notchflex._extras import need
-from notchflex._replacing import is_replaceable, replacing
+from notchflex._replacing import is_replaceable, replacing, unwritable
 from notchflex.errors import InputError
-from notchflex.robot.reading import bounded_text
 
 
 def write_document(text: str) -> None:
@@ -81,18 +80,13 @@ def check_output(target: str, option: str, *, inputs: Iterable[str | Path] = ())
             f"{option} {target!r} cannot be written: it holds a null character."
         )
     path = Path(target)
-    try:
+    with unwritable(f"{option} {target!r} cannot be written"):
         obstacle = _obstacle(path)
         for source in [] if obstacle else inputs:
             if Path(source).exists() and path.exists() and path.samefile(source):
                 raise InputError.CONFLICT(
                     f"{option} {target}: this would replace the file that is read; choose another."
                 )
-    except OSError as problem:
-        words = problem.strerror or problem
-        raise InputError.FILE_UNWRITABLE(
-            f"{option} {target!r} cannot be written: {words}."
-        ) from None
     if obstacle:
         raise InputError.FILE_UNWRITABLE(f"{option} {target}: {obstacle}.")
 
@@ -209,32 +203,6 @@ def check_distinct(outputs: dict[str, str | None]) -> None:
                 f"{seen[name]} and {option} both write to {where}; give them different files."
             )
         seen[name] = option
-
-
-def read_text(source: str | os.PathLike[str], kind: str) -> str:
-    """Read a text file in UTF-8, without the byte-order mark that spreadsheets put before it.
-
-    Args:
-        source: Path of the file.
-        kind: What kind of file it is, for messages.
-
-    Raises:
-        InputError: It is missing, a folder, no text or cannot be read.
-    """
-    try:
-        return bounded_text(source)
-    except FileNotFoundError:
-        raise InputError.FILE_NOT_FOUND(f"{source}: there is no such file.") from None
-    except IsADirectoryError:
-        raise InputError.FILE_UNREADABLE(f"{source} is a folder; name a {kind}.") from None
-    except UnicodeDecodeError:
-        form = kind.removesuffix(" file")  # such as "CSV file"
-        form = form if form[0].isupper() else "text"
-        saved = f"save it as {form} in UTF-8"
-        raise InputError.FILE_UNREADABLE(f"{source} is not text in UTF-8; {saved}.") from None
-    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
-        words = getattr(problem, "strerror", None) or problem
-        raise InputError.FILE_UNREADABLE(f"{source} cannot be read: {words}.") from None
 
 
 def write_text(target: str | Path, text: str) -> None:

@@ -127,7 +127,7 @@ class VariedRobots(Sequence[Robot]):
         if np.isfinite(self.table).all():
             boxes = (self.box, (self.table.min(axis=0), self.table.max(axis=0)))
             for low, high in boxes:
-                key = tuple(self._cliques()), tuple(low.tolist()), tuple(high.tolist())
+                key = tuple(map(tuple, self.cliques())), tuple(low.tolist()), tuple(high.tolist())
                 if _corners_are_valid(self.robot, self.names, *key):
                     return np.ones(len(self), bool)
         return np.array([_is_valid(self.robot, self.names, row) for row in self.table])
@@ -137,9 +137,6 @@ class VariedRobots(Sequence[Robot]):
         of, positions = self.notch_of, range(len(self.values))
         for notch in dict.fromkeys(one for one in of if one is not None) or {None: None}:
             yield [position for position in positions if of[position] in (None, notch)]
-
-    def _cliques(self) -> Iterator[tuple[int, ...]]:
-        return map(tuple, self.cliques())
 
 
 @lru_cache(maxsize=16)
