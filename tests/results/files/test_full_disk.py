@@ -23,6 +23,13 @@ import notchflex as nf
 path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 1.0, steps=40))
 nf.save_path(path, sys.argv[1])
 """
+ENDLESS = """
+import sys
+import notchflex as nf
+path = nf.read_path(sys.argv[1])
+while True:
+    nf.save_path(path, sys.argv[2])
+"""
 LIMITED = """
 import resource, signal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -83,12 +90,13 @@ def test_an_export_that_does_not_fit_is_one_sentence(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("times", [2, pytest.param(100, marks=pytest.mark.nightly)])
-def test_what_killed_processes_leave_is_swept(tmp_path, times, monkeypatch):
-    file, random_ = tmp_path / "p.json", random.Random(3)
-    nf.save_path(nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 1.0, steps=3)), file)
-    endless = WRITE.replace("nf.save_path(", "while True: nf.save_path(")
+def test_what_killed_processes_leave_is_swept(wrist, tmp_path, times, monkeypatch):
+    file, other, random_ = tmp_path / "p.json", tmp_path / "other" / "p.json", random.Random(3)
+    other.parent.mkdir()
+    for name, steps in ((file, 3), (other, 40)):
+        nf.save_path(nf.simulate(wrist, nf.pull(0.0, 1.0, steps=steps)), name)
     for _ in range(times):
-        writer = subprocess.Popen([sys.executable, "-c", endless, str(file)])
+        writer = subprocess.Popen([sys.executable, "-c", ENDLESS, str(other), str(file)])
         until = time.monotonic() + 120
         changed = file.stat().st_mtime_ns
         while file.stat().st_mtime_ns == changed and time.monotonic() < until:
@@ -99,7 +107,7 @@ def test_what_killed_processes_leave_is_swept(tmp_path, times, monkeypatch):
         assert len(nf.read_path(file)) in (3, 40)  # old or new, and whole
     monkeypatch.setattr(_replacing, "_swept", set())
     nf.save_path(nf.read_path(file), file)
-    assert os.listdir(tmp_path) == ["p.json"]
+    assert sorted(os.listdir(tmp_path)) == ["other", "p.json"]
 
 
 def test_the_file_of_a_process_that_writes_is_kept(tmp_path, monkeypatch):
