@@ -157,3 +157,22 @@ def test_leja_points_are_apart():
     points = leja_points()  # no closer than those of Chebyshev
     assert points[:3].tolist() == [0.0, -1.0, 1.0]
     assert np.min(np.diff(np.sort(points))) > 1.0 - np.cos(np.pi / len(points))
+
+
+def test_factors_on_stiffness_beside_another_number():
+    """They are no part of the polynomial; the robot has a factor of its own as well."""
+    robot = WRIST.with_value("notch[3].stiffness_factor", 1.2)
+    generator = np.random.default_rng(3)
+    values = {
+        "notch.depth": generator.uniform(1.38, 1.42, 600),
+        "notch[1].stiffness_factor": generator.uniform(0.9, 1.1, 600),
+        "notch[5].stiffness_factor": generator.uniform(0.9, 1.1, 600),
+    }
+    load, outputs = nf.Load(tension=1.0), ("notch_angle", "peak_strain")
+    robots = VariedRobots(robot, values)
+    assert varied.varied_chains(robots, nf.LoadPath([[1.0]]), 0) is not None
+    batch = nf.solve_batch(robots, load, outputs=outputs)
+    for row in (0, 300, 599):
+        state = nf.solve(robots[row], load)
+        for name in outputs:
+            np.testing.assert_allclose(batch[name][row], state.quantity(name), atol=1e-9)

@@ -444,10 +444,8 @@ def varied_chains(robots: VariedRobots, load: LoadPath, refinement: int) -> Vari
     varies[polynomial.entries] = np.nan
     if not structure.fits(varies[None, : form.chain.size]):
         return None
-    layouts = structure, form.command
-    return VariedChains(
-        robots.table, factor, ready, polynomial, *layouts, form.steps, load.base_to_world
-    )
+    of_form = structure, form.command, form.steps
+    return VariedChains(robots.table, factor, ready, polynomial, *of_form, load.base_to_world)
 
 
 _FACTOR = "stiffness_factor"
@@ -455,16 +453,16 @@ _FACTOR = "stiffness_factor"
 
 def _without_factors(robots: VariedRobots) -> tuple[Float[np.ndarray, "k n"], VariedRobots]:
     """Return the factor on the stiffness of each notch, and the robots without these factors."""
-    factor = np.tile([one.stiffness_factor for one in robots.robot.notches], (len(robots), 1))
-    others = dict(robots.values)
+    own, others = [one.stiffness_factor for one in robots.robot.notches], dict(robots.values)
+    factor = np.tile(own, (len(robots), 1))
     for notch, name in zip(robots.notch_of, robots.names, strict=True):
         if name.endswith(_FACTOR):
             notches = slice(None) if notch is None else slice(notch - 1, notch)
             factor[:, notches] = others.pop(name)[:, None]
-    plain = robots.robot.with_value(f"notch.{_FACTOR}", 1.0)
-    return factor, VariedRobots(
-        plain, others or {f"notch.{_FACTOR}": np.ones(len(robots))}, robots.ranges
-    )
+    if not others:
+        return np.ones_like(factor), robots
+    robot = robots.robot.with_value(f"notch.{_FACTOR}", 1.0)
+    return factor, VariedRobots(robot, others, robots.ranges)
 
 
 @lru_cache(maxsize=8)

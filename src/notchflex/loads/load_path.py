@@ -312,7 +312,5 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     return LoadPath.of_valid(*given, external)
 
 
-@lru_cache(maxsize=64)
-def _base_rotation(vector: tuple[float, ...]) -> Float[np.ndarray, " 3"]:
-    """Return a rotation vector as an array, the same for the same vector."""
-    return read_only(vector)
+_base_rotation = lru_cache(maxsize=64)(read_only)
+"""Returns a rotation vector as an array, the same for the same vector."""

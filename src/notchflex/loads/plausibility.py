@@ -40,8 +40,10 @@ def unlikely_loads(
 ) -> Iterator[InputWarning]:
     """Yield a warning for each kind of load that is far beyond a robot (`usual_loads`)."""
     # Every solve comes by: one number where tensions alone are given; NaN is never above a limit.
-    largest = {"tension": np.fmax.reduce(load.tension, axis=None)}
-    largest["base_rotation"] = hypot(*load.base_rotation)
+    largest = {
+        "tension": np.fmax.reduce(load.tension, axis=None),
+        "base_rotation": hypot(*load.base_rotation),
+    }
     if by_stroke:
         largest["stroke"] = np.fmax.reduce(np.abs(load.stroke), axis=None)
     for one in load.different:
