@@ -86,15 +86,10 @@ def test_rows_of_notches_with_elastic_ends_are_those_of_the_robots():
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["pacheco2021-a-true", "pacheco2021-b-true"])
 def test_assumed_tolerances_of_wrists_with_elastic_ends_need_no_robot_for_each_row(name):
-    """Up to a quarter of the wall: a thousand robots were assembled one by one.
-
-    With the error of the law, whose factors multiply the terms by the notches, it pays from some
-    3,200 robots on.
-    """
+    """Up to a quarter of the wall: a thousand robots were assembled one by one."""
     robot, load = nf.load_robot(name), nf.pull(0.5, 0.9, steps=2)
-    assumed = [one for one in tolerances_of(robot)[0] if not one.value.endswith("stiffness_factor")]
     exact_robot = robot.replace(tolerance=None)
-    sources = sources_of(exact_robot, assumed)
+    sources = sources_of(exact_robot, tolerances_of(robot)[0])
     levels = np.random.default_rng(1).uniform(1e-6, 1.0 - 1e-6, (2600, len(sources)))
     robots = VariedRobots(exact_robot, values_at(sources, levels))
     assert varied.varied_chains(robots, load, 0) is not None
