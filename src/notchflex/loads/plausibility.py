@@ -39,13 +39,13 @@ def unlikely_loads(
     load: LoadPath, by_stroke: bool, usual: Mapping[str, tuple[float, str]]
 ) -> Iterator[InputWarning]:
     """Yield a warning for each kind of load that is far beyond a robot (`usual_loads`)."""
-    # Every solve comes by: one number where tensions alone are given; NaN is never above a limit.
+    # Every solve comes by: lists are faster than arrays of one number; NaN is never above a limit.
     largest = {
-        "tension": np.fmax.reduce(load.tension, axis=None),
-        "base_rotation": hypot(*load.base_rotation),
+        "tension": max([0.0, *load.tension.ravel().tolist()]),
+        "base_rotation": hypot(*load.base_rotation.tolist()),
     }
     if by_stroke:
-        largest["stroke"] = np.fmax.reduce(np.abs(load.stroke), axis=None)
+        largest["stroke"] = max([0.0, *map(abs, load.stroke.ravel().tolist())])
     for one in load.different:
         if one is not NOTHING:
             sizes = {
