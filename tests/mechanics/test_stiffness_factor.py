@@ -8,6 +8,7 @@ import pytest
 import notchflex as nf
 from notchflex._jax import jax
 from notchflex.mechanics.chain import assemble
+from notchflex.plotting.shapes.robot_shape import shape_from_angles
 from notchflex.robot import robot_from_text, robot_text
 from notchflex.robot.value_names.varied import VariedRobots
 
@@ -52,6 +53,15 @@ def test_the_weight_stays(wrist: nf.Robot):
     robot = wrist.with_value("material.density", 6_450.0)
     masses = [assemble(robot.with_value(FACTOR, one)).body_mass for one in (1.0, 1.5)]
     np.testing.assert_allclose(masses[1], masses[0], rtol=1e-15)
+
+
+def test_the_cut_is_drawn_the_same(wrist: nf.Robot):
+    angles = np.full(wrist.number_of_notches, 0.2)
+    plain, stiff = (
+        shape_from_angles(wrist.with_value(FACTOR, factor), angles) for factor in (1.0, 1.5)
+    )
+    for one, other in zip(plain.flexures, stiff.flexures, strict=True):
+        np.testing.assert_allclose(other.area, one.area, rtol=1e-15)
 
 
 def test_it_varies_as_other_numbers_do(wrist: nf.Robot, margin):

@@ -217,7 +217,7 @@ class Reach(Displayed):
     @property
     def error(self) -> float:
         """Weighted distance from the target (mm, N, rad)."""
-        return self._attempt.error
+        return self.following.attempts[self.target].error
 
     @property
     def code(self) -> str:
@@ -253,10 +253,6 @@ class Reach(Displayed):
     def state(self) -> State:
         """The state there, to continue from."""
         return self.equilibrium.state
-
-    @property
-    def _attempt(self) -> Attempt:
-        return self.following.attempts[self.target]
 
     def _summary(self) -> Summary:
         loads: list[Any] = self.loads

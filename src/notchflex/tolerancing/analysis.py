@@ -19,7 +19,7 @@ from notchflex.analysis.uncertainty.assumed import tolerances_of
 from notchflex.errors import InputError
 from notchflex.loads.validation import check_integer, check_is_robot, short_repr
 from notchflex.pieces.folder import ACCEPTED, CODES, FAILED, INVALID
-from notchflex.pieces.run import PieceFolder, Progress
+from notchflex.pieces.run import PieceFolder
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
@@ -376,7 +376,9 @@ def tolerance_analysis(
     if folder is None:
         drawn = _draw(study, draws, seed, report["drawing"])
     else:
-        drawn = draw_in_pieces(study, asked, draws, seed, folder, _of_pieces(report["drawing"]))
+        told = report["drawing"]
+        of_pieces = None if told is None else lambda done, count, *_: told(done, count)
+        drawn = draw_in_pieces(study, asked, draws, seed, folder, of_pieces)
     return ToleranceAnalysis(
         robot=robot,
         paths=study.paths,
@@ -415,10 +417,6 @@ def tolerances_for(
     if asked.tolerances is None:
         return tolerances_of(robot)
     return robot.replace(tolerance=asked.tolerances).tolerance, ()
-
-
-def _of_pieces(report: Callable[[int, int], None] | None) -> Progress | None:
-    return None if report is None else lambda done, count, *_: report(done, count)
 
 
 def _draw(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -76,7 +77,11 @@ class Bands(Displayed, Mapping[str, Band]):
 
     def __getitem__(self, name: str) -> Band:
         """Return the band of a quantity."""
-        return band(self.samples[name])
+        return self._bands_by_name[name]
+
+    @cached_property
+    def _bands_by_name(self) -> dict[str, Band]:
+        return {name: band(samples) for name, samples in self.samples.items()}
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of the quantities."""

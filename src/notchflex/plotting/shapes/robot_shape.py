@@ -276,7 +276,8 @@ def _of_space(robot: Robot, level: str, refinement: int) -> Chain:
     """Return the chain of a robot with its flexures in space, with the modes of the flat one."""
     from notchflex.mechanics.chain import assemble
 
-    return assemble(robot, level, refinement=refinement, flat=False)
+    plain = robot.with_value("notch.stiffness_factor", 1.0)  # the areas are those of the cut
+    return assemble(plain, level, refinement=refinement, flat=False)
 
 
 def shape_from_angles(

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from notchflex._replacing import unwritable
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import flag
 from notchflex.errors import InputError
@@ -41,13 +40,16 @@ def completion(
         if not install:
             write_document(_with_files(app.generate_completion(shell=shell)))
             return
-        with unwritable("the script cannot be written"):
-            written: Path = app.install_completion(shell=shell)
-            written.write_text(_with_files(written.read_text(encoding="utf-8")), encoding="utf-8")
+        written: Path = app.install_completion(shell=shell)
+        written.write_text(_with_files(written.read_text(encoding="utf-8")), encoding="utf-8")
     except ShellDetectionError:
         raise InputError.MISSING_VALUE(
             "the current shell is not known; name it: notchflex completion bash (or zsh, fish, "
             "powershell)."
+        ) from None
+    except OSError as problem:
+        raise InputError.FILE_UNWRITABLE(
+            f"the script cannot be written: {problem.filename}: {problem.strerror}."
         ) from None
     terminal.output().print(
         f"Written: {written}. It works in every shell that is started from now on.", soft_wrap=True
