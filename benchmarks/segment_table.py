@@ -135,7 +135,7 @@ def fit(shape, values):
     estimate = {
         "closed": lambda: segment_estimates.closed_estimate(one, inner, cut),
         "open": lambda: segment_estimates.open_estimate(one, inner, cut, area),
-        "solid": lambda: segment_estimates.solid_estimate(one, cut, area),
+        "solid": lambda: (area * (2.0 * one - cut) ** 2 / 3.0, one),
     }[shape]()
     low, high = (np.sqrt(1.0 - r) for r in reversed(RATIO_RANGE))
     x = (2.0 * np.sqrt(1.0 - ratio) - low - high) / (high - low)

@@ -79,7 +79,7 @@ def test_priors_are_a_marginal_likelihood():
     """Profiled deviations give the quadratic form of the covariance that they add to the noise."""
     found = fit(priors=True)
     problem = found.problem
-    problem.linearise(found.best.values, np.zeros(len(problem.drawing)))
+    problem = problem.linearised(found.best.values, np.zeros(len(problem.drawing)))
     cost = problem(found.best.values)
     residuals = problem.samples.residuals(found.best.values)
     spread = np.stack(

@@ -34,12 +34,12 @@ def _length(text: str, most: float = 10.0) -> Any:
     return quantity("mm", text, at_least=0.0, at_most=most)
 
 
-def _pair(value: object) -> object:
-    return value if isinstance(value, tuple | list) else (value, value)
-
-
 _Width = Annotated[Float, _length("width of the beam")]
-_Kerf = Annotated[tuple[_Width, _Width], BeforeValidator(_pair), Field(validate_default=True)]
+_Kerf = Annotated[
+    tuple[_Width, _Width],
+    BeforeValidator(lambda one: one if isinstance(one, tuple | list) else (one, one)),
+    Field(validate_default=True),
+]
 _Polishing = Annotated[Float, _length("what polishing removes from every surface")]
 _Shank = Annotated[Float, _length("uncut tube on the base side", _LONGEST)]
 _Chord = Annotated[

@@ -81,7 +81,14 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         "deviations_of_drawing": found.deviations_of_drawing,
         "noise": _noise(found),
         "errors": _errors(found),
-        "searches": _searches(found),
+        "searches": [
+            {
+                **one._asdict(),
+                "values": dict(zip(found.names, one.values.tolist(), strict=True)),
+                "cost": None if one.cost is None else one.cost.value,
+            }
+            for one in found.searches
+        ],
         "solves": found.solves,
         "robots": {
             label: {"data": data_of(found, label), "robot": plain(to_table(robot))}
@@ -294,17 +301,6 @@ def _errors(calibration: Calibration) -> list[dict[str, Any]]:
             "count": one.count,
         }
         for one in errors_of_parts(calibration)
-    ]
-
-
-def _searches(calibration: Calibration) -> list[dict[str, Any]]:
-    return [
-        {
-            **one._asdict(),
-            "values": dict(zip(calibration.names, one.values.tolist(), strict=True)),
-            "cost": None if one.cost is None else one.cost.value,
-        }
-        for one in calibration.searches
     ]
 
 

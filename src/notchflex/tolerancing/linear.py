@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -85,7 +86,13 @@ def linear_effects(study: Study) -> LinearEffects:
     columns_of = {name: index for index, name in enumerate(names)}
     own_slopes = [slopes[:, [columns_of[name] for name in one.nominal]] for one in study.sources]
     shift, spread, one_end, other = (
-        _moved(study.sources, own_slopes, which) for which in (_mean, _sd, _least, _most)
+        _moved(study.sources, own_slopes, which)
+        for which in (
+            lambda *one: moments(*one)[0],
+            lambda *one: moments(*one)[1],
+            partial(_end, -1.0),
+            partial(_end, 1.0),
+        )
     )
     nominal = [
         np.asarray(study.paths[one.load].quantity(one.quantity.name))[(one.step, *one.index)]
@@ -110,19 +117,7 @@ def _moved(
     return np.stack(columns, axis=-1)
 
 
-def _mean(tolerance: Tolerance, value: float) -> float:
-    return moments(tolerance, value)[0]
-
-
-def _sd(tolerance: Tolerance, value: float) -> float:
-    return moments(tolerance, value)[1]
-
-
-def _least(tolerance: Tolerance, value: float) -> float:
-    least = float(deviation(tolerance, value, 0.0))
-    return least if np.isfinite(least) else -WORST_SD * moments(tolerance, value)[1]
-
-
-def _most(tolerance: Tolerance, value: float) -> float:
-    most = float(deviation(tolerance, value, 1.0))
-    return most if np.isfinite(most) else WORST_SD * moments(tolerance, value)[1]
+def _end(side: float, tolerance: Tolerance, value: float) -> float:
+    """Return the least (side -1) or the greatest (1) deviation."""
+    end = float(deviation(tolerance, value, 0.5 * (1.0 + side)))
+    return end if np.isfinite(end) else side * WORST_SD * moments(tolerance, value)[1]

@@ -263,7 +263,8 @@ class Differentiable(Displayed):
         if isinstance(value, Tracer) and (value.shape, value.dtype) == (shape, float):
             return value  # JAX would compile even a conversion that changes nothing
         try:
-            if any(_is_text(leaf) for leaf in jax.tree.leaves(value)):
+            plain = [one for one in jax.tree.leaves(value) if not isinstance(one, Tracer)]
+            if any(np.asarray(one).dtype.kind in "USO" for one in plain):
                 raise TypeError("text")
             return jnp.broadcast_to(jnp.asarray(value, float), shape)
         except (TypeError, ValueError):
@@ -302,7 +303,3 @@ class Differentiable(Displayed):
             self.model, self.start, self.outputs, self.numbers, self._path, self._load
         )
         return outputs_function(solver, start)
-
-
-def _is_text(value: object) -> bool:
-    return not isinstance(value, Tracer) and np.asarray(value).dtype.kind in "USO"

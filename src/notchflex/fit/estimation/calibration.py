@@ -378,7 +378,7 @@ class Calibration:
         """Return the misfit as a function of one constant."""
         problem, number = self.problem, self.names.index(name)
         values = self.best.values
-        return Profile(problem, values, self.reached, number, problem.lower, problem.upper)
+        return Profile(problem.held, values, self.reached, number, problem.lower, problem.upper)
 
     @cached_property
     def covariance(self) -> Float[np.ndarray, "k k"]:

@@ -301,7 +301,7 @@ def fitted(
     costs = [np.inf if one.cost is None else one.cost.value for one in searches]
     if np.isinf(costs).all():
         raise _no_start(problem.samples)
-    best, reached = _with_noise(problem, searches[int(np.argmin(costs))])
+    problem, best, reached = _with_noise(problem, searches[int(np.argmin(costs))])
     calibration = Calibration(robots, problem, best, reached, searches, {})
     if intervals and calibration.is_likelihood:
         return replace(calibration, intervals=_intervals(calibration, progress))
@@ -323,7 +323,7 @@ def _no_start(samples: Samples) -> InputError:
     )
 
 
-def _with_noise(problem: FitProblem, best: Minimum) -> tuple[Minimum, Cost]:
+def _with_noise(problem: FitProblem, best: Minimum) -> tuple[FitProblem, Minimum, Cost]:
     """Estimate unknown noise and deviations from the drawing, and fit again, until all agree."""
     cost, noise = best.cost, problem.noise
     assert cost is not None
@@ -336,10 +336,10 @@ def _with_noise(problem: FitProblem, best: Minimum) -> tuple[Minimum, Cost]:
         settled = np.allclose(left.deviation, noise.deviation, rtol=1e-3, atol=0.0)
         problem.noise = noise = left
         if problem.drawing:
-            try:
-                problem.linearise(best.values, deviations)
-            except InputError:
+            linearised = problem.linearised(best.values, deviations)
+            if linearised is None:
                 break
+            problem = linearised
         again = problem.minimum(best.values)
         if again.cost is None:
             break
@@ -349,7 +349,7 @@ def _with_noise(problem: FitProblem, best: Minimum) -> tuple[Minimum, Cost]:
         deviations = problem.means + cost.deviations
         if settled:
             break
-    return best, cost
+    return problem, best, cost
 
 
 def _intervals(calibration: Calibration, progress: Progress | None) -> dict[str, Interval]:

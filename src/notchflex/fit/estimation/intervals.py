@@ -223,7 +223,7 @@ class Profile(Displayed):
     """The misfit about its minimum, as a function of one constant.
 
     Attributes:
-        objective: The misfit.
+        search: Finds the least misfit from a start, between least and greatest values.
         best: Values at the minimum.
         cost: The misfit there, with derivatives.
         number: Number of the constant.
@@ -231,7 +231,7 @@ class Profile(Displayed):
         upper: Greatest values allowed.
     """
 
-    objective: Objective
+    search: Callable[[Vector, Vector, Vector], Minimum]
     best: Vector
     cost: Cost
     number: int
@@ -271,7 +271,7 @@ class Profile(Displayed):
         start, lower, upper = (one.copy() for one in (start, self.lower, self.upper))
         for values in (start, lower, upper):
             values[self.number] = value
-        return minimise(self.objective, start, lower, upper, tolerance=1e-7)
+        return self.search(start, lower, upper)
 
     def _end(
         self, side: float, limit: float, rise: float, scale: float, points: dict[float, float]

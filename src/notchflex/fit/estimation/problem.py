@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -81,24 +82,26 @@ class FitProblem:
                 )
         return cost
 
-    def linearise(self, values: Vector, deviations: Vector) -> None:
-        """Linearise the model about deviations from the drawings, at values of the constants.
+    def linearised(self, values: Vector, deviations: Vector) -> FitProblem | None:
+        """Return the problem with the model linearised about deviations from the drawing.
 
-        Deviations by which the model cannot be varied are left out.
-
-        Raises:
-            InputError: No robot deviates so.
+        Deviations by which the model cannot be varied are left out; None if no robot deviates so.
         """
         at = tuple(
             replace(one, start=float(start))
             for one, start in zip(self.drawing, deviations, strict=True)
         )
-        self.samples = self.samples.deviated(at)
-        slopes = [(one, self.samples.slopes_of(one, values)) for one in at]
-        self.drawing = tuple(one for one, by_one in slopes if by_one is not None)
+        other = copy(self)
+        try:
+            other.samples = self.samples.deviated(at)
+        except InputError:
+            return None
+        slopes = [(one, other.samples.slopes_of(one, values)) for one in at]
+        other.drawing = tuple(one for one, by_one in slopes if by_one is not None)
         spread = np.array([by_one for _, by_one in slopes if by_one is not None]).T
-        start = np.array([one.start for one in self.drawing])
-        self._spread = (spread, spread @ (self.means - start)) if self.drawing else None
+        start = np.array([one.start for one in other.drawing])
+        other._spread = (spread, spread @ (other.means - start)) if other.drawing else None
+        return other
 
     @property
     def means(self) -> Float[np.ndarray, " m"]:
@@ -108,6 +111,20 @@ class FitProblem:
     def minimum(self, start: Vector) -> Minimum:
         """Return the minimum that a search from a start ends at."""
         return minimise(self, start, self.lower, self.upper)
+
+    def held(self, start: Vector, lower: Vector, upper: Vector) -> Minimum:
+        """Return the minimum with a constant held by equal limits.
+
+        Deviations from the drawing are linearised there anew: those at the estimate would put the
+        ends of wide intervals too near.
+        """
+        minimum = minimise(self, start, lower, upper, tolerance=1e-7)
+        if self.drawing and minimum.cost is not None:
+            deviations = self.means + minimum.cost.deviations
+            linearised = self.linearised(minimum.values, deviations)
+            if linearised is not None:
+                return minimise(linearised, minimum.values, lower, upper, tolerance=1e-7)
+        return minimum
 
 
 def search(

@@ -405,22 +405,19 @@ class RodQuadrature:
         _, at_poses, between, before = np.split(twists, np.cumsum(counts))
         turns = _grouped(between[:, :3], self.between[1])
         at_node = slice(counts[0])
+        stop = np.searchsorted(self._stops, self.at_nodes[0]) - 1
         return {
             "length": constant(self.at_nodes[1]),
             "basis": constant(basis[at_node]),
             "turn": constant(np.cumsum(turns, axis=0)),
             "turn_pair": constant(_pairs(between[:, :3], self.between[1])),
             "step": constant(self.at_poses[1][:, None, None] * at_poses[:, 3:]),
-            "node_turn": constant(self._to_nodes(_grouped(before[:, :3], self.before[1]))),
+            "node_turn": constant(np.cumsum(_grouped(before[:, :3], self.before[1]), axis=0)[stop]),
             "node_index": np.searchsorted(self.at_poses[0], self.at_nodes[0], side="right"),
             "node_reach": constant(self._reach()),
             "node_rotation": constant(curve.rotation[at_node]),
             "node_offset": constant(curve.translation[at_node]),
         }
-
-    def _to_nodes(self, turns: Float[np.ndarray, "stops 3 hat"]) -> Any:
-        """Sum the rotations between stops up to each node of the strains."""
-        return np.cumsum(turns, axis=0)[np.searchsorted(self._stops, self.at_nodes[0]) - 1]
 
     def _reach(self) -> Float[np.ndarray, "nodes gauss"]:
         """Compute the fraction of each pose node's step before each node of the strains."""

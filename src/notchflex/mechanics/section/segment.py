@@ -87,22 +87,6 @@ def open_estimate(
     return area * wall**2 / 3.0, shear
 
 
-def solid_estimate(
-    outer: jax.Array, depth: jax.Array, area: jax.Array
-) -> tuple[jax.Array, jax.Array]:
-    """Estimate the solid segment of the wall: J = A h²/3 and the top of the circle.
-
-    Args:
-        outer: Outer radius, mm.
-        depth: Depth of the cut, mm, such that the plane passes beyond the bore.
-        area: Area of the section, mm².
-
-    Returns:
-        Torsion constant, mm⁴, and shear centre, mm.
-    """
-    return area * (2.0 * outer - depth) ** 2 / 3.0, outer
-
-
 # Where the factors were computed; benchmarks/segment_table.py reads these.
 RATIO_RANGE = (0.2, 0.98)  # r_i / r_o
 LIGAMENT_LEFT = 0.01  # least thickness left under the flat of a closed tube, over the wall
@@ -200,7 +184,8 @@ def segment_torsion(
     estimates = {
         "closed": closed_estimate(outer, inner, shallow),
         "open": open_estimate(outer, inner, through, area),
-        "solid": solid_estimate(outer, deep, area),
+        # J = A h²/3 and the top of the circle: the cut passes beyond the bore
+        "solid": (area * (2.0 * outer - deep) ** 2 / 3.0, outer),
     }
     torsion, shear = {}, {}
     for (shape, (first, second)), at in zip(
