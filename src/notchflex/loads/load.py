@@ -96,6 +96,8 @@ class Load(ExternalLoad):
 
 def _commanded(value: Any, what: str) -> float | tuple[float | None, ...]:
     """Return a command as a finite number, or as one per tendon and None where there is none."""
+    if type(value) is float and isfinite(value):
+        return value  # as most often
     if hasattr(value, "__array__"):
         value = np.asarray(value).tolist()
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):

@@ -306,9 +306,11 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     stroke = [load.per_tendon("stroke", tendons) for load in every]
     given = read_only(tension), read_only(stroke), _base_rotation(turns.pop())
     external = tuple(load.external for load in every)
-    entries = zip(chain.from_iterable(tension), chain.from_iterable(stroke), strict=True)
-    if any(pulled < 0.0 or not (isnan(pulled) or isnan(drawn)) for pulled, drawn in entries):
-        return LoadPath(*given, external)  # raises the error
+    for pulled, drawn in zip(
+        chain.from_iterable(tension), chain.from_iterable(stroke), strict=True
+    ):
+        if pulled < 0.0 or not (isnan(pulled) or isnan(drawn)):
+            return LoadPath(*given, external)  # raises the error
     return LoadPath.of_valid(*given, external)
 
 

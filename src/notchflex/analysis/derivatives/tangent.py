@@ -152,7 +152,7 @@ class PathTangents:
             pad_rows(one, ready.state, ready.long.state)
             for one in (run.states_before, run.states, run.between)
         )
-        remembers = self.remembers & ~run.from_start
+        remembers = self.remembers & (run.from_start[:, 0] == 0.0)
         how = np.stack([run.fraction_before, run.substeps, self.path.converged, remembers], axis=1)
         return (*states, how.astype(float))
 

@@ -54,7 +54,7 @@ class SolverRun:
     Attributes:
         first: The state before the first load, packed.
         table: What the program returned, for the padded chain.
-        from_start: Which loads began at the state before the first.
+        from_start: 1 for loads that began at the state before the first, (s, 1).
         residual: Largest scaled residual of the last attempt.
         iterations: Newton iterations.
         converged: Whether the load was reached.
@@ -77,7 +77,7 @@ class SolverRun:
         prepared: PreparedChain,
         first: np.ndarray,
         table: np.ndarray,
-        from_start: Bool[np.ndarray, " s"],
+        from_start: Float[np.ndarray, "s 1"],
     ) -> None:
         """Store the table that the program returned."""
         self._prepared, self.first, self.table = prepared, first, table
@@ -102,7 +102,7 @@ class SolverRun:
     def states_before(self) -> Float[np.ndarray, "s state"]:
         """The state before each load, packed."""
         last = np.concatenate([self.first[None], self.states[:-1]])
-        return np.where(self.from_start[:, None], self.first, last)
+        return np.where(self.from_start, self.first, last)
 
     @cached_property
     def between(self) -> Float[np.ndarray, "s state"]:
@@ -198,10 +198,9 @@ def run(
         first = np.asarray(prepared.state.pack(start))
         start_row = pad_rows(first, prepared.state, long.state)
         carried = np.append(start_row, 1.0)
-    from_start = np.empty(len(packed), bool)
-    from_start[:] = each_from_start
-    restarts = from_start[:, None].astype(float)
-    vectors = (carried, long.dynamic_vector, packed, restarts, start_row, _numbers(settings))
+    from_start = np.empty((len(packed), 1))
+    from_start[:, 0] = each_from_start
+    vectors = (carried, long.dynamic_vector, packed, from_start, start_row, _numbers(settings))
     by_row = (False, False, True, True, False, False)
     table = _follow.along(by_row, *vectors, long.static_structure, form, long.state)
     return SolverRun(prepared, first, table, from_start)
