@@ -12,6 +12,8 @@ import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
+from notchflex._arrays import xp
+
 jax.config.update("jax_enable_x64", True)
 
 import jax.numpy as jnp  # noqa: E402
@@ -50,5 +52,5 @@ def array_module(*values: Any) -> ModuleType:
 
 
 def constant(value: ArrayLike) -> jax.Array:
-    """Return a NumPy array of floats, typed as the JAX array that a program makes of it."""
-    return cast("jax.Array", np.asarray(value, float))
+    """Return an array of floats, typed as the JAX array that a program makes of it."""
+    return cast("jax.Array", xp.asarray(value, float))

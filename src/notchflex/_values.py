@@ -8,6 +8,8 @@ from typing import Any, cast
 
 import numpy as np
 
+from notchflex._arrays import is_traced
+
 
 class ByValue:
     """Base of records that are equal where all that `_value` returns is."""
@@ -28,7 +30,9 @@ class ByValue:
 
 
 def read_only(values: Any) -> np.ndarray:
-    """Return a copy of an array that cannot be written to."""
+    """Return a copy of an array that cannot be written to; one of JAX as it is."""
+    if is_traced(values):
+        return values
     copy = np.array(values)
     copy.setflags(write=False)
     return copy

@@ -18,7 +18,8 @@ from typing import NamedTuple, cast
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import array_module, constant, jax, jnp
+from notchflex._arrays import is_traced, xp
+from notchflex._jax import constant, jax, jnp
 
 PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 
@@ -28,7 +29,7 @@ PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 _SERIES_BELOW = 1.0  # of the squared angle
 _TERMS = 11
 _SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(_TERMS)] for start in (1, 2, 3)]
-_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
+_TURN = xp.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
 class Motion(NamedTuple):
@@ -60,7 +61,7 @@ class Motion(NamedTuple):
         axes = angular(inside)
         force = _times(self.rotation, inside[axes:])
         moment = turned(self.rotation, inside[:axes]) + moment_of(self.translation, force)
-        return array_module(inside, force).concatenate([moment, force])
+        return xp.concatenate([moment, force])
 
     def wrench_inside(self, outside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
         """Transform a wrench from the outer to the inner frame."""
@@ -69,14 +70,14 @@ class Motion(NamedTuple):
         moment = outside[:axes] - moment_of(self.translation, force)
         inside = turned(self.rotation.T, moment)
         along = _times(self.rotation.T, force)
-        return array_module(outside, inside).concatenate([inside, along])
+        return xp.concatenate([inside, along])
 
     def twist_inside(self, outside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
         """Transform a twist from the outer to the inner frame."""
         axes = angular(outside)
         moved = outside[axes:] + cross(outside[:axes], self.translation)
         turn = turned(self.rotation.T, outside[:axes])
-        return array_module(outside, moved).concatenate([turn, _times(self.rotation.T, moved)])
+        return xp.concatenate([turn, _times(self.rotation.T, moved)])
 
 
 def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[Array, "d ..."]:
@@ -85,7 +86,7 @@ def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[A
     In compiled code the product is written out, so that it fuses with its surroundings: for such
     small matrices the overhead of a separate product exceeds its cost.
     """
-    if array_module(matrix, other) is np:
+    if not is_traced((matrix, other)):
         return matrix @ other
     every = matrix.reshape(*matrix.shape, *(1,) * (other.ndim - 1))
     return (every * other[None]).sum(axis=1)
@@ -98,7 +99,7 @@ def angular(twist: Float[Array, "w ..."]) -> int:
 
 def identity(dimensions: int = 3) -> Motion:
     """Return the identity motion of space, or of the plane."""
-    return Motion(constant(np.eye(dimensions)), constant(np.zeros(dimensions)))
+    return Motion(constant(xp.eye(dimensions)), constant(xp.zeros(dimensions)))
 
 
 def turned(rotation: Float[Array, "d d"], axis: Float[Array, "a ..."]) -> Float[Array, "a ..."]:
@@ -113,7 +114,6 @@ def skew(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
 
     In space it accepts many vectors.
     """
-    xp = array_module(vector)
     if vector.shape[-1] == 1:
         return vector[0] * _TURN
     x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
@@ -127,7 +127,6 @@ def cross(first: Float[Array, "a ..."], second: Float[Array, "d ..."]) -> Float[
 
     Written out it compiles and runs faster than as a matrix.
     """
-    xp = array_module(first, second)
     if first.shape[0] == 1:
         return xp.stack([first[0] * second[1], -first[0] * second[0]])
     (a, b, c), (x, y, z) = first, second
@@ -138,13 +137,11 @@ def moment_of(point: Float[Array, "d ..."], force: Float[Array, "d ..."]) -> Flo
     """Return the moment about the origin of a force at a point, or of any two linear vectors."""
     if point.shape[0] == 3:
         return cross(point, force)
-    xp = array_module(point, force)
     return xp.stack([point[1] * force[0] - point[0] * force[1]])
 
 
 def unskew(matrix: Float[Array, "d d"]) -> Float[Array, " a"]:
     """Return the vector of the skew part of a matrix, the inverse of `skew`."""
-    xp = array_module(matrix)
     if matrix.shape[0] == 2:
         return 0.5 * xp.stack([matrix[0, 1] - matrix[1, 0]])
     return 0.5 * xp.stack(
@@ -154,7 +151,6 @@ def unskew(matrix: Float[Array, "d d"]) -> Float[Array, " a"]:
 
 def _coefficients(squared: Float[Array, ""]) -> tuple[Array, Array, Array]:
     """Compute sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 from a squared angle."""
-    xp = array_module(squared)
     small = squared < _SERIES_BELOW
     near = xp.where(small, squared, 0.0)
     angle = xp.sqrt(xp.where(small, _SERIES_BELOW, squared))
@@ -180,8 +176,8 @@ def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Ar
     In compiled code this is several times as fast as the scalar C library. The angle is reduced to
     half a turn, a quarter of it is put into the series, and the result is doubled twice.
     """
-    if array_module(angle) is np:
-        return cast("tuple[Array, Array]", (np.sin(angle), np.cos(angle)))
+    if not is_traced(angle):
+        return cast("tuple[Array, Array]", (xp.sin(angle), xp.cos(angle)))
     quarter = 0.25 * (angle - _WHOLE_TURN * jnp.round(angle / _WHOLE_TURN))
     squared = quarter * quarter
     sine, versine = quarter * _polynomial(_SINE, squared), squared * _polynomial(_VERSINE, squared)
@@ -197,7 +193,7 @@ _VERSINE = [(-1.0) ** k / factorial(2 * k + 2) for k in range(9)]
 
 def wrench_at(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Array, " w"]:
     """Return the wrench (moment, force) about the origin of a force at a point."""
-    return array_module(point, force).concatenate([moment_of(point, force), force])
+    return xp.concatenate([moment_of(point, force), force])
 
 
 def wrench_turn(wrench: Float[Array, " w"]) -> Float[Array, "w w"]:
@@ -206,8 +202,7 @@ def wrench_turn(wrench: Float[Array, " w"]) -> Float[Array, "w w"]:
     With moment m and force f, a twist (omega, v) changes it by (omega x m + v x f, omega x f).
     """
     axes = angular(wrench)
-    units = constant(np.eye(len(wrench)))
-    xp = array_module(wrench)
+    units = constant(xp.eye(len(wrench)))
     moment, force = wrench[:axes], wrench[axes:]
     columns = []
     for unit in units:
@@ -226,26 +221,25 @@ def outer_twists(motion: Motion, twists: Float[Array, "*n 6 k"]) -> Float[Array,
     """
     turn = motion.rotation @ twists[..., :3, :]
     offset = motion.translation[..., None]
-    moved = motion.rotation @ twists[..., 3:, :] + np.cross(offset, turn, axis=-2)
-    return constant(np.concatenate([turn, moved], axis=-2))
+    moved = motion.rotation @ twists[..., 3:, :] + xp.cross(offset, turn, axis=-2)
+    return constant(xp.concatenate([turn, moved], axis=-2))
 
 
 def rotation_about(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
     """Return the rotation matrix of a rotation vector (rad); in space of many."""
-    xp = array_module(vector)
     if vector.shape[-1] == 1:
         sine, cosine = sine_cosine(vector[0])
         return xp.stack([cosine, sine, -sine, cosine]).reshape(2, 2)
     first, second, _ = _coefficients(_squared(vector))
     matrix = skew(vector)
-    return constant(np.eye(3)) + _each(first) * matrix + _each(second) * (matrix @ matrix)
+    return constant(xp.eye(3)) + _each(first) * matrix + _each(second) * (matrix @ matrix)
 
 
 def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
     """Return the left Jacobian of SO(3): rotation in the outer frame per change of its vector."""
     _, second, third = _coefficients(_squared(vector))
     matrix = skew(vector)
-    return constant(np.eye(3)) + _each(second) * matrix + _each(third) * (matrix @ matrix)
+    return constant(xp.eye(3)) + _each(second) * matrix + _each(third) * (matrix @ matrix)
 
 
 def left_slope_change(
@@ -273,4 +267,4 @@ def _squared(vector: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
 
 def _each(values: Float[Array, "*n"]) -> Float[Array, "*n 1 1"]:
     """Shape numbers so that they multiply matrices."""
-    return values if np.ndim(values) == 0 else values[..., None, None]
+    return values if xp.ndim(values) == 0 else values[..., None, None]

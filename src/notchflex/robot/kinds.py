@@ -5,7 +5,6 @@ The folders are scanned, so that a new file is all that a new kind needs: readin
 JSON Schema and `--set` pick it up.
 """
 
-import dataclasses
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,7 +16,7 @@ from notchflex._packages import import_all
 from notchflex.robot.fields import kind_of
 from notchflex.robot.notches.cut import CutLayout
 from notchflex.robot.notches.opening import Opening
-from notchflex.robot.part import MOST_STRAIN, Float, Int, part, quantity
+from notchflex.robot.part import MOST_STRAIN, Float, Int, part, quantity, unchecked
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 
@@ -115,8 +114,7 @@ class Notch:
 
     def expanded(self) -> tuple["Notch", ...]:
         """Return the notches that this one stands for: `repeat` of them, each with `repeat` 1."""
-        # Checking a part again takes longer than all else here.
-        one = self if self.repeat == 1 else dataclasses.replace(self, repeat=1)
+        one = self if self.repeat == 1 else unchecked(self, repeat=1)
         return (one,) * self.repeat
 
     @classmethod

@@ -1,11 +1,12 @@
 """What every part of a robot is: a frozen dataclass, checked by pydantic when it is made."""
 
+import dataclasses
 import functools
 import inspect
 import operator
 import warnings
 from collections.abc import Callable, Iterable
-from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints, overload
+from typing import Annotated, Any, TypeVar, cast, dataclass_transform, get_type_hints, overload
 
 import pydantic.dataclasses
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationError
@@ -87,6 +88,14 @@ def _plain_signature(cls: Any) -> inspect.Signature:
     return signature.replace(
         parameters=[one.replace(annotation=plain[n]) for n, one in signature.parameters.items()]
     )
+
+
+def unchecked(part: T, **values: Any) -> T:
+    """Return a part with other values that nothing checks, such as numbers that are traced."""
+    other = object.__new__(type(part))
+    names = {field.name for field in dataclasses.fields(cast("Any", part))}
+    vars(other).update({name: one for name, one in vars(part).items() if name in names} | values)
+    return other
 
 
 def _as_float(value: object) -> float:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from notchflex._arrays import xp
 from notchflex._jax import constant, jax, jnp
 from notchflex._pytree import Pytree, static
 from notchflex.mechanics.contact import ContactGroup
@@ -105,7 +106,7 @@ class Chain(Pytree):
     @property
     def tendon_order(self) -> Int[np.ndarray, " t"]:
         """Numbers of the tendons, group by group."""
-        return np.array([number for group in self.groups for number in group.numbers], int)
+        return xp.array([number for group in self.groups for number in group.numbers], int)
 
     @property
     def remembers(self) -> bool:
@@ -144,13 +145,13 @@ def structural(chain: Chain) -> Chain:
     """
 
     def counts(leaf: Any) -> Any:
-        return np.full(np.shape(leaf), np.asarray(leaf).dtype.kind != "f")
+        return xp.full(xp.shape(leaf), xp.asarray(leaf).dtype.kind != "f")
 
     plain: Chain = jax.tree.map(counts, chain)
     rods = chain.rods
     pairs = None
     if rods.turn_pair is not None:
-        pairs = _of_modes(rods.turn_pair) & np.swapaxes(_of_modes(rods.turn_pair), -1, -2)
+        pairs = _of_modes(rods.turn_pair) & xp.swapaxes(_of_modes(rods.turn_pair), -1, -2)
     return replace(
         plain,
         rods=replace(
@@ -167,12 +168,12 @@ def structural(chain: Chain) -> Chain:
 
 
 def _all(leaf: Array) -> Any:
-    return np.full(np.shape(leaf), True)
+    return xp.full(xp.shape(leaf), True)
 
 
 def _of_modes(leaf: Array) -> Any:
     """Mark the entries over the modes of an array over (1, modes)."""
-    return np.broadcast_to(np.arange(np.shape(leaf)[-1]) > 0, np.shape(leaf))
+    return xp.broadcast_to(xp.arange(xp.shape(leaf)[-1]) > 0, xp.shape(leaf))
 
 
 _ROTATIONS = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")
@@ -204,14 +205,14 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         edges: Number of entries for the contact edges of a tendon.
     """
     more = flexures - chain.flexures
-    contacts = np.pad(
+    contacts = xp.pad(
         chain.contacts, ((0, 0), (0, edges - chain.contacts.shape[1])), constant_values=-1
     )
     if more == 0:
         return dataclasses.replace(chain, contacts=contacts)
 
     def longer(leaf: Any) -> Array:
-        return np.concatenate([leaf, np.repeat(leaf[-1:], more, axis=0)])  # pyright: ignore
+        return xp.concatenate([leaf, xp.repeat(leaf[-1:], more, axis=0)])  # pyright: ignore
 
     def changed(part: Any, **values: Any) -> Any:
         """Return a part whose added entries have other values."""
@@ -222,7 +223,7 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         return dataclasses.replace(wider, **own)
 
     def with_nothing(values: Any) -> Array:
-        return constant(np.pad(values, [(0, more)] + [(0, 0)] * (np.ndim(values) - 1)))
+        return constant(xp.pad(values, [(0, more)] + [(0, 0)] * (xp.ndim(values) - 1)))
 
     return dataclasses.replace(
         chain,
@@ -237,7 +238,7 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         body_length=with_nothing(chain.body_length),
         body_mass=with_nothing(chain.body_mass),
         body_centre=with_nothing(chain.body_centre),
-        stiffness=np.concatenate([chain.stiffness, np.ones((more, chain.stiffness.shape[1]))]),
+        stiffness=xp.concatenate([chain.stiffness, xp.ones((more, chain.stiffness.shape[1]))]),
         elastic=None if chain.elastic is None else _elastic(chain.elastic, more),
         contact_stiffness=longer(chain.contact_stiffness),
         contact_flexibility=jax.tree.map(longer, chain.contact_flexibility),
@@ -249,7 +250,7 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
 def _rods(chain: Chain, changed: Any) -> Rod:
     rods = chain.rods
     values = {name: 0.0 for name in _NOTHING if getattr(rods, name) is not None}
-    values |= {name: np.eye(getattr(rods, name).shape[-1]) for name in _ROTATIONS}
+    values |= {name: xp.eye(getattr(rods, name).shape[-1]) for name in _ROTATIONS}
     wider: Rod = changed(rods, padding_mask=1.0, **values)
     # The first added flexure begins at the tip, at the end of the last body.
     wider.start_offset[chain.flexures, -1] = chain.body_length[-1]  # pyright: ignore
@@ -257,5 +258,5 @@ def _rods(chain: Chain, changed: Any) -> Rod:
 
 
 def _elastic(elastic: Any, more: int) -> Array:
-    idle = np.broadcast_to(np.eye(elastic.shape[-1]), (more, *elastic.shape[1:]))
-    return np.concatenate([elastic, idle])  # pyright: ignore
+    idle = xp.broadcast_to(xp.eye(elastic.shape[-1]), (more, *elastic.shape[1:]))
+    return xp.concatenate([elastic, idle])  # pyright: ignore

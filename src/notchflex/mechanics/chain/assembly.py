@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from notchflex._arrays import cached, xp
 from notchflex._jax import constant, jax
 from notchflex.mechanics.chain.arrays import Chain
 from notchflex.mechanics.chain.flexures import FlexureOf, flexure
@@ -30,8 +31,9 @@ from notchflex.mechanics.motion import Motion, rotation_about
 from notchflex.mechanics.tendon import RoutedTendons, RoutingContext, TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
 from notchflex.robot.kinds import Friction, Material, Notch
+from notchflex.robot.part import unchecked
 
-_UP = np.array([0.0, 0.0, 1.0])
+_UP = xp.array([0.0, 0.0, 1.0])
 
 
 def assemble(
@@ -74,7 +76,7 @@ def assemble(
         groups=routed.groups,
         contact_pairs=template.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
-        free_length=constant(routed.base_length + [tendon.free_length for tendon in tendons]),
+        free_length=routed.base_length + constant([tendon.free_length for tendon in tendons]),
         body_length=body_length,
         body_mass=constant(body_mass),
         body_centre=constant(body_centre),
@@ -87,7 +89,7 @@ def assemble(
         follows=loaded and follows,  # unloaded chains are of one form
         refinement=refinement,
         window=max(
-            (int(np.max(part.back)) for part in (*routed.groups, *template.contact_pairs)),
+            (int(xp.max(part.back)) for part in (*routed.groups, *template.contact_pairs)),
             default=1,
         ),
         **laws(robot.material, template),
@@ -96,7 +98,7 @@ def assemble(
     normal = bending_normal(robot)
     if not flat or level == "space" or normal is None or not tendons_in_plane(robot):
         return chain
-    return _flat(chain, np.stack([np.cross(normal, _UP), normal, _UP], axis=1))
+    return _flat(chain, xp.stack([xp.cross(normal, _UP), normal, _UP], axis=1))
 
 
 def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
@@ -111,10 +113,10 @@ def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
     law = section_law(part)
     elastic = _elastic(template.distinct_rods, law)[template.rod_index]
     elastic = template.stiffness_factor[:, None, None] * elastic
-    stiffness = np.einsum("nmm->nm", elastic)
+    stiffness = (elastic * np.eye(elastic.shape[-1])).sum(axis=-1)
     stop = template.rods.stop_flexibility
     linear = law.is_linear and not template.distinct_rods.section.softens
-    contact_stiffness = 1.0 / np.sum(template.contact_motion / stiffness, axis=-1)
+    contact_stiffness = 1.0 / xp.sum(template.contact_motion / stiffness, axis=-1)
     return {
         "law": law,
         "stiffness": constant(stiffness),
@@ -137,7 +139,7 @@ def stiffened(chain: Chain, factor: Float[np.ndarray, "*rows n"]) -> Chain:
         elastic=None if elastic is None else constant(factor[..., None, None] * elastic),
         contact_stiffness=constant(contact_stiffness),
         contact_flexibility=None if flexibility is None else constant(flexibility / factor),
-        **chain_averages(contact_stiffness, np.sum(chain.rods.length, axis=-1)),
+        **chain_averages(contact_stiffness, xp.sum(chain.rods.length, axis=-1)),
     )
 
 
@@ -152,8 +154,8 @@ def chain_averages(
     """
     count = contact_stiffness.shape[-1]
     return {
-        "closing_force": constant(np.sum(contact_stiffness * height, axis=-1) / count),
-        "stroke_stiffness": constant(np.sum(contact_stiffness, axis=-1) / count**2),
+        "closing_force": constant(xp.sum(contact_stiffness * height, axis=-1) / count),
+        "stroke_stiffness": constant(xp.sum(contact_stiffness, axis=-1) / count**2),
     }
 
 
@@ -174,7 +176,7 @@ class ChainTemplate(NamedTuple):
     """
 
     distinct_rods: Rod
-    rod_index: list[int]
+    rod_index: Int[np.ndarray, " n"]
     rods: Rod
     routed_tendons: RoutedTendons
     contact_pairs: tuple[ContactGroup, ...]
@@ -207,28 +209,29 @@ def _build_template(
     flexures: FlexureOf = flexure,
 ) -> ChainTemplate:
     # Notches that are equal but for their factor are built once.
-    factor = np.array([notch.stiffness_factor for notch in notches])
-    if (factor != 1.0).any():
-        notches = tuple(dataclasses.replace(notch, stiffness_factor=1.0) for notch in notches)
-    sited_notches = tuple(zip(notches, sites, strict=True))
-    different = dict.fromkeys(sited_notches)
-    built = {each: flexures(*each, tube, level, refinement, by_fibres) for each in different}
-    own_rods, free_poses = zip(*built.values(), strict=True)
+    factor = xp.array([notch.stiffness_factor for notch in notches])
+    plain = {id(notch): unchecked(notch, stiffness_factor=1.0) for notch in notches}
+    notches = tuple(plain[id(notch)] for notch in notches)
+    # By identity, as numbers that are traced are neither equal nor different.
+    pairs = list(zip(notches, sites, strict=True))
+    sited = {(id(notch), id(site)): (notch, site) for notch, site in pairs}
+    built = [flexures(*each, tube, level, refinement, by_fibres) for each in sited.values()]
+    own_rods, free_poses = zip(*built, strict=True)
     distinct_rods = stack(own_rods)
-    number = {each: index for index, each in enumerate(built)}
-    rod_index = [number[each] for each in sited_notches]
+    order = {key: index for index, key in enumerate(sited)}
+    rod_index = np.array([order[id(notch), id(site)] for notch, site in pairs])
     rods = jax.tree.map(lambda leaf: leaf[rod_index], distinct_rods)
     body_length = constant(body_lengths(tube, notches))
     lead = body_length[:-1, None] * _UP
     rods = dataclasses.replace(rods, start_offset=rods.start_offset + lead)
-    free = jax.tree.map(lambda *leaves: np.stack(leaves)[rod_index], *free_poses)
+    free = jax.tree.map(lambda *leaves: xp.stack(leaves)[rod_index], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
     context = RoutingContext(
         notches, tube.outer_radius, rods, free, body_length, turns_with_chord=turns_with_chord
     )
-    directions = {notch.direction_deg: np.empty(0) for notch in notches}
+    directions = {notch.direction_deg: xp.empty(0) for notch in notches}
     for side in directions:
-        directions[side] = np.asarray(rotation_about(constant(_UP * np.radians(side))))
+        directions[side] = xp.asarray(rotation_about(constant(_UP * xp.radians(side))))
     return ChainTemplate(
         distinct_rods,
         rod_index,
@@ -236,15 +239,15 @@ def _build_template(
         route(tendons, context),
         build_contacts(notches, tube, rods, body_length),
         body_length,
-        constant(np.stack([directions[notch.direction_deg] for notch in notches])),
-        np.sum(rods.length, axis=-1),
+        constant(xp.stack([directions[notch.direction_deg] for notch in notches])),
+        xp.sum(rods.length, axis=-1),
         _squared_contact_motion(rods, tube.outer_radius),
         factor,
     )
 
 
 # Fits of material or friction constants assemble one shape hundreds of times.
-_cached_template = lru_cache(maxsize=64)(_build_template)
+_cached_template = cached(64)(_build_template)
 
 
 def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
@@ -268,8 +271,8 @@ def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:
     """Compute the stiffness of every flexure in the free robot; 1 for padding modes."""
     basis = rods.basis
     stiffness_product = rods.length[..., None, None] * (law.stiffness(rods.section) @ basis)
-    own = np.einsum("niam,niak->nmk", basis, stiffness_product)
-    return own + rods.padding_mask[:, None] * np.eye(rods.modes)
+    own = xp.einsum("niam,niak->nmk", basis, stiffness_product)
+    return own + rods.padding_mask[:, None] * xp.eye(rods.modes)
 
 
 def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[np.ndarray, "n modes"]:
@@ -278,22 +281,22 @@ def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[np.ndarray,
     A contact opposite a spine moves with its fibre; an edge contact by its distance from the tube
     axis times the rotation of the distal body.
     """
-    fibre = np.einsum("nc,nicm,ni->nm", fibre_stretch(rods.closure), rods.basis, rods.length)
+    fibre = xp.einsum("nc,nicm,ni->nm", fibre_stretch(rods.closure), rods.basis, rods.length)
     turn = rods.start_rotation @ rods.turn[:, -1, :, 1:]
-    edge = outer_radius * np.linalg.norm(turn[:, :2], axis=1)
-    slope = np.where(rods.has_closure[:, None] > 0.0, fibre, edge)
+    edge = outer_radius * xp.linalg.norm(turn[:, :2], axis=1)
+    slope = xp.where(rods.has_closure[:, None] > 0.0, fibre, edge)
     return slope**2 * (1.0 - rods.padding_mask)
 
 
 def _contacts(groups: tuple[TendonGroup, ...], tendons: int) -> Int[Array, "t edges"]:
     """List the edges that every tendon touches, base to tip: two per body that it visits."""
-    contact_edges: list[np.ndarray] = [np.zeros(0, int)] * tendons
+    contact_edges: list[np.ndarray] = [xp.zeros(0, int)] * tendons
     for group in groups:
         for column, number in enumerate(group.numbers):
-            flexures = np.flatnonzero(np.asarray(group.visits)[:, column])
-            contact_edges[number] = (2 * flexures[:, None] + np.arange(2)).ravel()
+            flexures = xp.flatnonzero(xp.asarray(group.visits)[:, column])
+            contact_edges[number] = (2 * flexures[:, None] + xp.arange(2)).ravel()
     max_edges = max(len(edges) for edges in contact_edges)
     filled = [
-        np.pad(edges, (0, max_edges - len(edges)), constant_values=-1) for edges in contact_edges
+        xp.pad(edges, (0, max_edges - len(edges)), constant_values=-1) for edges in contact_edges
     ]
-    return cast("Array", np.stack(filled))
+    return cast("Array", xp.stack(filled))

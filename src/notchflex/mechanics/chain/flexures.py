@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import lru_cache
 from typing import Any, Protocol
 
-import numpy as np
-
+from notchflex._arrays import cached, xp
 from notchflex._jax import constant
 from notchflex.mechanics.flexure import Rod, Site, free_pose, rod_at, section_fibres, with_level
 from notchflex.mechanics.material import Fibres
@@ -24,9 +22,9 @@ def with_fibres(rod: Rod, notch: Any, tube: Tube, refinement: int = 0) -> Rod:
     numbers = section.edge_near, section.edge_spine, section.area, section.second_moment_weak
     every = [
         fitted(points_at(near, spine, count), area, second_moment)
-        for near, spine, area, second_moment in np.stack(numbers, axis=-1)
+        for near, spine, area, second_moment in xp.stack(numbers, axis=-1)
     ]
-    arm, area = (constant(np.stack(part)) for part in zip(*every, strict=True))
+    arm, area = (constant(xp.stack(part)) for part in zip(*every, strict=True))
     return dataclasses.replace(rod, section=dataclasses.replace(section, fibres=Fibres(arm, area)))
 
 
@@ -46,7 +44,7 @@ class FlexureOf(Protocol):
         ...
 
 
-@lru_cache(maxsize=512)
+@cached(512)
 def flexure(
     notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int, by_fibres: bool
 ) -> tuple[Rod, Motion]:

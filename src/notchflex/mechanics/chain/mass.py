@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from notchflex._arrays import xp
 from notchflex.mechanics.flexure import Rod
 from notchflex.robot import Robot, Tube
 from notchflex.robot.kinds import Notch
@@ -19,7 +20,7 @@ def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[np.ndarray, " bo
     """Return the length of each rigid piece on the tube axis, base first, mm."""
     following = (*notches[1:], None)
     spacings = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
-    return np.array([tube.base_length, *spacings])
+    return xp.array([tube.base_length, *spacings])
 
 
 def body_masses(
@@ -40,22 +41,20 @@ def body_masses(
         Masses (g, (n + 1,)), base first, and centres (mm, (n + 1, 3)) in the frames of the
         bodies; zero masses where the material's density is not known.
     """
-    notches = robot.notches
-    centre = np.zeros((len(notches) + 1, 3))
+    bodies = len(robot.notches) + 1
     density = robot.material.density
     if density is None:
-        return np.zeros(len(centre)), centre
+        return np.zeros(bodies), np.zeros((bodies, 3))
     length = body_lengths(robot.tube, robot.notches)
     wall = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2)
     piece = wall * length
-    half = 0.5 * np.sum(np.asarray(rods.section.area) * np.asarray(rods.length), axis=-1)
-    start = np.asarray(rods.start_offset)
-    end = -np.einsum("nba,nb->na", np.asarray(rods.end_rotation), np.asarray(rods.end_offset))
-    volume = piece.copy()
-    volume[:-1] += half
-    volume[1:] += half
-    centre[:, 2] = 0.5 * length * piece
-    centre[:-1] += half[:, None] * start
-    centre[1:] += half[:, None] * end
+    half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1)
+    end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
+    nothing = np.zeros(1)
+    before, behind = xp.concatenate([half, nothing]), xp.concatenate([nothing, half])
     # Every body has a volume: where no tube is left between two notches, half of each flexure.
-    return _GRAMS * density * volume, centre / volume[:, None]
+    volume = piece + before + behind
+    on_axis = (0.5 * length * piece)[:, None] * np.eye(3)[2]
+    at_starts = before[:, None] * xp.pad(rods.start_offset, ((0, 1), (0, 0)))
+    at_ends = behind[:, None] * xp.pad(end, ((1, 0), (0, 0)))
+    return _GRAMS * density * volume, (on_axis + at_starts + at_ends) / volume[:, None]

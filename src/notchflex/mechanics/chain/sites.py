@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from notchflex._arrays import plain_number
 from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.mechanics.ends import Side
 from notchflex.mechanics.flexure import Site, validity_warnings
@@ -27,9 +28,11 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     notches = robot.notches
     if not any(notch.has_elastic_ends for notch in notches):
         return (None,) * len(notches)
-    lengths = [float(length) for length in body_lengths(robot.tube, notches)]
+    lengths = [plain_number(length) for length in body_lengths(robot.tube, notches)]
     last = len(notches) - 1
     ratio = robot.material.poisson_ratio
+
+    sites: dict[tuple[int | None, ...], Site] = {}  # shared where all around is of the same parts
 
     def site(index: int) -> Site:
         before, after = lengths[index], lengths[index + 1]
@@ -37,7 +40,9 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
         turned = [_is_turned(notches[index], one) for one in neighbours]
         proximal = Side("clamped" if index == 0 else "between", before, turned[0])
         distal = Side("free" if index == last else "between", after, turned[1])
-        return Site(proximal, distal, ratio)
+        parts = (neighbours[0], notches[index], neighbours[1])
+        key = (*map(id, parts), index == 0, index == last)
+        return sites.setdefault(key, Site(proximal, distal, ratio))
 
     return tuple(
         site(index) if notch.has_elastic_ends else None for index, notch in enumerate(notches)

@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._arrays import xp
 from notchflex._jax import constant
 from notchflex.mechanics.contact.edge import EdgeContact
 from notchflex.mechanics.contact.pairs import ContactGroup
@@ -30,31 +31,31 @@ def build_contacts(
         body_length: Length of the rigid pieces on the tube axis, base first, mm.
     """
     groups: list[ContactGroup] = []
-    if np.any(rods.has_closure):
+    if xp.any(rods.has_closure):
         has_contact = rods.has_closure[:, None]
-        groups.append(SpineContact(has_contact, cast("Array", np.ones(has_contact.shape, int))))
+        groups.append(SpineContact(has_contact, cast("Array", xp.ones(has_contact.shape, int))))
     sides = _sides(notches)
     if sides:
         line = passages(notches, body_length, sides)
-        angle = np.radians(sides)
-        across = tube.outer_radius * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
-        along = np.array([0.0, 0.0, 1.0])
+        angle = xp.radians(sides)
+        across = tube.outer_radius * xp.stack([xp.cos(angle), xp.sin(angle), 0.0 * angle], axis=-1)
+        along = xp.array([0.0, 0.0, 1.0])
         # Keep as many contacts as close at one flexure, on any side.
         count = int(line.on_side.sum(axis=1).max(initial=1.0))
-        chosen = np.argsort(-line.on_side, axis=1, kind="stable")[:, :count]
+        chosen = xp.argsort(-line.on_side, axis=1, kind="stable")[:, :count]
 
         def own(values: np.ndarray) -> np.ndarray:
             index = chosen.reshape(*chosen.shape, *(1,) * (values.ndim - 2))
-            return np.take_along_axis(values, index, axis=1)
+            return xp.take_along_axis(values, index, axis=1)
 
         has_contact = own(line.on_side)
         groups.append(
             EdgeContact(
                 has_contact=constant(has_contact),
-                back=cast("Array", np.where(has_contact > 0.0, own(line.back), 1)),
+                back=cast("Array", xp.where(has_contact > 0.0, own(line.back), 1)),
                 leaves=constant(own(across + line.left[..., None] * along)),
                 enters=constant(own(across + line.enters[..., None] * along)),
-                normal=constant(np.broadcast_to(along, (*has_contact.shape, 3))),
+                normal=constant(xp.broadcast_to(along, (*has_contact.shape, 3))),
             )
         )
     return tuple(groups)

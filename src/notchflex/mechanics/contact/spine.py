@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._arrays import xp
 from notchflex._jax import constant
 from notchflex.mechanics.contact.pairs import ContactGroup, GapResponse
 from notchflex.mechanics.flexure import (
@@ -45,13 +46,13 @@ def closing_angles(rods: Rod) -> Float[np.ndarray, " n"]:
     an arc h / (r_o + ybar) less the precurvature.
     """
     weights = of_rod(rods, fibre_stretch(constant(rods.closure)))
-    free = np.einsum("nc,nic,ni->n", weights, rods.reference_strain, rods.length)
-    slope = np.einsum("nc,nic,ni->n", weights, np.asarray(rods.basis)[..., 0], rods.length)
-    spine = np.asarray(rods.has_closure) > 0.0
-    return np.where(spine, -free / np.where(spine, slope, 1.0), np.inf)
+    free = xp.einsum("nc,nic,ni->n", weights, rods.reference_strain, rods.length)
+    slope = xp.einsum("nc,nic,ni->n", weights, xp.asarray(rods.basis)[..., 0], rods.length)
+    spine = xp.asarray(rods.has_closure) > 0.0
+    return xp.where(spine, -free / xp.where(spine, slope, 1.0), np.inf)
 
 
 def free_angle(rods: Rod) -> Float[np.ndarray, " n"]:
     """Return the precurvature of every notch with a spine, rad."""
-    bending = np.asarray(in_space(rods.reference_strain))[..., 1]
-    return np.einsum("ni,ni->n", rods.length, bending)
+    bending = xp.asarray(in_space(rods.reference_strain))[..., 1]
+    return xp.einsum("ni,ni->n", rods.length, bending)

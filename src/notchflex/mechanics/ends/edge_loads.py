@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from notchflex._arrays import decide, plain_number, xp
 from notchflex.mechanics.ends.ring import HARMONICS, edge_compliance
 from notchflex.mechanics.ends.side import Side
 from notchflex.mechanics.section import Section, annular_sector
@@ -52,9 +53,9 @@ def arc_of(outer: float, inner: float, section: Section) -> WallSector:
         The arc.
     """
     radius, wall = 0.5 * (outer + inner), outer - inner
-    angle = float(section.area) / (2.0 * radius * wall)
+    angle = plain_number(section.area) / (2.0 * radius * wall)
     return WallSector(
-        radius, wall, angle, annular_sector(outer, inner, outer * (1.0 + np.cos(angle)))
+        radius, wall, angle, annular_sector(outer, inner, outer * (1.0 + xp.cos(angle)))
     )
 
 
@@ -85,10 +86,10 @@ def arc_harmonics(arc: WallSector) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         and a unit tension: in cos nφ, sin nφ, cos nφ.
     """
     r, t, a = arc.radius, arc.wall, arc.half_angle
-    n = np.arange(HARMONICS, dtype=float)
+    n = xp.arange(HARMONICS, dtype=float)
     # Integrals over |φ| < a of cos nφ, cos φ cos nφ, sin φ sin nφ.
-    even = 2.0 * a * np.sinc(n * (a / np.pi))
-    below, above = a * np.sinc((n - 1.0) * (a / np.pi)), a * np.sinc((n + 1.0) * (a / np.pi))
+    even = 2.0 * a * xp.sinc(n * (a / np.pi))
+    below, above = a * xp.sinc((n - 1.0) * (a / np.pi)), a * xp.sinc((n + 1.0) * (a / np.pi))
     cosine, sine = below + above, below - above
     third = t**3 / 12.0
 
@@ -96,16 +97,16 @@ def arc_harmonics(arc: WallSector) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Compute loads of the stress `constant` + (1 + ζ/r) `varying`, in harmonics of φ."""
         force = t * (constant + varying) + third / r**2 * varying
         moment = third / r * (constant + 2.0 * varying)
-        return np.stack([force, -moment], axis=-1) / _NORM[:, None]
+        return xp.stack([force, -moment], axis=-1) / _NORM[:, None]
 
     section = arc.section
-    weak = loads(-float(section.centroid) * even, r * cosine) / section.second_moment_weak
+    weak = loads(-plain_number(section.centroid) * even, r * cosine) / section.second_moment_weak
     strong = loads(0.0 * sine, r * sine) / section.second_moment_strong
     return weak, strong, loads(even, 0.0 * even) / section.area
 
 
-_NORM = np.pi * np.where(np.arange(HARMONICS) == 0, 2.0, 1.0)
-_RELAXED = np.where(np.arange(HARMONICS) < 2, 1.0, RELAXATION)
+_NORM = np.pi * xp.where(xp.arange(HARMONICS) == 0, 2.0, 1.0)
+_RELAXED = xp.where(xp.arange(HARMONICS) < 2, 1.0, RELAXATION)
 
 
 def end_compliance(
@@ -130,22 +131,22 @@ def end_compliance(
         The added lengths; none where there is no ring.
     """
     ring_length = 0.5 * side.length if side.boundary == "between" else side.length
-    if ring_length == 0.0:
+    if decide(ring_length == 0.0):
         return EndCompliance(0.0, 0.0, 0.0, 0.0)
     weak, strong, axial = arc_harmonics(arc)
     flexibility = edge_compliance(arc.radius, arc.wall, ring_length, poisson_ratio, side.boundary)
     weights = _NORM * relaxation
 
     def energy(one: np.ndarray, other: np.ndarray) -> float:
-        return arc.radius * np.einsum("n,ni,nij,nj->", weights, one, flexibility, other)
+        return arc.radius * xp.einsum("n,ni,nij,nj->", weights, one, flexibility, other)
 
     # As a beam, the ring has the compliances c/(E I_tube) in bending and c/(E A_tube) in tension.
     bends = ring_length / (0.25 * np.pi * (outer**4 - inner**4))
     stretches = ring_length / (np.pi * (outer**2 - inner**2))
     section, offset = arc.section, arc.section.centroid
     return EndCompliance(
-        weak=float(section.second_moment_weak * (energy(weak, weak) - bends)),
-        strong=float(section.second_moment_strong * (energy(strong, strong) - bends)),
-        axial=float(section.area * (energy(axial, axial) - stretches - bends * offset**2)),
-        coupling=float(section.second_moment_weak * (energy(weak, axial) - bends * offset)),
+        weak=plain_number(section.second_moment_weak * (energy(weak, weak) - bends)),
+        strong=plain_number(section.second_moment_strong * (energy(strong, strong) - bends)),
+        axial=plain_number(section.area * (energy(axial, axial) - stretches - bends * offset**2)),
+        coupling=plain_number(section.second_moment_weak * (energy(weak, axial) - bends * offset)),
     )

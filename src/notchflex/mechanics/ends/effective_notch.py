@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
-import numpy as np
-
+from notchflex._arrays import cached, plain_number, xp
 from notchflex.mechanics.ends.edge_loads import WallSector, arc_of, end_compliance
 from notchflex.mechanics.ends.flattening import edge_and_brazier, flattening_numbers
 from notchflex.mechanics.ends.shear import shear_compliances
@@ -70,10 +68,10 @@ def reach_of(arc: WallSector) -> float:
 
     The ovalising load reaches farthest; it decays over a length that grows with r √(r/t).
     """
-    return float(_REACH * arc.radius * np.sqrt(arc.radius / arc.wall))
+    return plain_number(_REACH * arc.radius * xp.sqrt(arc.radius / arc.wall))
 
 
-@lru_cache(maxsize=1024)
+@cached(1024)
 def notch_stiffness(
     outer_radius: float,
     inner_radius: float,
@@ -109,7 +107,7 @@ def notch_stiffness(
     sides: list[Side] = []
     for side in (proximal, distal):  # cut where the effects of the edge have died out
         longest = reach_of(arc) * (2.0 if side.boundary == "between" else 1.0)
-        sides.append(side._replace(length=min(side.length, longest)))
+        sides.append(side._replace(length=xp.minimum(side.length, longest)))
     added = [end_compliance(outer_radius, inner_radius, arc, side, poisson_ratio) for side in sides]
     weak, strong, axial, coupling = (sum(each) for each in zip(*added, strict=True))
     length = height + weak
@@ -122,21 +120,21 @@ def notch_stiffness(
         arc,
         outer_radius,
         (length, height + strong),
-        (float(section.second_moment_weak), float(section.second_moment_strong)),
+        (plain_number(section.second_moment_weak), plain_number(section.second_moment_strong)),
         sides,
     )
     closed = _CLOSED_STIFFNESS * arc.wall * arc.radius**2 * length / section.second_moment_weak
     return NotchStiffness(
-        weak=float(length),
-        strong=float(height + strong),
-        axial=float(height + axial),
-        coupling=float(coupling),
-        torsion=float(torsion_length(arc, outer_radius, height, poisson_ratio, section)),
+        weak=plain_number(length),
+        strong=plain_number(height + strong),
+        axial=plain_number(height + axial),
+        coupling=plain_number(coupling),
+        torsion=plain_number(torsion_length(arc, outer_radius, height, poisson_ratio, section)),
         shear_centre=shear_centre(arc, height, section),
         shear=shear,
         sway=sway,
-        alpha=float(arc.radius * phi * imposed / length**2),
-        beta=float(share * brazier * height / length**3),
+        alpha=plain_number(arc.radius * phi * imposed / length**2),
+        beta=plain_number(share * brazier * height / length**3),
         closing_factor=_CLOSING_FACTOR[cut],
-        closed_ratio=float(closed),
+        closed_ratio=plain_number(closed),
     )

@@ -19,6 +19,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from notchflex._arrays import xp
 from notchflex.mechanics.ends.side import Side
 from notchflex.mechanics.section import Section
 
@@ -45,7 +46,7 @@ def edge_and_brazier(radius: float, sides: Sequence[Side]) -> tuple[float, float
     specimen = all(side.boundary == "clamped" for side in sides)
     factor, decay = _EDGE_OF_SPECIMEN if specimen else _EDGE
     # The flattening k that a ring of some length imposes at the edge of the notch.
-    both = [-factor * np.expm1(-((side.length / (decay * radius)) ** 2)) for side in sides]
+    both = [-factor * xp.expm1(-((side.length / (decay * radius)) ** 2)) for side in sides]
     return 0.5 * (both[0] + both[1]), _BRAZIER_OF_SPECIMEN if specimen else _BRAZIER
 
 
@@ -71,20 +72,20 @@ def flattening_numbers(
         Half angle a_o of the arc on the outer surface, rad; φ, without unit; B, mm².
     """
     radius, wall = 0.5 * (outer + inner), outer - inner
-    outer_angle = np.arccos((depth - outer) / outer)
+    outer_angle = xp.arccos((depth - outer) / outer)
     # An off-axis cut beyond the mean radius leaves no arc at mid-wall; `validity` says so.
     a = outer_angle
     if cut == "off-axis":
-        a = np.arccos(np.minimum((depth - outer) / radius, 1.0 - 1e-9))
+        a = xp.arccos(xp.minimum((depth - outer) / radius, 1.0 - 1e-9))
     angle = 0.5 * a * (1.0 + _NODES)
-    slope = np.sin(a) / a
+    slope = xp.sin(a) / a
     bent = (
-        0.5 * (np.sin(a) ** 2 + np.sin(angle) ** 2)
-        + slope * (np.cos(a) - np.cos(angle))
-        - slope * angle * np.sin(angle)
+        0.5 * (xp.sin(a) ** 2 + xp.sin(angle) ** 2)
+        + slope * (xp.cos(a) - xp.cos(angle))
+        - slope * angle * xp.sin(angle)
     )
     first, second = (0.5 * a * (moment @ _WEIGHTS) for moment in (bent, bent**2))
     weak = section.second_moment_weak
-    phi = 2.0 * wall * radius**3 * np.abs(first) / weak
+    phi = 2.0 * wall * radius**3 * xp.abs(first) / weak
     brazier = 48.0 * (1.0 - poisson_ratio**2) * radius**7 * second / (wall * weak)
     return outer_angle, phi, brazier

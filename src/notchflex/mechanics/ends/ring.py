@@ -16,9 +16,12 @@ then nearly orthogonal, and a condition at the far edge leaves out one polynomia
 
 from __future__ import annotations
 
-from functools import cache, lru_cache
+from functools import cache
 
 import numpy as np
+
+from notchflex._arrays import cached, xp
+from notchflex._values import read_only
 
 HARMONICS = 41  # n = 0 ... 40
 _DEGREE = 18
@@ -36,12 +39,12 @@ def _polynomials(integrals: int) -> np.ndarray:
         (3, 1 + points, polynomials).
     """
     legendre = np.polynomial.legendre
-    at = np.concatenate([[-1.0], _GAUSS[0]])
-    series = [np.array([1.0]), np.array([-0.5, 0.5])][:integrals]
+    at = xp.concatenate([[-1.0], _GAUSS[0]])
+    series = [xp.array([1.0]), xp.array([-0.5, 0.5])][:integrals]
     for k in range(_COUNT - integrals):
-        unit = np.sqrt(2.0 * k + 1.0) * np.eye(k + 1)[k]
+        unit = xp.sqrt(2.0 * k + 1.0) * xp.eye(k + 1)[k]
         series.append(legendre.legint(unit, integrals, lbnd=1.0, scl=0.5))
-    return np.array(
+    return xp.array(
         [[legendre.legval(at, legendre.legder(s, d, 2.0)) for s in series] for d in range(3)]
     ).transpose(0, 2, 1)
 
@@ -61,7 +64,7 @@ def _strains() -> np.ndarray:
     Returns:
         Array (power of n, derivative, strain, displacement) of factors, for r = 1.
     """
-    factors = np.zeros((3, 3, 6, 3))
+    factors = xp.zeros((3, 3, 6, 3))
     u, v, w = range(3)
     axial, around, shear, along, across, twist = range(6)
     for power, derivative, strain, displacement, factor in (
@@ -92,21 +95,21 @@ def _energies() -> np.ndarray:
     """
     size = 3 * _COUNT
     in_surface, outward = _surface()
-    tables = np.stack([in_surface, in_surface, outward])[:, :, 1:]
-    strains = np.einsum("pdsk,kdgi->pdsgki", _strains(), tables).reshape(3, 3, 6, _COUNT, size)
-    plane = np.array([np.diag([1.0, 1.0, 0.5]), [[0, 1, 0], [1, 0, 0], [0, 0, -0.5]]])
-    energies = np.zeros((2, 2, 5, 5, size, size))
+    tables = xp.stack([in_surface, in_surface, outward])[:, :, 1:]
+    strains = xp.einsum("pdsk,kdgi->pdsgki", _strains(), tables).reshape(3, 3, 6, _COUNT, size)
+    plane = xp.array([xp.diag([1.0, 1.0, 0.5]), [[0, 1, 0], [1, 0, 0], [0, 0, -0.5]]])
+    energies = xp.zeros((2, 2, 5, 5, size, size))
     for part, of in enumerate((strains[:, :, :3], strains[:, :, 3:])):
-        stresses = np.einsum("mst,g,pdtgj->mpdsgj", plane, 0.5 * _GAUSS[1], of)
-        for p, d, q, e in np.ndindex(3, 3, 3, 3):
-            product = np.einsum("sgi,msgj->mij", of[p, d], stresses[:, q, e])
+        stresses = xp.einsum("mst,g,pdtgj->mpdsgj", plane, 0.5 * _GAUSS[1], of)
+        for p, d, q, e in xp.ndindex(3, 3, 3, 3):
+            product = xp.einsum("sgi,msgj->mij", of[p, d], stresses[:, q, e])
             energies[part, :, d + e, p + q] += product
     return energies
 
 
 def _constraints(boundary: str) -> np.ndarray:
     """Return the constrained polynomials of each harmonic, shape (harmonics, 3 × polynomials)."""
-    constrained = np.zeros((HARMONICS, 3, _COUNT), dtype=bool)
+    constrained = xp.zeros((HARMONICS, 3, _COUNT), dtype=bool)
     constrained[0, 1] = True  # no torsion
     if boundary == "clamped":
         constrained[:, :, 0] = constrained[:, 2, 1] = True
@@ -121,17 +124,17 @@ def _constraints(boundary: str) -> np.ndarray:
 def _edge() -> np.ndarray:
     """Return displacement and slope of polynomials at the loaded edge, (3 × polynomials, 2)."""
     in_surface, outward = _surface()
-    edge = np.zeros((3 * _COUNT, 2))
+    edge = xp.zeros((3 * _COUNT, 2))
     edge[:_COUNT, 0] = in_surface[0, 0]
     edge[2 * _COUNT :, 1] = outward[1, 0]
     return edge
 
 
-_POWERS = np.arange(HARMONICS, dtype=float)[:, None] ** np.arange(5)
+_POWERS = xp.arange(HARMONICS, dtype=float)[:, None] ** xp.arange(5)
 _CONSTRAINTS = {boundary: _constraints(boundary) for boundary in ("between", "clamped", "free")}
 
 
-@lru_cache(maxsize=256)  # rings of one length are equal, however deep the notches beside them
+@cached(256)  # rings of one length are equal, however deep the notches beside them
 def edge_compliance(
     radius: float, wall: float, length: float, poisson_ratio: float, boundary: str
 ) -> np.ndarray:
@@ -152,21 +155,20 @@ def edge_compliance(
     ratio = radius / length
     one = 1.0
     # Strains of the membrane come per 1/r, those of bending per 1/r².
-    parts = np.stack([one, wall**2 / (12.0 * radius**2)])
-    material = np.stack([one, one * poisson_ratio])
-    slopes = np.stack([one, ratio, ratio**2, ratio**3, ratio**4])
-    factors = np.einsum("a,b,c->abc", parts, material, slopes).ravel()
+    parts = xp.stack([one, wall**2 / (12.0 * radius**2)])
+    material = xp.stack([one, one * poisson_ratio])
+    slopes = xp.stack([one, ratio, ratio**2, ratio**3, ratio**4])
+    factors = xp.einsum("a,b,c->abc", parts, material, slopes).ravel()
     constrained = _CONSTRAINTS[boundary]
     free = (~constrained[:, :, None] & ~constrained[:, None, :]).astype(float)
     by_power = (factors @ _energies().reshape(20, -1)).reshape(5, -1)
     stiffness = (_POWERS @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
-    stiffness = free * stiffness + np.eye(3 * _COUNT) * constrained[:, :, None]
-    edge = np.stack([_edge()[:, 0] * one, _edge()[:, 1] * ratio], axis=-1)
-    loads = np.where(constrained[:, :, None], 0.0, edge[None])
-    flexibility = np.swapaxes(loads, 1, 2) @ np.linalg.solve(stiffness, loads)
+    stiffness = free * stiffness + xp.eye(3 * _COUNT) * constrained[:, :, None]
+    edge = xp.stack([_edge()[:, 0] * one, _edge()[:, 1] * ratio], axis=-1)
+    loads = xp.where(constrained[:, :, None], 0.0, edge[None])
+    flexibility = xp.swapaxes(loads, 1, 2) @ xp.linalg.solve(stiffness, loads)
     # Displacements are of order r² per N/mm over E t length; slopes have one r less.
-    unit = np.stack([radius, one])
+    unit = xp.stack([radius, one])
     scale = (1.0 - poisson_ratio**2) / (wall * length)
-    compliance = flexibility * (scale * np.outer(unit, unit)[None])
-    compliance.setflags(write=False)
-    return compliance
+    compliance = flexibility * (scale * xp.outer(unit, unit)[None])
+    return read_only(compliance)

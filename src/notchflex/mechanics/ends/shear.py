@@ -16,8 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
+from notchflex._arrays import plain_number
 from notchflex.mechanics.ends.edge_loads import WallSector
 from notchflex.mechanics.ends.side import Side
 
@@ -60,10 +59,10 @@ def shear_compliances(
     wall, width = arc.wall / diameter, 2.0 * arc.half_angle * arc.radius / diameter
 
     def compliance(powers: _Powers, length: float, second_moment: float) -> float:
-        rings = np.mean([(side.length / diameter) ** powers.ring for side in sides])
+        rings = sum((side.length / diameter) ** powers.ring for side in sides) / len(sides)
         arc_and_rings = wall**powers.wall * width**powers.width * rings
         distorted = powers.factor * arc_and_rings * (length / diameter) ** powers.length
-        return float(length**3 / (12.0 * second_moment) + distorted / diameter)
+        return plain_number(length**3 / (12.0 * second_moment) + distorted / diameter)
 
     in_plane, sideways = map(compliance, (_IN_PLANE, _SIDEWAYS), lengths, second_moments)
     return in_plane, sideways

@@ -12,8 +12,7 @@ numbers and the spring λ_w were fitted to cells of chains of equal notches.
 
 from __future__ import annotations
 
-import numpy as np
-
+from notchflex._arrays import plain_number, xp
 from notchflex.mechanics.ends.edge_loads import WallSector
 from notchflex.mechanics.section import Section
 
@@ -28,7 +27,7 @@ def warping_constant(arc: WallSector) -> float:
         C_w of the middle line and of the wall, mm⁶.
     """
     r, t, a = arc.radius, arc.wall, arc.half_angle
-    sine, cosine = np.sin(a), np.cos(a)
+    sine, cosine = xp.sin(a), xp.cos(a)
     line = a**3 - 6.0 * (sine - a * cosine) ** 2 / (a - sine * cosine)
     return 2.0 / 3.0 * t * r**5 * line + (2.0 * a * r * t) ** 3 / 144.0
 
@@ -54,10 +53,10 @@ def torsion_length(
     """
     t, a, diameter = arc.wall, arc.half_angle, 2.0 * outer
     shear_over_young = 0.5 / (1.0 + poisson_ratio)
-    rate = np.sqrt(shear_over_young * section.torsion_constant / warping_constant(arc))
+    rate = xp.sqrt(shear_over_young * section.torsion_constant / warping_constant(arc))
     width = 2.0 * a * arc.radius / diameter
-    spring = 0.004 * diameter * (t / diameter) ** -1.98 * np.exp(0.16 * width)
-    warping = 2.0 / (rate * (1.0 / np.tanh(0.5 * rate * height) + spring * rate))
+    spring = 0.004 * diameter * (t / diameter) ** -1.98 * xp.exp(0.16 * width)
+    warping = 2.0 / (rate * (1.0 / xp.tanh(0.5 * rate * height) + spring * rate))
     return height + t * (3.11 - 1.60 * a) - warping
 
 
@@ -73,4 +72,4 @@ def shear_centre(arc: WallSector, height: float, section: Section) -> float:
         The distance, mm: that of the section, moved out by the ends of short notches.
     """
     width = 2.0 * arc.half_angle * arc.radius
-    return float(section.shear_centre) * (1.0 + 0.027 * width / (height + 0.72 * width))
+    return plain_number(section.shear_centre) * (1.0 + 0.027 * width / (height + 0.72 * width))

@@ -17,8 +17,7 @@ from __future__ import annotations
 
 import dataclasses
 
-import numpy as np
-
+from notchflex._arrays import plain_number, xp
 from notchflex._jax import constant
 from notchflex.mechanics.ends import NotchStiffness, notch_stiffness, validity
 from notchflex.mechanics.flexure.notch_rod import (
@@ -45,7 +44,7 @@ MATERIAL_SHARE = 0.25
 def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
     shape = tube.outer_radius, tube.inner_radius, notch.section_depth(tube)
     cut = SECTION_OF_CUT[notch.cut](*shape)
-    centroid, section = float(cut.centroid), about_neutral_axis(cut)
+    centroid, section = plain_number(cut.centroid), about_neutral_axis(cut)
     closure, stop = tube.outer_radius + centroid, 0.0
     shear = (0.0, 0.0)
     if site is not None:
@@ -68,7 +67,7 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
     # need ten for 3e-8.
     points = rod_quadrature((0.0, notch.height), (7 + 4 * refinement,), (10 + 3 * refinement,))
     bending, twist = 2 + refinement, 1 + refinement
-    centre = float(section.shear_centre)
+    centre = plain_number(section.shear_centre)
     modes = legendre_modes(
         points,
         bending,
@@ -78,7 +77,7 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
         shear_centre=centre,
         shear=shear,
     )
-    free = STRAIGHT + np.radians(notch.precurvature_deg) * modes.basis[..., 0]
+    free = STRAIGHT + xp.radians(notch.precurvature_deg) * modes.basis[..., 0]
     axis = NeutralAxis(points, start=shifted(-centroid), end=shifted(centroid), strain=free)
     return build_rod(
         axis, section, modes, closure, stop_flexibility=stop, direction_deg=notch.direction_deg
@@ -95,7 +94,7 @@ def _ends(
         moment has the curvature P_1(s)/h.
     """
     bending = (stiffness.weak, stiffness.strong)
-    seconds = (float(cut.second_moment_weak), float(cut.second_moment_strong))
+    seconds = (plain_number(cut.second_moment_weak), plain_number(cut.second_moment_strong))
     # Beyond what the linear part of the bending gives: h^2 l/(12 I).
     shear = [
         all_of_it - height**2 * length / (12.0 * second)
@@ -104,7 +103,7 @@ def _ends(
         )
     ]
     push, sway = (
-        one * float(cut.area) / (2.0 * (1.0 + poisson_ratio) * height) - 1.0 for one in shear
+        one * plain_number(cut.area) / (2.0 * (1.0 + poisson_ratio) * height) - 1.0 for one in shear
     )
     ends = NotchEnds(
         weak=constant(stiffness.weak / height - 1.0),

@@ -13,17 +13,17 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
-from numpy.polynomial.legendre import legvander
 from numpy.typing import ArrayLike
 
+from notchflex._arrays import xp
 from notchflex._jax import constant, jax
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
+from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature, legendre
 from notchflex.mechanics.material import FibreSection
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import Section
 
-STRAIGHT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+STRAIGHT = xp.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 """Strains of a straight, unloaded rod: a stretch of 1 along z."""
 
 
@@ -61,7 +61,7 @@ class StrainModes(NamedTuple):
 
 def shifted(x: float = 0.0, z: float = 0.0) -> Motion:
     """Make the pose of a frame displaced along x and z, mm, without rotation."""
-    return Motion(constant(np.eye(3)), constant([x, 0.0, z]))
+    return Motion(constant(xp.eye(3)), constant([x, 0.0, z]))
 
 
 def between(outer: Motion, inner: Motion) -> Motion:
@@ -96,19 +96,20 @@ def legendre_modes(
         The modes; a unit of the first bends the rod by 1 rad.
     """
     length = quadrature.ends[-1]
-    modes = np.zeros((len(quadrature.every), 6, bending + sideways + twist))
-    max_count = max(bending, sideways, twist)
-    polynomials = legvander(2.0 * quadrature.every / length - 1.0, max_count - 1)
-    first = 0
-    for component, count in ((1, bending), (0, sideways), (2, twist)):
-        modes[:, component, first : first + count] = polynomials[:, :count]
-        first += count
-    # Twist about the shear centre shears the neutral axis, which lies off it, sideways.
-    modes[:, 4, bending + sideways :] = shear_centre * modes[:, 2, bending + sideways :]
+    polynomials = legendre(2.0 * quadrature.every / length - 1.0, max(bending, sideways, twist))
+    about_x, about_y, about_z, along_x, along_y, _ = np.eye(6)
     # Of dM/ds = n x e_z: a force along x lowers the moment about y, along y it raises that about x.
-    if any(shear):
-        modes[:, 3, 1] -= shear[0]
-        modes[:, 4, bending + 1] += shear[1]
+    sheared = {0: -shear[0] * along_x, 1: shear[1] * along_y}
+    # Twist about the shear centre shears the neutral axis, which lies off it, sideways.
+    turning = about_z + shear_centre * along_y
+    strains = [
+        polynomials[:, degree, None] * strain + (sheared.get(number, 0.0) if degree == 1 else 0.0)
+        for number, (strain, count) in enumerate(
+            ((about_y, bending), (about_x, sideways), (turning, twist))
+        )
+        for degree in range(count)
+    ]
+    modes = xp.stack(strains, axis=-1)
     fewest = bending if tendon_modes is None else tendon_modes
     return StrainModes(modes / length, (fewest, bending, modes.shape[-1]))
 
@@ -160,19 +161,19 @@ def build_rod(
     """
     points = axis.quadrature
     nodes = len(points.at_nodes[0])
-    strain = np.tile(STRAIGHT, (len(points.every), 1)) if axis.strain is None else axis.strain
+    strain = xp.tile(STRAIGHT, (len(points.every), 1)) if axis.strain is None else axis.strain
     # Written out, so that opposite directions are exact mirror images.
-    cosine, sine = np.cos(np.radians(direction_deg)), np.sin(np.radians(direction_deg))
-    turned = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    cosine, sine = xp.cos(xp.radians(direction_deg)), xp.sin(xp.radians(direction_deg))
+    turned = xp.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     curve, curve_end, reference = None, shifted(), strain
     if axis.curve is not None:
         curve, curve_end = (Motion(*(part[at] for part in axis.curve)) for at in (slice(-1), -1))
         reference = None
 
     def at_nodes(values: Array, own_axes: int = 0) -> Array:
-        each = np.asarray(values)
+        each = xp.asarray(values)
         is_uniform = each.ndim == own_axes
-        return constant(np.broadcast_to(each, (nodes, *each.shape)) if is_uniform else each[:nodes])
+        return constant(xp.broadcast_to(each, (nodes, *each.shape)) if is_uniform else each[:nodes])
 
     return Rod(
         start_rotation=constant(turned @ axis.start.rotation),
@@ -187,11 +188,11 @@ def build_rod(
             jax.tree.map(at_nodes, dataclasses.replace(section, fibres=None)),
             fibres=jax.tree.map(partial(at_nodes, own_axes=1), section.fibres),
         ),
-        closure=constant([closure or 0.0, 0.0]),
+        closure=constant([0.0 if closure is None else closure, 0.0]),
         has_closure=constant(float(closure is not None)),
         stop_flexibility=constant(stop_flexibility),
         linear_kinematics=constant(float(linear_kinematics)),
         chord=constant(float(has_chord)),
-        padding_mask=constant(np.zeros(modes.basis.shape[-1])),
+        padding_mask=constant(xp.zeros(modes.basis.shape[-1])),
         levels=modes.levels,
     )

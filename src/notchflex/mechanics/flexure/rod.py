@@ -18,6 +18,7 @@ from typing import Any, cast
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from notchflex._arrays import decide, xp
 from notchflex._jax import constant, jax
 from notchflex._pytree import Pytree, static
 from notchflex.mechanics.material import NotchEnds
@@ -129,12 +130,12 @@ def flattened(rods: Rod, frame: Float[np.ndarray, "3 3"]) -> Rod:
 
 def planar_points(points: Float[Array, "*shape 3"]) -> Float[Array, "*shape 2"]:
     """Return the components of points or forces in the plane."""
-    return constant(np.asarray(points)[..., IN_PLANE])
+    return constant(xp.asarray(points)[..., IN_PLANE])
 
 
 def planar_rotations(rotations: Float[Array, "*shape 3 3"]) -> Float[Array, "*shape 2 2"]:
     """Return the components of rotations in the plane."""
-    return constant(np.asarray(rotations)[..., IN_PLANE, :][..., IN_PLANE])
+    return constant(xp.asarray(rotations)[..., IN_PLANE, :][..., IN_PLANE])
 
 
 LEVELS = ("tendons", "plane", "space")
@@ -163,7 +164,7 @@ def with_level(rod: Rod, level: str) -> Rod:
     if rod.turn_pair is not None:
         kept["turn_pair"] = rod.turn_pair[..., : modes + 1, : modes + 1]
     arrays = (rod.reference_strain, kept["basis"], *jax.tree.leaves(rod.section))
-    if all((leaf == leaf[:1]).all() for leaf in arrays):
+    if decide(xp.all(xp.stack([xp.all(leaf == leaf[:1]) for leaf in arrays]))):
         # The one node in the middle.
         middle = slice(len(rod.length) // 2, len(rod.length) // 2 + 1)
         kept |= {name: kept.get(name, getattr(rod, name))[middle] for name in _AT_NODES}
@@ -184,10 +185,10 @@ def stack(rods: Sequence[Rod]) -> Rod:
     unused: dict[str, Any] = {
         name: None
         for name in ("linear_kinematics", "chord", "stop_flexibility")
-        if not any(np.any(getattr(rod, name)) for rod in filled)
+        if not decide(xp.any(xp.stack([xp.any(getattr(rod, name)) for rod in filled])))
     }
     used = [dataclasses.replace(rod, **unused) if unused else rod for rod in filled]
-    together: Rod = jax.tree.map(lambda *leaves: _stacked(np.stack(leaves)), *used)
+    together: Rod = jax.tree.map(lambda *leaves: _stacked(xp.stack(leaves)), *used)
     return together
 
 
@@ -210,20 +211,20 @@ def _filled(rod: Rod, modes: int, nodes: int, poses: int, levels: tuple[int, ...
     count = rod.length.shape[0]
     if (more, further, count, levels) == (0, 0, nodes, rod.levels):
         return rod
-    index = np.minimum(np.arange(nodes), count - 1)
-    at_end = np.minimum(np.arange(poses + 1), rod.step.shape[0])
+    index = xp.minimum(xp.arange(nodes), count - 1)
+    at_end = xp.minimum(xp.arange(poses + 1), rod.step.shape[0])
 
     def wider(values: Array, axes: int = 1) -> Array:
-        return constant(np.pad(values, [(0, 0)] * (values.ndim - axes) + [(0, more)] * axes))
+        return constant(xp.pad(values, [(0, 0)] * (values.ndim - axes) + [(0, more)] * axes))
 
     def longer(values: Array) -> Array:
-        return constant(np.pad(values, [(0, further)] + [(0, 0)] * (values.ndim - 1)))
+        return constant(xp.pad(values, [(0, further)] + [(0, 0)] * (values.ndim - 1)))
 
     pair = None if rod.turn_pair is None else longer(wider(rod.turn_pair, 2))
-    reach = np.pad(rod.node_reach[index], ((0, 0), (0, further)))
+    reach = xp.pad(rod.node_reach[index], ((0, 0), (0, further)))
     return dataclasses.replace(
         rod,
-        length=rod.length[index] * (np.arange(nodes) < count),
+        length=rod.length[index] * (xp.arange(nodes) < count),
         reference_strain=rod.reference_strain[index],
         basis=wider(rod.basis)[index],
         turn=wider(rod.turn)[at_end],
@@ -235,6 +236,6 @@ def _filled(rod: Rod, modes: int, nodes: int, poses: int, levels: tuple[int, ...
         node_rotation=rod.node_rotation[index],
         node_offset=rod.node_offset[index],
         section=jax.tree.map(lambda leaf: leaf[index], rod.section),
-        padding_mask=constant(np.arange(modes) >= rod.modes),
+        padding_mask=constant(xp.arange(modes) >= rod.modes),
         levels=levels,
     )

@@ -25,7 +25,8 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.polynomial.legendre import leggauss
 
-from notchflex._jax import array_module, constant, jax, jnp
+from notchflex._arrays import cached, is_traced, xp
+from notchflex._jax import constant, jax, jnp
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.motion import (
     Motion,
@@ -65,8 +66,7 @@ class RodConfiguration(NamedTuple):
 
 def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
     """Integrate the rotations and steps of a rod for given modes."""
-    xp = array_module(modes)
-    hat = xp.concatenate([np.ones(1), modes])
+    hat = xp.concatenate([xp.ones(1), modes])
     from_place = None
     if rod.turn_pair is None:
         rotation, turn = _in_plane(rod.turn[:, 0] @ hat), rod.turn[..., 1:]
@@ -85,7 +85,7 @@ def free_pose(rod: Rod) -> Motion:
     It equals `relative_pose` without modes, and omits terms that only the derivatives need.
     """
     assert rod.turn_pair is not None
-    turns = np.diff(rod.turn[..., 0], axis=0, prepend=0.0) + rod.turn_pair[..., 0, 0]
+    turns = xp.diff(rod.turn[..., 0], axis=0, prepend=0.0) + rod.turn_pair[..., 0, 0]
     rotation = _products(_rotations(constant(turns)))
     end = Motion(rotation[-1], _stepped(rod, rotation)[..., 0].sum(axis=0))
     return Motion(rod.start_rotation, rod.start_offset).then(end).then(tail_pose(rod))
@@ -97,7 +97,6 @@ def _stepped(rod: Rod, rotation: Float[Array, "places d d"]) -> Float[Array, "ga
 
 
 def _in_plane(angle: Float[Array, " places"]) -> Float[Array, "places 2 2"]:
-    xp = array_module(angle)
     sine, cosine = sine_cosine(angle)
     return xp.stack([xp.stack([cosine, sine], -1), xp.stack([-sine, cosine], -1)], -2)
 
@@ -106,7 +105,6 @@ def _turns(
     rod: Rod, hat: Float[Array, " hat"]
 ) -> tuple[Float[Array, "places 3"], Float[Array, "places 3 modes"]]:
     """Compute the rotation vectors from place to place, and their slopes by the modes."""
-    xp = array_module(hat)
     parts = xp.concatenate([rod.turn[:1], rod.turn[1:] - rod.turn[:-1]])
     by_pair = _by_pair(rod, hat)
     return (parts + by_pair) @ hat, parts[..., 1:] + 2.0 * by_pair[..., 1:]
@@ -114,7 +112,7 @@ def _turns(
 
 def _by_pair(rod: Rod, hat: Float[Array, " hat"]) -> Float[Array, "places 3 hat"]:
     """Compute the second Magnus term from place to place, per unit of (1, modes)."""
-    return array_module(hat).einsum("kcab,b->kca", rod.turn_pair, hat)
+    return xp.einsum("kcab,b->kca", rod.turn_pair, hat)
 
 
 def rotation_error_estimate(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, ""]:
@@ -133,33 +131,31 @@ def rotation_error_estimate(rod: Rod, modes: Float[Array, " modes"]) -> Float[Ar
 
 
 def _rotations(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
-    if array_module(turns) is np:
+    if not is_traced(turns):
         return rotation_about(turns)
     return jax.vmap(rotation_about)(turns)
 
 
 def left_slopes(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
     """Return the left Jacobians of the exponential at rotation vectors."""
-    if array_module(turns) is np:
+    if not is_traced(turns):
         return left_slope(turns)
     return jax.vmap(left_slope)(turns)
 
 
 def _products(parts: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
     """Multiply all rotations up to each."""
-    xp = array_module(parts)
     return xp.stack(list(accumulate(parts, xp.matmul)))
 
 
 def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
     """Return the rotation at the place before each; the identity before the first."""
-    return array_module(values).concatenate([np.eye(3)[None], values[:-1]])
+    return xp.concatenate([xp.eye(3)[None], values[:-1]])
 
 
 def _small_motion(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
     """Compute the end motion of small deflection: displacements proportional to the strains."""
-    xp = array_module(modes)
-    hat = xp.concatenate([np.ones(1), modes])
+    hat = xp.concatenate([xp.ones(1), modes])
     turn, moved = rod.turn[-1] @ hat, rod.step.sum(axis=0) @ hat
     rotation, end = rotation_about(turn), rod.curve_offset
     return Motion(rotation, end + cross(turn, end) + moved - rotation @ end)
@@ -169,7 +165,7 @@ def _end_motion(rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration) 
     """Compute the motion from the end of the reference curve to that of the rod."""
     if rod.linear_kinematics is None:
         return own.end
-    xp, is_small = array_module(modes), rod.linear_kinematics > 0.0
+    is_small = rod.linear_kinematics > 0.0
     pairs = zip(_small_motion(rod, modes), own.end, strict=True)
     return Motion(*(xp.where(is_small, small, large) for small, large in pairs))
 
@@ -266,15 +262,6 @@ def _rule(count: int) -> tuple[Float[np.ndarray, " nodes"], Float[np.ndarray, " 
     return rule
 
 
-@lru_cache(maxsize=64)
-def _polynomials(count: int) -> Float[np.ndarray, "nodes nodes"]:
-    """Return the coefficients of the Lagrange polynomials of Gauss's nodes from 0 to 1, cached."""
-    points = 0.5 * (1.0 + _rule(count)[0])
-    coefficients = np.linalg.inv(points[:, None] ** np.arange(count))
-    coefficients.setflags(write=False)
-    return coefficients
-
-
 def gauss_nodes(
     ends: Sequence[float], per_interval: int | Sequence[int] = 3
 ) -> tuple[Float[np.ndarray, " nodes"], Float[np.ndarray, " nodes"]]:
@@ -292,18 +279,18 @@ def gauss_nodes(
         >>> print(f"{weights @ positions**2:.6f}")
         9.000000
     """
-    half = 0.5 * np.diff(np.asarray(ends, float))
+    half = 0.5 * xp.diff(xp.asarray(ends, float))
     if isinstance(per_interval, int):
         points, weight = _rule(per_interval)
-        positions = np.asarray(ends[:-1])[:, None] + half[:, None] * (1.0 + points)
+        positions = xp.asarray(ends[:-1])[:, None] + half[:, None] * (1.0 + points)
         return positions.ravel(), (half[:, None] * weight).ravel()
     rules = [_rule(count) for count in per_interval]
     positions = [low + h * (1.0 + x) for low, h, (x, _) in zip(ends, half, rules, strict=False)]
     weights = [h * w for h, (_, w) in zip(half, rules, strict=True)]
-    return np.concatenate(positions), np.concatenate(weights)
+    return xp.concatenate(positions), xp.concatenate(weights)
 
 
-@lru_cache(maxsize=64)
+@cached(64)
 def rod_quadrature(
     ends: tuple[float, ...], nodes: tuple[int, ...], poses: tuple[int, ...]
 ) -> RodQuadrature:
@@ -311,11 +298,28 @@ def rod_quadrature(
     return RodQuadrature(ends, nodes, poses)
 
 
+def legendre(at: Float[np.ndarray, " k"], count: int) -> Float[np.ndarray, "k count"]:
+    """Return the first Legendre polynomials at points between -1 and 1."""
+    values = [xp.ones_like(at), at]
+    for degree in range(2, count):
+        last, before = values[-1], values[-2]
+        values.append(((2.0 * degree - 1.0) * at * last - (degree - 1.0) * before) / degree)
+    return xp.stack(values[:count], axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _projection(count: int) -> Float[np.ndarray, "count nodes"]:
+    """Return the coefficients, of Legendre polynomials, of Lagrange's at Gauss's nodes."""
+    points, weights = _rule(count)
+    return (xp.arange(count) + 0.5)[:, None] * (weights[:, None] * legendre(points, count)).T
+
+
 def up_to(count: int, parts: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k nodes"]:
     """Integrate the Lagrange polynomials of Gauss's nodes on (0, 1) from 0 to given parts."""
-    powers = np.arange(1, count + 1)
-    integrals = np.asarray(parts)[:, None] ** powers / powers
-    return integrals @ _polynomials(count)
+    values = legendre(2.0 * xp.asarray(parts) - 1.0, count + 1)
+    higher = (values[:, 2:] - values[:, :-2]) / (2.0 * xp.arange(1, count) + 1.0)
+    integrals = xp.concatenate([1.0 + values[:, 1:2], higher], axis=1)
+    return 0.5 * integrals @ _projection(count)
 
 
 @dataclass(frozen=True)
@@ -350,35 +354,44 @@ class RodQuadrature:
         ]
         positions, lengths = pieces[0]
         for low, (more, stand_for) in zip(self.ends[1:], pieces[1:], strict=False):
-            positions = np.concatenate([positions, [low], more])
-            lengths = np.concatenate([lengths, [0.0], stand_for])
+            positions = xp.concatenate([positions, xp.reshape(low, 1), more])
+            lengths = xp.concatenate([lengths, np.zeros(1), stand_for])
         return positions, lengths
 
     @cached_property
     def between(self) -> tuple[Float[np.ndarray, " fine"], Float[np.ndarray, " fine"]]:
         """Points between the neighbours of start, nodes of the pose and end, and their lengths."""
-        return gauss_nodes([0.0, *self.at_poses[0], self.ends[-1]], _BETWEEN)
+        ends = xp.asarray(self.ends)
+        return gauss_nodes(xp.concatenate([ends[:1], self.at_poses[0], ends[-1:]]), _BETWEEN)
 
     @cached_property
     def before(self) -> tuple[Float[np.ndarray, " more"], Float[np.ndarray, " more"]]:
         """Points between the start, the nodes of the strains and the ends, and their lengths."""
         return gauss_nodes(self._stops, _BETWEEN)
 
-    @property
-    def _stops(self) -> list[float]:
-        return sorted({0.0, *self.ends[1:-1], *self.at_nodes[0].tolist()})
+    @cached_property
+    def _stops(self) -> Float[np.ndarray, " stops"]:
+        """The start, the nodes of the strains, and the ends between pieces, rising."""
+        nodes = xp.split(self.at_nodes[0], np.cumsum(self.nodes)[:-1])
+        starts = xp.asarray(self.ends)[:-1, None]
+        return xp.concatenate([part for pair in zip(starts, nodes, strict=True) for part in pair])
+
+    @cached_property
+    def unit(self) -> RodQuadrature:
+        """The same with pieces of length 1: for what their lengths do not change."""
+        return RodQuadrature(tuple(map(float, range(len(self.ends)))), self.nodes, self.poses)
 
     @cached_property
     def every(self) -> Float[np.ndarray, " every"]:
         """All points, in the order of the properties above."""
         parts = (self.at_nodes, self.at_poses, self.between, self.before)
-        return np.concatenate([positions for positions, _ in parts])
+        return xp.concatenate([positions for positions, _ in parts])
 
     @property
     def weight(self) -> Float[np.ndarray, " every"]:
         """Weights of all points in an integral over the nodes of the strains."""
         own = self.at_nodes[1]
-        return np.pad(own, (0, len(self.every) - len(own)))
+        return xp.pad(own, (0, len(self.every) - len(own)))
 
     def fields(
         self,
@@ -393,28 +406,29 @@ class RodQuadrature:
             basis: Strain at every point per unit of mode.
             reference: Strain of the free rod beyond that of the curve; none where not given.
         """
-        free = np.zeros(basis.shape[:2]) if reference is None else reference
-        hat = np.concatenate([free[..., None], basis], axis=-1)
+        free = xp.zeros(basis.shape[:2]) if reference is None else reference
+        hat = xp.concatenate([free[..., None], basis], axis=-1)
         if curve is None:
             count = len(hat)
             twists = constant(hat)
-            curve = Motion(constant([np.eye(3)] * count), constant(np.zeros((count, 3))))
+            curve = Motion(constant([xp.eye(3)] * count), constant(xp.zeros((count, 3))))
         else:
             twists = outer_twists(curve, constant(hat))
         counts = [len(part[0]) for part in (self.at_nodes, self.at_poses, self.between)]
-        _, at_poses, between, before = np.split(twists, np.cumsum(counts))
+        _, at_poses, between, before = xp.split(twists, xp.cumsum(counts))
         turns = _grouped(between[:, :3], self.between[1])
         at_node = slice(counts[0])
-        stop = np.searchsorted(self._stops, self.at_nodes[0]) - 1
+        unit = self.unit
+        stop = np.searchsorted(unit._stops, unit.at_nodes[0]) - 1
         return {
             "length": constant(self.at_nodes[1]),
             "basis": constant(basis[at_node]),
-            "turn": constant(np.cumsum(turns, axis=0)),
+            "turn": constant(xp.cumsum(turns, axis=0)),
             "turn_pair": constant(_pairs(between[:, :3], self.between[1])),
             "step": constant(self.at_poses[1][:, None, None] * at_poses[:, 3:]),
-            "node_turn": constant(np.cumsum(_grouped(before[:, :3], self.before[1]), axis=0)[stop]),
-            "node_index": np.searchsorted(self.at_poses[0], self.at_nodes[0], side="right"),
-            "node_reach": constant(self._reach()),
+            "node_turn": constant(xp.cumsum(_grouped(before[:, :3], self.before[1]), axis=0)[stop]),
+            "node_index": np.searchsorted(unit.at_poses[0], unit.at_nodes[0], side="right"),
+            "node_reach": constant(unit._reach()),
             "node_rotation": constant(curve.rotation[at_node]),
             "node_offset": constant(curve.translation[at_node]),
         }
@@ -424,9 +438,9 @@ class RodQuadrature:
         nodes = self.at_nodes[0]
         columns = []
         for low, high, count in zip(self.ends[:-1], self.ends[1:], self.poses, strict=True):
-            part = np.clip((nodes - low) / (high - low), 0.0, 1.0)
-            columns += [up_to(count, part) / (0.5 * _rule(count)[1]), np.zeros((len(nodes), 1))]
-        return np.concatenate(columns[:-1], axis=1)
+            part = xp.clip((nodes - low) / (high - low), 0.0, 1.0)
+            columns += [up_to(count, part) / (0.5 * _rule(count)[1]), xp.zeros((len(nodes), 1))]
+        return xp.concatenate(columns[:-1], axis=1)
 
 
 def _grouped(values: Float[np.ndarray, "fine ..."], lengths: Float[np.ndarray, " fine"]) -> Any:
@@ -445,7 +459,7 @@ def _pairs(
     own = turning.reshape(-1, _BETWEEN, *turning.shape[1:])
     weights = lengths.reshape(-1, _BETWEEN)
     inner = up_to(_BETWEEN, 0.5 * (1.0 + _rule(_BETWEEN)[0]))
-    so_far = weights.sum(axis=1)[:, None, None, None] * np.einsum("ij,rjch->rich", inner, own)
-    crossed = np.cross(so_far[..., :, None], own[..., None, :], axisa=2, axisb=2, axisc=2)
-    pairs = 0.5 * np.einsum("ri,richk->rchk", weights, crossed)
-    return 0.5 * (pairs + np.swapaxes(pairs, -1, -2))
+    so_far = weights.sum(axis=1)[:, None, None, None] * xp.einsum("ij,rjch->rich", inner, own)
+    crossed = xp.cross(so_far[..., :, None], own[..., None, :], axisa=2, axisb=2, axisc=2)
+    pairs = 0.5 * xp.einsum("ri,richk->rchk", weights, crossed)
+    return 0.5 * (pairs + xp.swapaxes(pairs, -1, -2))

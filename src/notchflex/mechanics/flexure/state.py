@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._arrays import xp
 from notchflex._jax import jax, jnp
 from notchflex._pytree import Pytree
 from notchflex.mechanics.flexure.rod import Rod
@@ -62,11 +62,11 @@ def fibre_stretch(across: Float[Array, "*shape 2"]) -> Float[Array, "*shape 6"]:
     tendon (its l = h - theta (r_i + ybar)) and for the edge of a notch.
     """
     weights = across @ _ACROSS
-    return weights + np.broadcast_to(_ALONG, weights.shape)
+    return weights + xp.broadcast_to(_ALONG, weights.shape)
 
 
-_ALONG = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-_ACROSS = np.array([[0.0, -1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+_ALONG = xp.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+_ACROSS = xp.array([[0.0, -1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
 
 
 def of_rod(rod: Rod, values: Float[Array, "*shape 6"]) -> Float[Array, "*shape w"]:
@@ -76,7 +76,7 @@ def of_rod(rod: Rod, values: Float[Array, "*shape 6"]) -> Float[Array, "*shape w
 
 def in_space(values: Float[Array, "*shape w"]) -> Float[Array, "*shape 6"]:
     """Expand components (last axis) of a plane to all six of space."""
-    return values if values.shape[-1] == 6 else values @ np.eye(6)[PLANE]
+    return values if values.shape[-1] == 6 else values @ xp.eye(6)[PLANE]
 
 
 def fibre_slope(rod: Rod, weights: Float[Array, "t w"]) -> Float[Array, "t modes"]:
@@ -155,7 +155,7 @@ def material_tangent(
         if slope is not None:
             every = in_space(columns.T)
             elastic = law.elastic(every.T, jax.tree.map(lambda leaf: leaf[..., None], section))
-            weak = np.arange(6) == 1
+            weak = xp.arange(6) == 1
             return of_rod(rod, jnp.where(weak, slope * every, elastic)).T
 
         def resultants(varied: Array) -> Array:
@@ -177,7 +177,7 @@ def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "d d"],
     that the paper calls bending angle, about two thirds of the slope at the end.
     """
     end, free = rod_end(rod, modes).translation, rod.curve_offset
-    about_y = np.eye(3)[1] if len(end) == 3 else np.ones(1)
+    about_y = xp.eye(3)[1] if len(end) == 3 else xp.ones(1)
     angle = jnp.atan2(end[0] * free[-1] - end[-1] * free[0], end[0] * free[0] + end[-1] * free[-1])
     turn = rotation_about(angle * about_y)
     return rod.start_rotation @ turn @ rod.start_rotation.T, angle

@@ -12,8 +12,7 @@ against sideways forces, though not against sideways moments and torques.
 
 from __future__ import annotations
 
-import numpy as np
-
+from notchflex._arrays import xp
 from notchflex._jax import constant
 from notchflex.mechanics.flexure.notch_rod import (
     NeutralAxis,
@@ -39,7 +38,7 @@ from notchflex.robot import StripNotch, Tube
 # Polynomials of the sideways curvature and of the twist.
 _SIDEWAYS, _TWIST = 3, 2
 # Rod frame in the notch's frame: z along the strip toward the bend, x toward the base, same y.
-_LYING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+_LYING = xp.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
 @rod.register
@@ -83,14 +82,14 @@ def strip_rod(
     length = notch.strip_length_in(tube)
     points = RodQuadrature((0.0, length), (nodes,), (nodes,))
     modes = legendre_modes(points, bending_modes, _SIDEWAYS + more_sideways, _TWIST + more_sideways)
-    along = np.append(points.every, length)
+    along = xp.append(points.every, length)
     axis = NeutralAxis(
         points,
         start=Motion(constant(_LYING), constant([-0.5 * length, 0.0, notch.height])),
         end=Motion(constant(_LYING.T), constant([0.0, 0.0, -0.5 * length])),
         curve=Motion(
-            constant(np.tile(np.eye(3), (len(along), 1, 1))),
-            constant(along[:, None] * np.array([0.0, 0.0, 1.0])),
+            constant(xp.tile(xp.eye(3), (len(along), 1, 1))),
+            constant(along[:, None] * xp.array([0.0, 0.0, 1.0])),
         ),
     )
     # Both walls, their middles where the wall of the tube has its own.

@@ -17,12 +17,13 @@ prints b h for the area of both, which must be 2 b h.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from notchflex._arrays import plain_number, xp
 from notchflex._jax import constant
 from notchflex.mechanics.flexure.notch_rod import (
     STRAIGHT,
@@ -50,10 +51,10 @@ from notchflex.mechanics.section import clamped_torsion_constant, two_walls
 from notchflex.mechanics.section.fibres import FibresAt, two_walls_fibres
 from notchflex.robot import Tube, ULink
 
-# The arc length is a smooth integral over t, a third of a turn at most.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(40)
+# The arc length is a smooth integral over t, a third of a turn at most: ten nodes are exact.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
-_EXACT = 1e-9  # a step of Newton this small leaves an error of 1e-18
+_NEWTON = 4  # the speed varies by a few tenths: the fourth step is below 1e-16
 
 
 @dataclass(frozen=True)
@@ -82,23 +83,23 @@ class CurvedEnd:
         """
         radius = self.slot_radius
         beyond = 2.0 * np.pi * radius * (radius + self.strip_thickness)
-        return 0.5 * beyond / (radius + float(np.sqrt(radius**2 + beyond)))
+        return 0.5 * beyond / (radius + plain_number(xp.sqrt(radius**2 + beyond)))
 
     @property
     def angle(self) -> float:
         """Angle alpha between the strip and the cut where S1 begins, rad (Gao 2017, eq. 10)."""
-        return float(np.arctan2(self.slot_radius + self.strip_thickness, self.outer_length))
+        return plain_number(xp.arctan2(self.slot_radius + self.strip_thickness, self.outer_length))
 
     def inner_edge(self, t: ArrayLike) -> np.ndarray:
         """Compute the points M on the slot's round end: (..., 2), (y, z) in mm."""
-        turn = 0.5 * np.pi * np.asarray(t, dtype=float)
-        return self.slot_radius * np.stack([-np.cos(turn), np.sin(turn)], axis=-1)
+        turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
+        return self.slot_radius * xp.stack([-xp.cos(turn), xp.sin(turn)], axis=-1)
 
     def outer_edge(self, t: ArrayLike) -> np.ndarray:
         """Compute the points N on the other edge of the material, that of the next slot."""
-        t = np.asarray(t, dtype=float)
+        t = xp.asarray(t, dtype=float)
         along = -(self.outer_length + self.slot_radius) * (1.0 - t)
-        return np.stack([along, np.full_like(t, self.slot_radius + self.strip_thickness)], axis=-1)
+        return xp.stack([along, xp.full_like(t, self.slot_radius + self.strip_thickness)], axis=-1)
 
     def middle(self, t: ArrayLike) -> np.ndarray:
         """Compute the points C of the middle line."""
@@ -106,22 +107,22 @@ class CurvedEnd:
 
     def thickness(self, t: ArrayLike) -> np.ndarray:
         """Compute the thickness |N - M| of the material, mm."""
-        return np.linalg.norm(self.outer_edge(t) - self.inner_edge(t), axis=-1)
+        return xp.linalg.norm(self.outer_edge(t) - self.inner_edge(t), axis=-1)
 
     def _first_derivative(self, t: ArrayLike) -> np.ndarray:
-        turn = 0.5 * np.pi * np.asarray(t, dtype=float)
-        inner = 0.5 * np.pi * self.slot_radius * np.stack([np.sin(turn), np.cos(turn)], axis=-1)
-        return 0.5 * (inner + np.array([self.outer_length + self.slot_radius, 0.0]))
+        turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
+        inner = 0.5 * np.pi * self.slot_radius * xp.stack([xp.sin(turn), xp.cos(turn)], axis=-1)
+        return 0.5 * (inner + xp.array([self.outer_length + self.slot_radius, 0.0]))
 
     def _second_derivative(self, t: ArrayLike) -> np.ndarray:
-        turn = 0.5 * np.pi * np.asarray(t, dtype=float)
-        inward = np.stack([np.cos(turn), -np.sin(turn)], axis=-1)
+        turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
+        inward = xp.stack([xp.cos(turn), -xp.sin(turn)], axis=-1)
         return 0.5 * (0.5 * np.pi) ** 2 * self.slot_radius * inward
 
     def heading(self, t: ArrayLike) -> np.ndarray:
         """Compute the direction of the middle line: from pi/2 - alpha at 0 to 0 at 1."""
         first = self._first_derivative(t)
-        return np.arctan2(first[..., 1], first[..., 0])
+        return xp.arctan2(first[..., 1], first[..., 0])
 
     def curvature(self, t: ArrayLike) -> np.ndarray:
         """Compute the signed curvature, negative, 1/mm.
@@ -130,27 +131,24 @@ class CurvedEnd:
         """
         first, second = self._first_derivative(t), self._second_derivative(t)
         cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-        return cross / np.linalg.norm(first, axis=-1) ** 3
+        return cross / xp.linalg.norm(first, axis=-1) ** 3
 
     def length(self, t: ArrayLike = 1.0) -> np.ndarray:
         """Compute the length of the middle line from 0 to t, mm (Gao 2017, eq. 9 for t = 1)."""
-        t = np.asarray(t, dtype=float)
+        t = xp.asarray(t, dtype=float)
         return 0.5 * t * (self._speed(0.5 * t[..., None] * (1.0 + _NODES)) @ _WEIGHTS)
 
     def _speed(self, t: np.ndarray) -> np.ndarray:
         """Compute |C'|, written out: it is evaluated at some thousand points per link."""
         inner, outer = 0.5 * np.pi * self.slot_radius, self.outer_length + self.slot_radius
-        return 0.5 * np.sqrt(inner**2 + outer**2 + 2.0 * inner * outer * np.sin(0.5 * np.pi * t))
+        return 0.5 * xp.sqrt(inner**2 + outer**2 + 2.0 * inner * outer * xp.sin(0.5 * np.pi * t))
 
     def at_length(self, length: ArrayLike) -> np.ndarray:
         """Find the parameter t where the middle line has a given length from its beginning."""
-        target = np.asarray(length, dtype=float)
+        target = xp.asarray(length, dtype=float)
         t = target / self.length()
-        for _ in range(8):  # Newton; the speed varies by a few tenths, so half do
-            step = (self.length(t) - target) / self._speed(t)
-            t = t - step
-            if np.max(np.abs(step), initial=0.0) < _EXACT:
-                break
+        for _ in range(_NEWTON):
+            t = t - (self.length(t) - target) / self._speed(t)
         return t
 
 
@@ -203,38 +201,25 @@ class Link:
     @cached_property
     def length(self) -> float:
         """Length of the middle line, mm."""
-        return 2.0 * float(self.end.length()) + self.strip_length
+        return 2.0 * plain_number(self.end.length()) + self.strip_length
 
-    def course_at(self, positions: tuple[float, ...]) -> Course:
-        """Evaluate the middle line at some positions; cached, as both hands of a link need them."""
-        return _course(self, positions)
-
-    def course(self, position: ArrayLike) -> Course:
-        """Evaluate the middle line at some positions."""
-        position = np.asarray(position, dtype=float)
-        end, nearer = self.end, np.minimum(position, self.length - position)
+    def course(self, part: ArrayLike) -> Course:
+        """Evaluate the middle line at parts of it: 0 to 1 on S1, to 2 on S2 and to 3 on S3."""
+        part, end = xp.asarray(part, dtype=float), self.end
         of_end = end.length()
-        curved, half = nearer < of_end, np.where(position <= 0.5 * self.length, 1.0, -1.0)
-        t = np.ones_like(nearer)
-        t[curved] = end.at_length(nearer[curved])
+        curved, half = (part < 1.0) | (part > 2.0), xp.where(part <= 1.5, 1.0, -1.0)
+        t = end.at_length(xp.clip(xp.minimum(part, 3.0 - part), 0.0, 1.0) * of_end)
         points = end.middle(t)
-        along = np.where(curved, points[..., 0], nearer - of_end)
+        straight = (xp.minimum(part, 3.0 - part) - 1.0) * self.strip_length
+        along = xp.where(curved, points[..., 0], straight)
         above = points[..., 1] - self.slot_radius - 0.5 * self.strip_thickness
         return Course(
             along=half * (along - 0.5 * self.strip_length),
-            above=half * np.where(curved, above, 0.0),
-            heading=np.where(curved, end.heading(t), 0.0),
-            curvature=np.where(curved, half * end.curvature(t), 0.0),
-            thickness=np.where(curved, end.thickness(t), self.strip_thickness),
+            above=half * xp.where(curved, above, 0.0),
+            heading=xp.where(curved, end.heading(t), 0.0),
+            curvature=xp.where(curved, half * end.curvature(t), 0.0),
+            thickness=xp.where(curved, end.thickness(t), self.strip_thickness),
         )
-
-
-@lru_cache(maxsize=16)
-def _course(link: Link, positions: tuple[float, ...]) -> Course:
-    course = link.course(positions)
-    for values in course:
-        values.setflags(write=False)
-    return course
 
 
 # Poisson's ratio of a robot file without one. It only affects the shape of the modes and the
@@ -289,17 +274,16 @@ def u_link_rod(
     # One node less moves the tip of 27 links by 4e-8 mm, modes left out by 1e-5 mm.
     quadrature = rod_quadrature(ends, counts, tuple(count - 1 for count in counts))
     position = quadrature.every
-    course = link.course_at((*position.tolist(), 0.0, link.length))
+    course = link.course(np.append(quadrature.unit.every, [0.0, 3.0]))
     section = _section(link, tube, Course(*(values[:-2] for values in course)), poisson_ratio)
     # A slot cut from the side away from the bend leaves the wall on the bend's side, where the
     # link then begins; over the slot that follows stands its mirror image.
     hand = 1.0 if notch.proximal_slot == "away" else -1.0
     # The strip lies above its proximal slot, whose lower edge is the proximal face.
-    middle = np.array([0.0, 0.0, 2.0 * notch.slot_radius + 0.5 * notch.strip_thickness])
+    middle = xp.array([0.0, 0.0, 2.0 * notch.slot_radius + 0.5 * notch.strip_thickness])
     every = _poses(course, middle, hand)
     poses, start, end = (Motion(*(part[at] for part in every)) for at in (slice(-2), -2, -1))
-    free = np.tile(STRAIGHT, (len(position), 1))
-    free[:, 1] = hand * course.curvature[:-2]
+    free = STRAIGHT + (hand * course.curvature[:-2])[:, None] * np.eye(6)[1]
     basis = wrench_modes(
         poses,
         2.0 * position / link.length - 1.0,
@@ -310,7 +294,7 @@ def u_link_rod(
         force_modes,
         poisson_ratio,
     )
-    poses_to_end = Motion(*(constant(np.delete(part, -2, axis=0)) for part in every))
+    poses_to_end = Motion(*(xp.concatenate([part[:-2], part[-1:]]) for part in every))
     # The distal body's frame: level with the strip's lower edge, on the tube axis.
     distal = between(end, shifted(z=2.0 * notch.slot_radius))
     axis = NeutralAxis(quadrature, start, distal, between(start, poses_to_end), free)
@@ -321,16 +305,16 @@ def u_link_rod(
 
 def _poses(course: Course, middle: np.ndarray, hand: float) -> Motion:
     """Compute the poses of the free middle line: z along it, y out of the plane."""
-    position = np.stack([-hand * course.along, 0.0 * course.along, course.above], axis=-1)
+    position = xp.stack([-hand * course.along, 0.0 * course.along, course.above], axis=-1)
     about_y = hand * (course.heading - 0.5 * np.pi)
-    turns = rotation_about(constant(about_y[:, None] * np.array([0.0, 1.0, 0.0])))
+    turns = rotation_about(constant(about_y[:, None] * xp.array([0.0, 1.0, 0.0])))
     return Motion(turns, constant(middle + position))
 
 
 def _section(link: Link, tube: Tube, course: Course, poisson_ratio: float) -> FibreSection:
     """Compute the sections: two walls as wide as the tube's wall there, joined beyond the lumen."""
-    outer = np.sqrt(tube.outer_radius**2 - course.along**2)
-    inner = np.sqrt(np.maximum(tube.inner_radius**2 - course.along**2, 0.0))
+    outer = xp.sqrt(tube.outer_radius**2 - course.along**2)
+    inner = xp.sqrt(xp.maximum(tube.inner_radius**2 - course.along**2, 0.0))
     middle = 0.5 * (outer + inner)
     walls = two_walls(outer - inner, course.thickness, middle)
     torsion = clamped_torsion_constant(walls, middle, link.length, poisson_ratio)

@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
-from numpy.polynomial.legendre import legvander
 
+from notchflex._arrays import decide, xp
+from notchflex.mechanics.flexure.rod_kinematics import legendre
 from notchflex.mechanics.material import FibreSection
 from notchflex.mechanics.motion import Motion
 
-_X, _Y, _Z = np.eye(3)
+_X, _Y, _Z = xp.eye(3)
 
 
 def wrench_modes(
@@ -53,33 +54,33 @@ def wrench_modes(
     """
     whole = length.sum()
     rotation, lever = poses.rotation, poses.translation - middle
-    reach = np.abs(lever).max(axis=0)
-    legendre = legvander(part, max(moment_modes - 2, force_modes - 1))
+    reach = xp.abs(lever).max(axis=0)
+    polynomials = legendre(part, max(moment_modes - 1, force_modes))
 
-    moment = [np.ones_like(length), lever[:, 0] / reach[0], lever[:, 2] / reach[2]]
-    moment += [legendre[:, degree] for degree in range(2, moment_modes - 1)]
-    force = [(legendre[:, k], along) for k in range(force_modes) for along in (_X, _Z)]
-    none = np.zeros_like(lever)
-    wrenches = [np.concatenate([size[:, None] * _Y, none], axis=1) for size in moment]
-    wrenches += [np.concatenate([none, size[:, None] * along], axis=1) for size, along in force]
-    sideways = np.cross(lever, _Y) / reach[0]
+    moment = [xp.ones_like(length), lever[:, 0] / reach[0], lever[:, 2] / reach[2]]
+    moment += [polynomials[:, degree] for degree in range(2, moment_modes - 1)]
+    force = [(polynomials[:, k], along) for k in range(force_modes) for along in (_X, _Z)]
+    none = xp.zeros_like(lever)
+    wrenches = [xp.concatenate([size[:, None] * _Y, none], axis=1) for size in moment]
+    wrenches += [xp.concatenate([none, size[:, None] * along], axis=1) for size, along in force]
+    sideways = xp.cross(lever, _Y) / reach[0]
     out_of_plane = [about + none for about in (_X, _Z, sideways)]
     out_of_plane += [
-        legendre[:, degree, None] * about
+        polynomials[:, degree, None] * about
         for degree in range(2, moment_modes - 1)
         for about in (_X, _Z)
     ]
-    wrenches += [np.concatenate([about, none], axis=1) for about in out_of_plane]
-    wrenches += [np.concatenate([none, _Y + none], axis=1)]
-    of_force = np.arange(len(wrenches)) >= moment_modes
+    wrenches += [xp.concatenate([about, none], axis=1) for about in out_of_plane]
+    wrenches += [xp.concatenate([none, _Y + none], axis=1)]
+    of_force = xp.arange(len(wrenches)) >= moment_modes
     of_force[-len(out_of_plane) - 1 : -1] = False
 
-    in_frame = np.einsum(
-        "kji,mkcj->kmci", rotation, np.reshape(wrenches, (len(wrenches), -1, 2, 3))
+    in_frame = xp.einsum(
+        "kji,mkcj->kmci", rotation, xp.stack(wrenches).reshape(len(wrenches), -1, 2, 3)
     ).reshape(len(length), len(wrenches), 6)
     strain = _strains(section, poisson_ratio, in_frame)
-    work = np.einsum("k,kmc,kmc->m", length, in_frame, strain)
-    return np.moveaxis(strain * (np.where(of_force, whole, 1.0) / work)[:, None], 1, 2)
+    work = xp.einsum("k,kmc,kmc->m", length, in_frame, strain)
+    return xp.moveaxis(strain * (xp.where(of_force, whole, 1.0) / work)[:, None], 1, 2)
 
 
 def _strains(
@@ -88,16 +89,15 @@ def _strains(
     """Compute strains by resultants, times Young's modulus."""
     compliance = _compliance(section, poisson_ratio)[:, None]
     strain = compliance * resultants
-    if section.ends is None or not np.any(section.ends.oblique):
+    if section.ends is None or not decide(xp.any(section.ends.oblique)):
         return strain
-    oblique = np.asarray(section.ends.oblique)[:, None]
+    oblique = xp.asarray(section.ends.oblique)[:, None]
     # The inverse of the stiffness of sideways bending and torsion together.
     part = 1.0 - oblique**2 * compliance[..., 0] * compliance[..., 2]
     crossed = oblique * compliance[..., 0] * compliance[..., 2]
     about_x = (strain[..., 0] - crossed * resultants[..., 2]) / part
     twist = (strain[..., 2] - crossed * resultants[..., 0]) / part
-    strain[..., 0], strain[..., 2] = about_x, twist
-    return strain
+    return xp.stack([about_x, strain[..., 1], twist, *xp.moveaxis(strain[..., 3:], -1, 0)], axis=-1)
 
 
 def _compliance(section: FibreSection, poisson_ratio: float) -> Float[np.ndarray, "nodes 6"]:
@@ -111,9 +111,9 @@ def _compliance(section: FibreSection, poisson_ratio: float) -> Float[np.ndarray
         section.area / ratio,
         section.area,
     ]
-    compliance = 1.0 / np.stack([np.asarray(one) for one in stiffness], axis=-1)
+    compliance = 1.0 / xp.stack([xp.asarray(one) for one in stiffness], axis=-1)
     if (ends := section.ends) is None:
         return compliance
     added = (ends.strong, ends.weak, ends.torsion, ends.push, ends.sway, ends.axial)
-    parts = np.broadcast_arrays(*map(np.asarray, added))
-    return compliance * (1.0 + np.stack(parts, axis=-1))
+    parts = xp.broadcast_arrays(*map(xp.asarray, added))
+    return compliance * (1.0 + xp.stack(parts, axis=-1))

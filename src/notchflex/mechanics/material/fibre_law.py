@@ -15,9 +15,9 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, NamedTuple
 
-import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._arrays import xp
 from notchflex._jax import constant, jax, jnp
 from notchflex.mechanics.material.fibre_balance import (
     FibreSums,
@@ -94,7 +94,7 @@ class FibreLaw(SectionLaw):
     def rest(self, section: FibreSection) -> Any:
         """Return untransformed fibres."""
         assert section.fibres is not None
-        return constant(np.zeros(np.shape(section.fibres.arm))) if self.remembers else ()
+        return constant(xp.zeros(xp.shape(section.fibres.arm))) if self.remembers else ()
 
     def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
         """Return the moment halfway between loading and unloading."""
@@ -217,12 +217,12 @@ class FibreLaw(SectionLaw):
         if not self.remembers or section.fibres is None:
             return super().dissipated(section, before, after)
         loss = 0.0
-        for side, kinks in (np.minimum, self.low), (np.maximum, self.high):
-            change = np.abs(side(after, 0.0) - side(before, 0.0))
-            loss = loss + 0.5 * self.elastic_modulus * np.abs(kinks[1, 0] - kinks[0, 0]) * change
+        for side, kinks in (xp.minimum, self.low), (xp.maximum, self.high):
+            change = xp.abs(side(after, 0.0) - side(before, 0.0))
+            loss = loss + 0.5 * self.elastic_modulus * xp.abs(kinks[1, 0] - kinks[0, 0]) * change
         ends = section.ends
         follows = 1.0 if ends is None else 1.0 + ends.material_share * ends.weak
-        return follows * np.sum(loss * section.fibres.area, axis=-1)
+        return follows * xp.sum(loss * section.fibres.area, axis=-1)
 
 
 def _in_parts(array: Array) -> Array:

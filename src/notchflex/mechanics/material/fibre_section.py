@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._arrays import decide, xp
 from notchflex._jax import constant
 from notchflex._pytree import Pytree
 
@@ -47,7 +48,7 @@ class NotchEnds(Pytree):
     @classmethod
     def rigid(cls, like: Float[Array, "*shape"]) -> NotchEnds:
         """Return rigid ends, in the shape of an array."""
-        return cls(*(np.zeros(np.shape(like)) for _ in range(10)))  # pyright: ignore
+        return cls(*(xp.zeros(xp.shape(like)) for _ in range(10)))  # pyright: ignore
 
     def flattening(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
         """Compute the factor q by which the distances of the fibres shrink at a curvature."""
@@ -117,4 +118,5 @@ class FibreSection(Pytree):
     @property
     def softens(self) -> bool:
         """Whether any section flattens as it bends; for plain arrays."""
-        return self.ends is not None and bool(np.any(self.ends.odd) or np.any(self.ends.even))
+        ends = self.ends
+        return ends is not None and decide(xp.any(ends.odd) | xp.any(ends.even))

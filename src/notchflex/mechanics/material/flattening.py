@@ -23,6 +23,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from jaxtyping import Array
 
+from notchflex._arrays import xp
 from notchflex._jax import constant, jax, jnp
 from notchflex.mechanics.material.fibre_section import FibreSection, NotchEnds
 from notchflex.mechanics.material.root import bracketed_root
@@ -30,7 +31,7 @@ from notchflex.mechanics.material.root import bracketed_root
 _POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
 NODES, WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
 """Gauss's rule on 0 ... 1."""
-_RULE = np.stack([NODES, WEIGHTS], axis=-1)
+_RULE = xp.stack([NODES, WEIGHTS], axis=-1)
 # Lower bound of `even`, 1/mm^2, for sections that do not flatten: negligible, but above 0.
 _MIN_EVEN = 1e-12
 # With a smaller change of the transformation with s a section counts as elastic.

@@ -20,10 +20,10 @@ from abc import ABC, abstractmethod
 from functools import partial, singledispatch
 from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import array_module, constant, jax, jnp
+from notchflex._arrays import xp
+from notchflex._jax import constant, jax, jnp
 from notchflex._pytree import Pytree
 from notchflex.mechanics.material.fibre_section import FibreSection
 from notchflex.mechanics.material.flattening import Flattening, flattening
@@ -65,7 +65,7 @@ class Bending(NamedTuple):
 
 
 # Mask of weak-axis bending among strains and resultants.
-_WEAK = np.arange(6) == 1
+_WEAK = xp.arange(6) == 1
 
 
 class SectionLaw(Pytree, ABC):
@@ -94,7 +94,7 @@ class SectionLaw(Pytree, ABC):
     def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
         """Return the energy per length lost between two memories, N mm/mm; for plain arrays."""
         del before, after
-        return np.zeros(np.shape(section.area))
+        return xp.zeros(xp.shape(section.area))
 
     @abstractmethod
     def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
@@ -241,7 +241,6 @@ def elastic_resultants(
     Returns:
         Resultants, in the order of the strains.
     """
-    xp = array_module(*jax.tree.leaves((elastic_modulus, shear_modulus, section)), strain)
     about_x, about_y, twist, along_x, along_y, stretch = (
         strain[component] for component in range(6)
     )
@@ -274,10 +273,9 @@ def elastic_stiffness(
     elastic_modulus: float | Array, shear_modulus: float | Array, section: FibreSection
 ) -> Float[Array, "*shape 6 6"]:
     """Compute the stiffness of a linear elastic section, or of many; see `elastic_resultants`."""
-    xp = array_module(*jax.tree.leaves(section))
     plain = dataclasses.replace(section, fibres=None)
     every = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], plain)
-    by_strain = elastic_resultants(elastic_modulus, shear_modulus, every, constant(np.eye(6)))
+    by_strain = elastic_resultants(elastic_modulus, shear_modulus, every, constant(xp.eye(6)))
     return by_strain.swapaxes(-1, -2)
 
 

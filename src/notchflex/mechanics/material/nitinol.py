@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from notchflex._arrays import xp
 from notchflex._jax import constant
 from notchflex.mechanics.material.fibre_law import FLATTEST, FibreLaw
 from notchflex.mechanics.material.law import section_law
@@ -19,12 +18,12 @@ def _(material: Nitinol) -> FibreLaw:
     if material.unloading_stress is not None:
         unloading = material.unloading_stress / modulus
         tension, compression = [loading, unloading], [-ratio * unloading, -ratio * loading]
-    low, high = np.array(compression)[:, None], np.array(tension)[:, None]
-    change = np.array([1.0 - max(material.plateau_modulus / modulus, FLATTEST)])
+    low, high = xp.array(compression)[:, None], xp.array(tension)[:, None]
+    change = xp.array([1.0 - xp.maximum(material.plateau_modulus / modulus, FLATTEST)])
     if material.transformation_strain is not None:
         length = material.transformation_strain - loading
-        low, high = np.hstack([low, low - length]), np.hstack([high, high + length])
-        change = np.append(change, -change)
+        low, high = xp.hstack([low, low - length]), xp.hstack([high, high + length])
+        change = xp.append(change, -change)
     return FibreLaw(
         elastic_modulus=constant(modulus),
         shear_modulus=constant(modulus / (2.0 * (1.0 + material.poisson_ratio))),

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from notchflex._arrays import xp
 from notchflex._jax import constant
 from notchflex.mechanics.material.fibre_law import FLATTEST, FibreLaw
 from notchflex.mechanics.material.law import section_law
@@ -24,17 +25,17 @@ def _(material: StressStrain) -> FibreLaw:
     low = -high
     if material.in_compression is not None:
         at, by = _kinks(*material.in_compression, modulus)
-        low = np.append(np.full(len(high), -_NEVER), -at)
-        high = np.append(high, np.full(len(at), _NEVER))
-        change = np.append(change, by)
+        low = xp.append(xp.full(len(high), -_NEVER), -at)
+        high = xp.append(high, xp.full(len(at), _NEVER))
+        change = xp.append(change, by)
     # Numbers of kinks are powers of two, so that curves share programs.
     spare = (0, (1 << (len(change) - 1).bit_length()) - len(change))
     return FibreLaw(
         elastic_modulus=constant(modulus),
         shear_modulus=constant(modulus / (2.0 * (1.0 + material.poisson_ratio))),
-        low=constant(np.pad(low, spare, constant_values=-_NEVER)[None]),
-        high=constant(np.pad(high, spare, constant_values=_NEVER)[None]),
-        change=constant(np.pad(change, spare)),
+        low=constant(xp.pad(low, spare, constant_values=-_NEVER)[None]),
+        high=constant(xp.pad(high, spare, constant_values=_NEVER)[None]),
+        change=constant(xp.pad(change, spare)),
     )
 
 
@@ -43,10 +44,10 @@ def _kinks(
     strain: tuple[float, ...], stress: tuple[float, ...], modulus: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """List the kinks of a curve, and the fall of slope there over Young's modulus."""
-    at, value = _few_points(np.append(0.0, strain), np.append(0.0, stress))
-    slope = np.maximum(np.diff(value) / np.diff(at) / modulus, FLATTEST)
-    change = -np.diff(slope, prepend=1.0)
-    turns = np.abs(change) > 1e-12  # at zero only where compression begins with another slope
+    at, value = _few_points(xp.append(0.0, strain), xp.append(0.0, stress))
+    slope = xp.maximum(xp.diff(value) / xp.diff(at) / modulus, FLATTEST)
+    change = -xp.diff(slope, prepend=1.0)
+    turns = xp.abs(change) > 1e-12  # at zero only where compression begins with another slope
     return (at[:-1][turns], change[turns]) if turns.any() else (at[:1], change[:1])
 
 

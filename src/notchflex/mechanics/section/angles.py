@@ -9,12 +9,12 @@ below one radian and as it stands above.
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from math import factorial
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from notchflex._jax import array_module, jax
+from notchflex._arrays import xp
+from notchflex._jax import jax
 
 _SERIES_BELOW = 1.0  # rad; above it the closed forms lose at most two digits
 _TERMS = 16  # of the series: the first one left out is below 1e-16 of the sum at one radian
@@ -37,7 +37,7 @@ def cancelling_sum(terms: Sequence[Term]) -> Callable[[jax.Array], jax.Array]:
     Example:
         >>> import numpy as np
         >>> excess = cancelling_sum([(1, 1, "cos", 0), (-1, 0, "sin", 1)])  # α − sin α
-        >>> print(f"{float(excess(np.asarray(1e-5))) * 6e15:.10f}")  # α³/6
+        >>> print(f"{float(excess(xp.asarray(1e-5))) * 6e15:.10f}")  # α³/6
         1.0000000000
     """
     series: dict[int, Fraction] = {}
@@ -52,10 +52,9 @@ def cancelling_sum(terms: Sequence[Term]) -> Callable[[jax.Array], jax.Array]:
 
     def evaluate(angle: jax.Array) -> jax.Array:
         if isinstance(angle, np.ndarray) and angle.ndim == 0:  # of one notch: no arrays needed
-            number: Any = float(angle)
-            return np.asarray(near(number) if number < _SERIES_BELOW else far(np, number))  # pyright: ignore[reportReturnType]
-        xp = array_module(angle)
-        return xp.where(angle < _SERIES_BELOW, near(angle), far(xp, angle))
+            plain: Any = float(angle)
+            return xp.asarray(near(plain) if plain < _SERIES_BELOW else far(plain))  # pyright: ignore[reportReturnType]
+        return xp.where(angle < _SERIES_BELOW, near(angle), far(angle))
 
     def near(angle: Any) -> Any:
         square, total = angle * angle, coefficients[-1]
@@ -63,7 +62,7 @@ def cancelling_sum(terms: Sequence[Term]) -> Callable[[jax.Array], jax.Array]:
             total = total * square + coefficient
         return total * angle**first
 
-    def far(xp: ModuleType, angle: Any) -> Any:
+    def far(angle: Any) -> Any:
         total = 0.0
         for factor, power, kind, multiple in terms:
             wave = xp.sin(multiple * angle) if kind == "sin" else xp.cos(multiple * angle)
@@ -86,7 +85,6 @@ def half_angle(radius: jax.Array, above: jax.Array, below: jax.Array) -> jax.Arr
         The angle in rad: 0 where the chord passes above the circle (`above` ≤ 0), π where it
         passes below, 2 atan(√(above / below)) between. Its derivative is finite everywhere.
     """
-    xp = array_module(radius)
     cut = (above > 0.0) & (below > 0.0)
     above_safe = xp.where(cut, above, radius)
     below_safe = xp.where(cut, below, radius)

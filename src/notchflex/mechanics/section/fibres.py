@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from numpy.polynomial import legendre
 
+from notchflex._arrays import cached, decide, xp
 from notchflex._jax import constant
 from notchflex.mechanics.section.angles import half_angle
 
@@ -36,7 +38,7 @@ def two_walls_fibres(near: float, spine: float, count: int) -> Points:
     return gauss_rule(*rectangle_fibres(near, spine), count)
 
 
-@lru_cache(maxsize=1024)  # the same for all sites and heights
+@cached(1024)  # the same for all sites and heights
 def cut_fibres(cut: str, outer: float, inner: float, depth: float, count: int) -> Points:
     """Few fibres of what a cut leaves of a tube."""
     return gauss_rule(*_FIBRES_OF_CUT[cut](outer, inner, depth), count)
@@ -51,11 +53,11 @@ def rectangle_fibres(near: float, spine: float) -> Points:
 def sector_fibres(outer: float, inner: float, depth: float) -> Points:
     """Divide an annular sector (`annular_sector`); each piece stands for both halves."""
     numbers = outer, 2.0 * outer - depth, depth
-    half = float(half_angle(*(constant(number) for number in numbers)))
+    half = half_angle(*map(constant, numbers))
     angles, of_angles = _between(0.0, half, _ANGLES)
     radii, of_radii = _between(inner, outer, _RADII)
-    area = 2.0 * np.outer(of_radii * radii, of_angles)
-    return np.outer(radii, np.cos(angles)).ravel(), area.ravel()
+    area = 2.0 * xp.outer(of_radii * radii, of_angles)
+    return xp.outer(radii, xp.cos(angles)).ravel(), area.ravel()
 
 
 def segment_fibres(outer: float, inner: float, depth: float) -> Points:
@@ -64,22 +66,22 @@ def segment_fibres(outer: float, inner: float, depth: float) -> Points:
     The heights of strips are cosines, so that the chords of both circles are smooth over them.
     """
     plane = depth - outer
-    top, bottom = (float(np.arccos(np.clip(plane / r, -1.0, 1.0))) for r in (outer, inner))
-    beyond = float(np.arccos(np.clip(inner / outer, plane / outer, 1.0)))
-    ends = [(0.0, beyond)] + ([(np.pi - beyond, top)] if plane < -inner else [])
-    at_bore = _STRIPS // 2 if bottom > 0.0 else 0
+    top, bottom = (xp.arccos(xp.clip(plane / r, -1.0, 1.0)) for r in (outer, inner))
+    beyond = xp.arccos(xp.clip(inner / outer, plane / outer, 1.0))
+    ends = [(0.0, beyond)] + ([(np.pi - beyond, top)] if decide(plane < -inner) else [])
+    at_bore = _STRIPS // 2 if decide(bottom > 0.0) else 0
     angles, of_angles = zip(
         *(_between(*pair, (_STRIPS - at_bore) // len(ends)) for pair in ends), strict=True
     )
-    solid, of_solid = np.concatenate(angles), np.concatenate(of_angles)
-    bore, of_bore = _between(0.0, bottom, at_bore) if at_bore else (np.zeros(0), np.zeros(0))
-    height = inner * np.cos(bore)
-    wall = np.sqrt(outer**2 - height**2) - inner * np.sin(bore)
+    solid, of_solid = xp.concatenate(angles), xp.concatenate(of_angles)
+    bore, of_bore = _between(0.0, bottom, at_bore) if at_bore else (xp.zeros(0), xp.zeros(0))
+    height = inner * xp.cos(bore)
+    wall = xp.sqrt(outer**2 - height**2) - inner * xp.sin(bore)
     area = (
-        2.0 * (outer * np.sin(solid)) ** 2 * of_solid,
-        2.0 * wall * inner * np.sin(bore) * of_bore,
+        2.0 * (outer * xp.sin(solid)) ** 2 * of_solid,
+        2.0 * wall * inner * xp.sin(bore) * of_bore,
     )
-    return np.append(outer * np.cos(solid), height), np.concatenate(area)
+    return xp.append(outer * xp.cos(solid), height), xp.concatenate(area)
 
 
 _FIBRES_OF_CUT = {"on-axis": sector_fibres, "off-axis": segment_fibres}
@@ -93,9 +95,9 @@ def _between(first: float, last: float, count: int) -> tuple[np.ndarray, np.ndar
 def fitted(points: Points, area: float, second_moment: float) -> Points:
     """Shift fibres to their centroid; scale to a given area (mm^2) and second moment (mm^4)."""
     arm, areas = points
-    areas = areas * (area / np.sum(areas))
+    areas = areas * (area / xp.sum(areas))
     arm = arm - areas @ arm / area
-    return arm * np.sqrt(second_moment / (areas @ arm**2)), areas
+    return arm * xp.sqrt(second_moment / (areas @ arm**2)), areas
 
 
 def gauss_rule(points: Strips, weights: Strips, count: int) -> Points:
@@ -104,21 +106,19 @@ def gauss_rule(points: Strips, weights: Strips, count: int) -> Points:
     They are the eigenvalues of the recurrence of the polynomials orthogonal over the points.
     """
     total, last_polynomial, polynomial = (
-        np.sum(weights),
-        np.zeros_like(points),
-        np.ones_like(points),
+        xp.sum(weights),
+        xp.zeros_like(points),
+        xp.ones_like(points),
     )
-    diagonal, off_diagonal = np.zeros(count), np.zeros(count + 1)
-    polynomial = polynomial / np.sqrt(total)
-    for degree in range(count):
-        diagonal[degree] = weights @ (points * polynomial**2)
-        next_polynomial = (points - diagonal[degree]) * polynomial - off_diagonal[
-            degree
-        ] * last_polynomial
-        off_diagonal[degree + 1] = np.sqrt(weights @ next_polynomial**2)
-        last_polynomial, polynomial = polynomial, next_polynomial / off_diagonal[degree + 1]
-    off_diagonal = off_diagonal[1:-1]
-    nodes, vectors = np.linalg.eigh(
-        np.diag(diagonal) + np.diag(off_diagonal, 1) + np.diag(off_diagonal, -1)
-    )
+    diagonal, off_diagonal = list[Any](), list[Any]([0.0])
+    polynomial = polynomial / xp.sqrt(total)
+    for _ in range(count):
+        diagonal.append(weights @ (points * polynomial**2))
+        next_polynomial = (points - diagonal[-1]) * polynomial
+        next_polynomial = next_polynomial - off_diagonal[-1] * last_polynomial
+        off_diagonal.append(xp.sqrt(weights @ next_polynomial**2))
+        last_polynomial, polynomial = polynomial, next_polynomial / off_diagonal[-1]
+    beside = xp.stack(off_diagonal[1:-1])
+    matrix = xp.diag(xp.stack(diagonal)) + xp.diag(beside, 1) + xp.diag(beside, -1)
+    nodes, vectors = xp.linalg.eigh(matrix)
     return nodes, total * vectors[0] ** 2

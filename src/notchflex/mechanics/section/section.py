@@ -1,13 +1,13 @@
 """The cross-section that a cut leaves of a tube, as the numbers a rod needs."""
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import NamedTuple
 
-import numpy as np
 from jax.typing import ArrayLike
 
-from notchflex._jax import array_module, constant, jax
+from notchflex._arrays import cached, xp
+from notchflex._jax import constant, jax
+from notchflex._values import read_only
 
 
 class Section(NamedTuple):
@@ -53,39 +53,21 @@ class Section(NamedTuple):
     half_angle: jax.Array
 
 
-def plain_or_compiled(
+def of_any_shape(
     properties: Callable[[jax.Array, jax.Array, jax.Array], Section],
 ) -> Callable[[ArrayLike, ArrayLike, ArrayLike], Section]:
     """Let a formula for arrays of one shape take radii and depth in any form.
 
     Args:
-        properties: Section of outer radius, inner radius and depth, written with `array_module`.
+        properties: Section of outer radius, inner radius and depth.
 
     Returns:
-        The same for numbers and arrays that broadcast: by NumPy where they are plain, compiled
-        by JAX where one is an array of JAX or traced.
+        The same for numbers and arrays that broadcast; read-only, as it is kept for plain numbers.
     """
-    compiled = jax.jit(properties)
 
-    @lru_cache(maxsize=1024)  # notches of a tube, and their sites, share sections
-    def of_numbers(outer: float, inner: float, depth: float) -> Section:
-        properties_of_cut = properties(constant(outer), constant(inner), constant(depth))
-        return Section(*(_fixed(value) for value in properties_of_cut))
-
+    @cached(1024)  # notches of a tube, and their sites, share sections
     def section(outer: ArrayLike, inner: ArrayLike, depth: ArrayLike) -> Section:
-        if isinstance(outer, float) and isinstance(inner, float) and isinstance(depth, float):
-            return of_numbers(float(outer), float(inner), float(depth))
-        xp = array_module(outer, inner, depth)
-        chosen = properties if xp is np else compiled
-        return chosen(
-            *(xp.asarray(value, dtype=float) for value in xp.broadcast_arrays(outer, inner, depth))
-        )
+        numbers = xp.broadcast_arrays(*map(constant, (outer, inner, depth)))
+        return Section(*map(read_only, properties(*numbers)))
 
     return section
-
-
-def _fixed(value: jax.Array) -> jax.Array:
-    """Return a number as a read-only array, since results are cached."""
-    array = np.array(value)
-    array.setflags(write=False)
-    return array  # pyright: ignore[reportReturnType]

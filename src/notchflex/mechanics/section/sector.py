@@ -28,9 +28,10 @@ from fractions import Fraction
 
 import numpy as np
 
-from notchflex._jax import array_module, jax
+from notchflex._arrays import xp
+from notchflex._jax import jax
 from notchflex.mechanics.section.angles import cancelling_sum, half_angle
-from notchflex.mechanics.section.section import Section, plain_or_compiled
+from notchflex.mechanics.section.section import Section, of_any_shape
 from notchflex.mechanics.section.terms import broadcast_terms
 
 _SUMMED = 24  # terms added one by one; even, so that odd and even terms pair up
@@ -45,15 +46,15 @@ def _series_nodes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rule. With it slivers (a much less than the wall over the radius) keep their accuracy,
     where terms decay only as n⁻² up to n = L / a.
     """
-    n = np.arange(1, _SUMMED + 1)
+    n = xp.arange(1, _SUMMED + 1)
     x, weight = np.polynomial.legendre.leggauss(_TAIL_NODES)
     u, weight = 0.5 * (1.0 + x), 0.5 * weight
-    index, parity, weights = [n.astype(float)], [(-1.0) ** n], [np.ones(_SUMMED)]
+    index, parity, weights = [n.astype(float)], [(-1.0) ** n], [xp.ones(_SUMMED)]
     for start, sign in ((_SUMMED, -1.0), (_SUMMED + 1, 1.0)):
         index.append(start / u)
-        parity.append(np.full(_TAIL_NODES, sign))
+        parity.append(xp.full(_TAIL_NODES, sign))
         weights.append(0.5 * weight * start / u**2)
-    return np.concatenate(index), np.concatenate(parity), np.concatenate(weights)
+    return xp.concatenate(index), xp.concatenate(parity), xp.concatenate(weights)
 
 
 _INDEX, _PARITY, _WEIGHT = _series_nodes()
@@ -70,7 +71,6 @@ def sector_torsion_constant(outer: jax.Array, inner: jax.Array, angle: jax.Array
     Returns:
         Torsion constant, mm⁴. At a = π that of the slit tube.
     """
-    xp = array_module(outer)
     n, parity, weight = (broadcast_terms(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
     outer, inner, angle = outer[None], inner[None], angle[None]
     length = xp.log(outer / inner)
@@ -96,7 +96,6 @@ def sector_shear_centre(
         Distance of the shear centre from the tube axis, toward the spine, mm. It lies outside
         the material, up to two mean radii from the axis.
     """
-    xp = array_module(outer)
     n, parity, weight = (broadcast_terms(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
     outer_, inner_, angle_ = outer[None], inner[None], angle[None]
     length = xp.log(outer_ / inner_)
@@ -173,7 +172,6 @@ def annular_sector(
 
 def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
     """Compute all properties of arrays of one shape."""
-    xp = array_module(outer)
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     a = half_angle(outer, left, depth)
     # Sine and cosine from the lengths: exact to rounding also near a = π.
@@ -213,4 +211,4 @@ def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section
     )
 
 
-_section = plain_or_compiled(_properties)
+_section = of_any_shape(_properties)

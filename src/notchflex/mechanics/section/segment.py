@@ -25,9 +25,10 @@ from importlib.resources import files
 
 import numpy as np
 
-from notchflex._jax import array_module, jax
+from notchflex._arrays import xp
+from notchflex._jax import jax
 from notchflex.mechanics.section.angles import cancelling_sum, half_angle
-from notchflex.mechanics.section.section import Section, plain_or_compiled
+from notchflex.mechanics.section.section import Section, of_any_shape
 from notchflex.mechanics.section.terms import broadcast_terms
 
 
@@ -49,7 +50,6 @@ def closed_estimate(
     Returns:
         Torsion constant, mm⁴, and shear centre, mm.
     """
-    xp = array_module(outer)
     mean, wall = 0.5 * (outer + inner), outer - inner
     height = outer - depth  # |d|, from the tube axis to the flat
     tangent = xp.sqrt(depth / (2.0 * outer - depth))  # tan(b / 2)
@@ -79,7 +79,6 @@ def open_estimate(
     Returns:
         Torsion constant, mm⁴, and shear centre, mm.
     """
-    xp = array_module(outer)
     mean, wall = 0.5 * (outer + inner), outer - inner
     a = half_angle(mean, mean + outer - depth, mean - outer + depth)
     sine, cosine = xp.sin(a), xp.cos(a)
@@ -91,7 +90,7 @@ def open_estimate(
 RATIO_RANGE = (0.2, 0.98)  # r_i / r_o
 LIGAMENT_LEFT = 0.01  # least thickness left under the flat of a closed tube, over the wall
 CHORD_RANGE = {  # of the angle in rad, see `chord_angle`
-    "closed": (2.0 * np.arcsin(np.sqrt(LIGAMENT_LEFT)), np.pi),
+    "closed": (2.0 * xp.arcsin(xp.sqrt(LIGAMENT_LEFT)), np.pi),
     "open": (0.0, np.pi),
     "solid": (0.1, np.pi / 2.0),
 }
@@ -106,16 +105,15 @@ def _read_table() -> dict[tuple[str, str], np.ndarray]:
         if not line.startswith("#"):
             shape, quantity, *coefficients = line.split(",")
             table.setdefault((shape, quantity), []).append([float(c) for c in coefficients])
-    return {key: np.array(rows) for key, rows in table.items()}
+    return {key: xp.array(rows) for key, rows in table.items()}
 
 
 def _chebyshev(count: int, value: jax.Array, low: float, high: float) -> jax.Array:
     """Evaluate the first Chebyshev polynomials (count, …), constant outside low … high."""
-    xp = array_module(value)
     # The ends are moved in by 1e-12, because the arccosine has no derivative there.
     x = (2.0 * value - low - high) / (high - low)
     x = xp.clip(x, -1.0 + 1e-12, 1.0 - 1e-12)
-    return xp.cos(broadcast_terms(np.arange(count, dtype=float), x) * xp.arccos(x)[None])
+    return xp.cos(broadcast_terms(xp.arange(count, dtype=float), x) * xp.arccos(x)[None])
 
 
 def chord_angle(shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array) -> jax.Array:
@@ -143,10 +141,9 @@ def _factors(
     shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
     """Interpolate the factors on the torsion constant and on the shear centre."""
-    xp = array_module(outer)
-    low, high = (float(np.sqrt(1.0 - ratio)) for ratio in reversed(RATIO_RANGE))
+    low, high = (float(xp.sqrt(1.0 - ratio)) for ratio in reversed(RATIO_RANGE))
     table = _read_table()
-    both = np.stack([table[shape, "torsion"], table[shape, "shear"]])
+    both = xp.stack([table[shape, "torsion"], table[shape, "shear"]])
     _, rows, columns = both.shape
     across = _chebyshev(rows, xp.sqrt(1.0 - inner / outer), low, high)
     along = _chebyshev(
@@ -171,7 +168,6 @@ def segment_torsion(
         Torsion constant, mm⁴, and distance of the (Trefftz) shear centre from the tube axis,
         toward the spine, mm.
     """
-    xp = array_module(outer)
     wall, plane = outer - inner, depth - outer
     closed = (plane < -inner) & (depth < wall)  # both: they may differ by rounding
     solid = plane >= inner
@@ -271,7 +267,6 @@ def annular_segment(
 
 def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
     """Compute all properties of arrays of one shape."""
-    xp = array_module(outer)
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     plane = depth - outer  # d
     alpha = half_angle(outer, left, depth)
@@ -321,4 +316,4 @@ def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section
     )
 
 
-_section = plain_or_compiled(_properties)
+_section = of_any_shape(_properties)

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from notchflex._jax import array_module, jax
+from notchflex._arrays import xp
+from notchflex._jax import jax
 
 
 def broadcast_terms(constants: np.ndarray, like: jax.Array) -> jax.Array:
@@ -16,5 +17,4 @@ def broadcast_terms(constants: np.ndarray, like: jax.Array) -> jax.Array:
         The constants, shape (terms, 1, …, 1) with as many ones as `like` has axes; explicit
         because silent broadcasting across ranks is an error in the tests.
     """
-    xp = array_module(like)
     return xp.asarray(constants).reshape((-1, *([1] * like.ndim)))

@@ -13,10 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from notchflex._arrays import xp
 from notchflex._jax import constant
 from notchflex.mechanics.section.section import Section
 
-_ODD = 2.0 * np.arange(8) + 1.0
+_ODD = 2.0 * xp.arange(8) + 1.0
 _FIFTH_POWERS = 31.0 / 32.0 * 1.0369277551433699  # sum of n^-5 over odd n, from zeta(5)
 
 
@@ -39,9 +40,9 @@ def two_walls(width: ArrayLike, thickness: ArrayLike, middle: ArrayLike) -> Sect
         1.1250 mm⁴, torsion 2.4362 mm⁴
     """
     b, h, c = (
-        np.asarray(value, dtype=float) for value in np.broadcast_arrays(width, thickness, middle)
+        xp.asarray(value, dtype=float) for value in xp.broadcast_arrays(width, thickness, middle)
     )
-    nought = np.zeros_like(b)
+    nought = xp.zeros_like(b)
     return Section(
         area=constant(2.0 * b * h),
         centroid=constant(nought),
@@ -78,10 +79,10 @@ def rectangle_torsion_constant(width: ArrayLike, thickness: ArrayLike) -> np.nda
         >>> print(f"{rectangle_torsion_constant(1.0, 1.0):.10f}")
         0.1405770150
     """
-    one, other = np.asarray(width, dtype=float), np.asarray(thickness, dtype=float)
-    b, h = np.maximum(one, other), np.minimum(one, other)
-    decay = np.exp(-np.pi * _ODD * (b / h)[..., None])
-    taken_off = np.sum(2.0 * decay / (1.0 + decay) / _ODD**5, axis=-1)
+    one, other = xp.asarray(width, dtype=float), xp.asarray(thickness, dtype=float)
+    b, h = xp.maximum(one, other), xp.minimum(one, other)
+    decay = xp.exp(-np.pi * _ODD * (b / h)[..., None])
+    taken_off = xp.sum(2.0 * decay / (1.0 + decay) / _ODD**5, axis=-1)
     return b * h**3 / 3.0 * (1.0 - 192.0 / np.pi**5 * (h / b) * (_FIFTH_POWERS - taken_off))
 
 
@@ -114,21 +115,21 @@ def clamped_torsion_constant(
         >>> print(f"{clamped_torsion_constant(strip, 4.0, 8.0):.3f} mm⁴")
         11.890 mm⁴
     """
-    free = np.asarray(section.torsion_constant)
-    warping = np.asarray(section.second_moment_weak) * np.asarray(middle, dtype=float) ** 2
-    u = 0.5 * length * np.sqrt(free / (2.0 * (1.0 + poisson_ratio) * warping))
+    free = xp.asarray(section.torsion_constant)
+    warping = xp.asarray(section.second_moment_weak) * xp.asarray(middle, dtype=float) ** 2
+    u = 0.5 * length * xp.sqrt(free / (2.0 * (1.0 + poisson_ratio) * warping))
     return free / _beyond_tanh(u)
 
 
 def _beyond_tanh(u: np.ndarray) -> np.ndarray:
     """Compute 1 - tanh(u)/u, which is u²/3 for small u, without cancellation."""
     small = u < 0.1
-    square = np.where(small, u, 0.0) ** 2
+    square = xp.where(small, u, 0.0) ** 2
     # The series of tanh; the first term left out is below 1e-14 of the sum.
     coefficients = (-21844.0 / 6081075.0, 1382.0 / 155925.0, -62.0 / 2835.0, 17.0 / 315.0)
-    series = np.zeros_like(square)
+    series = xp.zeros_like(square)
     for coefficient in coefficients:
         series = series * square + coefficient
     series = square * (1.0 / 3.0 - square * (2.0 / 15.0 - square * series))
-    large = np.where(small, 1.0, u)
-    return np.where(small, series, 1.0 - np.tanh(large) / large)
+    large = xp.where(small, 1.0, u)
+    return xp.where(small, series, 1.0 - xp.tanh(large) / large)

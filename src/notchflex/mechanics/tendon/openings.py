@@ -7,11 +7,13 @@ its description knows (`Notch.openings`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from notchflex._arrays import xp
+from notchflex._jax import constant
 from notchflex.robot.kinds import Notch, openings_along
 
 
@@ -56,20 +58,22 @@ def passage(
             the middle of the openings.
     """
     count = len(notches)
-    visits, on_side, left, enters = (np.zeros(count) for _ in range(4))
-    back = np.ones(count, int)
-    leaves = np.array(body_length, float)
-    last = 0
+    visits, on_side, back = xp.zeros(count), xp.zeros(count), xp.ones(count, int)
+    left: list[Any] = [0.0] * count
+    enters: list[Any] = [0.0] * count
+    leaves, last = list(body_length), 0
     for body, opening in openings_along(notches, direction_deg):
         inside = 0.0
         if radius is not None:
             inside = opening.inside(direction_deg, outer_radius, radius)
-        visits[body - 1], enters[body - 1] = 1.0, opening.enters + inside * opening.enters_rise
+        visits[body - 1] = 1.0
+        enters[body - 1] = opening.enters + inside * opening.enters_rise
         on_side[body - 1] = opening.faces(direction_deg)
         leaves[last] += opening.leaves + inside * opening.leaves_rise
         back[body - 1], left[body - 1] = body - last, leaves[last]
         last = body
-    return Passage(visits, on_side, back, left, enters, leaves[1:], leaves[0])
+    along = map(constant, (left, enters, leaves[1:], leaves[0]))
+    return Passage(visits, on_side, back, *along)
 
 
 def passages(
@@ -85,4 +89,4 @@ def passages(
         passage(notches, body_length, direction, outer_radius, radius)
         for direction, radius in zip(directions_deg, distances, strict=True)
     ]
-    return Passage(*(np.stack(values, axis=-1) for values in zip(*lines, strict=True)))
+    return Passage(*(xp.stack(values, axis=-1) for values in zip(*lines, strict=True)))

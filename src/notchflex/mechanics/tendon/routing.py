@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._arrays import xp
 from notchflex._jax import constant
 from notchflex.errors import InputError
 from notchflex.mechanics.flexure import Rod, fibre_stretch
@@ -74,24 +75,24 @@ def route(tendons: Sequence[Tendon], ground: RoutingContext) -> RoutedTendons:
         numbers = tuple(i for i, tendon in enumerate(tendons) if tendon.path == path)
         if numbers:
             chosen = [tendons[i] for i in numbers]
-            own = Passage(*(np.asarray(values)[..., list(numbers)] for values in line))
+            own = Passage(*(values[..., np.array(numbers)] for values in line))
             masks = _masks(numbers, chosen, own)
             lay = _wall_arc if path == "wall-arc" else _straight
             groups.append(lay(masks, chosen, own, ground, path))
-    return RoutedTendons(tuple(groups), _on_tube(tendons), np.asarray(line.base_leaves))
+    return RoutedTendons(tuple(groups), _on_tube(tendons), xp.asarray(line.base_leaves))
 
 
 def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -> dict[str, Any]:
     """Where each tendon is: flexures as rows, tendons as columns."""
     count = line.visits.shape[0]
-    end = np.array([tendon.end_body or count for tendon in tendons])
-    body = np.arange(1, count + 1)[:, None]
+    end = xp.array([tendon.end_body or count for tendon in tendons])
+    body = xp.arange(1, count + 1)[:, None]
     present = (body <= end).astype(float)
     visits = present * line.visits
     ends = (body == end).astype(float)
     for column, number in enumerate(numbers):
         if not (ends * visits)[:, column].any():
-            on_its_side = ", ".join(str(j + 1) for j in np.flatnonzero(line.visits[:, column]))
+            on_its_side = ", ".join(str(j + 1) for j in xp.flatnonzero(line.visits[:, column]))
             raise InputError.UNSUPPORTED(
                 f"tendon[{number + 1}].end_body has no wall on the tendon's side; "
                 f"the bodies there are {on_its_side}"
@@ -101,18 +102,18 @@ def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -
         "present": present,
         "visits": visits,
         "ends": ends,
-        "back": np.where(visits > 0.0, line.back, 1),
+        "back": xp.where(visits > 0.0, line.back, 1),
         # A cable may end at an edge beyond the axial length of the last piece.
-        "body_length": visits * np.maximum(line.leaves - line.enters, 0.0),
+        "body_length": visits * xp.maximum(line.leaves - line.enters, 0.0),
     }
 
 
 def _on_tube(tendons: Sequence[Tendon]) -> Float[Array, "t 3"]:
     """Where the tendons cross a section of the tube, mm from its axis."""
-    radius = np.array([tendon.radius for tendon in tendons], float)
-    direction = np.deg2rad(np.array([tendon.direction_deg for tendon in tendons], float))
+    radius = xp.array([tendon.radius for tendon in tendons], float)
+    direction = xp.deg2rad(xp.array([tendon.direction_deg for tendon in tendons], float))
     return constant(
-        np.stack([radius * np.cos(direction), radius * np.sin(direction), 0.0 * radius], axis=-1)
+        xp.stack([radius * xp.cos(direction), radius * xp.sin(direction), 0.0 * radius], axis=-1)
     )
 
 
@@ -126,11 +127,11 @@ def _wall_arc(
     del line, path
     rods = ground.rods
     across = (
-        np.einsum("nab,tb->nta", rods.end_rotation, _on_tube(tendons)) + rods.end_offset[:, None]
+        xp.einsum("nab,tb->nta", rods.end_rotation, _on_tube(tendons)) + rods.end_offset[:, None]
     )[..., :2]
     return WallArc(
         **masks,
-        natural_gap=np.einsum(
+        natural_gap=xp.einsum(
             "ntc,nic,ni->nt", fibre_stretch(across), rods.reference_strain, rods.length
         ),
         across=across,
@@ -144,17 +145,17 @@ def _straight(
     ground: RoutingContext,
     path: str,
 ) -> Straight:
-    along = np.array([0.0, 0.0, 1.0])
-    place = np.asarray(_on_tube(tendons))
+    along = xp.array([0.0, 0.0, 1.0])
+    place = xp.asarray(_on_tube(tendons))
     entry = place + line.enters[..., None] * along
     leave = place + line.leaves[..., None] * along
-    base = place + np.asarray(line.base_leaves)[:, None] * along
+    base = place + xp.asarray(line.base_leaves)[:, None] * along
     return Straight(
         **masks,
         natural_gap=_free_gaps(masks["visits"], entry, leave, base, ground.free),
         leaves=constant(place + line.left[..., None] * along),
         enters=constant(entry),
-        along=constant(np.broadcast_to(along, entry.shape)),
+        along=constant(xp.broadcast_to(along, entry.shape)),
         pulls=_PULLS[path],
         turns_with_chord=ground.turns_with_chord,
     )
@@ -168,9 +169,9 @@ def _free_gaps(
     free: Motion,
 ) -> Float[Array, "n t"]:
     """Length of every straight span in the free robot, mm; 0 where a tendon passes by."""
-    point, gaps = base, np.zeros(visits.shape)
+    point, gaps = base, list[Any]()
     for j in range(len(visits)):
         point = (point - free.translation[j]) @ free.rotation[j]
-        gaps[j] = visits[j] * np.linalg.norm(entry[j] - point, axis=-1)
-        point = np.where(visits[j][:, None] > 0.0, leave[j], point)
-    return constant(gaps)
+        gaps.append(visits[j] * xp.linalg.norm(entry[j] - point, axis=-1))
+        point = xp.where(visits[j][:, None] > 0.0, leave[j], point)
+    return constant(xp.stack(gaps))

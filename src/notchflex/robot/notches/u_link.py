@@ -1,6 +1,5 @@
 """The U-link of Gao 2017: the strip between two slots that are cut from opposite sides."""
 
-import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import KW_ONLY
@@ -11,7 +10,7 @@ from pydantic import Field
 from notchflex.robot.kinds import GAO, Notch
 from notchflex.robot.notches.cut import CutLayout, slot
 from notchflex.robot.notches.opening import Opening
-from notchflex.robot.part import Float, part, quantity
+from notchflex.robot.part import Float, part, quantity, unchecked
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 
@@ -185,8 +184,8 @@ class ULink(Notch):
         """Return the links of the row, the slots before them from the two sides in turn."""
         if self.repeat == 1:
             return (self,)
-        changes = {"repeat": 1, "proximal_slot": OTHER[self.proximal_slot]}
-        pair = dataclasses.replace(self, repeat=1), dataclasses.replace(self, **changes)
+        swapped = OTHER[self.proximal_slot]
+        pair = unchecked(self, repeat=1), unchecked(self, repeat=1, proximal_slot=swapped)
         return (pair * self.repeat)[: self.repeat]
 
     @classmethod

@@ -41,6 +41,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from notchflex._arrays import plain_number, xp
 from notchflex._jax import constant
 from notchflex.mechanics.flexure.notch_rod import about_neutral_axis
 from notchflex.mechanics.material import FibreSection, NotchEnds
@@ -110,16 +111,16 @@ def plane_compliance(
     """
     ratio, ends = 2.0 * (1.0 + poisson_ratio), section.ends
     assert ends is not None
-    bending = (1.0 + np.asarray(ends.weak)) / np.asarray(section.second_moment_weak)
-    along = (1.0 + np.asarray(ends.axial)) / np.asarray(section.area)
-    across = ratio * (1.0 + np.asarray(ends.push)) / np.asarray(section.area)
-    lever = np.asarray(poses.translation) - middle
+    bending = (1.0 + xp.asarray(ends.weak)) / xp.asarray(section.second_moment_weak)
+    along = (1.0 + xp.asarray(ends.axial)) / xp.asarray(section.area)
+    across = ratio * (1.0 + xp.asarray(ends.push)) / xp.asarray(section.area)
+    lever = xp.asarray(poses.translation) - middle
     # Of unit forces along x and z: moments about y, then the forces in the frames of the sections.
-    moment = np.stack([-lever[:, 2], lever[:, 0]], axis=-1)
-    force = np.asarray(poses.rotation)[:, [0, 2]]
+    moment = xp.stack([-lever[:, 2], lever[:, 0]], axis=-1)
+    force = xp.asarray(poses.rotation)[:, [0, 2]]
     parts = (bending, moment), (across, force[..., 0]), (along, force[..., 2])
     return sum(
-        (np.einsum("k,ki,kj->ij", length * soft, by, by) for soft, by in parts), np.zeros((2, 2))
+        (xp.einsum("k,ki,kj->ij", length * soft, by, by) for soft, by in parts), xp.zeros((2, 2))
     )
 
 
@@ -135,12 +136,12 @@ def turned_compliance(
         poisson_ratio: For the ratio of the moduli.
     """
     arm = 0.25 * (walls.outer + walls.inner) ** 2
-    torsion = 2.0 * float(rectangle_torsion_constant(walls.width, walls.thickness))
+    torsion = 2.0 * plain_number(rectangle_torsion_constant(walls.width, walls.thickness))
     twisted = rule.twist * torsion / (2.0 * (1.0 + poisson_ratio)) / walls.length
     strip = 1.0 / (rule.against * arm / plane[1, 1] + twisted)
     tube = (rule.across[0] + rule.across[1] * walls.inner / walls.outer) * plane[0, 0] / arm
-    limit = _MAX_COUPLING * float(np.sqrt(strip * tube))
-    return strip, tube, float(np.clip(-rule.coupling * plane[0, 1] / arm, -limit, limit))
+    limit = _MAX_COUPLING * plain_number(xp.sqrt(strip * tube))
+    return strip, tube, plain_number(xp.clip(-rule.coupling * plane[0, 1] / arm, -limit, limit))
 
 
 def with_sideways(
@@ -161,19 +162,19 @@ def with_sideways(
     """
     strip, tube, both = turned
     assert section.ends is not None
-    wall = length[on_wall].sum()
-    rest = length[~on_wall].sum()
+    wall = xp.where(on_wall, length, 0.0).sum()
+    rest = xp.where(on_wall, 0.0, length).sum()
     of_strip, of_tube = _ON_WALLS
-    block = np.linalg.inv(np.array([[of_strip * strip, both], [both, of_tube * tube]]) / wall)
+    block = xp.linalg.inv(xp.array([[of_strip * strip, both], [both, of_tube * tube]]) / wall)
     # About x and z of the section: strip and tube on a wall, tube and strip elsewhere.
-    about_x = np.where(on_wall, block[0, 0], rest / ((1.0 - of_tube) * tube))
-    about_z = np.where(on_wall, block[1, 1], rest / ((1.0 - of_strip) * strip))
-    torsion = np.asarray(section.torsion_constant) / (2.0 * (1.0 + poisson_ratio))
+    about_x = xp.where(on_wall, block[0, 0], rest / ((1.0 - of_tube) * tube))
+    about_z = xp.where(on_wall, block[1, 1], rest / ((1.0 - of_strip) * strip))
+    torsion = xp.asarray(section.torsion_constant) / (2.0 * (1.0 + poisson_ratio))
     ends = dataclasses.replace(
         section.ends,
-        strong=constant(np.asarray(section.second_moment_strong) / about_x - 1.0),
+        strong=constant(xp.asarray(section.second_moment_strong) / about_x - 1.0),
         torsion=constant(torsion / about_z - 1.0),
-        oblique=constant(np.where(on_wall, block[0, 1], 0.0)),
+        oblique=constant(xp.where(on_wall, block[0, 1], 0.0)),
     )
     return dataclasses.replace(section, ends=ends)
 
@@ -280,56 +281,56 @@ def strip_sections(
     """Compute the sections of the strip (as wide as the tube's walls) and of its roots."""
     # Beyond the tips of the slots the width of the walls is constant.
     tip = 0.5 * strip.free_length
-    at = np.minimum(np.abs(along), tip)
-    outer = np.sqrt(tube.outer_radius**2 - at**2)
-    inner = np.sqrt(np.maximum(tube.inner_radius**2 - at**2, 0.0))
+    at = xp.minimum(xp.abs(along), tip)
+    outer = xp.sqrt(tube.outer_radius**2 - at**2)
+    inner = xp.sqrt(xp.maximum(tube.inner_radius**2 - at**2, 0.0))
     middle, width = 0.5 * (outer + inner), strip.width_factor * (outer - inner)
     walls = two_walls(width, strip.thickness, middle)
     ratio = 2.0 * (1.0 + poisson_ratio)  # E / G
     wall = strip.width_factor * (tube.outer_radius - tube.inner_radius)
     radius = 0.5 * (tube.outer_radius + tube.inner_radius)
-    square = np.minimum((at / radius) ** 2, _STEEPEST)
+    square = xp.minimum((at / radius) ** 2, _STEEPEST)
     oblique = square / (1.0 - square)
     bar = two_walls(wall, strip.thickness, 0.0)
-    twisting = ratio * float(bar.second_moment_weak / bar.torsion_constant)
-    area = np.asarray(walls.area)
-    along_wall, root = above != 0.0, (above != 0.0) | (np.abs(along) > tip)
+    twisting = ratio * plain_number(bar.second_moment_weak / bar.torsion_constant)
+    area = xp.asarray(walls.area)
+    along_wall, root = above != 0.0, (above != 0.0) | (xp.abs(along) > tip)
     in_root = (1.0 + _TWIST * oblique * strip.thickness / wall) / strip.bending - 1.0
     arch = _arch(strip.thickness, wall, radius, tip) * area / strip.free_length
     frame = _frame(strip, wall, width) * area / ratio
     sheared = np.pi * (tube.outer_radius**2 - tube.inner_radius**2) * strip.along
-    in_wall = sheared / max(strip.sheared, sheared / (_RIGID * area.min()))
-    nought = np.zeros(len(at))
+    in_wall = sheared / xp.maximum(strip.sheared, sheared / (_RIGID * area.min()))
+    nought = xp.zeros(len(at))
     ends = NotchEnds(
-        weak=constant(np.where(root, in_root, twisting * oblique)),
+        weak=constant(xp.where(root, in_root, twisting * oblique)),
         strong=constant(nought),
         axial=constant(
-            np.where(along_wall, 0.0, _SHEAR_AREA * np.where(root, 1.0, 1.0 + arch) - 1.0)
+            xp.where(along_wall, 0.0, _SHEAR_AREA * xp.where(root, 1.0, 1.0 + arch) - 1.0)
         ),
         torsion=constant(nought),
         odd=constant(nought),
         even=constant(nought),
         material_share=constant(nought + 1.0),  # the root yields where the strip does
-        sway=constant(np.where(root, 0.0, _SHEAR_AREA * frame)),
+        sway=constant(xp.where(root, 0.0, _SHEAR_AREA * frame)),
     )
     section = about_neutral_axis(
         walls, clamped_torsion_constant(walls, middle, length, poisson_ratio)
     )
-    area = constant(np.where(along_wall, in_wall, _SHEAR_AREA * area))
+    area = constant(xp.where(along_wall, in_wall, _SHEAR_AREA * area))
     return dataclasses.replace(section, area=area, ends=ends)
 
 
 def _arch(thickness: float, wall: float, radius: float, tip: float) -> float:
     """Compute the stretch of two walls that straighten as arches, times E over force, 1/mm."""
     angle = (
-        np.arcsin(min(tip / radius, np.sqrt(_STEEPEST)))
-        + _CLAMP * np.sqrt(thickness * wall) / radius
+        xp.arcsin(xp.minimum(tip / radius, xp.sqrt(_STEEPEST)))
+        + _CLAMP * xp.sqrt(thickness * wall) / radius
     )
-    spread = 0.5 + 0.25 * np.sin(2.0 * angle) / angle - (np.sin(angle) / angle) ** 2
-    return float(radius**3 * 2.0 * angle * spread / (2.0 * thickness * wall**3 / 12.0))
+    spread = 0.5 + 0.25 * xp.sin(2.0 * angle) / angle - (xp.sin(angle) / angle) ** 2
+    return plain_number(radius**3 * 2.0 * angle * spread / (2.0 * thickness * wall**3 / 12.0))
 
 
 def _frame(strip: RootedStrip, wall: float, width: np.ndarray) -> np.ndarray:
     """Compute the sway of two walls as posts of a frame, times E over force and length, 1/mm²."""
-    length = strip.free_length + 2.0 * _CLAMP_SIDEWAYS * np.sqrt(strip.thickness * wall)
+    length = strip.free_length + 2.0 * _CLAMP_SIDEWAYS * xp.sqrt(strip.thickness * wall)
     return length**3 / (12.0 * 2.0 * strip.thickness * width**3 / 12.0) / strip.free_length

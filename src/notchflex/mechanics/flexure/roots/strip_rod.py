@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from notchflex._arrays import xp
 from notchflex._jax import constant
 from notchflex.mechanics.flexure.notch_rod import (
     STRAIGHT,
@@ -66,15 +67,15 @@ def rooted_strip_rod(
         The rod, from the proximal wall to the distal one.
     """
     pieces = [0.0, strip.along, strip.beyond, strip.free_length, strip.beyond, strip.along]
-    ends = tuple(np.cumsum(pieces).tolist())
+    ends = tuple(xp.cumsum(xp.stack(pieces)))
     more = refinement
     counts = (3 + more, 2 + more, 6 + 3 * more, 2 + more, 3 + more)
     points = RodQuadrature(ends, counts, counts)
     position = points.every
     course = _course(position, ends)
     section = strip_sections(strip, tube, *course[:2], ends[-1], poisson_ratio)
-    middle = np.array([0.0, 0.0, strip.middle])
-    start, end = (_poses(strip, *_course(np.array([at]), ends)) for at in (0.0, ends[-1]))
+    middle = xp.array([0.0, 0.0, strip.middle])
+    start, end = (_poses(strip, *_course(xp.array([at]), ends)) for at in (0.0, ends[-1]))
     start, end = (Motion(one.rotation[0], one.translation[0]) for one in (start, end))
     poses = _poses(strip, *course)
     plane = plane_compliance(poses, points.weight, section, middle, poisson_ratio)
@@ -92,15 +93,15 @@ def rooted_strip_rod(
         poisson_ratio,
     )
     poses_to_end = Motion(
-        constant(np.concatenate([poses.rotation, end.rotation[None]])),
-        constant(np.concatenate([poses.translation, end.translation[None]])),
+        constant(xp.concatenate([poses.rotation, end.rotation[None]])),
+        constant(xp.concatenate([poses.translation, end.translation[None]])),
     )
     axis = NeutralAxis(
         points,
         start,
         between(end, shifted(z=distal)),
         between(start, poses_to_end),
-        np.tile(STRAIGHT, (len(position), 1)),
+        xp.tile(STRAIGHT, (len(position), 1)),
     )
     in_plane = moments + 2 * forces
     return build_rod(
@@ -117,15 +118,15 @@ def _course(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return positions along the strip and above its middle, mm, and a mask of the walls."""
     half = 0.5 * ends[-1]
-    along = np.clip(position - half, ends[1] - half, half - ends[1])
+    along = xp.clip(position - half, ends[1] - half, half - ends[1])
     above = position - half - along
     return along, above, above != 0.0
 
 
 def _poses(strip: RootedStrip, along: ArrayLike, above: ArrayLike, on_wall: ArrayLike) -> Motion:
     """Compute poses along the free rod: z along it, y out of the plane."""
-    x = -strip.hand * np.asarray(along)
-    position = np.stack([x, np.zeros_like(x), strip.middle + np.asarray(above)], axis=-1)
-    about_y = np.where(on_wall, 0.0, -0.5 * np.pi * strip.hand)
-    turns = rotation_about(constant(about_y[:, None] * np.array([0.0, 1.0, 0.0])))
+    x = -strip.hand * xp.asarray(along)
+    position = xp.stack([x, xp.zeros_like(x), strip.middle + xp.asarray(above)], axis=-1)
+    about_y = xp.where(on_wall, 0.0, -0.5 * np.pi * strip.hand)
+    turns = rotation_about(constant(about_y[:, None] * xp.array([0.0, 1.0, 0.0])))
     return Motion(turns, constant(position))
