@@ -7,12 +7,12 @@ traced by JAX, make programs for many robots and for slopes by their numbers.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import lru_cache, wraps
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -55,10 +55,8 @@ class _Dispatched:
         return call
 
 
-if TYPE_CHECKING:
-    import numpy as xp
-else:
-    xp = _Dispatched(np, "jax.numpy")
+xp: Any = _Dispatched(np, "jax.numpy")
+"""NumPy for plain numbers, `jax.numpy` where an argument is traced; their types have no base."""
 
 
 def plain_number(value: Any) -> Any:
@@ -111,7 +109,7 @@ class Decisions:
         return expected
 
     @contextmanager
-    def deciding(self) -> Iterator[Decisions]:
+    def deciding(self) -> Generator[Decisions]:
         """Take all decisions of a block of code, in this thread."""
         token = _deciding.set(self)
         try:

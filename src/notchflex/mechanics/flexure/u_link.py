@@ -52,7 +52,7 @@ from notchflex.mechanics.section.fibres import FibresAt, two_walls_fibres
 from notchflex.robot import Tube, ULink
 
 # The arc length is a smooth integral over t, a third of a turn at most: ten nodes are exact.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
 _NEWTON = 4  # the speed varies by a few tenths: the fourth step is below 1e-16
 
@@ -205,12 +205,14 @@ class Link:
 
     def course(self, part: ArrayLike) -> Course:
         """Evaluate the middle line at parts of it: 0 to 1 on S1, to 2 on S2 and to 3 on S3."""
-        part, end = xp.asarray(part, dtype=float), self.end
-        of_end = end.length()
-        curved, half = (part < 1.0) | (part > 2.0), xp.where(part <= 1.5, 1.0, -1.0)
-        t = end.at_length(xp.clip(xp.minimum(part, 3.0 - part), 0.0, 1.0) * of_end)
+        place, end = np.asarray(part, dtype=float), self.end
+        curved, half = (place < 1.0) | (place > 2.0), np.where(place <= 1.5, 1.0, -1.0)
+        nearer = np.minimum(place, 3.0 - place)
+        # Each place once: S3 has those of S1, and S2 begins where these end.
+        on_end, back = np.unique(np.round(np.clip(nearer, 0.0, 1.0), 14), return_inverse=True)
+        t = end.at_length(on_end * end.length())[back]
         points = end.middle(t)
-        straight = (xp.minimum(part, 3.0 - part) - 1.0) * self.strip_length
+        straight = (nearer - 1.0) * self.strip_length
         along = xp.where(curved, points[..., 0], straight)
         above = points[..., 1] - self.slot_radius - 0.5 * self.strip_thickness
         return Course(

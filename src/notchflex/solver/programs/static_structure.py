@@ -165,9 +165,10 @@ class StaticStructure:
             cls._structures[key] = cls(form, chain.flexures, constant, kept)
         return cls._structures[key]
 
-    def fits(self, numbers: Float[np.ndarray, "k chain"]) -> bool:
-        """Return whether packed chains have the constants of this structure."""
-        return bool((numbers[:, self._constant] == self._numbers[self._constant]).all())
+    def fits(self, numbers: Any) -> Any:
+        """Return whether packed chains have the constants of this structure (NumPy or JAX)."""
+        constant = np.flatnonzero(self._constant)
+        return (numbers[..., constant] == self._numbers[constant]).all()
 
     def pack(self, numbers: Any) -> Any:
         """Return the vectors of chains from their packed numbers (NumPy or JAX)."""
