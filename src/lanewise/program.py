@@ -17,7 +17,7 @@ from lanewise.lowering.lower import lower_batch, lower_path, lower_single
 from lanewise.machine import load
 
 _thread = threading.local()
-_first_byte = ctypes.c_char.from_buffer
+_first_byte, _address_of = ctypes.c_char.from_buffer, ctypes.addressof
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,19 @@ def lower(
     return LoweredProgram(emitter.source, tuple(lowered.sizes), size), tree
 
 
+class FixedVector:
+    """A vector of floats that nobody changes, with its address: for many calls of programs."""
+
+    def __init__(self, values: Any) -> None:
+        """Copy the numbers."""
+        self.values = np.array(values, float)
+        self.shape, self.address = self.values.shape, _address(self.values)
+
+    def __array__(self, *options: Any, **named: Any) -> np.ndarray:
+        """Return the numbers, for NumPy and JAX."""
+        return np.asarray(self.values, *options, **named)
+
+
 class Program:
     """A compiled program; threads may call it at the same time.
 
@@ -86,10 +99,11 @@ class Program:
         self, code: bytes, sizes: Sequence[int], memory: int, by_row: Sequence[bool] | None
     ) -> None:
         """Load the machine code."""
-        self.sizes, self.memory, self.by_row = sizes, memory, by_row
+        self.sizes, self.memory = sizes, memory
+        self._first_table = None if by_row is None else by_row.index(True)
         self._function = load(code)
 
-    def __call__(self, arguments: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def __call__(self, arguments: Sequence[np.ndarray | FixedVector]) -> list[np.ndarray]:
         """Run the program.
 
         Args:
@@ -98,26 +112,29 @@ class Program:
         Returns:
             Flat arrays, rows as leading axis where there are any.
         """
-        arrays = [np.ascontiguousarray(one, float) for one in arguments]
-        rows, shape = 1, ()
-        if self.by_row is not None:
-            rows = max([len(one) for one, own in zip(arrays, self.by_row, strict=True) if own])
-            shape = (rows,)
-        results = [np.empty((*shape, size)) for size in self.sizes]
+        addresses: list[int] = []
+        arrays: list[np.ndarray] = []  # they live until the program has run
+        for argument in arguments:
+            if type(argument) is FixedVector:
+                addresses.append(argument.address)
+            else:
+                arrays.append(np.ascontiguousarray(argument, float))
+                addresses.append(_address(arrays[-1]))
+        if self._first_table is None:
+            rows, results = 1, [np.empty(size) for size in self.sizes]
+        else:
+            rows = arguments[self._first_table].shape[0]
+            results = [np.empty((rows, size)) for size in self.sizes]
         if rows:
-            memory = _working_memory(self.memory)
-            self._function(_addresses(arrays), _addresses(results), memory, rows)
+            given = pack(f"{len(addresses)}P", *addresses)
+            returned = pack(f"{len(results)}P", *map(_address, results))
+            self._function(given, returned, _working_memory(self.memory), rows)
         return results
 
 
-def _addresses(arrays: Sequence[np.ndarray]) -> bytes:
-    """Return the addresses of arrays as an array of C pointers."""
-    return pack(f"{len(arrays)}P", *map(_address, arrays))
-
-
-def _address(array: np.ndarray) -> int:
+def _address(array: Any) -> int:
     try:  # through the buffer it takes a fifth of the time
-        return ctypes.addressof(_first_byte(array))  # pyright: ignore[reportArgumentType]
+        return _address_of(_first_byte(array))
     except (TypeError, ValueError):  # read-only, or empty
         return array.__array_interface__["data"][0]
 

@@ -5,18 +5,16 @@ Every module that needs JAX imports it from here.
 """
 
 from collections.abc import Callable
-from types import ModuleType
 from typing import Any, cast
 
 import jax
-import numpy as np
 from numpy.typing import ArrayLike
 
 from notchflex._arrays import xp
 
 jax.config.update("jax_enable_x64", True)
 
-import jax.numpy as jnp  # noqa: E402
+import jax.numpy as jnp  # noqa: E402, F401 # pyright: ignore[reportUnusedImport]
 
 # The chain is many small steps one after the other, each far too small for several threads. XLA's
 # newer fusion on the CPU compiles them in 7 s rather than 4 s (jax 0.10.1); later versions have no
@@ -38,17 +36,6 @@ def jit(function: Callable[..., Any], **options: Any) -> Any:
         options: Others of `jax.jit`.
     """
     return jax.jit(function, compiler_options=_OPTIONS, **options)
-
-
-def array_module(*values: Any) -> ModuleType:
-    """Return NumPy for plain numbers, so that nothing is compiled; JAX for its own arrays.
-
-    Formulas that turn a robot into arrays run once per robot. Written with the module that this
-    returns they take microseconds there, and can still be differentiated.
-    """
-    # To ask for jax.Array takes long; most that is asked for is a plain array.
-    traced = (type(value) is not np.ndarray and isinstance(value, jax.Array) for value in values)
-    return jnp if any(traced) else np
 
 
 def constant(value: ArrayLike) -> jax.Array:

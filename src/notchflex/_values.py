@@ -29,7 +29,7 @@ class ByValue:
         return hash((type(self), len(cast("Any", self)) if hasattr(self, "__len__") else 0))
 
 
-def read_only(values: Any) -> np.ndarray:
+def read_only(values: Any) -> Any:
     """Return a copy of an array that cannot be written to; one of JAX as it is."""
     if is_traced(values):
         return values

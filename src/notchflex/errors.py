@@ -164,17 +164,16 @@ class ErrorCode(_Coded):
 _Error = TypeVar("_Error", bound="InputError")
 
 
-class _Raised:
-    """What `InputError.UNKNOWN_NAME(message)` calls: makes an error of this class with its code."""
+class _OfCodes(type):
+    """Class of errors that `InputError.UNKNOWN_NAME(message)` makes with the code of that name."""
 
-    def __init__(self, code: ErrorCode) -> None:
-        self._code = code
+    def __getattr__(cls: Callable[..., _Error], name: str) -> Callable[[str], _Error]:
+        if name not in ErrorCode.__members__:
+            raise AttributeError(name)
+        return lambda message: cls(message, ErrorCode[name])
 
-    def __get__(self, thing: object, owner: type[_Error]) -> Callable[[str], _Error]:
-        return lambda message: owner(message, self._code)
 
-
-class InputError(ValueError):
+class InputError(ValueError, metaclass=_OfCodes):
     """An input is outside what is allowed.
 
     The message is one sentence, or one per problem: what was got, what is allowed, what to do.
@@ -188,17 +187,6 @@ class InputError(ValueError):
     def __init__(self, message: str, code: ErrorCode = ErrorCode.INVALID_INPUT) -> None:
         super().__init__(message)
         self.code = code
-
-    # In the order of `ErrorCode`; a test compares the names.
-    # fmt: off
-    (
-        UNKNOWN_NAME, WRONG_TYPE, BAD_SYNTAX, NOT_A_NUMBER, NOT_FINITE, OUT_OF_RANGE,
-        WRONG_SHAPE, MISSING_VALUE, CONFLICT, NO_DATA, TOO_FEW_DATA, UNSUPPORTED,
-        INVALID_ROBOT, INVALID_SPECIFICATION, STATE_OF_ANOTHER_ROBOT, FILE_NOT_FOUND,
-        FILE_UNREADABLE, FILE_UNWRITABLE, FILE_FORMAT, FILE_DAMAGED, TABLE_COLUMNS, TABLE_ROWS,
-        MISSING_PACKAGE, NOT_CONVERGED, PROCESS_FAILED, NO_CONNECTION
-    ) = map(_Raised, list(ErrorCode)[1:])
-    # fmt: on
 
 
 class InputWarning(UserWarning):

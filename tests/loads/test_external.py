@@ -1,5 +1,7 @@
 """External loads: the sums that the solver takes against every force added up by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -29,7 +31,8 @@ RNG = np.random.default_rng(4)
 def sums(load, *, robot=ROBOT, mass=None, centre=None) -> BodyLoads:
     mass = np.zeros(BODIES) if mass is None else mass
     centre = np.zeros((BODIES, 3)) if centre is None else centre
-    return applied(load_path(load, robot.number_of_tendons), robot, mass, centre, LENGTH)
+    chain = SimpleNamespace(body_mass=mass, body_centre=centre, body_length=LENGTH, frame=None)
+    return applied(load_path(load, robot.number_of_tendons), robot, chain)
 
 
 def of_body(every: BodyLoads, body: int, step: int = 0) -> BodyLoads:

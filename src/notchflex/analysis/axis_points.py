@@ -15,7 +15,8 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 from numpy.typing import ArrayLike, NDArray
 
-from notchflex._jax import array_module, constant
+from notchflex._arrays import xp
+from notchflex._jax import constant
 from notchflex.analysis.kinematics import bodies_from_angles
 from notchflex.errors import InputError
 from notchflex.mechanics.chain.mass import body_lengths
@@ -118,7 +119,6 @@ def points_on_axis(
         >>> points_on_axis(axis_places(robot, [0.4, 9.0]), *bodies)[0, :, 2].round(9).tolist()
         [0.4, 9.0]
     """
-    xp = array_module(body_position, body_rotation)
     axis = body_rotation[..., :, 2]
     first, last = axis[..., positions.body, :], axis[..., positions.after, :]
     origin = body_position[..., positions.body, :]

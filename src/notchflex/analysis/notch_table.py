@@ -69,11 +69,13 @@ def named_values(notch: Notch) -> dict[str, Any]:
         >>> list(named_values(load_robot("pacheco2021-a").notches[0]))[:3]
         ['kind', 'cut', 'depth_mm']
     """
-    return {
-        _with_unit(type(notch), name): getattr(notch, name)
-        for name in fields_of(type(notch))
-        if name != "repeat"
-    }
+    values: dict[str, Any] = {}
+    for name, field in fields_of(type(notch)).items():
+        unit = (field.json_schema_extra or {}).get("unit", "")
+        with_unit = f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name
+        values[with_unit] = getattr(notch, name)
+    del values["repeat"]
+    return values
 
 
 def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
@@ -87,9 +89,3 @@ def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
     if float(one.has_closure) > 0.0:  # opposite a spine
         values["centroid_mm"] = tube.outer_radius - float(section.edge_spine[weakest])
     return named_values(notch) | values
-
-
-def _with_unit(kind: type, name: str) -> str:
-    extra = fields_of(kind)[name].json_schema_extra or {}
-    unit = extra.get("unit", "")
-    return f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name

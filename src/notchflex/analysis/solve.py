@@ -53,8 +53,6 @@ def simulate(
         >>> bool(path.total_angle[3] == path.total_angle[2] > path.total_angle[1])
         True
     """
-    if from_state is not None:
-        check_robot(from_state, robot)
     return _follow(robot, loads, from_state, settings or DEFAULT, refinement)
 
 
@@ -88,7 +86,7 @@ def solve(
         >>> print(f"{degrees(state.total_angle):.2f} deg")
         150.08 deg
     """
-    return simulate(robot, load, from_state=from_state, settings=settings, refinement=refinement)[0]
+    return Equilibrium(_follow(robot, load, from_state, settings or DEFAULT, refinement), 0)
 
 
 def solve_each(
@@ -130,17 +128,16 @@ def _follow(
     *,
     each_from_rest: bool = False,
 ) -> EquilibriumPath:
+    if from_state is not None:
+        check_robot(from_state, robot)
     load = load_path(loads, check_is_robot(robot).number_of_tendons)
     ready = prepare_for(robot, load, from_state, refinement)
     start = None if from_state is None else fitted(from_state, ready.chain)
     commands = make_commands(load, robot, ready.chain)
-    by_stroke = commands.by_stroke is not None
-    for warning in unlikely_loads(load, by_stroke, ready.usual_loads):
+    for warning in unlikely_loads(load, ready.usual_loads):
         warnings.warn(warning, stacklevel=3)
     states = run(ready, commands, start, settings, each_from_start=each_from_rest)
-    return EquilibriumPath(
-        robot, load, ready, states, each_from_rest=each_from_rest, settings=settings
-    )
+    return EquilibriumPath(robot, load, ready, states, each_from_rest, settings)
 
 
 def check_refinement(refinement: int) -> None:
@@ -164,12 +161,12 @@ def prepare_for(
             f"the state was computed with refinement {from_state.refinement}, not {refinement}; "
             "go on with the same"
         )
-    unloaded = is_unloaded(load)
-    loaded = not unloaded or (from_state is not None and from_state.loaded)
-    level = "tendons" if not loaded else "plane"
-    if not (tendons_in_plane(robot) and (unloaded or is_planar(load, robot))):
+    loaded = not is_unloaded(load)
+    turning = loaded and follows(load)
+    level = "plane" if loaded else "tendons"
+    if not tendons_in_plane(robot) or (loaded and not is_planar(load, robot)):
         level = "space"
     if from_state is not None:
+        loaded, turning = loaded or from_state.loaded, turning or from_state.follows
         level = max(level, from_state.level, key=LEVELS.index)
-    turning = loaded and (follows(load) or (from_state is not None and from_state.follows))
-    return prepare(robot, level, loaded=loaded, follows=turning, refinement=refinement)
+    return prepare(robot, level, loaded, turning, refinement)

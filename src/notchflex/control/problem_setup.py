@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple, get_args
 
 import numpy as np
@@ -93,7 +93,15 @@ def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tup
     fixed = np.where(np.isnan(given.stroke[0]), given.tension[0], given.stroke[0])
     bounds = tuple(bounds_of_robot(limits, drive, tendons, robot.number_of_notches))
     outputs = [*targets.outputs, *(one.quantity for one in bounds)]
-    model = DriveModel(robot, _driven(given, drive, held), _together(outputs), options.state)
+    # With those usually asked beside them: fewer programs.
+    groups = [group for group in _ASKED_TOGETHER if set(group) & set(outputs)]
+    usual = [name for group in groups for name in group]
+    names = tuple(dict.fromkeys([*usual, *sorted(set(outputs))]))
+    # A command for every tendon, of what is driven a zero.
+    tables = {"tension": given.tension.copy(), "stroke": given.stroke.copy()}
+    tables[drive][0, ~held] = 0.0
+    load = LoadPath(**tables, base_rotation=given.base_rotation, external=given.external)
+    model = DriveModel(robot, load, names, options.state)
     chain = model.prepared.chain
     unit = float(chain.closing_force)
     if drive == "stroke":
@@ -119,20 +127,6 @@ def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tup
     return problem, aim
 
 
-def _together(outputs: Sequence[str]) -> tuple[str, ...]:
-    """Quantities that are asked, with those usually asked beside them: fewer programs."""
-    groups = [group for group in _ASKED_TOGETHER if set(group) & set(outputs)]
-    usual = [name for group in groups for name in group]
-    return tuple(dict.fromkeys([*usual, *sorted(set(outputs))]))
-
-
 def present_drives(problem: Problem, state: np.ndarray) -> np.ndarray:
     """Return the drives of a packed state; of held tendons what they are held at."""
     return np.where(problem.driven, problem.model.drives(state), problem.low)
-
-
-def _driven(given: LoadPath, drive: Drive, held: np.ndarray) -> LoadPath:
-    """The load with a command for every tendon, of what is driven a zero."""
-    tables = {"tension": given.tension.copy(), "stroke": given.stroke.copy()}
-    tables[drive][0, ~held] = 0.0
-    return LoadPath(tables["tension"], tables["stroke"], given.base_rotation, given.external)

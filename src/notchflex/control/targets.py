@@ -196,7 +196,14 @@ def _checked(values: Mapping[str, np.ndarray], robot: Robot) -> Targets:
     if DIRECTION in values:
         values = {**values, DIRECTION: _unit(values[DIRECTION])}
     if "tip_rotation" in values:
-        _check_rotations(values["tip_rotation"])
+        rotations = values["tip_rotation"]
+        whole = rotations[~np.isnan(rotations).any(axis=(1, 2))]
+        error = np.abs(whole @ np.swapaxes(whole, 1, 2) - np.eye(3)).max(initial=0.0)
+        if error > _ROTATION_ERROR or (np.linalg.det(whole) < 0.0).any():
+            raise InputError.OUT_OF_RANGE(
+                "a target of tip_rotation is not a rotation matrix: its rows must be of length 1, "
+                "at right angles and right-handed"
+            )
     return Targets(values)
 
 
@@ -241,16 +248,6 @@ def _unit(directions: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
             "tip_direction must not be zero, and no entry beside a free one may exceed 1"
         )
     return np.where(whole[:, None], directions / length, directions)
-
-
-def _check_rotations(rotations: Float[np.ndarray, "k 3 3"]) -> None:
-    whole = rotations[~np.isnan(rotations).any(axis=(1, 2))]
-    error = np.abs(whole @ np.swapaxes(whole, 1, 2) - np.eye(3)).max(initial=0.0)
-    if error > _ROTATION_ERROR or (np.linalg.det(whole) < 0.0).any():
-        raise InputError.OUT_OF_RANGE(
-            "a target of tip_rotation is not a rotation matrix: its rows must be of length 1, at "
-            "right angles and right-handed"
-        )
 
 
 # Columns of a simulation that say what was commanded are no targets, but may stand in the file.

@@ -59,7 +59,15 @@ def problems_of(spec: DesignSpec, robot: Robot) -> list[DesignProblem]:
         wishes = wishes_of(spec, one)
         paths = _paths(spec, wishes, one)
         variables = variables_of(one, spec.variable, paths.states)
-        outputs = _outputs(wishes)
+        names: list[str] = []
+        for quantity in (wish.asked.quantity for wish in wishes):
+            if quantity in OF_STATES:
+                names.append(quantity)
+            elif quantity == COMPLIANCE:
+                names.append("tip_position")
+            elif quantity.startswith(CURVE):
+                names += ["body_position", "body_rotation"]
+        outputs = tuple(dict.fromkeys(names)) or ("total_angle",)
         problems.append(DesignProblem(Solver(variables, paths, outputs), wishes))
     return problems
 
@@ -155,19 +163,6 @@ def _paths(spec: DesignSpec, wishes: tuple[Wish, ...], robot: Robot) -> StatePat
         else:
             used += names
     return state_paths(spec.state, robot.number_of_tendons, list(dict.fromkeys(used)), probes)
-
-
-def _outputs(wishes: tuple[Wish, ...]) -> tuple[str, ...]:
-    names: list[str] = []
-    for wish in wishes:
-        quantity = wish.asked.quantity
-        if quantity in OF_STATES:
-            names.append(quantity)
-        elif quantity == COMPLIANCE:
-            names.append("tip_position")
-        elif quantity.startswith(CURVE):
-            names += ["body_position", "body_rotation"]
-    return tuple(dict.fromkeys(names)) or ("total_angle",)
 
 
 # Lengths that are tried on both sides of where the search ended; of more, the nearest is taken.

@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from math import hypot
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from notchflex._jax import array_module, constant, jnp
+from notchflex._arrays import xp
+from notchflex._jax import constant, jnp
 from notchflex.errors import InputError
 from notchflex.loads.external import NOTHING, ExternalLoad
 from notchflex.loads.load import rotation_of
@@ -46,38 +47,23 @@ class BodyLoads(NamedTuple):
     following: Float[Array, "*s bodies w"]
 
 
-def applied(
-    load_path: LoadPath,
-    robot: Robot,
-    body_mass: Float[np.ndarray, " bodies"],
-    body_centre: Float[np.ndarray, "bodies 3"],
-    body_length: Float[np.ndarray, " bodies"],
-    frame: Float[np.ndarray, "3 3"] | None = None,
-) -> BodyLoads:
+def applied(load_path: LoadPath, robot: Robot, chain: Chain) -> BodyLoads:
     """Sum the external loads on each body.
 
-    Args:
-        load_path: The loads, s steps.
-        robot: The robot.
-        body_mass: Mass of each body, base first, g; zeros where the density is not known.
-        body_centre: Centre of mass of each body in its frame, mm.
-        body_length: Axial length of each body, mm; the tip is the end of the last one.
-        frame: Frame whose x and z span the plane of a flat chain; the sums are in that plane.
-
     Returns:
-        The sums, s steps as leading axis; those on the base too.
+        The sums, s steps as leading axis; those on the base too. Of a flat chain those in the plane
+        that x and z of its frame span.
 
     Raises:
         InputError: A body that the robot does not have, or gravity where nothing has a mass.
     """
-    axes = _axes(
-        tuple(load_path.base_rotation.tolist()),
-        None if frame is None else tuple(frame.ravel().tolist()),
-    )
+    frame = None if chain.frame is None else tuple(np.asarray(chain.frame).ravel().tolist())
+    axes = _axes(tuple(load_path.base_rotation.tolist()), frame)
+    mass, centre = np.asarray(chain.body_mass), np.asarray(chain.body_centre)
     sums: list[tuple[np.ndarray, ...]] = []
     for external in load_path.different:
         _check(external, robot)
-        sums.append(_sums(external, axes, body_mass, body_centre, float(body_length[-1])))
+        sums.append(_sums(external, axes, mass, centre, float(chain.body_length[-1])))
     if len(load_path) == 1:
         return BodyLoads(*(constant(field[None]) for field in sums[0]))
     # Loads that are equal over many steps are summed once.
@@ -125,7 +111,6 @@ def body_wrench(rotation: Float[Array, "d d"], one: BodyLoads) -> Float[Array, "
         >>> body_wrench(np.eye(3), at_side).tolist()
         [0.0, -2.0, 0.0, 0.0, 0.0, 1.0]
     """
-    xp = array_module(rotation, *one)
     # The vector of the skew part of p f^T is minus half of p x f.
     moment = turned(rotation.T, one.dead_moment) - 2.0 * unskew(one.dead_arm @ rotation)
     return xp.concatenate([moment, one.dead_force @ rotation]) + one.following
@@ -172,13 +157,10 @@ def _sticks_out(
     normal_of_body: Float[np.ndarray, " 3"],
 ) -> bool:
     """Return whether a force or its point leaves a plane, or a moment's axis is not its normal."""
-    across = hypot(*_cross(moment, normal.tolist()))
-    (off_plane,) = _components(force, (normal.tolist(),))
-    (component,) = _components(point, (normal_of_body.tolist(),))
     return (
-        abs(off_plane) > _ROUNDING * hypot(*force)
-        or across > _ROUNDING * hypot(*moment)
-        or (any(force) and abs(component) > _ROUNDING * hypot(*point))
+        abs(np.dot(force, normal)) > _ROUNDING * hypot(*force)
+        or hypot(*_cross(moment, normal.tolist())) > _ROUNDING * hypot(*moment)
+        or (any(force) and abs(np.dot(point, normal_of_body)) > _ROUNDING * hypot(*point))
     )
 
 
@@ -284,6 +266,12 @@ class Command(NamedTuple):
     by_stroke: Bool[Array, " t"] | None
     applied: BodyLoads | None
 
+    def packed(self) -> Float[np.ndarray, "s command"]:
+        """Return a row for each load: all its numbers, in the order of the fields."""
+        fields: Any = (self.target, self.by_stroke, *(self.applied or ()))
+        rows = [field.reshape(len(field), -1) for field in fields if field is not None]
+        return rows[0].copy() if len(rows) == 1 else np.concatenate(rows, axis=1, dtype=float)
+
     def either(self, by_stroke: Array, by_tension: Array) -> Array:
         """Select per tendon the value for a stroke or that for a tension."""
         if self.by_stroke is None:
@@ -298,13 +286,6 @@ def tension_commands(tension: Float[np.ndarray, "s t"]) -> Command:
 
 def make_commands(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     """Return the commands of a path; a tendon without one is slack (0 N)."""
-    no_stroke = np.isnan(load.stroke)
-    drawn, target = None, np.where(np.isnan(load.tension), 0.0, load.tension)
-    if not no_stroke.all():
-        drawn, target = cast("Array", ~no_stroke), np.where(no_stroke, target, load.stroke)
-    loads = None
-    if chain.loaded:
-        mass, centre = np.asarray(chain.body_mass), np.asarray(chain.body_centre)
-        frame = None if chain.frame is None else np.asarray(chain.frame)
-        loads = applied(load, robot, mass, centre, np.asarray(chain.body_length), frame)
-    return Command(constant(target), drawn, loads)
+    by_stroke = ~np.isnan(load.stroke) if load.draws else None
+    external = applied(load, robot, chain) if chain.loaded else None
+    return Command(cast("Any", load.target), cast("Any", by_stroke), external)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
+from operator import itemgetter
 from typing import Any
 
 from notchflex.errors import InputError
@@ -56,12 +57,11 @@ class BodyForce:
         body = check_integer(self.body, "the body of a BodyForce")
         if body < 0:
             raise InputError.OUT_OF_RANGE(f"bodies are counted from 0, the base; got {body}")
-        object.__setattr__(self, "body", body)
+        given = vars(self)
+        given["body"] = body
         for what, form in (("force", "N"), ("moment", "N mm"), ("point", "mm, from the body")):
-            taken = check_vector(getattr(self, what), f"the {what} of a BodyForce", form)
-            object.__setattr__(self, what, taken)
-        following = check_bool(self.following, "following of a BodyForce")
-        object.__setattr__(self, "following", following)
+            given[what] = check_vector(given[what], f"the {what} of a BodyForce", form)
+        given["following"] = check_bool(self.following, "following of a BodyForce")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,8 +104,7 @@ class ExternalLoad:
     @property
     def external(self) -> ExternalLoad:
         """The external loads alone, without what else a load may command."""
-        given = vars(self)
-        numbers = [given[name] for name in EXTERNAL]
+        numbers = _numbers_of(vars(self))
         if numbers == _NOTHING:
             return NOTHING
         load = object.__new__(ExternalLoad)
@@ -153,18 +152,24 @@ def _body_forces(value: Any) -> tuple[BodyForce, ...]:
 
 
 _CHECKS: dict[str, Callable[[Any], Any]] = {
-    "tip_force": partial(check_vector, what="tip_force", form="N"),
-    "tip_moment": partial(check_vector, what="tip_moment", form="N mm"),
-    "tip_point": partial(check_vector, what="tip_point", form="mm, from the tip"),
+    **{
+        name: partial(check_vector, what=name, form=form)
+        for name, form in (
+            ("tip_force", "N"),
+            ("tip_moment", "N mm"),
+            ("tip_point", "mm, from the tip"),
+            ("gravity", "m/s^2, in the world"),
+        )
+    },
     "following": partial(check_bool, what="following"),
     "body_forces": _body_forces,
     "tip_mass": _mass,
-    "gravity": partial(check_vector, what="gravity", form="m/s^2, in the world"),
 }
 EXTERNAL = tuple(one.name for one in fields(ExternalLoad))
 _DEFAULTS = tuple((one.name, one.default) for one in fields(ExternalLoad))
 NOTHING = ExternalLoad()
-_NOTHING = [default for _, default in _DEFAULTS]
+_numbers_of = itemgetter(*EXTERNAL)
+_NOTHING = _numbers_of(vars(NOTHING))
 
 
 def external_of_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:

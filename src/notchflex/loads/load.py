@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from math import hypot, isfinite, isnan, nan
+from math import hypot, isfinite, isnan
 from typing import Any
 
 import numpy as np
@@ -58,9 +58,8 @@ class Load(ExternalLoad):
     def __repr__(self) -> str:
         """Show what is given; tendons first."""
         ordered = sorted(fields(self), key=lambda one: bool(one.kw_only))
-        values = {one.name: getattr(self, one.name) for one in ordered}
-        unlike = {one.name for one in ordered if repr(values[one.name]) != repr(one.default)}
-        given = (f"{name}={value!r}" for name, value in values.items() if name in unlike)
+        words = ((one.name, repr(getattr(self, one.name)), repr(one.default)) for one in ordered)
+        given = (f"{name}={value}" for name, value, default in words if value != default)
         return f"Load({', '.join(given)})"
 
     def __post_init__(self) -> None:
@@ -73,8 +72,8 @@ class Load(ExternalLoad):
         if self.base_rotation is not NO_VECTOR:
             given["base_rotation"] = check_turn(self.base_rotation)
 
-    def per_tendon(self, what: str, tendons: int) -> list[float]:
-        """Return tension (N) or stroke (mm) of every tendon, NaN where not commanded.
+    def per_tendon(self, what: str, tendons: int) -> tuple[float | None, ...]:
+        """Return tension (N) or stroke (mm) of every tendon, None where not commanded.
 
         Args:
             what: "tension" or "stroke".
@@ -83,15 +82,14 @@ class Load(ExternalLoad):
         Raises:
             InputError: Too many entries.
         """
-        value = vars(self)[what]
-        entries = value if isinstance(value, tuple) else (value,)
+        value = getattr(self, what)
+        entries = value if type(value) is tuple else (value,)
         if len(entries) > tendons:
             raise InputError.WRONG_SHAPE(
                 f"{what} has {len(entries)} entries, but the robot has {tendons} tendons; "
                 f"give at most {tendons}"
             )
-        given = [nan if entry is None else entry for entry in entries]
-        return given if len(given) == tendons else given + [nan] * (tendons - len(given))
+        return entries + (None,) * (tendons - len(entries))
 
 
 def _commanded(value: Any, what: str) -> float | tuple[float | None, ...]:
@@ -139,6 +137,6 @@ def rotation_of(vector: tuple[float, ...]) -> Float[np.ndarray, "3 3"] | None:
 def entries_of(values: np.ndarray) -> float | list[float | None] | None:
     """Return an entry per tendon as a `Load` takes them: a number for a single tendon."""
     entries = [None if isnan(value) else value for value in values.tolist()]
-    if all(entry is None for entry in entries):
+    if entries.count(None) == len(entries):
         return None
     return entries[0] if len(entries) == 1 else entries

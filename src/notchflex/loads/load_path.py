@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from itertools import chain
-from math import isnan
 from typing import Any, overload
 
 import numpy as np
@@ -39,6 +37,9 @@ class LoadPath(ByValue, Displayed):
         base_rotation: Rotation vector of the base in the world, rad.
         external: External loads, one per step; none by default. `loaded` puts the same on all.
 
+    Attributes:
+        different: The distinct external loads, in order.
+
     Raises:
         InputError: Unequal shapes, no step, a negative or infinite number, or both tension and
             stroke for one tendon.
@@ -52,6 +53,7 @@ class LoadPath(ByValue, Displayed):
     stroke: np.ndarray = None  # pyright: ignore[reportAssignmentType]
     base_rotation: np.ndarray = field(default_factory=lambda: np.zeros(3))
     external: tuple[ExternalLoad, ...] = ()
+    different: list[ExternalLoad] = field(init=False)
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
@@ -75,9 +77,8 @@ class LoadPath(ByValue, Displayed):
                 f"got {tension.shape} and {stroke.shape}"
             )
         external = external_of_steps(self.external, len(tension))
-        fields = {"tension": tension, "stroke": stroke, "base_rotation": base_rotation}
-        vars(self).update(fields, external=external)
-        if tension.size and np.isnan(stroke).all() and 0.0 <= tension.min() < np.inf:
+        vars(self).update(vars(LoadPath.of_valid(tension, stroke, base_rotation, external)))
+        if tension.size and not self.draws and 0.0 <= tension.min() < np.inf:
             return  # valid tensions alone: the common case
         if len(tension) == 0:
             raise InputError.NO_DATA("a load path needs at least one step; got none")
@@ -104,9 +105,16 @@ class LoadPath(ByValue, Displayed):
     ) -> LoadPath:
         """Make a path of valid values without checks, for control loops."""
         path = object.__new__(cls)
-        vars(path).update(
-            tension=tension, stroke=stroke, base_rotation=base_rotation, external=external
+        fields = vars(path)
+        fields["tension"], fields["stroke"], fields["base_rotation"] = (
+            tension,
+            stroke,
+            base_rotation,
         )
+        # Usually all steps share one object; identity is faster than equality.
+        several = external if len(external) == 1 else {id(one): one for one in external}.values()
+        fields["external"] = external
+        fields["different"] = [*several] if len(several) == 1 else [*dict.fromkeys(several)]
         return path
 
     def __len__(self) -> int:
@@ -139,7 +147,7 @@ class LoadPath(ByValue, Displayed):
             entries_of(self.tension[step]),
             entries_of(self.stroke[step]),
             tuple(self.base_rotation.tolist()),
-            **{name: getattr(self.external[step], name) for name in EXTERNAL},
+            **vars(self.external[step]),
         )
 
     def _summary(self) -> Summary:
@@ -153,12 +161,15 @@ class LoadPath(ByValue, Displayed):
         return rotation_of(tuple(self.base_rotation.tolist()))
 
     @cached_property
-    def different(self) -> list[ExternalLoad]:
-        """The distinct external loads, in order."""
-        if len(self.external) == 1:
-            return list(self.external)
-        # Usually all steps share one object; identity is faster than equality.
-        return list(dict.fromkeys({id(one): one for one in self.external}.values()))
+    def target(self) -> Float[np.ndarray, "s t"]:
+        """Tension (N) or stroke (mm) of every tendon, 0 N where neither is commanded."""
+        slack = np.where(np.isnan(self.tension), 0.0, self.tension)
+        return read_only(np.where(np.isnan(self.stroke), slack, self.stroke))
+
+    @cached_property
+    def draws(self) -> bool:
+        """Whether a stroke is commanded in any step."""
+        return not np.isnan(self.stroke).all()
 
     @cached_property
     def which(self) -> Int[np.ndarray, " s"]:
@@ -289,29 +300,37 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     """
     if isinstance(loads, LoadPath):
         return loads.for_tendons(tendons)
-    every: list[Load] = one_or_several(
+    several: list[Load] = one_or_several(
         loads, Load, "loads must be a notchflex.Load, a LoadPath or Loads in order"
     )
-    if not every:
+    if not several:
         raise InputError.NO_DATA("there are no loads; give at least one")
-    for load in every:
+    tension: list[float | None] = []
+    stroke: list[float | None] = []
+    for load in several:
         if not isinstance(load, Load):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError.WRONG_TYPE(
                 f"a load must be a notchflex.Load; got {type(load).__name__}"
             )
-    turns = {load.base_rotation for load in every}
-    if len(turns) > 1:
-        raise InputError.CONFLICT(_TURNED)
-    tension = [load.per_tendon("tension", tendons) for load in every]
-    stroke = [load.per_tendon("stroke", tendons) for load in every]
-    given = read_only(tension), read_only(stroke), _base_rotation(turns.pop())
-    external = tuple(load.external for load in every)
-    for pulled, drawn in zip(
-        chain.from_iterable(tension), chain.from_iterable(stroke), strict=True
-    ):
-        if pulled < 0.0 or not (isnan(pulled) or isnan(drawn)):
-            return LoadPath(*given, external)  # raises the error
-    return LoadPath.of_valid(*given, external)
+        if load.base_rotation != several[0].base_rotation:
+            raise InputError.CONFLICT(_TURNED)
+        tension += load.per_tendon("tension", tendons)
+        stroke += load.per_tendon("stroke", tendons)
+    target: list[float] = []
+    valid = True
+    for pull, length in zip(tension, stroke, strict=True):
+        slack_or_pulled = 0.0 if pull is None else pull
+        target.append(slack_or_pulled if length is None else length)
+        valid = valid and (pull is None or (length is None and pull >= 0.0))
+    tables = np.array([*tension, *stroke, *target], float).reshape(3, -1, tendons)
+    tables.setflags(write=False)
+    external = tuple([load.external for load in several])
+    fields = tables[0], tables[1], _base_rotation(several[0].base_rotation), external
+    if not valid:
+        return LoadPath(*fields)  # raises the error
+    path = LoadPath.of_valid(*fields)
+    vars(path).update(target=tables[2], draws=stroke.count(None) < len(stroke))
+    return path
 
 
 _base_rotation = lru_cache(maxsize=64)(read_only)

@@ -1,6 +1,6 @@
 """Loads that were probably not meant, such as mN typed as N."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from math import hypot, pi
 
 import numpy as np
@@ -35,16 +35,14 @@ def usual_loads(chain: Chain) -> dict[str, tuple[float, str]]:
     }
 
 
-def unlikely_loads(
-    load: LoadPath, by_stroke: bool, usual: Mapping[str, tuple[float, str]]
-) -> Iterator[InputWarning]:
-    """Yield a warning for each kind of load that is far beyond a robot (`usual_loads`)."""
+def unlikely_loads(load: LoadPath, usual: Mapping[str, tuple[float, str]]) -> list[InputWarning]:
+    """Return a warning for each kind of load that is far beyond a robot (`usual_loads`)."""
     # Every solve comes by: lists are faster than arrays of one number; NaN is never above a limit.
     largest = {
         "tension": max([0.0, *load.tension.ravel().tolist()]),
         "base_rotation": hypot(*load.base_rotation.tolist()),
     }
-    if by_stroke:
+    if load.draws:
         largest["stroke"] = max([0.0, *map(abs, load.stroke.ravel().tolist())])
     for one in load.different:
         if one is not NOTHING:
@@ -57,7 +55,8 @@ def unlikely_loads(
             }
             for name, size in sizes.items():
                 largest[name] = max(largest.get(name, 0.0), size)
-    for name, size in largest.items():
-        most, unit = usual[name]
-        if size > most:
-            yield unlikely(name, float(size), (0.0, float(f"{most:.2g}")), unit)
+    return [
+        unlikely(name, float(size), (0.0, float(f"{usual[name][0]:.2g}")), usual[name][1])
+        for name, size in largest.items()
+        if size > usual[name][0]
+    ]

@@ -78,9 +78,8 @@ def _ramp(what: str, start: Ends, stop: Ends, steps: int, tendon: int) -> LoadPa
         raise InputError.OUT_OF_RANGE(
             f"tendons are counted from 1, to {_MAX_TENDONS} at most; got {tendon}"
         )
-    several = next((one for one in (start, stop) if _is_several(one)), None)
-    if several is None:
-        several = [None] * (tendon - 1) + [0.0]
+    alone = [*[None] * (tendon - 1), 0.0]
+    several = next((ends for ends in (start, stop) if _is_several(ends)), alone)
     first, last = (
         one if _is_several(one) else [None if entry is None else one for entry in several]
         for one in (start, stop)

@@ -56,7 +56,11 @@ def contrast(photograph: NDArray[np.uint8]) -> Contrast:
     value: Any = np.sqrt(cv2.transform(background, np.full((1, 3), 1.0 / 3.0, np.float32)))
     value = cv2.GaussianBlur(value, (0, 0), 0.7)
     low = cv2.resize(value, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-    return Contrast(value, _threshold(low), float(np.median(low)))
+    noise = float(np.median(low))
+    # Otsu's threshold between background and the rest, not below the noise of the background.
+    capped = np.clip(low, 0.0, 255.0).astype(np.uint8)
+    otsu, _ = cv2.threshold(capped, 0, 255, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
+    return Contrast(value, max(0.6 * float(otsu), 4.0 * noise, 5.0), noise)
 
 
 def _surface(image: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -81,12 +85,3 @@ def _surface(image: NDArray[np.float64]) -> NDArray[np.float64]:
         away = np.sqrt(((colour - fitted) ** 2).mean(axis=1))
         scale = max(6.0, min(0.8 * scale, 60.0), 4.0 * float(np.median(away[weight > 0.0])))
     return fitted.reshape(image.shape)
-
-
-def _threshold(value: Image) -> float:
-    """Otsu's threshold between background and the rest, not below the noise of the background."""
-    import cv2
-
-    capped = np.clip(value, 0.0, 255.0).astype(np.uint8)
-    otsu, _ = cv2.threshold(capped, 0, 255, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
-    return max(0.6 * float(otsu), 4.0 * float(np.median(value)), 5.0)

@@ -81,15 +81,19 @@ def refine(
         edges = find_edges(contrast, outline, reach, middle)
         if np.count_nonzero(np.isfinite(edges.offset)) < 2 * len(numbers):
             break
-        before = numbers
-        if quick:
-            weighed = _quick(edges.offset, 0.25 * reach)
-            numbers = _stepped(model, numbers, jacobian, edges.offset, weighed)
-            continue
         early = number < _EARLY
-        weighed = _weighed(lines, edges, None if early else len(numbers))
+        if quick:  # edges count by their distance alone
+            is_edge = np.isfinite(edges.offset)
+            far = np.nan_to_num(edges.offset) / (0.25 * reach)
+            weight = np.where(is_edge, 1.0 / (1.0 + far**2), 0.0) / _EDGE**2
+            weighed = _EdgeWeights(weight, np.zeros((len(weight), 0)), np.zeros(0))
+        else:
+            weighed = _weighed(lines, edges, None if early else len(numbers))
+        before = numbers
         numbers = _stepped(model, numbers, jacobian, edges.offset, weighed)
-        if not early and np.abs((numbers - before) / _scales(model, numbers)).max() < _DONE:
+        if quick or early:
+            continue
+        if np.abs((numbers - before) / _scales(model, numbers)).max() < _DONE:
             break
     outline, jacobian = _outline(model, numbers)
     edges = find_edges(contrast, outline, max(reaches[-1], 3.0), middle)
@@ -104,13 +108,6 @@ class _EdgeWeights(NamedTuple):
     weight: Numbers
     columns: Numbers
     spreads: Numbers
-
-
-def _quick(offset: Numbers, robust: float) -> _EdgeWeights:
-    """Weigh edges by their distance alone."""
-    is_edge = np.isfinite(offset)
-    weight = np.where(is_edge, 1.0 / (1.0 + (np.nan_to_num(offset) / robust) ** 2), 0.0)
-    return _EdgeWeights(weight / _EDGE**2, np.zeros((len(offset), 0)), np.zeros(0))
 
 
 def _noise_of(errors: Numbers) -> float:
@@ -204,8 +201,7 @@ def _bounds(model: OutlineModel, numbers: Numbers) -> tuple[Numbers, Numbers]:
     low[4], high[4] = turn - 0.7, turn + 0.7
     low[5], high[5] = -0.5, 0.5
     low[6], high[6] = 0.0, 0.03 / outer
-    low[7], high[7] = -0.08 * outer, 0.08 * outer
-    low[8], high[8] = -0.08 * outer, 0.08 * outer
+    low[7:9], high[7:9] = -0.08 * outer, 0.08 * outer
     angles = slice(NUMBERS, NUMBERS + model.table.notches)
     low[angles], high[angles] = -0.6, 1.9
     low[angles.stop :], high[angles.stop :] = -_MAX_OWN * outer, _MAX_OWN * outer

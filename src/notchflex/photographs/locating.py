@@ -58,8 +58,14 @@ def starts(table: ChainTable, contrast: Contrast, middle: Numbers) -> list[Numbe
         middle: Middle of that photograph, px.
     """
     ribbons = sorted(_ribbons(table, contrast), key=lambda one: -one.quality)
+    different: list[Ribbon] = []  # in their free end or their width
+    for one in ribbons:
+        ends = [np.linalg.norm(one.centre[0] - other.centre[0]) for other in different]
+        widths = [abs(math.log(one.width / other.width)) for other in different]
+        if all(e > one.width or w > 0.15 for e, w in zip(ends, widths, strict=True)):
+            different.append(one)
     views: list[Numbers] = []
-    for ribbon in _different(ribbons)[:3]:
+    for ribbon in different[:3]:
         for side, slip in itertools.product((1.0, -1.0), _SLIPS):
             numbers = _numbers(table, ribbon, side, slip, middle)
             if numbers is not None:
@@ -82,17 +88,6 @@ def _ribbons(table: ChainTable, contrast: Contrast) -> Iterator[Ribbon]:
                 continue
             for levels in _levels(labels == label):
                 yield from _stretches(table, *levels)
-
-
-def _different(ribbons: list[Ribbon]) -> list[Ribbon]:
-    """Return those that differ in their free end or their width."""
-    kept: list[Ribbon] = []
-    for one in ribbons:
-        ends = [np.linalg.norm(one.centre[0] - other.centre[0]) for other in kept]
-        widths = [abs(math.log(one.width / other.width)) for other in kept]
-        if all(e > one.width or w > 0.15 for e, w in zip(ends, widths, strict=True)):
-            kept.append(one)
-    return kept
 
 
 def _levels(part: NDArray[np.bool_]) -> Iterator[tuple[Numbers, Numbers]]:
@@ -181,19 +176,11 @@ def _numbers(
 
 
 def _smoothed(points: Numbers, half: int) -> Numbers:
-    padded = (
-        np.concatenate(
-            [
-                2.0 * points[0] - points[half:0:-1],
-                points,
-                2.0 * points[-1] - points[-2 : -half - 2 : -1],
-            ]
-        )
-        if len(points) > half + 1
-        else points
-    )
-    if len(padded) == len(points):
+    if len(points) <= half + 1:
         return points
+    before = 2.0 * points[0] - points[half:0:-1]
+    after = 2.0 * points[-1] - points[-2 : -half - 2 : -1]
+    padded = np.concatenate([before, points, after])
     kernel = np.ones(2 * half + 1) / (2 * half + 1)
     return np.stack([np.convolve(padded[:, axis], kernel, "valid") for axis in (0, 1)], axis=1)
 
@@ -284,7 +271,10 @@ def locate(
     first = min(whole, key=lambda fit: cost(fit, model))
     noise = max(EDGE_NOISE, covariance(first, model)[1])
     best = min(whole, key=lambda fit: misfit(fit, model, noise))
-    turned = _turned(model, contrast, best, middle)
+    # Fitted again from views that are turned a little.
+    views = best.numbers + np.zeros((len(_VIEWS), 1))
+    views[:, 4:6] += _VIEWS
+    turned = [refine(model, contrast, one, _LAST_REACHES, middle, MAX_RESIDUAL) for one in views]
     whole += [fit for fit in turned if not missing(model, fit)]
     misfits = [misfit(fit, model, noise) for fit in whole]
     least = min(misfits)
@@ -294,13 +284,6 @@ def locate(
         for one, fit in zip(misfits, whole, strict=True)
     ]
     return Located(best, model, tuple(rivals), fine)
-
-
-def _turned(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers) -> list[Fit]:
-    """Fit again from views that are turned a little."""
-    views = fit.numbers + np.zeros((len(_VIEWS), 1))
-    views[:, 4:6] += _VIEWS
-    return [refine(model, contrast, one, _LAST_REACHES, middle, MAX_RESIDUAL) for one in views]
 
 
 def _slipped(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers) -> list[Fit]:

@@ -26,7 +26,11 @@ def exif_texts(photograph: bytes) -> list[str]:
     if head is None:
         return []
     comment, description = (_bytes(head.tags.get(tag)) for tag in (_COMMENT, _DESCRIPTION))
-    texts = _comment(comment, head.order), description.decode("utf-8", "replace")
+    code = _CODES.get(comment[:8])
+    text = comment[8:] if code else comment
+    if code == "utf-16":
+        code = "utf-16-le" if head.order == "<" else "utf-16-be"
+    texts = text.decode(code or "utf-8", "replace"), description.decode("utf-8", "replace")
     return [text for one in texts if (text := one.replace("\0", " ").strip())]
 
 
@@ -34,13 +38,6 @@ def _bytes(value: object) -> bytes:
     """Return the bytes of a value, which Pillow gives as latin-1 where its type is text."""
     text = value.encode("latin-1", "replace") if isinstance(value, str) else value
     return text if isinstance(text, bytes) else b""
-
-
-def _comment(value: bytes, order: str) -> str:
-    code = _CODES.get(value[:8])
-    if code == "utf-16":
-        code = "utf-16-le" if order == "<" else "utf-16-be"
-    return (value[8:] if code else value).decode(code or "utf-8", "replace")
 
 
 _FIELDS = {"tension": r"(?P<tension>\d+(?:[.,]\d+)?)", "pull": r"(?P<pull>[^_]+?)"}

@@ -404,34 +404,18 @@ def shaded(
     if several:
         shades = [*sequence_colours(ends.shape[2])]
     x = abscissa(path)[0]
-    areas = [
-        replace(area, group=f"notch {entry + 1}") if several else area
-        for entry, shade in enumerate(shades)
-        for area in _areas(path, x, ends[:, :, entry], shade)
-    ]
+    areas: list[Area] = []
+    for entry, shade in enumerate(shades):
+        group = f"notch {entry + 1}" if several else ""
+        low, high = (converged_only(path, end) for end in ends[:, :, entry])
+        for part, way in branches(load_parameter(path)):
+            is_finite = np.isfinite(low[part]) & np.isfinite(high[part])
+            along = x[part][is_finite]
+            across = np.append(low[part][is_finite], high[part][is_finite][::-1])
+            outline = np.stack([np.append(along, along[::-1]), across], axis=1)
+            if len(along) > 1:
+                colour = COLOUR[way] if shade is None else shade
+                areas.append(Area([outline], colour, colour, 0.18, 0.0, group=group, layer=1))
     if areas and not several:
         areas[0] = replace(areas[0], name=NAME)
     return replace(panel, items=[*areas, *panel.items], legend=panel.legend or INSIDE)
-
-
-def _areas(
-    path: EquilibriumPath,
-    x: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    shade: Colour | None,
-) -> Iterator[Area]:
-    """Yield the area between two ends, (2, S), of every branch."""
-    low, high = (converged_only(path, end) for end in ends)
-    for part, way in branches(load_parameter(path)):
-        is_finite = np.isfinite(low[part]) & np.isfinite(high[part])
-        along = x[part][is_finite]
-        outline = np.stack(
-            [
-                np.append(along, along[::-1]),
-                np.append(low[part][is_finite], high[part][is_finite][::-1]),
-            ],
-            axis=1,
-        )
-        if len(along) > 1:
-            colour = COLOUR[way] if shade is None else shade
-            yield Area([outline], colour, colour, opacity=0.18, width=0.0, layer=1)

@@ -51,7 +51,7 @@ def design_picture(design: Design, *, title: str = "") -> Picture:
         steps = [step for _, step in states if one.converged[step]]
         shades = [colour] * len(steps)
         panel = shape_panel(one, steps, plane_of(one), title=label, colours=shades, legend=BELOW)
-        cells.append(Cell(_with_curves(panel, design, one, label), 0, column, 2))
+        cells.append(Cell(_with_curves(panel, design, one), 0, column, 2))
         column += 1
     several = [one for one in design.wishes if len(one.achieved) > 1]
     beside = [_variables(design), *(_numbers(one) for one in several[:1])]
@@ -60,7 +60,7 @@ def design_picture(design: Design, *, title: str = "") -> Picture:
     return Picture(name, 1.2 + 3.6 * (column + 1), 6.8, cells, [])
 
 
-def _with_curves(panel: Panel, design: Design, path: EquilibriumPath, label: str) -> Panel:
+def _with_curves(panel: Panel, design: Design, path: EquilibriumPath) -> Panel:
     """Add the points of target curves."""
     from dataclasses import replace
 
@@ -119,8 +119,7 @@ def front_picture(front: DesignFront, *, title: str = "") -> Picture:
     for other in range(1, values.shape[1]):
         points = np.stack([values[:, 0], values[:, other]], axis=1)
         line = Curve(points, BLUE, None if values.shape[1] > 2 else (), marker="o", hover=True)
-        items: list[Mark] = [line]
-        panels.append(Panel(items, titles[0], titles[other]))
+        panels.append(Panel([line], titles[0], titles[other]))
     if values.shape[1] > 2:
         points = values[:, [1, 2]]
         panels.append(Panel([Curve(points, BLUE, None, marker="o")], titles[1], titles[2]))

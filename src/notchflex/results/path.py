@@ -77,9 +77,10 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
         """Return one state, or the path of some of them; work is counted from its first state."""
         if isinstance(step, slice):
             return replace(self, load=self.load[step], run=self.run.rows(step))
-        if not -len(self) <= step < len(self):
-            raise IndexError(f"step {step} of a path of {len(self)} steps")
-        return Equilibrium(self, step % len(self))
+        steps = len(self.load.tension)
+        if not -steps <= step < steps:
+            raise IndexError(f"step {step} of a path of {steps} steps")
+        return Equilibrium(self, step % steps)
 
     def quantity(self, name: str) -> Any:
         """Return a quantity of every step by its name, steps as leading axis, read only.
@@ -88,18 +89,19 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
             name: Name of a property, such as "notch_angle".
         """
         kept = vars(self).setdefault("_kept", {})
-        if name not in kept:
-            if name not in QUANTITIES:
-                names = ", ".join(QUANTITIES)
-                raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {names}")
-            quantity = QUANTITIES[name]
-            if quantity.source in ("path", "derived"):
-                kept[name] = quantity.formula(self)
-            else:  # vectors and rotations of the solver are in the frame of the base
-                kept[name] = self.solver_quantity(name)
-                if quantity.in_world:
-                    kept[name] = quantity.turned(kept[name], self.load.base_to_world)
-            kept[name] = frozen(kept[name])
+        if name in kept:
+            return kept[name]
+        if name not in QUANTITIES:
+            names = ", ".join(QUANTITIES)
+            raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {names}")
+        quantity = QUANTITIES[name]
+        if quantity.source in ("path", "derived"):
+            values = quantity.formula(self)
+        else:  # vectors and rotations of the solver are in the frame of the base
+            values = self.solver_quantity(name)
+            if quantity.in_world:
+                values = quantity.turned(values, self.load.base_to_world)
+        kept[name] = frozen(values)
         return kept[name]
 
     def _value(self) -> Any:
@@ -112,10 +114,10 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
 
         Steps that were not tried repeat the last one that was: their rows are empty.
         """
-        values = np.asarray(self.run.quantity(name))
-        if len(self) == 1:  # always tried
+        values = self.run.quantity(name)
+        if len(values) == 1:  # always tried
             return values
-        tried = np.asarray(self.run.tried)
+        tried = self.run.tried
         if tried.all():
             return values
         return values[np.maximum.accumulate(np.where(tried, np.arange(len(tried)), 0))]

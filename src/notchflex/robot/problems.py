@@ -137,7 +137,22 @@ def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
         yield _outside(entries, unit, other)
     if not by_unit:
         for i, tendon in enumerate(robot.tendon, start=1):
-            yield from _in_thin_wall(f"tendon[{i}].radius", tendon, robot.tube)
+            # A wall that has no room for a channel is asked about, unless its diameter is given.
+            tube, radius = robot.tube, tendon.radius
+            room = 2.0 * min(radius - tube.inner_radius, tube.outer_radius - radius)
+            is_inside = radius - tube.inner_radius > _ON_SURFACE * tube.outer_diameter
+            if (
+                is_inside
+                and tendon.diameter is None
+                and room < _LEAST_CHANNEL * tube.outer_diameter
+            ):
+                name = f"tendon[{i}].radius"
+                text = (
+                    f"`{name}` is {_shown(radius, 'mm')}, inside the wall, where a channel has "
+                    f"{_shown(room, 'mm')}; did you mean a tendon in the lumen, at most "
+                    f"{_shown(tube.inner_radius, 'mm')}? One in the wall has a `diameter`."
+                )
+                yield InputWarning(text, name, radius, tube.inner_radius)
         yield from _remaining_depths(robot)
 
 
@@ -168,19 +183,6 @@ def _outside(
         f"{_shown(high, unit)}{also}; {question or 'is that what you mean?'}"
     )
     return InputWarning(text, name, value, meant)
-
-
-def _in_thin_wall(name: str, tendon: Tendon, tube: Tube) -> Iterator[InputWarning]:
-    """Ask about a tendon in a wall that has no room for a channel, unless its diameter is given."""
-    room = 2.0 * min(tendon.radius - tube.inner_radius, tube.outer_radius - tendon.radius)
-    is_inside = tendon.radius - tube.inner_radius > _ON_SURFACE * tube.outer_diameter
-    if is_inside and tendon.diameter is None and room < _LEAST_CHANNEL * tube.outer_diameter:
-        text = (
-            f"`{name}` is {_shown(tendon.radius, 'mm')}, inside the wall, where a channel has "
-            f"{_shown(room, 'mm')}; did you mean a tendon in the lumen, at most "
-            f"{_shown(tube.inner_radius, 'mm')}? One in the wall has a `diameter`."
-        )
-        yield InputWarning(text, name, tendon.radius, tube.inner_radius)
 
 
 def _remaining_depths(robot: "Robot") -> Iterator[InputWarning]:

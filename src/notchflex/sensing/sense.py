@@ -111,16 +111,12 @@ def _largest(robot: Robot, readings: Readings, largest: float | None) -> float:
                 f"largest is the largest force looked for, above 0 N; got {value:g}"
             )
         return value
-    length = float(np.linalg.norm(_straight_tip(robot)))
+    from notchflex.analysis.kinematics import tip_from_angles
+
+    length = float(np.linalg.norm(tip_from_angles(robot, np.zeros(robot.number_of_notches))[0]))
     lever = max(tendon.radius for tendon in robot.tendon)
     tension = float(np.nanmax(readings.tension, initial=0.0))
     return _RANGE * max(tension, 1.0) * lever / length
-
-
-def _straight_tip(robot: Robot) -> np.ndarray:
-    from notchflex.analysis.kinematics import tip_from_angles
-
-    return tip_from_angles(robot, np.zeros(robot.number_of_notches))[0]
 
 
 def _stage(progress: Stage | None, name: str) -> Callable[[int, int], None] | None:

@@ -137,19 +137,16 @@ class Session:
         reason = ""
         if changed.number_of_tendons == self.robot.number_of_tendons:
             again.before = past if len(past) > 1 else None
-            reason = again._repeat(past.controls[1:], go_on)
+            count = len(past.controls)
+            for number, controls in enumerate(past.controls[1:], start=2):
+                if reason := again.go(controls):
+                    reason = f"step {number} of {count} repeated: {reason}"
+                    break
+                if go_on is not None and not go_on(number, count) and number < count:
+                    reason = f"stopped after step {number} of {count} repeated"
+                    break
         self.__dict__.update(again.__dict__)
         return reason
-
-    def _repeat(self, settings: list[Controls], go_on: Callable[[int, int], bool] | None) -> str:
-        """Solve settings one after the other, until one fails or `go_on` returns False."""
-        count = len(settings) + 1
-        for number, controls in enumerate(settings, start=2):
-            if reason := self.go(controls):
-                return f"step {number} of {count} repeated: {reason}"
-            if go_on is not None and not go_on(number, count) and number < count:
-                return f"stopped after step {number} of {count} repeated"
-        return ""
 
     def path(self) -> EquilibriumPath:
         """Return the whole history as one path from rest, as `notchflex.simulate` finds it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -105,7 +105,11 @@ def tip_response(
     changes = [Change(loads, None) for loads in _unit_loads(path)]
     # Each state is varied alone: what the contacts remember of the state before stays.
     by_loads = model.derivatives(path, changes, _POSE, remembers=False)
-    slopes = np.moveaxis(_pose_change(path, by_loads), 0, -1)
+    # Rotation vectors and displacements of the tip, in the world.
+    spin = by_loads["tip_rotation"] @ np.swapaxes(path.tip_rotation, -1, -2)
+    turned = [0.5 * (spin[..., b, a] - spin[..., a, b]) for a, b in ((1, 2), (2, 0), (0, 1))]
+    poses = np.concatenate([np.stack(turned, axis=-1), by_loads["tip_position"]], axis=-1)
+    slopes = np.moveaxis(poses, 0, -1)
     by_drive, by_wrench = np.split(slopes, [path.chain.tendons], axis=-1)
     moment_and_force = by_wrench.reshape(*by_wrench.shape[:-1], 2, 3)
     in_world = REGISTERED["base_force"].turned(moment_and_force, load.base_to_world)
@@ -124,15 +128,6 @@ def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"
         units.append(none._replace(applied=applied))
     for unit in units:
         yield np.broadcast_to(np.asarray(form.pack(unit)), packed.shape)
-
-
-def _pose_change(
-    path: EquilibriumPath, changes: Mapping[str, np.ndarray]
-) -> Float[np.ndarray, "k s 6"]:
-    """Compute rotation vectors and displacements of the tip, in the world."""
-    spin = changes["tip_rotation"] @ np.swapaxes(path.tip_rotation, -1, -2)
-    turned = [spin[..., b, a] - spin[..., a, b] for a, b in ((1, 2), (2, 0), (0, 1))]
-    return np.concatenate([0.5 * np.stack(turned, axis=-1), changes["tip_position"]], axis=-1)
 
 
 def _with_tip(applied: BodyLoads, wrench: Float[np.ndarray, " 6"], length: float) -> BodyLoads:

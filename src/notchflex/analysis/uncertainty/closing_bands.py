@@ -79,15 +79,11 @@ def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
     total = band(bands.samples["total_angle"][:, step])
     shares = bands.variance_shares("total_angle", step)
     by_depth = _by_depth(robot, _pull(robot, tendon, np.array([load])))
-    closing = _with_never(tension), band(angle)
+    # Of tensions of which some are infinite.
+    finite = band(np.minimum(tension, _NEVER))
+    ends = (finite.low, finite.median, finite.high)
+    closing = Band(*(np.where(end < _NEVER, end, np.inf) for end in ends)), band(angle)
     return ClosingBands(bands, own + 1, *closing, load, tendon, total, by_depth, shares)
-
-
-def _with_never(tension: Float[np.ndarray, "d n"]) -> Band:
-    """Return the band of tensions of which some are infinite."""
-    one = band(np.minimum(tension, _NEVER))
-    ends = (one.low, one.median, one.high)
-    return Band(*(np.where(end < _NEVER, end, np.inf) for end in ends))
 
 
 def closing_document(closing_bands: ClosingBands) -> dict[str, Any]:

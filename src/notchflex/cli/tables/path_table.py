@@ -278,7 +278,13 @@ def shown_rows(path: EquilibriumPath, *, every_row: bool = False) -> tuple[list[
     rows = set(range(0, steps, stride)) | {0, steps - 1}
     if stride > 1:
         reversals = reversals_of(path)
-        rows |= reversals if len(reversals) <= MAX_ROWS else _extremes(path)
+        extremes = {
+            int(pick(column))
+            for column in _commanded(path)
+            for pick in (np.nanargmin, np.nanargmax)
+            if np.isfinite(column).any()
+        }
+        rows |= reversals if len(reversals) <= MAX_ROWS else extremes
         rows |= {int(step) for step in np.flatnonzero(~np.asarray(path.converged))[:1]}
     return sorted(rows), stride
 
@@ -307,15 +313,6 @@ def rows_note(steps: int, shown: int, stride: int) -> str:
         f"{steps} steps, {shown} shown: every {stride}{which} one, and where the load reverses. "
         "--all shows every step."
     )
-
-
-def _extremes(path: EquilibriumPath) -> set[int]:
-    return {
-        int(pick(column))
-        for column in _commanded(path)
-        for pick in (np.nanargmin, np.nanargmax)
-        if np.isfinite(column).any()
-    }
 
 
 def _commanded(path: EquilibriumPath) -> list[np.ndarray]:

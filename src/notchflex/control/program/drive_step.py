@@ -6,7 +6,8 @@ from typing import Any
 
 from jaxtyping import Array, Float
 
-from notchflex._jax import array_module, jnp
+from notchflex._arrays import xp
+from notchflex._jax import jnp
 from notchflex.solver.linear_step.block_elimination import gauss_jordan
 
 MIN_DRIVES = 1e-10
@@ -97,7 +98,6 @@ def dead_band(
         bound: Their largest, (t,).
         by_stroke: Which drives are strokes, (t,).
     """
-    xp = array_module(drive)
     still = by_stroke | (xp.abs(ratio) > (1.0 + _ROUNDING) * bound)
     low, high = (drive * xp.exp(-ratio + side * bound) for side in (-1.0, 1.0))
     low = xp.where(still, drive, xp.minimum(low, drive))

@@ -114,7 +114,10 @@ def _lowered(
                 guess = 0.5 * (below + top)
         else:
             below = guess
-            onward = below + _PART_OF_WAY * _tension_increase(problem, goal, trial, tendon)
+            # How much higher the tension must be to meet the target, by the slopes.
+            steep = _steepness(problem, goal, trial, tendon)
+            is_known = steep > 0.0 and trial.response.converged
+            onward = below + _PART_OF_WAY * trial.error / steep if is_known else np.nan
             guess = onward if below < onward < top else 0.5 * (below + top)
         if below is not None and top - below <= _EXACT * top * (1.0 + 1e-6):
             break
@@ -138,12 +141,6 @@ def _at(
     met = response.converged and error <= problem.search.tolerance
     failure = None if met else Failure.SEARCH_STOPPED
     return within_limits(problem, Attempt(drive, response, error, 0.0, 1, failure))
-
-
-def _tension_increase(problem: Problem, goal: np.ndarray, attempt: Attempt, tendon: int) -> float:
-    """How much higher the tension must be to meet the target, by the slopes; NaN if unknown."""
-    steep = _steepness(problem, goal, attempt, tendon)
-    return attempt.error / steep if steep > 0.0 and attempt.response.converged else np.nan
 
 
 def _holds(problem: Problem, goal: np.ndarray, attempt: Attempt, tendon: int) -> bool:

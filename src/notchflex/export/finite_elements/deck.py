@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -209,8 +209,12 @@ def deck(
     lines += ["*MATERIAL,NAME=TUBE", *material_cards(robot.material)]
     lines += ["*SOLID SECTION,ELSET=TUBE,MATERIAL=TUBE"]
     lines += _springs(mesh, spans, number)
-    for point, node in number.items():
-        lines += _ties(point, node, (1, 3) if mesh.is_half else (1, 2, 3))
+    for point, node in number.items():  # hang it on the nodes of the wall
+        terms = [(node, -1.0), *point.ties]
+        for axis in ((1, 3) if mesh.is_half else (1, 2, 3)) if point.ties else ():
+            lines += ["*EQUATION", str(len(terms))]
+            texts = [f"{tied},{axis},{weight:.12g}" for tied, weight in terms]
+            lines += [",".join(texts[start : start + 4]) for start in range(0, len(texts), 4)]
     if tip:
         lines += tip
     if options.contact:
@@ -272,15 +276,6 @@ def ring_layers(mesh: TubeMesh) -> list[int]:
     edges = [0, *mesh.faces.ravel().tolist(), len(height) - 1]
     middle = 0.5 * (height[edges[::2]] + height[edges[1::2]])
     return [int(np.argmin(np.abs(height - z))) for z in middle]
-
-
-def _ties(point: TendonPoint, node: int, axes: Sequence[int]) -> Iterator[str]:
-    """Hang a point of a tendon on the nodes of the wall."""
-    for axis in axes if point.ties else ():
-        terms = [(node, -1.0), *point.ties]
-        yield from ("*EQUATION", str(len(terms)))
-        texts = [f"{number},{axis},{weight:.12g}" for number, weight in terms]
-        yield from (",".join(texts[start : start + 4]) for start in range(0, len(texts), 4))
 
 
 def _springs(

@@ -79,7 +79,18 @@ def mjcf(model: JointModel, head: str = "", numbers: Mapping[str, float] | None 
     drums = [_drum(spring) for spring in model.springs]
     _bodies(root, model, drums)
     _tendons(root, model)
-    _equalities(root, drums)
+    equality = add(root, "equality")
+    for j, drum in enumerate(drums):
+        if drum:
+            add(
+                equality,
+                "joint",
+                joint1=f"drum_{j + 1}",
+                joint2=f"notch_{j + 1}",
+                polycoef=drum.powers,
+                solref=[4 * TIME_STEP, 1],
+                solimp=[0.999, 0.9999, 1e-3],
+            )
     _keyframes(root, model, drums)
     actuators = add(root, "actuator")
     sensors = add(root, "sensor")
@@ -201,21 +212,6 @@ def _tendons(root: ElementTree.Element, model: JointModel) -> None:
                 springlength=[-far, knot] if knot > 0.0 else [knot, far],
             )
             add(fixed, "joint", joint=f"notch_{j + 1}", coef=1)
-
-
-def _equalities(root: ElementTree.Element, drums: list[_Drum | None]) -> None:
-    equality = add(root, "equality")
-    for j, drum in enumerate(drums):
-        if drum:
-            add(
-                equality,
-                "joint",
-                joint1=f"drum_{j + 1}",
-                joint2=f"notch_{j + 1}",
-                polycoef=drum.powers,
-                solref=[4 * TIME_STEP, 1],
-                solimp=[0.999, 0.9999, 1e-3],
-            )
 
 
 def _keyframes(root: ElementTree.Element, model: JointModel, drums: list[_Drum | None]) -> None:

@@ -62,7 +62,12 @@ def simulate_measurements(
         notch_angle>
     """
     noise = dict(deviation or {})
-    _check_noise(observed, noise)
+    check_quantities((*observed, *noise))
+    for name, value in noise.items():
+        if name not in observed or not 0.0 < value < np.inf:
+            raise InputError.OUT_OF_RANGE(
+                f"the deviation of {name} must be positive and {name} be observed; got {value:g}"
+            )
     path = load_path(load, robot.number_of_tendons)
     labels = ("1",) * len(path) if pull is None else tuple(map(str, pull))
     check_labels(labels, len(path), "steps")
@@ -125,15 +130,6 @@ def modelled(
         name: np.asarray(derived[name]() if name in derived else getattr(path, name))
         for name in observed
     }
-
-
-def _check_noise(observed: Sequence[str], noise: Mapping[str, float]) -> None:
-    check_quantities((*observed, *noise))
-    for name, value in noise.items():
-        if name not in observed or not 0.0 < value < np.inf:
-            raise InputError.OUT_OF_RANGE(
-                f"the deviation of {name} must be positive and {name} be observed; got {value:g}"
-            )
 
 
 def _as_read(value: Any, name: str) -> Any:

@@ -227,7 +227,10 @@ def _numbers(label: str, robot: Robot, path: str) -> tuple[RobotNumber, ...]:
     if path in _SENSOR or not rule:
         return (RobotNumber(label, number),)
     key, end = number.rpartition(".")[2], len(read.rpartition(".")[2])
-    values = [(one[:-end] + key, value) for one, value in _apart(robot, read).items()]
+    numbers = numbers_at(robot, read)
+    if len(set(numbers.values())) == 1:  # part by part only where they are unlike
+        numbers = {read: next(iter(numbers.values()))}
+    values = [(one[:-end] + key, value) for one, value in numbers.items()]
     if rule == _OFFSET:
         return tuple(RobotNumber(label, one, value, 1.0) for one, value in values)
     if not any(value for _, value in values):
@@ -235,12 +238,6 @@ def _numbers(label: str, robot: Robot, path: str) -> tuple[RobotNumber, ...]:
             f"`{path}` multiplies `{read}`, which is 0 in {robot.name}; give it a value first"
         )
     return tuple(RobotNumber(label, one, 0.0, value) for one, value in values)
-
-
-def _apart(robot: Robot, path: str) -> dict[str, float]:
-    """The numbers that a name means, part by part where they are unlike."""
-    numbers = numbers_at(robot, path)
-    return numbers if len(set(numbers.values())) > 1 else {path: next(iter(numbers.values()))}
 
 
 def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant, each: bool) -> Unknown:

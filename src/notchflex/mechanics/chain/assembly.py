@@ -282,10 +282,9 @@ def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[np.ndarray,
     axis times the rotation of the distal body.
     """
     fibre = xp.einsum("nc,nicm,ni->nm", fibre_stretch(rods.closure), rods.basis, rods.length)
-    turn = rods.start_rotation @ rods.turn[:, -1, :, 1:]
-    edge = outer_radius * xp.linalg.norm(turn[:, :2], axis=1)
-    slope = xp.where(rods.has_closure[:, None] > 0.0, fibre, edge)
-    return slope**2 * (1.0 - rods.padding_mask)
+    turn = outer_radius * (rods.start_rotation @ rods.turn[:, -1, :, 1:])[:, :2]
+    squared = xp.where(rods.has_closure[:, None] > 0.0, fibre**2, xp.sum(turn**2, axis=1))
+    return squared * (1.0 - rods.padding_mask)
 
 
 def _contacts(groups: tuple[TendonGroup, ...], tendons: int) -> Int[Array, "t edges"]:

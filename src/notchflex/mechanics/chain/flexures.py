@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Any
 
 from notchflex._arrays import cached, xp
 from notchflex._jax import constant
@@ -28,20 +29,8 @@ def with_fibres(rod: Rod, notch: Any, tube: Tube, refinement: int = 0) -> Rod:
     return dataclasses.replace(rod, section=dataclasses.replace(section, fibres=Fibres(arm, area)))
 
 
-class FlexureOf(Protocol):
-    """Makes a flexure, and its pose in the free robot; for the arguments see `flexure`."""
-
-    def __call__(
-        self,
-        notch: Notch,
-        site: Site | None,
-        tube: Tube,
-        level: str,
-        refinement: int,
-        by_fibres: bool,
-    ) -> tuple[Rod, Motion]:
-        """Make a flexure, and its pose in the free robot."""
-        ...
+FlexureOf = Callable[..., tuple[Rod, Motion]]
+"""Makes a flexure, and its pose in the free robot; for the arguments see `flexure`."""
 
 
 @cached(512)

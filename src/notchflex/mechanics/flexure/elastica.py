@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from notchflex._arrays import xp
 from notchflex.errors import InputError
 
 
@@ -80,23 +79,23 @@ def elastica(
         follower if follower is not None else 0.5 * np.pi if clamp_angle is None else clamp_angle
     )
     name = "clamp_angle" if follower is None else "follower"
-    load, length, stiffness, angle = xp.broadcast_arrays(
+    load, length, stiffness, angle = np.broadcast_arrays(
         *(
-            xp.asarray(value, dtype=float)
+            np.asarray(value, dtype=float)
             for value in (load, length, bending_stiffness, given_angle)
         )
     )
     for word, valid, allowed in (
-        ("load", (load >= 0.0) & xp.isfinite(load), "0 or more"),
-        ("length", (length > 0.0) & xp.isfinite(length), "greater than 0"),
-        ("bending_stiffness", (stiffness > 0.0) & xp.isfinite(stiffness), "greater than 0"),
+        ("load", (load >= 0.0) & np.isfinite(load), "0 or more"),
+        ("length", (length > 0.0) & np.isfinite(length), "greater than 0"),
+        ("bending_stiffness", (stiffness > 0.0) & np.isfinite(stiffness), "greater than 0"),
         (name, (angle > 0.0) & (angle < np.pi), "between 0 and pi"),
     ):
-        if not xp.all(valid):
+        if not np.all(valid):
             raise InputError.NOT_FINITE(f"{word} must be {allowed} and finite")
     from scipy import special  # the import takes half a second; solves do not need it
 
-    scaled = length * xp.sqrt(load / stiffness)  # λ
+    scaled = length * np.sqrt(load / stiffness)  # λ
     shape = (_from_clamp_angle if follower is None else _from_end_angle)(scaled, angle)
     slope, clamp, modulus, complement, sn, cn, dn, amplitude = shape
     squared = modulus**2
@@ -107,11 +106,11 @@ def elastica(
             2.0 * (special.ellipeinc(amplitude, squared) - squared * sn * cn / dn) - scaled
         ) / scaled
         across = 2.0 * modulus * complement * sn / (dn * scaled)
-    opposite = xp.where(scaled > 0.0, opposite, xp.cos(angle))
-    across = xp.where(scaled > 0.0, across, xp.sin(angle))
-    tip_along = length * (opposite * xp.cos(clamp) + across * xp.sin(clamp))
-    tip_across = length * (across * xp.cos(clamp) - opposite * xp.sin(clamp))
-    return Elastica(slope, tip_along, tip_across, xp.arctan2(tip_across, tip_along))
+    opposite = np.where(scaled > 0.0, opposite, np.cos(angle))
+    across = np.where(scaled > 0.0, across, np.sin(angle))
+    tip_along = length * (opposite * np.cos(clamp) + across * np.sin(clamp))
+    tip_across = length * (across * np.cos(clamp) - opposite * np.sin(clamp))
+    return Elastica(slope, tip_along, tip_across, np.arctan2(tip_across, tip_along))
 
 
 class _Shape(NamedTuple):
@@ -131,11 +130,11 @@ def _from_end_angle(scaled: np.ndarray, free: np.ndarray) -> _Shape:
     """Solve for a given ω(0); also beyond a quarter period, where the beam curls."""
     from scipy.special import ellipj
 
-    modulus, complement = xp.sin(0.5 * free), xp.cos(0.5 * free)
+    modulus, complement = np.sin(0.5 * free), np.cos(0.5 * free)
     sn, cn, dn, amplitude = ellipj(scaled, modulus**2)
     # Sums of angles: sin((ω₀ - ω_L)/2) = k k' (1 - cn)/dn, its cosine (k² cn + k'²)/dn.
-    vers = xp.where(cn > 0.0, sn**2 / (1.0 + xp.abs(cn)), 1.0 - cn)
-    slope = 2.0 * xp.arctan2(modulus * complement * vers, modulus**2 * cn + complement**2)
+    vers = np.where(cn > 0.0, sn**2 / (1.0 + np.abs(cn)), 1.0 - cn)
+    slope = 2.0 * np.arctan2(modulus * complement * vers, modulus**2 * cn + complement**2)
     return _Shape(slope, free - slope, modulus, complement, sn, cn, dn, amplitude)
 
 
@@ -143,17 +142,17 @@ def _from_clamp_angle(scaled: np.ndarray, clamp: np.ndarray) -> _Shape:
     """Solve for a given ω(L)."""
     # Near ω₀ = π, k' is computed from π - ω₀ to keep its digits; `ellipj` would lose them.
     slope, rest = _slope_for(scaled, clamp)
-    modulus, complement = xp.cos(0.5 * rest), xp.sin(0.5 * rest)
+    modulus, complement = np.cos(0.5 * rest), np.sin(0.5 * rest)
     tangent = _tangent(slope, clamp, rest)
-    sn, cn = tangent / xp.hypot(1.0, tangent), 1.0 / xp.hypot(1.0, tangent)
-    dn = xp.hypot(cn, complement * sn)
-    return _Shape(slope, clamp, modulus, complement, sn, cn, dn, xp.arctan(tangent))
+    sn, cn = tangent / np.hypot(1.0, tangent), 1.0 / np.hypot(1.0, tangent)
+    dn = np.hypot(cn, complement * sn)
+    return _Shape(slope, clamp, modulus, complement, sn, cn, dn, np.arctan(tangent))
 
 
 def _tangent(slope: np.ndarray, clamp: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """Compute tan am(λ): cot γ₁ / k', with sin γ₁ = sin(ω_L/2) / k (Liu 2022, eq. 17)."""
-    below = xp.sin(0.5 * slope) * xp.sin(clamp + 0.5 * slope)  # k² - sin²(ω_L/2)
-    return xp.sqrt(below) / (xp.sin(0.5 * clamp) * xp.sin(0.5 * rest))
+    below = np.sin(0.5 * slope) * np.sin(clamp + 0.5 * slope)  # k² - sin²(ω_L/2)
+    return np.sqrt(below) / (np.sin(0.5 * clamp) * np.sin(0.5 * rest))
 
 
 def _slope_for(scaled: np.ndarray, clamp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -167,28 +166,28 @@ def _slope_for(scaled: np.ndarray, clamp: np.ndarray) -> tuple[np.ndarray, np.nd
 
     span = np.pi - clamp
     loaded = scaled > 0.0
-    log_load = xp.log(xp.where(loaded, scaled, 1.0))
+    log_load = np.log(np.where(loaded, scaled, 1.0))
 
     def excess(logit: np.ndarray, log_load: np.ndarray, clamp: np.ndarray) -> np.ndarray:
         span = np.pi - clamp
         slope, rest = span * expit(logit), span * expit(-logit)
         tangent = _tangent(slope, clamp, rest)
-        sine, cosine = tangent / xp.hypot(1.0, tangent), 1.0 / xp.hypot(1.0, tangent)
-        delta = cosine**2 + (sine * xp.sin(0.5 * rest)) ** 2  # 1 - k² sin², without cancelling
-        return xp.log(sine * elliprf(cosine**2, delta, 1.0)) - log_load
+        sine, cosine = tangent / np.hypot(1.0, tangent), 1.0 / np.hypot(1.0, tangent)
+        delta = cosine**2 + (sine * np.sin(0.5 * rest)) ** 2  # 1 - k² sin², without cancelling
+        return np.log(sine * elliprf(cosine**2, delta, 1.0)) - log_load
 
     # λ² is about twice the slope over sin ω_L for small loads and the logit about λ for large
     # ones; -80 to 80 covers every load with a slope between 1e-34 and pi - 1e-34.
-    low, high = xp.full_like(scaled, -80.0), xp.full_like(scaled, 80.0)
+    low, high = np.full_like(scaled, -80.0), np.full_like(scaled, 80.0)
     root = elementwise.find_root(
         excess, (low, high), args=(log_load, clamp), tolerances={"xatol": 1e-15, "xrtol": 1e-15}
     )
-    if not xp.all(root.success | ~loaded):
+    if not np.all(root.success | ~loaded):
         raise InputError.OUT_OF_RANGE(
             "load * length^2 / bending_stiffness must be at least 1e-30 (or 0) and below 3000"
         )
-    logit = xp.where(loaded, root.x, 0.0)
-    return xp.where(loaded, span * expit(logit), 0.0), xp.where(loaded, span * expit(-logit), span)
+    logit = np.where(loaded, root.x, 0.0)
+    return np.where(loaded, span * expit(logit), 0.0), np.where(loaded, span * expit(-logit), span)
 
 
 def modulus_from_single_notch(
@@ -229,22 +228,22 @@ def modulus_from_single_notch(
     """
     from scipy.optimize import least_squares
 
-    pull, measured = xp.asarray(force, dtype=float), xp.asarray(chord_angle, dtype=float)
+    pull, measured = np.asarray(force, dtype=float), np.asarray(chord_angle, dtype=float)
     if pull.ndim != 1 or pull.shape != measured.shape or not len(pull):
         raise InputError.WRONG_SHAPE(
             f"force and chord_angle must be lists of one length, got shapes {pull.shape} and "
             f"{measured.shape}"
         )
     bends = pull * length**2 / (3.0 * second_moment)  # of small deflections, by E times the angle
-    if not xp.all(xp.isfinite(measured)) or not bends @ measured > 0.0:
+    if not np.all(np.isfinite(measured)) or not bends @ measured > 0.0:
         raise InputError.NOT_FINITE(
             "no modulus fits: the angles must be finite, and grow with the force"
         )
 
     def misses(logarithm: np.ndarray) -> np.ndarray:
-        stiffness = xp.exp(logarithm[0]) * second_moment
+        stiffness = np.exp(logarithm[0]) * second_moment
         bent = elastica(pull, length, stiffness, clamp_angle=clamp_angle, follower=follower)
         return bent.chord_angle - measured
 
-    start = xp.log(bends @ bends / (bends @ measured))
-    return float(xp.exp(least_squares(misses, [start], xtol=1e-14, ftol=1e-14, gtol=1e-14).x[0]))
+    start = np.log(bends @ bends / (bends @ measured))
+    return float(np.exp(least_squares(misses, [start], xtol=1e-14, ftol=1e-14, gtol=1e-14).x[0]))

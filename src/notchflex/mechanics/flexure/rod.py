@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -124,18 +124,13 @@ def flattened(rods: Rod, frame: Float[np.ndarray, "3 3"]) -> Rod:
     kept |= {name: constant(getattr(rods, name)[:, :, 1:2]) for name in _TURNS}
     kept["step"] = constant(rods.step[:, :, IN_PLANE])
     kept |= {name: planar_points(own(name)) for name in _POINTS}
-    kept |= {name: planar_rotations(own(name)) for name in _ROTATIONS}
+    kept |= {name: own(name)[..., IN_PLANE, :][..., IN_PLANE] for name in _ROTATIONS}
     return dataclasses.replace(rods, **kept, turn_pair=None)
 
 
 def planar_points(points: Float[Array, "*shape 3"]) -> Float[Array, "*shape 2"]:
     """Return the components of points or forces in the plane."""
     return constant(xp.asarray(points)[..., IN_PLANE])
-
-
-def planar_rotations(rotations: Float[Array, "*shape 3 3"]) -> Float[Array, "*shape 2 2"]:
-    """Return the components of rotations in the plane."""
-    return constant(xp.asarray(rotations)[..., IN_PLANE, :][..., IN_PLANE])
 
 
 LEVELS = ("tendons", "plane", "space")
@@ -188,8 +183,7 @@ def stack(rods: Sequence[Rod]) -> Rod:
         if not decide(xp.any(xp.stack([xp.any(getattr(rod, name)) for rod in filled])))
     }
     used = [dataclasses.replace(rod, **unused) if unused else rod for rod in filled]
-    together: Rod = jax.tree.map(lambda *leaves: _stacked(xp.stack(leaves)), *used)
-    return together
+    return jax.tree.map(lambda *leaves: xp.stack(leaves), *used)
 
 
 def _with_ends(rod: Rod) -> Rod:
@@ -198,11 +192,6 @@ def _with_ends(rod: Rod) -> Rod:
         return rod
     ends = NotchEnds.rigid(rod.section.area)
     return dataclasses.replace(rod, section=dataclasses.replace(rod.section, ends=ends))
-
-
-def _stacked(values: np.ndarray) -> Array:
-    """Convert to floats, except integers, which are indices."""
-    return cast("Array", values) if values.dtype.kind == "i" else constant(values)
 
 
 def _filled(rod: Rod, modes: int, nodes: int, poses: int, levels: tuple[int, ...]) -> Rod:

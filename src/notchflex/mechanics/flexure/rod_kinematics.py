@@ -263,7 +263,7 @@ def _rule(count: int) -> tuple[Float[np.ndarray, " nodes"], Float[np.ndarray, " 
 
 
 def gauss_nodes(
-    ends: Sequence[float], per_interval: int | Sequence[int] = 3
+    ends: Sequence[float] | Float[np.ndarray, " k"], per_interval: int | Sequence[int] = 3
 ) -> tuple[Float[np.ndarray, " nodes"], Float[np.ndarray, " nodes"]]:
     """Return Gauss's nodes and weights in every interval between neighbouring numbers.
 

@@ -18,10 +18,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from notchflex._arrays import plain_number, xp
 from notchflex._jax import constant
@@ -90,41 +89,41 @@ class CurvedEnd:
         """Angle alpha between the strip and the cut where S1 begins, rad (Gao 2017, eq. 10)."""
         return plain_number(xp.arctan2(self.slot_radius + self.strip_thickness, self.outer_length))
 
-    def inner_edge(self, t: ArrayLike) -> np.ndarray:
+    def inner_edge(self, t: Any) -> np.ndarray:
         """Compute the points M on the slot's round end: (..., 2), (y, z) in mm."""
         turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
         return self.slot_radius * xp.stack([-xp.cos(turn), xp.sin(turn)], axis=-1)
 
-    def outer_edge(self, t: ArrayLike) -> np.ndarray:
+    def outer_edge(self, t: Any) -> np.ndarray:
         """Compute the points N on the other edge of the material, that of the next slot."""
         t = xp.asarray(t, dtype=float)
         along = -(self.outer_length + self.slot_radius) * (1.0 - t)
         return xp.stack([along, xp.full_like(t, self.slot_radius + self.strip_thickness)], axis=-1)
 
-    def middle(self, t: ArrayLike) -> np.ndarray:
+    def middle(self, t: Any) -> np.ndarray:
         """Compute the points C of the middle line."""
         return 0.5 * (self.inner_edge(t) + self.outer_edge(t))
 
-    def thickness(self, t: ArrayLike) -> np.ndarray:
+    def thickness(self, t: Any) -> np.ndarray:
         """Compute the thickness |N - M| of the material, mm."""
         return xp.linalg.norm(self.outer_edge(t) - self.inner_edge(t), axis=-1)
 
-    def _first_derivative(self, t: ArrayLike) -> np.ndarray:
+    def _first_derivative(self, t: Any) -> np.ndarray:
         turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
         inner = 0.5 * np.pi * self.slot_radius * xp.stack([xp.sin(turn), xp.cos(turn)], axis=-1)
         return 0.5 * (inner + xp.array([self.outer_length + self.slot_radius, 0.0]))
 
-    def _second_derivative(self, t: ArrayLike) -> np.ndarray:
+    def _second_derivative(self, t: Any) -> np.ndarray:
         turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
         inward = xp.stack([xp.cos(turn), -xp.sin(turn)], axis=-1)
         return 0.5 * (0.5 * np.pi) ** 2 * self.slot_radius * inward
 
-    def heading(self, t: ArrayLike) -> np.ndarray:
+    def heading(self, t: Any) -> np.ndarray:
         """Compute the direction of the middle line: from pi/2 - alpha at 0 to 0 at 1."""
         first = self._first_derivative(t)
         return xp.arctan2(first[..., 1], first[..., 0])
 
-    def curvature(self, t: ArrayLike) -> np.ndarray:
+    def curvature(self, t: Any) -> np.ndarray:
         """Compute the signed curvature, negative, 1/mm.
 
         |C' x C''| / |C'|³: Gao's eq. 8 leaves out the denominator, but C has not unit speed.
@@ -133,7 +132,7 @@ class CurvedEnd:
         cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
         return cross / xp.linalg.norm(first, axis=-1) ** 3
 
-    def length(self, t: ArrayLike = 1.0) -> np.ndarray:
+    def length(self, t: Any = 1.0) -> np.ndarray:
         """Compute the length of the middle line from 0 to t, mm (Gao 2017, eq. 9 for t = 1)."""
         t = xp.asarray(t, dtype=float)
         return 0.5 * t * (self._speed(0.5 * t[..., None] * (1.0 + _NODES)) @ _WEIGHTS)
@@ -143,7 +142,7 @@ class CurvedEnd:
         inner, outer = 0.5 * np.pi * self.slot_radius, self.outer_length + self.slot_radius
         return 0.5 * xp.sqrt(inner**2 + outer**2 + 2.0 * inner * outer * xp.sin(0.5 * np.pi * t))
 
-    def at_length(self, length: ArrayLike) -> np.ndarray:
+    def at_length(self, length: Any) -> np.ndarray:
         """Find the parameter t where the middle line has a given length from its beginning."""
         target = xp.asarray(length, dtype=float)
         t = target / self.length()
@@ -203,7 +202,7 @@ class Link:
         """Length of the middle line, mm."""
         return 2.0 * plain_number(self.end.length()) + self.strip_length
 
-    def course(self, part: ArrayLike) -> Course:
+    def course(self, part: Any) -> Course:
         """Evaluate the middle line at parts of it: 0 to 1 on S1, to 2 on S2 and to 3 on S3."""
         place, end = np.asarray(part, dtype=float), self.end
         curved, half = (place < 1.0) | (place > 2.0), np.where(place <= 1.5, 1.0, -1.0)

@@ -87,7 +87,7 @@ def segment_fibres(outer: float, inner: float, depth: float) -> Points:
 _FIBRES_OF_CUT = {"on-axis": sector_fibres, "off-axis": segment_fibres}
 
 
-def _between(first: float, last: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _between(first: float, last: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
     points, weights = leggauss(count)
     return 0.5 * (first + last) + 0.5 * (last - first) * points, 0.5 * (last - first) * weights
 

@@ -34,10 +34,10 @@ class Passage(NamedTuple):
     visits: Float[np.ndarray, " n"]
     on_side: Float[np.ndarray, " n"]
     back: Int[np.ndarray, " n"]
-    left: Float[np.ndarray, " n"]
-    enters: Float[np.ndarray, " n"]
-    leaves: Float[np.ndarray, " n"]
-    base_leaves: Float[np.ndarray, ""]
+    left: Float[Array, " n"]
+    enters: Float[Array, " n"]
+    leaves: Float[Array, " n"]
+    base_leaves: Float[Array, ""]
 
 
 def passage(

@@ -54,7 +54,7 @@ class RoutedTendons(NamedTuple):
 
     groups: tuple[TendonGroup, ...]
     place: Float[Array, "t 3"]
-    base_length: Float[np.ndarray, " t"]
+    base_length: Float[Array, " t"]
 
 
 def route(tendons: Sequence[Tendon], ground: RoutingContext) -> RoutedTendons:
@@ -75,11 +75,12 @@ def route(tendons: Sequence[Tendon], ground: RoutingContext) -> RoutedTendons:
         numbers = tuple(i for i, tendon in enumerate(tendons) if tendon.path == path)
         if numbers:
             chosen = [tendons[i] for i in numbers]
-            own = Passage(*(values[..., np.array(numbers)] for values in line))
+            some: Any = (values[..., np.array(numbers)] for values in line)
+            own = Passage(*some)
             masks = _masks(numbers, chosen, own)
             lay = _wall_arc if path == "wall-arc" else _straight
             groups.append(lay(masks, chosen, own, ground, path))
-    return RoutedTendons(tuple(groups), _on_tube(tendons), xp.asarray(line.base_leaves))
+    return RoutedTendons(tuple(groups), _on_tube(tendons), constant(line.base_leaves))
 
 
 def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -> dict[str, Any]:
@@ -149,29 +150,19 @@ def _straight(
     place = xp.asarray(_on_tube(tendons))
     entry = place + line.enters[..., None] * along
     leave = place + line.leaves[..., None] * along
-    base = place + xp.asarray(line.base_leaves)[:, None] * along
+    # Every straight span in the free robot; 0 where a tendon passes by.
+    point, gaps = place + xp.asarray(line.base_leaves)[:, None] * along, list[Any]()
+    spans = zip(masks["visits"], entry, leave, *ground.free, strict=True)
+    for visits, enters, leaves, rotation, translation in spans:
+        point = (point - translation) @ rotation
+        gaps.append(visits * xp.linalg.norm(enters - point, axis=-1))
+        point = xp.where(visits[:, None] > 0.0, leaves, point)
     return Straight(
         **masks,
-        natural_gap=_free_gaps(masks["visits"], entry, leave, base, ground.free),
+        natural_gap=constant(xp.stack(gaps)),
         leaves=constant(place + line.left[..., None] * along),
         enters=constant(entry),
         along=constant(xp.broadcast_to(along, entry.shape)),
         pulls=_PULLS[path],
         turns_with_chord=ground.turns_with_chord,
     )
-
-
-def _free_gaps(
-    visits: Float[np.ndarray, "n t"],
-    entry: Float[np.ndarray, "n t 3"],
-    leave: Float[np.ndarray, "n t 3"],
-    base: Float[np.ndarray, "t 3"],
-    free: Motion,
-) -> Float[Array, "n t"]:
-    """Length of every straight span in the free robot, mm; 0 where a tendon passes by."""
-    point, gaps = base, list[Any]()
-    for j in range(len(visits)):
-        point = (point - free.translation[j]) @ free.rotation[j]
-        gaps.append(visits[j] * xp.linalg.norm(entry[j] - point, axis=-1))
-        point = xp.where(visits[j][:, None] > 0.0, leave[j], point)
-    return constant(xp.stack(gaps))

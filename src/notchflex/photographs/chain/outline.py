@@ -122,15 +122,13 @@ class OutlineModel:
 
     def _oriented(self, projected: Numbers, normal: Numbers, view: View) -> tuple[Numbers, ...]:
         """Turn normals outward; find the room outside and the breadth inside of each point."""
-        inward = projected[self.across] - projected
-        breadth = np.abs((inward * normal).sum(axis=1))
-        outward = -np.sign((inward * normal).sum(axis=1))
+        inward = ((projected[self.across] - projected) * normal).sum(axis=1)
+        outward = -np.sign(inward)
         normal = normal * np.where(outward == 0.0, 1.0, outward)[:, None]
         room = np.full(len(projected), np.inf)
         has = self.facing >= 0
-        gap = ((projected[self.facing[has]] - projected[has]) * normal[has]).sum(axis=1)
-        room[has] = gap
-        return normal, room, breadth
+        room[has] = ((projected[self.facing[has]] - projected[has]) * normal[has]).sum(axis=1)
+        return normal, room, np.abs(inward)
 
     def _other(self, index: _Index) -> NDArray[np.int_]:
         """Return the point across the robot of each point."""

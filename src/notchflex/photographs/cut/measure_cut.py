@@ -198,12 +198,15 @@ def fit_straight(
         reason = _BENT
     judged = (reason, noise, factor * fine)
     photograph = judged_photograph(name, result, both[angles, angles], judged, middle)
-    rows, slopes = _lengths(n, len(numbers)), _edge_slopes(table, fit.numbers)
+    rows, edges = _lengths(n, len(numbers)), _edges(table, fit.numbers)
+    steps = _STEP * np.eye(len(numbers))
+    shifts = [_edges(table, fit.numbers + step) - edges for step in steps]
+    slopes = np.stack(shifts, axis=1) / _STEP
     return StraightFit(
         photograph,
         rows @ fit.numbers,
         rows @ both @ rows.T,
-        _edges(table, fit.numbers),
+        edges,
         slopes @ both @ slopes.T,
     )
 
@@ -261,12 +264,6 @@ def seen_edges(table: ChainTable, cut: Numbers, roll: float) -> Numbers:
     """
     x, y = np.full(len(cut), abs(math.cos(roll))), np.full(len(cut), abs(math.sin(roll)))
     return spine_edge(table, np.arange(table.notches), cut, x, y)
-
-
-def _edge_slopes(table: ChainTable, numbers: Numbers) -> Numbers:
-    steps = _STEP * np.eye(len(numbers))
-    edges = _edges(table, numbers)
-    return np.stack([_edges(table, numbers + step) - edges for step in steps], axis=1) / _STEP
 
 
 _ROLL = math.radians(10.0)  # usual roll of a robot that was laid down with care

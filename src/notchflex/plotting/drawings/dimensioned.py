@@ -339,24 +339,18 @@ def _side_view(axes: Axes, row: NotchRow, axis: float) -> None:
     if view.held:  # hatched, as what is fixed
         for y in np.arange(axis - outer, axis + outer, 0.12):
             draw.line(axes, [LEFT - 0.1, LEFT], [y, y + 0.1], color=draw.INK)
-    _tendons(axes, row, axis, right)
+    for tendon in robot.tendon:
+        turn = math.radians(tendon.direction_deg - row.notch.direction_deg)
+        y = axis + scale * tendon.radius * math.cos(turn)
+        draw.line(axes, [LEFT - 0.16, right + 0.06], [y, y], color=VERMILLION, lw=1.1, zorder=6)
+    foot = axis - outer - 0.47  # the direction of the tip
+    draw.arrow(axes, (LEFT, foot), (LEFT + 0.5, foot), color=draw.INK, lw=1.0)
+    draw.label(axes, LEFT + 0.56, foot, "z, toward the tip", ha="left")
+    draw.line(axes, [LEFT + 1.8, LEFT + 2.1], [foot] * 2, color=VERMILLION, lw=1.1)
+    draw.label(axes, LEFT + 2.16, foot, "tendon", ha="left")
     section = LEFT + scale * view.section_at
     foot = axis - outer - 0.2
     draw.centre_line(axes, [section] * 2, [axis + outer + 0.06, foot])
     draw.line(axes, [section] * 2, [axis - outer - 0.05, foot], color=draw.INK, lw=1.4)
     draw.arrow(axes, (section + 0.24, foot), (section, foot), color=draw.INK)
     draw.label(axes, section + 0.32, foot, "A", fontweight="bold")
-
-
-def _tendons(axes: Axes, row: NotchRow, axis: float, right: float) -> None:
-    """Draw the tendons in the side view, and the direction of the tip."""
-    robot, scale = row.robot, row.scale
-    for tendon in robot.tendon:
-        turn = math.radians(tendon.direction_deg - row.notch.direction_deg)
-        y = axis + scale * tendon.radius * math.cos(turn)
-        draw.line(axes, [LEFT - 0.16, right + 0.06], [y, y], color=VERMILLION, lw=1.1, zorder=6)
-    foot = axis - scale * robot.tube.outer_radius - 0.47
-    draw.arrow(axes, (LEFT, foot), (LEFT + 0.5, foot), color=draw.INK, lw=1.0)
-    draw.label(axes, LEFT + 0.56, foot, "z, toward the tip", ha="left")
-    draw.line(axes, [LEFT + 1.8, LEFT + 2.1], [foot] * 2, color=VERMILLION, lw=1.1)
-    draw.label(axes, LEFT + 2.16, foot, "tendon", ha="left")

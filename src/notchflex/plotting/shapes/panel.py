@@ -59,10 +59,6 @@ def applied_loads(path: EquilibriumPath, step: int, shape: RobotShape) -> list[A
 
     Gravity on the robot's own mass is distributed and not included.
     """
-    return [one for one in _every(path, step, shape) if one.size > 0.0]
-
-
-def _every(path: EquilibriumPath, step: int, shape: RobotShape) -> Iterator[AppliedLoad]:
     load = path.load.external[step]
     world = path.body_rotation[step, 0]
 
@@ -72,15 +68,20 @@ def _every(path: EquilibriumPath, step: int, shape: RobotShape) -> Iterator[Appl
 
     kind = FOLLOWING if load.following else DEAD
     point = shape.on_body(-1, np.array([0.0, 0.0, shape.body_length[-1]]) + load.tip_point)
-    yield AppliedLoad("force", kind, point, carried(load.tip_force, -1, load.following))
-    yield AppliedLoad("moment", kind, shape.tip, carried(load.tip_moment, -1, load.following))
     weight = np.asarray(load.weight(load.tip_mass), float)
-    yield AppliedLoad("force", WEIGHT, point, weight @ world)
+    loads = [
+        AppliedLoad("force", kind, point, carried(load.tip_force, -1, load.following)),
+        AppliedLoad("moment", kind, shape.tip, carried(load.tip_moment, -1, load.following)),
+        AppliedLoad("force", WEIGHT, point, weight @ world),
+    ]
     for one in load.body_forces:
         kind = FOLLOWING if one.following else DEAD
         point = shape.on_body(one.body, one.point)
-        yield AppliedLoad("force", kind, point, carried(one.force, one.body, one.following))
-        yield AppliedLoad("moment", kind, point, carried(one.moment, one.body, one.following))
+        loads += [
+            AppliedLoad("force", kind, point, carried(one.force, one.body, one.following)),
+            AppliedLoad("moment", kind, point, carried(one.moment, one.body, one.following)),
+        ]
+    return [one for one in loads if one.size > 0.0]
 
 
 def out_of_plane(path: EquilibriumPath, step: int, shape: RobotShape, view: float) -> float:
@@ -208,11 +209,6 @@ def load_label(path: EquilibriumPath, step: int) -> str:
     return f"{', '.join(numbers)} {unit}, {angle:.1f}°"
 
 
-def scaled_arrow(one: AppliedLoad, largest: float, longest: float) -> NDArray[np.float64]:
-    """Return the arrow of a load [mm]: `longest` for the largest load, never too short to see."""
-    return longest * max(one.size / largest, SHORTEST) * one.vector / one.size
-
-
 def _from_the_side(
     shape: RobotShape, view: float, colour: Colour, label: str, order: int
 ) -> Iterator[Mark]:
@@ -251,7 +247,8 @@ def _load_arrows(
     for one in loads:
         style: dict[str, Any] = {"layer": layer, "name": "" if one.label in named else one.label}
         named.add(one.label)
-        end = one.point + scaled_arrow(one, largest[one.name], longest)
+        size = longest * max(one.size / largest[one.name], SHORTEST)  # never too short to see
+        end = one.point + size * one.vector / one.size
         if view is None:
             if one.name == "moment" and style["name"]:
                 style["name"] += ", about its arrow"

@@ -99,7 +99,7 @@ def tendon_work(path: EquilibriumPath) -> np.ndarray:
           "counts as not converged.")  # fmt: skip
 def converged(path: EquilibriumPath) -> np.ndarray:
     """True where the equilibrium was found."""
-    return np.asarray(path.run.converged) & believable(path.solver_quantity)
+    return path.run.converged & believable(path.solver_quantity)
 
 
 @Quantity("path", "reason", key="reason", column="reason", kind=str)
@@ -142,20 +142,20 @@ def determinant_sign(path: EquilibriumPath) -> np.ndarray:
           "between, and none is counted.")  # fmt: skip
 def snap(path: EquilibriumPath) -> np.ndarray:
     """1 where a notch passed a limit point under tension and snapped shut, -1 open; 0 elsewhere."""
-    under_tension = np.isnan(path.load.stroke).all(axis=1) & np.asarray(path.run.converged)
+    under_tension = np.isnan(path.load.stroke).all(axis=1) & path.run.converged
     return np.where(under_tension[:, None], path.run.snapped, 0.0).astype(int)
 
 
 @Quantity("path", "residual", "r", key="residual", column="residual")
 def residual(path: EquilibriumPath) -> np.ndarray:
     """Largest scaled residual of the equations at the end of the iteration."""
-    return np.asarray(path.run.residual)
+    return path.run.residual
 
 
 @Quantity("path", "iterations", key="iterations", column="iterations", kind=int)
 def iterations(path: EquilibriumPath) -> np.ndarray:
     """Number of Newton iterations."""
-    return np.asarray(path.run.iterations)
+    return path.run.iterations
 
 
 def _accumulated(path: EquilibriumPath, force: str, length: str) -> np.ndarray:

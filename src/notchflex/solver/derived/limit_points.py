@@ -12,8 +12,8 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jax, jnp
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.element import Iterate, Unknowns
-from notchflex.solver.residual import Evaluation, evaluate
+from notchflex.solver.element import Iterate
+from notchflex.solver.residual import evaluate
 from notchflex.solver.solver_state import SolverState
 
 # Number of shapes between the two, and the smallest relative fall of the holding tension.
@@ -43,6 +43,7 @@ def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Fl
     unknowns = after.point.unknowns._replace(contact_force=free)
 
     slid = jax.tree.map(jnp.subtract, after.memory.slid, before.memory.slid)
+    offset = chain.friction.offset()
 
     def balance_at(part: Array) -> tuple[Array, Array, Array]:
         """Compute resistance, drive and 1 where the edges are apart, at a fraction of the way."""
@@ -50,7 +51,18 @@ def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Fl
         at = evaluate(chain, point, before.memory, after.applied)
         resistance = jnp.sum(at.flexure.internal * change, axis=-1)
         missing = jnp.sum(at.residual.modes * chain.stiffness * change, axis=-1)
-        drive = _own_friction(at, unknowns, slid, chain.friction.offset()) * (resistance - missing)
+        # With the friction of a notch's own edge, relative to the end: a contact slides all the way
+        # in the direction of its total slip, so its log ratio is its bound. Several tendons are
+        # weighted with their tensions.
+        left, all_tension = jnp.zeros(()), jnp.zeros(())
+        for span, last, slip in zip(at.spans, unknowns.log_ratio, slid, strict=True):
+            log_ratio = jnp.sign(slip[..., 0]) * span.bound[..., 0]
+            raised = (span.gap_tension + offset) * jnp.exp(last[..., 0] - log_ratio)
+            left = left + jnp.sum(jnp.where(span.gap_tension > 0.0, raised - offset, 0.0), axis=-1)
+            all_tension = all_tension + jnp.sum(span.gap_tension, axis=-1)
+        tight = all_tension > 0.0
+        own_edge = jnp.where(tight, left / jnp.where(tight, all_tension, 1.0), 1.0)
+        drive = own_edge * (resistance - missing)
         apart = jnp.ones(chain.flexures)
         for group, response in zip(chain.contact_pairs, at.contacts, strict=True):
             touches = (response.gap <= 0.0) & (group.has_contact > 0.0)
@@ -72,23 +84,3 @@ def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Fl
     size = jnp.max(jnp.where(counts, jnp.abs(holding_tension), 0.0), axis=0)
     falls = jnp.any(counts & (so_far - rising > _MIN_FALL * size[None]), axis=0)
     return jnp.where(falls, jnp.where(closes, 1.0, -1.0), 0.0)
-
-
-def _own_friction(
-    at: Evaluation,
-    unknowns: Unknowns,
-    slid: tuple[Float[Array, "n t 2"], ...],
-    offset: Float[Array, ""] | float,
-) -> Float[Array, " n"]:
-    """Compute the drive of each notch with the friction of its own edge, relative to the end.
-
-    A contact slides all the way in the direction of its total slip, so its log ratio is its bound.
-    Several tendons are weighted with their tensions.
-    """
-    left, all_tension = jnp.zeros(()), jnp.zeros(())
-    for span, last, slip in zip(at.spans, unknowns.log_ratio, slid, strict=True):
-        log_ratio = jnp.sign(slip[..., 0]) * span.bound[..., 0]
-        raised = (span.gap_tension + offset) * jnp.exp(last[..., 0] - log_ratio)
-        left = left + jnp.sum(jnp.where(span.gap_tension > 0.0, raised - offset, 0.0), axis=-1)
-        all_tension = all_tension + jnp.sum(span.gap_tension, axis=-1)
-    return jnp.where(all_tension > 0.0, left / jnp.where(all_tension > 0.0, all_tension, 1.0), 1.0)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array
 
-from notchflex._jax import array_module, jax, jnp
+from notchflex._arrays import xp
+from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED, Quantity
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import in_space, rotation_error_estimate
@@ -147,7 +148,6 @@ def tip_axis_angle(state: SolvedState) -> Array:
     """
     axes = state.quantity("body_rotation")[..., :, 2]
     base, tip = axes[..., 0, :], axes[..., -1, :]
-    xp = array_module(base)
     between = xp.linalg.norm(tip - base, axis=-1), xp.linalg.norm(tip + base, axis=-1)
     return 2.0 * xp.arctan2(*between)
 

@@ -64,6 +64,11 @@ def warn_of_xla(function: str, error: UnsupportedPrimitiveError, stacklevel: int
     )
 
 
+def runs_uncompiled() -> bool:
+    """Return whether JAX is asked to run functions without compiling them."""
+    return getattr(jax.config, "jax_disable_jit")  # noqa: B009
+
+
 # Batch sizes of XLA's programs; larger batches are split, smaller ones padded.
 _BATCH_SIZES = (64, 256, 1024)
 # Largest number of programs in memory; the least recently used is dropped.
@@ -88,9 +93,7 @@ class CompiledFunction:
 
     def __call__(self, vectors: Sequence[np.ndarray]) -> Any:
         """Call the program; return NumPy arrays."""
-        flat = self._program(vectors)
-        rows = () if self._program.by_row is None else flat[0].shape[:1]
-        return _rebuild(self._structure, iter(flat), rows)
+        return _rebuild(self._structure, iter(self._program(vectors)))
 
 
 def _content(head: Sequence[Any], body: bytes) -> bytes:
@@ -115,15 +118,17 @@ def _structure(tree: Any) -> Any:
     return ["array", list(tree.shape), np.dtype(tree.dtype).str]
 
 
-def _rebuild(structure: Any, flat: Iterator[np.ndarray], rows: tuple[int, ...]) -> Any:
-    """Rebuild the tree of a structure from its arrays in order."""
+def _rebuild(structure: Any, flat: Iterator[np.ndarray]) -> Any:
+    """Rebuild the tree of a structure from its flat arrays in order; they may have rows."""
     if isinstance(structure, dict):
-        return {name: _rebuild(one, flat, rows) for name, one in structure.items()}
+        return {name: _rebuild(part, flat) for name, part in structure.items()}
     if structure[0] == "tuple":
-        return tuple(_rebuild(one, flat, rows) for one in structure[1:])
+        return tuple(_rebuild(part, flat) for part in structure[1:])
     _, shape, kind = structure
-    one = next(flat)
-    return (one if kind == "<f8" else one.astype(kind)).reshape(*rows, *shape)
+    values = next(flat)
+    if len(shape) != 1:
+        values = values.reshape(*values.shape[:-1], *shape)
+    return values if kind == "<f8" else values.astype(kind)
 
 
 class Native:
@@ -153,7 +158,7 @@ class Native:
 
     def __call__(self, *arguments: Any) -> Any:
         """Evaluate the function of single vectors."""
-        return self._run("once", None, arguments)
+        return self.bound("once", None, arguments)(arguments[: self._vectors])
 
     def along(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
         """Evaluate the function row after row, with a vector carried from row to row.
@@ -166,7 +171,7 @@ class Native:
         Returns:
             The results, steps as leading axis of all.
         """
-        return self._run("along", by_row, arguments)
+        return self.bound("along", by_row, arguments)(arguments[: self._vectors])
 
     def rows(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
         """Evaluate the function of every row of a batch.
@@ -180,9 +185,9 @@ class Native:
         """
         on_cpu = jax.default_backend() == "cpu"
         program = self._program("rows", by_row, arguments) if on_cpu else None
-        if program is not None:
-            return program(arguments[: self._vectors])
         tables = arguments[: self._vectors]
+        if program is not None:
+            return program(tables)
         count = max(len(one) for one, rows in zip(tables, by_row, strict=True) if rows)
         piece = next((size for size in _BATCH_SIZES if size >= count), _BATCH_SIZES[-1])
         results: list[Any] = []
@@ -192,21 +197,25 @@ class Native:
             results.append(self._by_xla("rows", by_row, (*some, *arguments[self._vectors :])))
         return jax.tree.map(lambda *leaves: np.concatenate(leaves)[:count], *results)
 
-    def count(self) -> int:
-        """Return the number of programs of this function in memory."""
-        return sum(key[0] is self for key in Native.programs)
+    def bound(
+        self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]
+    ) -> Callable[[Sequence[Any]], Any]:
+        """Return the program for arguments, as a function of vectors of the same sizes.
 
-    def _run(self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]) -> Any:
+        Args:
+            how: "once", "along" or "rows", as the methods are called.
+            by_row: Which of the vectors are tables; None without tables.
+            arguments: As the function takes them.
+        """
         program = self._program(how, by_row, arguments)
-        if program is None:
-            return self._by_xla(how, by_row, arguments)
-        return program(arguments[: self._vectors])
+        others = arguments[self._vectors :]
+        return program or (lambda vectors: self._by_xla(how, by_row, (*vectors, *others)))
 
     def _program(
         self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]
     ) -> CompiledFunction | None:
         """Return the program for these arguments; None where XLA must compile it."""
-        if getattr(jax.config, "jax_disable_jit"):  # noqa: B009
+        if runs_uncompiled():
             return None
         vectors, others = arguments[: self._vectors], arguments[self._vectors :]
         per_row = by_row or (False,) * len(vectors)
@@ -259,7 +268,7 @@ class Native:
         others: tuple[Any, ...],
     ) -> bytes | None:
         """Trace the program to text; None where XLA must compile it."""
-        function, zeros = partial(self._with, others), [np.zeros(shape) for shape in shapes]
+        function, zeros = self._of_vectors(others), [np.zeros(shape) for shape in shapes]
         try:
             program, tree = lower(
                 function, zeros, self._lanes(*others), by_row, carries=how == "along"
@@ -276,19 +285,19 @@ class Native:
         shipped.record(key, content)
         return content
 
-    def _with(self, others: tuple[Any, ...], *vectors: Any) -> Any:
-        return self._function(*vectors, *others)
+    def _of_vectors(self, others: tuple[Any, ...]) -> Callable[..., Any]:
+        return lambda *vectors: self._function(*vectors, *others)
 
     def _by_xla(self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]) -> Any:
         """Evaluate the function by a program of XLA."""
         others = arguments[self._vectors :]
         key = (how, by_row, others)
         if key not in self._jitted:
-            function = partial(self._with, others)
-            if by_row is not None and how == "along":
-                function = partial(_scan, function, by_row)
-            elif by_row is not None:
-                function = jax.vmap(function, in_axes=[0 if rows else None for rows in by_row])
+            function = self._of_vectors(others)
+            if by_row is not None:
+                along = partial(_scan, function, by_row)
+                axes = [0 if rows else None for rows in by_row]
+                function = along if how == "along" else jax.vmap(function, in_axes=axes)
             self._jitted[key] = jit(function)
         vectors = map(jnp.asarray, arguments[: self._vectors])
         return jax.tree.map(np.asarray, self._jitted[key](*vectors))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex._jax import constant, jax
+from lanewise import FixedVector
+from notchflex._jax import jax
 from notchflex.loads.command import Command
 from notchflex.loads.plausibility import usual_loads
 from notchflex.mechanics.chain import Chain, assemble, padded
@@ -118,9 +119,19 @@ class PreparedChain:
         return np.asarray(self.state.pack(self.rest))
 
     @cached_property
-    def rest_carried(self) -> np.ndarray:
+    def rest_carried(self) -> FixedVector:
         """The free robot as a vector, with the flag that no load has failed: start of a path."""
-        return np.append(self.rest_vector, 1.0)
+        return FixedVector(np.append(self.rest_vector, 1.0))
+
+    @cached_property
+    def fixed_vector(self) -> FixedVector:
+        """The dynamic vector, for programs that are called many times."""
+        return FixedVector(self.dynamic_vector)
+
+    @cached_property
+    def programs(self) -> dict[Any, Callable[[Sequence[Any]], np.ndarray]]:
+        """The programs that solve loads of this robot, by what they are compiled for."""
+        return {}
 
     @cached_property
     def shape(self) -> PytreeLayout:
@@ -134,30 +145,28 @@ class PreparedChain:
 
     def command_layout(self, commands: Command) -> PytreeLayout:
         """Return the layout of one load: tensions alone, or some strokes."""
-        return self._stroke_layout if commands.by_stroke is not None else self._tension_layout
+        return self._command_layouts[commands.by_stroke is not None]
 
     @cached_property
-    def _tension_layout(self) -> PytreeLayout:
-        target = constant(np.zeros(self.chain.tendons))
-        return PytreeLayout.of(Command(target, None, unloaded(self.chain)))
-
-    @cached_property
-    def _stroke_layout(self) -> PytreeLayout:
-        target, by_stroke = (np.zeros(self.chain.tendons, kind) for kind in (float, bool))
-        return PytreeLayout.of(Command(target, by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
+    def _command_layouts(self) -> dict[bool, PytreeLayout]:
+        target: Any = np.zeros(self.chain.tendons)
+        return {
+            by_stroke is not None: PytreeLayout.of(Command(target, by_stroke, unloaded(self.chain)))
+            for by_stroke in (None, target > 0.0)
+        }
 
     def padded_commands(
         self, commands: Command
     ) -> tuple[Float[np.ndarray, "s command"], PytreeLayout]:
         """Return s loads packed for the padded chain, and the layout of one of them."""
         own, long = self.command_layout(commands), self.long.command_layout(commands)
-        return pad_rows(own.pack(commands, leading=1), own, long), long
+        return pad_rows(commands.packed(), own, long), long
 
 
 # Cached properties that robots of one shape share.
 _OF_SHAPE = (
     *("chain_layout", "rest", "rest_vector", "rest_carried", "state", "shape"),
-    *("_tension_layout", "_stroke_layout"),
+    "_command_layouts",
 )
 
 
@@ -171,7 +180,6 @@ def flat(tree: Any) -> np.ndarray:
 def prepare(
     robot: Robot,
     level: str = "tendons",
-    *,
     loaded: bool = False,
     follows: bool = True,
     refinement: int = 0,

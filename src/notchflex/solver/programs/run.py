@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from lanewise import FixedVector
 from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
@@ -23,7 +24,7 @@ from notchflex.solver.derived.quantities import Shape, quantities, shape, unpad_
 from notchflex.solver.derived.solved_state import notch_contact
 from notchflex.solver.held_stiffness import stability, stable
 from notchflex.solver.newton import Settings
-from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.compiled import native, runs_uncompiled
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,
@@ -131,22 +132,23 @@ class SolverRun:
         """Return a quantity of each state, by its name in the registry."""
         if name not in Shape._fields:
             return self._derived[name][1:]
-        long = self._prepared.long
-        packed = self.table[:, 2 * long.state.size : -_STATUS]
-        values = long.shape.leaf(packed, Shape._fields.index(name))
-        return unpad_quantity(self._prepared.chain, name, values)
+        own, long, number = self._prepared.shape, self._prepared.long, Shape._fields.index(name)
+        # Flexures that only fill the chain up come last in every quantity.
+        shift = 2 * long.state.size + long.shape.ends[number] - own.ends[number]
+        return own.leaf(self.table[:, shift:], number)
 
     def before(self, name: str) -> np.ndarray:
         """Return a quantity of the state before the first load.
 
         Of the reported shape only tension and stroke exist; "material" is the material's memory.
         """
-        if name not in ("tension", "stroke", "material"):
-            return self._derived[name][0]
         start: SolverState = self._prepared.state.unpack(self.first)
-        if name == "material":
-            return np.asarray(start.memory.material)
-        return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
+        known = {
+            "tension": start.point.base_tension,
+            "stroke": start.stroke,
+            "material": start.memory.material,
+        }
+        return np.asarray(known[name]) if name in known else self._derived[name][0]
 
     @cached_property
     def snapped(self) -> Float[np.ndarray, "s n"]:
@@ -158,8 +160,8 @@ class SolverRun:
             pad_rows(rows, own.state, long.state) for rows in (self.states_before, self.states)
         )
         vectors = (np.zeros(1), long.dynamic_vector, *pairs)
-        by_row = (False, False, True, True)
-        notches = _snapped.along(by_row, *vectors, long.static_structure, long.state)
+        layouts = long.static_structure, long.state
+        notches = _snapped.along((False, False, True, True), *vectors, *layouts)
         return notches[:, : own.chain.flexures]
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
@@ -192,24 +194,31 @@ def run(
         One entry per load.
     """
     long = prepared.long
-    packed, form = prepared.padded_commands(commands)
+    loads, layout = prepared.padded_commands(commands)
     first, start_row, carried = prepared.rest_vector, long.rest_vector, long.rest_carried
     if start is not None:
         first = np.asarray(prepared.state.pack(start))
         start_row = pad_rows(first, prepared.state, long.state)
         carried = np.append(start_row, 1.0)
-    from_start = np.empty((len(packed), 1))
+    from_start = np.zeros((len(loads), 1))
     from_start[:, 0] = each_from_start
-    vectors = (carried, long.dynamic_vector, packed, from_start, start_row, _numbers(settings))
-    by_row = (False, False, True, True, False, False)
-    table = _follow.along(by_row, *vectors, long.static_structure, form, long.state)
-    return SolverRun(prepared, first, table, from_start)
+    numbers = _numbers(settings)
+    vectors = (carried, long.fixed_vector, loads, from_start, start_row, numbers)
+    compiled_for = layout, runs_uncompiled()
+    if compiled_for not in long.programs:
+        arguments = (*vectors, long.static_structure, layout, long.state)
+        long.programs[compiled_for] = _follow.bound("along", _BY_ROW, arguments)
+    return SolverRun(prepared, first, long.programs[compiled_for](vectors), from_start)
+
+
+# Which vectors of `_follow` have a row for every load.
+_BY_ROW = (False, False, True, True, False, False)
 
 
 @lru_cache(maxsize=64)
-def _numbers(settings: Settings) -> Float[np.ndarray, " settings"]:
-    """Return the settings as an array."""
-    return np.array(settings.numbers)
+def _numbers(settings: Settings) -> FixedVector:
+    """Return the settings as a vector."""
+    return FixedVector(settings.numbers)
 
 
 @native(6, lane_sizes)
@@ -297,7 +306,7 @@ def solve_contacts(
     long = prepared.long
     packed, form = prepared.padded_commands(commands)
     before = pad_rows(np.asarray(prepared.state.pack(start)), prepared.state, long.state)
-    vectors = (np.zeros(1), long.dynamic_vector, packed, before, np.array(settings.numbers))
+    vectors = (np.zeros(1), long.dynamic_vector, packed, before, _numbers(settings))
     force, gap, converged = _solve_contacts.along(
         (False, False, True, False, False), *vectors, long.static_structure, form, long.state
     )

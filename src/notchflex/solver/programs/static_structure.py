@@ -21,7 +21,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from lanewise import WIDTH
-from notchflex._jax import array_module, jax
+from notchflex._arrays import xp
+from notchflex._jax import jax
 from notchflex.mechanics.chain import Chain, structural
 
 
@@ -37,13 +38,13 @@ class PytreeLayout:
     def __init__(self, structure: Any, shapes: tuple[Any, ...], kinds: tuple[str, ...]) -> None:
         """Lay out leaves of these shapes and kinds of numbers."""
         self.structure, self.shapes, self.kinds = structure, shapes, kinds
-        self._ends = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes)]).tolist()
-        self.size: int = self._ends[-1]
+        self.ends = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes)]).tolist()
+        self.size: int = self.ends[-1]
 
     @cached_property
     def indices(self) -> list[np.ndarray]:
         """Indices of the numbers of every leaf in a vector, in the shape of the leaf."""
-        parts = np.split(np.arange(self.size), self._ends[1:-1])
+        parts = np.split(np.arange(self.size), self.ends[1:-1])
         return [part.reshape(shape) for part, shape in zip(parts, self.shapes, strict=True)]
 
     def __repr__(self) -> str:
@@ -67,7 +68,6 @@ class PytreeLayout:
         It is a NumPy vector where all leaves are NumPy arrays.
         """
         leaves = self.structure.flatten_up_to(tree)
-        xp = array_module(*leaves)
         arrays = [xp.asarray(leaf) for leaf in leaves]
         flat = [array.reshape(*array.shape[:leading], -1) for array in arrays]
         if len(flat) == 1 and flat[0].dtype == float:
@@ -81,15 +81,14 @@ class PytreeLayout:
 
     def leaf(self, vector: Any, number: int) -> Any:
         """Return one leaf of the tree of a vector, by its number."""
-        part = vector[..., self._ends[number] : self._ends[number + 1]]
+        part = vector[..., self.ends[number] : self.ends[number + 1]]
         shape = (*vector.shape[:-1], *self.shapes[number])
         return as_kind(part.reshape(shape), self.kinds[number])
 
 
 def lane_sizes(chain_layout: PytreeLayout, *_others: Any) -> tuple[int, int]:
     """Return the sizes of the axes that run along the chain: its flexures, and its bodies."""
-    one = jax.ShapeDtypeStruct((chain_layout.size,), float)
-    chain = jax.eval_shape(chain_layout.unpack, one)
+    chain = jax.eval_shape(chain_layout.unpack, jax.ShapeDtypeStruct((chain_layout.size,), float))
     return chain.flexures, chain.flexures + 1
 
 
@@ -172,7 +171,6 @@ class StaticStructure:
 
     def pack(self, numbers: Any) -> Any:
         """Return the vectors of chains from their packed numbers (NumPy or JAX)."""
-        xp = array_module(numbers)
         padding = np.zeros((*numbers.shape[:-1], _PADDING))
         return xp.concatenate([numbers[..., self._taken], padding], axis=-1)
 
@@ -189,7 +187,7 @@ class StaticStructure:
         return jax.tree.unflatten(self.form.structure, leaves)
 
     def _leaf(self, vector: Any, indices: Int[np.ndarray, ...]) -> Any:
-        constant, xp = self._constant[indices], array_module(vector)
+        constant = self._constant[indices]
         if constant.all():
             return xp.asarray(self._numbers[indices])
         values = xp.take(vector, self._index[indices], mode="clip")  # all are inside

@@ -119,7 +119,8 @@ class Correction:
 
     def refit(self) -> None:
         """Fit again, from the points as they were dragged."""
-        self._busy("fitting")
+        self._notice.content = notice("fitting", waiting=True)
+        self.server.flush()
         now = self.results[self.number]
         chain = self.plane.chain
         try:
@@ -186,10 +187,6 @@ class Correction:
         eye, camera = self.plane.eye(4.0 / 3.0), self.server.initial_camera
         camera.position, camera.look_at = eye.position, eye.target
         self._update()
-
-    def _busy(self, sentence: str) -> None:
-        self._notice.content = notice(sentence, waiting=True)
-        self.server.flush()
 
     def _update(self) -> None:
         now = self.results[self.number]

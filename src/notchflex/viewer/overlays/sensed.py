@@ -81,7 +81,10 @@ class SensedArrow:
             self._wanted[0] is key[0] and self._wanted[1:] == key[1:]
         )
         if not shown or not same:
-            self._hide()
+            self.found = None
+            for node in (self._arrow, self._interval, self._label):
+                if node.visible:
+                    node.visible = False
         if not shown:
             self._wanted = None
         elif still and not same:
@@ -104,12 +107,6 @@ class SensedArrow:
         for node in (self._arrow, self._interval, self._label):
             node.remove()
         self._wanted = None
-
-    def _hide(self) -> None:
-        self.found = None
-        for node in (self._arrow, self._interval, self._label):
-            if node.visible:
-                node.visible = False
 
     def _show(self, key: Any, tip: Float[np.ndarray, " 3"], force: SensedForce) -> None:
         if self._wanted is not key:

@@ -57,11 +57,18 @@ def rows(session: Session) -> list[ReadoutRow]:
     position = ", ".join(fixed(float(value), 2) for value in state.tip_position)
     closed = [str(number) for number in np.flatnonzero(state.closed) + 1]
     text = ", ".join(closed) if len(closed) <= 8 else f"{len(closed)}"
+    largest = float(np.max(np.abs(state.peak_strain)))
+    allowed = robot.material.allowed_strain
+    warns, limit = False, ", no limit set"
+    if allowed is not None:
+        warns = is_beyond(largest / allowed)
+        limit = f" {'>' if warns else 'of'} {100.0 * allowed:g} % allowed"
+    strain = f"{100.0 * largest:.2f} %{limit}"
     return [
         *table,
         ReadoutRow("total_angle", axis("total_angle"), fixed(angle, 2)),
         ReadoutRow("tip_position", axis("tip_position"), position),
-        ReadoutRow("peak_strain", "largest strain", *_strain(session)),
+        ReadoutRow("peak_strain", "largest strain", strain, warns),
         ReadoutRow("closed", f"closed notches of {robot.number_of_notches}", text or "none"),
     ]
 
@@ -76,17 +83,6 @@ def readout(session: Session) -> str:
         for row in rows(session)
     )
     return f'<table style="width:98%;font-size:12px;border-collapse:collapse">{cells}</table>'
-
-
-def _strain(session: Session) -> tuple[str, bool]:
-    """Return the largest strain and the allowed one, and whether it is exceeded."""
-    largest = float(np.max(np.abs(session.state.peak_strain)))
-    allowed = session.robot.material.allowed_strain
-    text = f"{100.0 * largest:.2f} %"
-    if allowed is None:
-        return f"{text}, no limit set", False
-    beyond = is_beyond(largest / allowed)
-    return f"{text} {'>' if beyond else 'of'} {100.0 * allowed:g} % allowed", beyond
 
 
 def fixed(value: float, digits: int) -> str:

@@ -58,7 +58,9 @@ def _body(rest: RobotShape, body: int) -> tuple[Points, Triangles]:
     notch = rest.robot.notches[max(body - 1, 0)]
     view = float(np.radians(notch.direction_deg))
     corners = np.array(body_corners(rest, body, view))
-    solid = _through(corners, view, rest) ^ _tube(rest, corners[:, 1])
+    along = corners[:, 1]
+    ends = float(along.min()) - _END_MARGIN, float(along.max()) + _END_MARGIN
+    solid = _through(corners, view, rest) ^ tube_wall(rest.robot.tube, ends, ROUND)
     spine = np.asarray(rest.chain.rods.has_closure) > 0.0
     for flexure in (body - 1, body):
         # A flexure on a spine lies between the bodies; one across the tube overlaps with them.
@@ -74,12 +76,6 @@ def _body(rest: RobotShape, body: int) -> tuple[Points, Triangles]:
 
 def _across(view: float) -> Points:
     return np.array([np.cos(view), np.sin(view), 0.0])
-
-
-def _tube(rest: RobotShape, along: Points) -> Manifold:
-    """Return the wall of the tube, longer than the body."""
-    ends = float(along.min()) - _END_MARGIN, float(along.max()) + _END_MARGIN
-    return tube_wall(rest.robot.tube, ends, ROUND)
 
 
 def _through(polygon: Points, view: float, rest: RobotShape) -> Manifold:
@@ -361,7 +357,11 @@ class Scene:
             self._turn(controls.pointing)
             self._dress(path, shape)
             self._move(shape)
-            self._paint(path)
+            allowed = self.robot.material.allowed_strain
+            for number, strain in enumerate(path.peak_strain[0]):
+                colour = strain_colour(None if allowed is None else float(strain) / allowed)
+                if colour != self._colours[number]:
+                    self._flexures[number].color = self._colours[number] = colour
             self._marks.move(path, shape, self.shown)
             self._move_loads(path, shape)
             self._base_frame.visible = self._tip_frame.visible = self.shown.frames
@@ -402,13 +402,6 @@ class Scene:
         self._tip_frame.position, self._tip_frame.wxyz = shape.tip, turned[-1]
         for node, skin, sections in zip(self._flexures, self._skins, shape.flexures, strict=True):
             node.vertices = skin.at(sections).astype(np.float32)
-
-    def _paint(self, path: EquilibriumPath) -> None:
-        allowed = self.robot.material.allowed_strain
-        for number, strain in enumerate(path.peak_strain[0]):
-            colour = strain_colour(None if allowed is None else float(strain) / allowed)
-            if colour != self._colours[number]:
-                self._flexures[number].color = self._colours[number] = colour
 
     def _move_loads(self, path: EquilibriumPath, shape: RobotShape) -> None:
         loads = applied_loads(path, 0, shape) if self.shown.loads else []

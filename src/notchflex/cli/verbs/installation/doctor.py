@@ -73,8 +73,8 @@ def examination() -> dict[str, Any]:
 
     terminal.use_compile_cache()
     from lanewise import target
-    from notchflex._canary import canary
     from notchflex._jax import jax
+    from notchflex.cli.verbs.installation.canary import canary
     from notchflex.solver.programs.compiled import backend
 
     llvm, processor, _ = target().split(" ", 2)

@@ -119,9 +119,8 @@ def plane_compliance(
     moment = xp.stack([-lever[:, 2], lever[:, 0]], axis=-1)
     force = xp.asarray(poses.rotation)[:, [0, 2]]
     parts = (bending, moment), (across, force[..., 0]), (along, force[..., 2])
-    return sum(
-        (xp.einsum("k,ki,kj->ij", length * soft, by, by) for soft, by in parts), xp.zeros((2, 2))
-    )
+    products = [xp.einsum("k,ki,kj->ij", length * soft, by, by) for soft, by in parts]
+    return xp.sum(xp.stack(products), axis=0)
 
 
 def turned_compliance(
