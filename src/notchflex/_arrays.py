@@ -16,10 +16,13 @@ from typing import Any
 
 import numpy as np
 
+# To ask for jax.Array takes long; most that is asked for is plain.
+_PLAIN = {np.ndarray, np.float64, np.int64, np.bool_, float, int, str, bool, type(None)}
+
 
 def is_traced(value: Any) -> bool:
     """Return whether a value, or an entry of a list, is an array of JAX."""
-    if type(value) in (np.ndarray, float, int, str, bool):
+    if type(value) in _PLAIN:
         return False
     if isinstance(value, list | tuple):
         return any(map(is_traced, value))
@@ -48,8 +51,9 @@ class _Dispatched:
 
     def _selecting(self, plain: Callable[..., Any], name: str) -> Callable[..., Any]:
         def call(*arguments: Any, **options: Any) -> Any:
-            if is_traced(arguments) or (options and is_traced([*options.values()])):
-                return getattr(sys.modules[self._path], name)(*arguments, **options)
+            for argument in (*arguments, *options.values()):
+                if type(argument) not in _PLAIN and is_traced(argument):
+                    return getattr(sys.modules[self._path], name)(*arguments, **options)
             return plain(*arguments, **options)
 
         return call

@@ -85,14 +85,6 @@ def _spine(robot: Robot) -> np.ndarray:
     return np.array([np.nan if cut is None else robot.tube.outer_diameter - cut[0] for cut in cuts])
 
 
-def _web(robot: Robot) -> np.ndarray:
-    return body_lengths(robot.tube, robot.notches)[1:]
-
-
-def _free_bore(robot: Robot) -> np.ndarray:
-    return 2.0 * np.array([min(robot.tube.inner_radius, *(one.radius for one in robot.tendon))])
-
-
 OF_ROBOTS: dict[str, OfRobot] = {
     "length": OfRobot("mm", "length of the straight robot", _length),
     "closing_angle": OfRobot("deg", "angle at which a notch closes", _closing_angle, True),
@@ -100,9 +92,18 @@ OF_ROBOTS: dict[str, OfRobot] = {
         "mm", "length of the tube axis with all notches closed", _closed_length
     ),
     "spine": OfRobot("mm", "width of the spine, outer diameter less depth", _spine, True),
-    "web": OfRobot("mm", "length of the rigid piece behind a notch", _web, True),
+    "web": OfRobot(
+        "mm",
+        "length of the rigid piece behind a notch",
+        lambda robot: body_lengths(robot.tube, robot.notches)[1:],
+        True,
+    ),
     "free_bore": OfRobot(
-        "mm", "diameter of the bore on the axis that is free of tendons", _free_bore
+        "mm",
+        "diameter of the bore on the axis that is free of tendons",
+        lambda robot: (
+            2.0 * np.array([min(robot.tube.inner_radius, *(one.radius for one in robot.tendon))])
+        ),
     ),
 }
 """Quantities of the robot alone, by name."""

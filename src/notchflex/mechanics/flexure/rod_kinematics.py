@@ -379,7 +379,7 @@ class RodQuadrature:
     @cached_property
     def unit(self) -> RodQuadrature:
         """The same with pieces of length 1: for what their lengths do not change."""
-        return RodQuadrature(tuple(map(float, range(len(self.ends)))), self.nodes, self.poses)
+        return rod_quadrature(tuple(map(float, range(len(self.ends)))), self.nodes, self.poses)
 
     @cached_property
     def every(self) -> Float[np.ndarray, " every"]:
@@ -428,11 +428,12 @@ class RodQuadrature:
             "step": constant(self.at_poses[1][:, None, None] * at_poses[:, 3:]),
             "node_turn": constant(xp.cumsum(_grouped(before[:, :3], self.before[1]), axis=0)[stop]),
             "node_index": np.searchsorted(unit.at_poses[0], unit.at_nodes[0], side="right"),
-            "node_reach": constant(unit._reach()),
+            "node_reach": constant(unit._reach),
             "node_rotation": constant(curve.rotation[at_node]),
             "node_offset": constant(curve.translation[at_node]),
         }
 
+    @cached_property
     def _reach(self) -> Float[np.ndarray, "nodes gauss"]:
         """Compute the fraction of each pose node's step before each node of the strains."""
         nodes = self.at_nodes[0]
