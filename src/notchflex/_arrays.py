@@ -25,7 +25,7 @@ def is_traced(value: Any) -> bool:
     if type(value) in _PLAIN:
         return False
     if isinstance(value, list | tuple):
-        return any(map(is_traced, value))
+        return not _PLAIN.issuperset(map(type, value)) and any(map(is_traced, value))
     jax = sys.modules.get("jax")  # robots are described without JAX
     return jax is not None and isinstance(value, jax.Array)
 
@@ -51,10 +51,9 @@ class _Dispatched:
 
     def _selecting(self, plain: Callable[..., Any], name: str) -> Callable[..., Any]:
         def call(*arguments: Any, **options: Any) -> Any:
-            for argument in (*arguments, *options.values()):
-                if type(argument) not in _PLAIN and is_traced(argument):
-                    return getattr(sys.modules[self._path], name)(*arguments, **options)
-            return plain(*arguments, **options)
+            if _PLAIN.issuperset(map(type, arguments)) or not is_traced(arguments):
+                return plain(*arguments, **options)
+            return getattr(sys.modules[self._path], name)(*arguments, **options)
 
         return call
 

@@ -322,6 +322,9 @@ def up_to(count: int, parts: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k no
     return 0.5 * integrals @ _projection(count)
 
 
+_BEFORE = up_to(_BETWEEN, 0.5 * (1.0 + _rule(_BETWEEN)[0]))
+
+
 @dataclass(frozen=True)
 class RodQuadrature:
     """Quadrature nodes along a rod.
@@ -457,10 +460,11 @@ def _pairs(
 
     It is half the integral of a(t) x a(s) over t < s, for a motion in the moving frame.
     """
-    own = turning.reshape(-1, _BETWEEN, *turning.shape[1:])
-    weights = lengths.reshape(-1, _BETWEEN)
-    inner = up_to(_BETWEEN, 0.5 * (1.0 + _rule(_BETWEEN)[0]))
-    so_far = weights.sum(axis=1)[:, None, None, None] * xp.einsum("ij,rjch->rich", inner, own)
-    crossed = xp.cross(so_far[..., :, None], own[..., None, :], axisa=2, axisb=2, axisc=2)
-    pairs = 0.5 * xp.einsum("ri,richk->rchk", weights, crossed)
+    modes = turning.shape[-1]
+    rates, weights = turning.reshape(-1, _BETWEEN, 3 * modes), lengths.reshape(-1, _BETWEEN, 1)
+    so_far = weights.sum(axis=1, keepdims=True) * (_BEFORE @ rates)
+    products = (xp.swapaxes(weights * so_far, 1, 2) @ rates).reshape(-1, 3, modes, 3, modes)
+    pairs = 0.5 * xp.stack(
+        [products[:, k - 2, :, k - 1] - products[:, k - 1, :, k - 2] for k in range(3)], axis=1
+    )
     return 0.5 * (pairs + xp.swapaxes(pairs, -1, -2))

@@ -61,8 +61,8 @@ def wrench_modes(
     moment += [polynomials[:, degree] for degree in range(2, moment_modes - 1)]
     force = [(polynomials[:, k], along) for k in range(force_modes) for along in (_X, _Z)]
     none = xp.zeros_like(lever)
-    wrenches = [xp.concatenate([size[:, None] * _Y, none], axis=1) for size in moment]
-    wrenches += [xp.concatenate([none, size[:, None] * along], axis=1) for size, along in force]
+    wrenches = [(size[:, None] * _Y, none) for size in moment]
+    wrenches += [(none, size[:, None] * along) for size, along in force]
     sideways = xp.cross(lever, _Y) / reach[0]
     out_of_plane = [about + none for about in (_X, _Z, sideways)]
     out_of_plane += [
@@ -70,14 +70,13 @@ def wrench_modes(
         for degree in range(2, moment_modes - 1)
         for about in (_X, _Z)
     ]
-    wrenches += [xp.concatenate([about, none], axis=1) for about in out_of_plane]
-    wrenches += [xp.concatenate([none, _Y + none], axis=1)]
+    wrenches += [(about, none) for about in out_of_plane] + [(none, _Y + none)]
     of_force = xp.arange(len(wrenches)) >= moment_modes
     of_force[-len(out_of_plane) - 1 : -1] = False
 
-    in_frame = xp.einsum(
-        "kji,mkcj->kmci", rotation, xp.stack(wrenches).reshape(len(wrenches), -1, 2, 3)
-    ).reshape(len(length), len(wrenches), 6)
+    parts = xp.stack([part for wrench in wrenches for part in wrench])
+    in_frame = xp.einsum("kji,mpkj->kmpi", rotation, parts.reshape(len(wrenches), 2, -1, 3))
+    in_frame = in_frame.reshape(len(length), len(wrenches), 6)
     strain = _strains(section, poisson_ratio, in_frame)
     work = xp.einsum("k,kmc,kmc->m", length, in_frame, strain)
     return xp.moveaxis(strain * (xp.where(of_force, whole, 1.0) / work)[:, None], 1, 2)
