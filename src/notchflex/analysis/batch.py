@@ -210,6 +210,9 @@ def _parts(
         for row, robot in enumerate(robots):
             yield 0, np.array([row]), robot, joined if paths == 1 else joined[steps[row]]
         return
+    if len(joined.different) == 1 and not joined.draws:  # the usual case, of many rows
+        yield 0, np.arange(paths), robots[0], joined
+        return
     kinds = np.bitwise_or.reduce(_kinds(robots[0], joined).reshape(paths, -1), axis=1)
     for kind in np.unique(kinds).tolist():
         rows = np.flatnonzero(kinds == kind)
@@ -226,8 +229,7 @@ def _kinds(robot: Robot, load: LoadPath) -> Int[np.ndarray, " s"]:
             for one in alone
         ]
     )
-    which = load.which if len(alone) > 1 else 0
-    return acting[which] + 8 * ~np.isnan(load.stroke).all(axis=1)
+    return acting[load.which] + 8 * ~np.isnan(load.stroke).all(axis=1)
 
 
 def solve_batch(

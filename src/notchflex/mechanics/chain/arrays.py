@@ -211,16 +211,17 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
     if more == 0:
         return dataclasses.replace(chain, contacts=contacts)
 
+    index = np.minimum(np.arange(flexures), chain.flexures - 1)
+
     def longer(leaf: Any) -> Array:
-        return xp.concatenate([leaf, xp.repeat(leaf[-1:], more, axis=0)])  # pyright: ignore
+        return leaf[index]
 
     def changed(part: Any, **values: Any) -> Any:
         """Return a part whose added entries have other values."""
         wider = jax.tree.map(longer, part)
-        own = {name: getattr(wider, name).copy() for name in values}
         for name, value in values.items():
-            own[name][-more:] = value
-        return dataclasses.replace(wider, **own)
+            getattr(wider, name)[-more:] = value
+        return wider
 
     def with_nothing(values: Any) -> Array:
         return constant(xp.pad(values, [(0, more)] + [(0, 0)] * (xp.ndim(values) - 1)))

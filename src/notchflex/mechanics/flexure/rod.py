@@ -177,13 +177,13 @@ def stack(rods: Sequence[Rod]) -> Rod:
     if any(rod.section.ends is not None for rod in rods):
         rods = [_with_ends(rod) for rod in rods]
     filled = [_filled(rod, modes, nodes, poses, levels) for rod in rods]
+    stacked: Rod = jax.tree.map(lambda *leaves: xp.stack(leaves), *filled)
     unused: dict[str, Any] = {
         name: None
         for name in ("linear_kinematics", "chord", "stop_flexibility")
-        if not decide(xp.any(xp.stack([xp.any(getattr(rod, name)) for rod in filled])))
+        if not decide(xp.any(getattr(stacked, name)))
     }
-    used = [dataclasses.replace(rod, **unused) if unused else rod for rod in filled]
-    return jax.tree.map(lambda *leaves: xp.stack(leaves), *used)
+    return dataclasses.replace(stacked, **unused)
 
 
 def _with_ends(rod: Rod) -> Rod:

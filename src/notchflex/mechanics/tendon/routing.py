@@ -151,15 +151,15 @@ def _straight(
     entry = place + line.enters[..., None] * along
     leave = place + line.leaves[..., None] * along
     # Every straight span in the free robot; 0 where a tendon passes by.
-    point, gaps = place + xp.asarray(line.base_leaves)[:, None] * along, list[Any]()
+    point, across = place + xp.asarray(line.base_leaves)[:, None] * along, list[Any]()
     spans = zip(masks["visits"], entry, leave, *ground.free, strict=True)
     for visits, enters, leaves, rotation, translation in spans:
         point = (point - translation) @ rotation
-        gaps.append(visits * xp.linalg.norm(enters - point, axis=-1))
+        across.append(enters - point)
         point = xp.where(visits[:, None] > 0.0, leaves, point)
     return Straight(
         **masks,
-        natural_gap=constant(xp.stack(gaps)),
+        natural_gap=constant(masks["visits"] * xp.linalg.norm(xp.stack(across), axis=-1)),
         leaves=constant(place + line.left[..., None] * along),
         enters=constant(entry),
         along=constant(xp.broadcast_to(along, entry.shape)),
