@@ -51,9 +51,13 @@ class _Dispatched:
 
     def _selecting(self, plain: Callable[..., Any], name: str) -> Callable[..., Any]:
         def call(*arguments: Any, **options: Any) -> Any:
-            if _PLAIN.issuperset(map(type, arguments)) or not is_traced(arguments):
-                return plain(*arguments, **options)
-            return getattr(sys.modules[self._path], name)(*arguments, **options)
+            for argument in arguments:
+                kind = type(argument)
+                if kind in _PLAIN or (kind is list and _PLAIN.issuperset(map(type, argument))):
+                    continue  # a hundred calls a link; nearly all are of these
+                if is_traced(argument):
+                    return getattr(sys.modules[self._path], name)(*arguments, **options)
+            return plain(*arguments, **options)
 
         return call
 

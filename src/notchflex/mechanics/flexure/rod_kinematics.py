@@ -15,6 +15,7 @@ A flexure evaluates its strains at all points (`every`) at once.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -145,7 +146,7 @@ def left_slopes(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
 
 def _products(parts: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
     """Multiply all rotations up to each."""
-    return xp.stack(list(accumulate(parts, xp.matmul)))
+    return xp.stack(list(accumulate(parts, operator.matmul)))
 
 
 def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
