@@ -62,10 +62,9 @@ def against_draws() -> None:
 
 
 def time_of_draws() -> Study:
-    """Time a hundred thousand draws, the first with the search for polynomials."""
+    """Time a hundred thousand draws, the first with compiling."""
     study = study_of(SHOP, nf.AcceptanceLimit("total_angle", lower=0.735, upper=0.9))
     levels = np.concatenate(list(replicates(len(study.sources), 4096, 0)))
-    study.at_levels(levels[:64])  # too few for polynomials: compiles the program
     for what in ("first", "again"):
         wall, cpu = time.perf_counter(), time.process_time()
         study.at_levels(levels)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import notchflex as nf
 from notchflex._jax import jax
+from notchflex.robot.value_names.varied import VariedRobots
 
 WRIST, LINKS, STRIPS = map(nf.load_robot, ("pacheco2021-a", "gao2017", "liu2022"))
 SIDEWAYS = {"tip_force": (0.0, 0.1, 0.0)}
@@ -25,6 +26,11 @@ def gradient() -> None:
     jax.grad(lambda numbers: bend(numbers)["total_angle"][-1])(bend.start)
 
 
+def many_robots() -> None:
+    """Robots that differ by a dimension."""
+    nf.solve_batch(VariedRobots(WRIST, {"notch.depth": [1.4] * 256}), nf.Load(tension=1.0))
+
+
 # In an order in which the two parts, every other call each, take about as long as each other.
 CALLS: list[Callable[[], object]] = [
     lambda: nf.tip_response(WRIST, [nf.Load(tension=1.0)]),
@@ -40,6 +46,7 @@ CALLS: list[Callable[[], object]] = [
     lambda: everything(WRIST, tension=2.0),
     lambda: everything(WRIST, stroke=1.0),
     lambda: nf.closing(WRIST),
+    many_robots,
 ]
 
 

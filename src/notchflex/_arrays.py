@@ -72,18 +72,24 @@ def plain_number(value: Any) -> Any:
 
 
 def cached(maxsize: int) -> Callable[[Callable[..., Any]], Any]:
-    """Make a function keep its last results for plain numbers, unless decisions are taken."""
+    """Make a function keep its last results; while decisions are taken, for the same objects."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         kept = lru_cache(maxsize)(function)
 
         @wraps(function)
         def call(*arguments: Any) -> Any:
+            decisions = _deciding.get()
+            if decisions is not None:  # values may be traced, which are compared as objects
+                key = (function, *map(id, arguments))
+                if key not in decisions.kept:
+                    decisions.kept[key] = arguments, function(*arguments)
+                return decisions.kept[key][1]
             try:
                 hash(arguments)
             except TypeError:
                 return function(*arguments)
-            return kept(*arguments) if _deciding.get() is None else function(*arguments)
+            return kept(*arguments)
 
         return call
 
@@ -98,6 +104,7 @@ class Decisions:
     Attributes:
         made: The decisions of the example, in order.
         alike: Of the trace, whether every decision is the example's; traced.
+        kept: Arguments and results of functions that are `cached`.
     """
 
     def __init__(self, made: tuple[bool, ...] | None = None) -> None:
@@ -105,6 +112,7 @@ class Decisions:
         self.follows = made is not None
         self.made: list[bool] = list(made or ())
         self.alike: list[Any] = []
+        self.kept: dict[Any, tuple[Any, Any]] = {}
 
     def take(self, value: Any) -> bool:
         """Take one decision."""

@@ -8,9 +8,10 @@ from collections.abc import Callable
 from typing import Any, cast
 
 import jax
+import numpy as np
 from numpy.typing import ArrayLike
 
-from notchflex._arrays import xp
+from notchflex._arrays import is_traced, xp
 
 jax.config.update("jax_enable_x64", True)
 
@@ -41,3 +42,20 @@ def jit(function: Callable[..., Any], **options: Any) -> Any:
 def constant(value: ArrayLike) -> jax.Array:
     """Return an array of floats, typed as the JAX array that a program makes of it."""
     return cast("jax.Array", xp.asarray(value, float))
+
+
+def scan(step: Callable[..., Any], state: Any, entries: tuple[Any, ...]) -> tuple[Any, Any]:
+    """Repeat a step along arrays as `jax.lax.scan` does; in Python where all is plain.
+
+    Args:
+        step: Returns the next state and a tuple of results, from a state and a tuple of entries.
+        state: The first state.
+        entries: Arrays with a row for every step.
+    """
+    if is_traced((state, entries)):
+        return jax.lax.scan(step, state, entries)
+    results: list[Any] = []
+    for entry in zip(*entries, strict=True):
+        state, result = step(state, entry)
+        results.append(result)
+    return state, tuple(map(np.array, zip(*results, strict=True)))

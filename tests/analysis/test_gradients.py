@@ -7,7 +7,7 @@ import pytest
 
 import notchflex as nf
 from notchflex._jax import jax, jnp
-from notchflex.analysis.derivatives.geometry_slopes import slope
+from notchflex.analysis.derivatives.differences import slope
 from notchflex.errors import ErrorCode
 from refusals import refused
 

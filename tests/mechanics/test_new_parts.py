@@ -24,8 +24,11 @@ MODULUS, LIMIT, LOSS, PULL = 40_000.0, 0.03, 0.4, 2.0
 
 SCRIPT = f"""
 import json
+import numpy as np
 import notchflex as nf
 from notchflex.mechanics.chain.flexures import with_fibres
+from notchflex.robot.value_names import number_at
+from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.mechanics.flexure import rod
 robot = nf.Robot(
     name="new parts",
@@ -41,7 +44,21 @@ notch, tube = robot.notches[0], robot.tube
 section = with_fibres(rod(notch, tube), notch, tube).section
 linear = section.fibres.area * section.fibres.arm**2
 assert abs(linear.sum(axis=-1) / ({WIDTH} * {THICK}**3 / 12.0) - 1.0).max() < 1e-12
-state = nf.solve(robot, nf.Load(tension={PULL}))
+load = nf.Load(tension={PULL})
+state = nf.solve(robot, load)
+# The formulas are traced as well: for slopes, and for many robots.
+names = ["notch.thickness", "material.limit", "friction.loss"]
+bend = nf.differentiable(robot, load, names)
+by = bend.model.changes(robot, bend.load, names)
+slopes = bend.model.derivatives(state.path, by, ("total_angle",))["total_angle"][:, 0]
+for name, slope in zip(names, slopes, strict=True):
+    at = number_at(robot, name)
+    moved = [robot.with_value(name, at * part) for part in (0.999, 1.001)]
+    ends = [nf.solve(one, load).total_angle for one in moved]
+    assert abs((ends[1] - ends[0]) / (2e-3 * at) / slope - 1.0) < 1e-5
+robots = VariedRobots(robot, {{"notch.thickness": np.linspace(0.19, 0.21, 300)}})
+angles = nf.solve_batch(robots, load)["total_angle"]
+assert abs(angles[7] - nf.solve(robots[7], load).total_angle) < 1e-12
 print(json.dumps([state.converged, *state.notch_angle.tolist(), sorted(nf.json_schema()["$defs"])]))
 """
 

@@ -19,14 +19,15 @@ from scipy.optimize import least_squares
 import notchflex as nf
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.material import Fibres, FibreSection, SectionLaw, section_law
-from notchflex.mechanics.section.fibres import fitted, rectangle_fibres
+from notchflex.mechanics.section.fibres import two_walls_fibres
 from shared_data import measured, numbers
 
 # Places along half a strut from the point without moment, and what each stands for.
 _POINTS, _TWICE = np.polynomial.legendre.leggauss(8)
 ARM, WEIGHT = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
 # Height and width of 2, as the size of a strut is one of the constants.
-FIBRES = Fibres(*fitted(rectangle_fibres(1.0, 1.0), 4.0, 4.0 / 3.0))
+(_ARMS,), _AREAS = two_walls_fibres(1.0, 1.0, 160)
+FIBRES = Fibres(_ARMS, 2.0 * _AREAS)
 ONE = np.ones(())
 SECTION = FibreSection(4.0 * ONE, 4.0 / 3.0 * ONE, ONE, ONE, ONE, ONE, ONE, None, FIBRES)
 MODULUS, PLATEAU = 42_000.0, 350.0

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 # A program of more nodes is refused: compiling it would take minutes.
-_MAX_NODES = 400_000
+_MAX_NODES = 1_000_000
 
 
 class UnsupportedPrimitiveError(Exception):

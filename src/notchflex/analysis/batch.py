@@ -8,13 +8,12 @@ bounds the memory. Where JAX has a GPU, whole pieces run there in parallel.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, closing, nullcontext
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
-from threadpoolctl import threadpool_limits
 
 from lanewise import WIDTH
 from notchflex._quantity import REGISTERED
@@ -73,14 +72,6 @@ class BatchRobots:
         unlike = self.every if self.varied is None else [self.varied.robot]
         return max(robot.number_of_tendons for robot in unlike)
 
-    @property
-    def threads(self) -> AbstractContextManager[Any]:
-        """Context that limits the threads of matrix products while rows are solved.
-
-        Every core has its own piece; a product that assembles varied robots must not use others.
-        """
-        return nullcontext() if self.varied is None else threadpool_limits(1)
-
 
 @dataclass(frozen=True)
 class BatchRows:
@@ -108,18 +99,17 @@ class BatchRows:
         size = -(-rows // (each * cores * WIDTH)) * WIDTH
         return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
 
-    def packed(
-        self, index: slice
-    ) -> tuple[Float[np.ndarray, "*k chain"], Float[np.ndarray, "k s command"]]:
-        """Return chains of a piece of the rows (one if shared), and their commands."""
+    def packed(self, index: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return chains of a piece of the rows (one if shared), commands, and which are wrong."""
         commands = self.commands[index]
         if len(self.commands) == 1:
             commands = np.repeat(self.commands, index.stop - index.start, axis=0)
-        return self.chains[0] if len(self.chains) == 1 else self.chains[index], commands
+        chains = self.chains[0] if len(self.chains) == 1 else self.chains[index]
+        return chains, commands, np.zeros(0, int)
 
     def run(self, index: slice, numbers: np.ndarray) -> dict[str, np.ndarray]:
         """Solve a piece of the rows: quantities in the world, NaN where they are not known."""
-        chains, commands = self.packed(index)
+        chains, commands, wrong = self.packed(index)
         by_row = (chains.ndim == 2, True, False)
         robot, command, names = self.layouts
         solved = tuple(dict.fromkeys(one for name in names for one in WORKS.get(name, (name,))))
@@ -132,7 +122,14 @@ class BatchRows:
                 outputs[name] = REGISTERED[name].turned(values, self.turn)
                 if failed.any():
                     outputs[name][failed] = np.nan
+        if len(wrong):
+            for name, values in self.separately(wrong + index.start, numbers).items():
+                outputs[name][wrong] = values
         return outputs
+
+    def separately(self, rows: np.ndarray, numbers: np.ndarray) -> dict[str, np.ndarray]:
+        """Solve rows whose chains are not of the form of the others."""
+        raise NotImplementedError
 
 
 def _work(found: Mapping[str, np.ndarray], name: str) -> np.ndarray:
@@ -150,16 +147,15 @@ class VariedRows(BatchRows):
 
     varied: VariedChains
 
-    def packed(self, index: slice) -> tuple[np.ndarray, np.ndarray]:
-        """Return chains and commands of a piece of the rows."""
+    def packed(self, index: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return chains, commands and wrong ones of a piece of the rows."""
         return self.varied.rows(index)
 
-
-def varied_rows(varied: VariedChains, count: int, outputs: tuple[str, ...]) -> VariedRows:
-    """Return the rows of robots whose chains are computed piece by piece."""
-    layouts = (varied.structure, varied.command, outputs)
-    nothing = np.zeros((0, 0))
-    return VariedRows(np.arange(count), nothing, nothing, layouts, varied.turn, varied)
+    def separately(self, rows: np.ndarray, numbers: np.ndarray) -> dict[str, np.ndarray]:
+        """Solve robots one by one."""
+        robots, load = BatchRobots(self.varied.robots.take(rows)), self.varied.load
+        tables = tables_of(robots, load, 1, len(rows), self.layouts[2], self.varied.refinement)
+        return _solved(tables, len(rows), numbers, 1, None)
 
 
 def missing_value(values: np.ndarray) -> float:
@@ -180,7 +176,9 @@ def tables_of(
     if robots.varied is not None and paths == 1:
         varied = varied_chains(robots.varied, joined, refinement)
         if varied is not None:
-            return [varied_rows(varied, count, outputs)]
+            layouts, nothing = (varied.structure, varied.command, outputs), np.zeros((0, 0))
+            form = np.arange(count), nothing, nothing, layouts, joined.base_to_world
+            return [VariedRows(*form, varied)]
     groups: dict[Any, list[tuple[np.ndarray, np.ndarray, np.ndarray]]] = {}
     for kind, rows, robot, part in _parts(robots.every, joined, paths):
         ready = prepare_for(robot, part, None, refinement)
@@ -317,28 +315,6 @@ def simulate_batch(
     return Batch(_simulate(every, joined, len(paths), *common))
 
 
-def simulate_varied(
-    chains: VariedChains, *, outputs: Sequence[str], settings: Settings | None = None
-) -> Batch:
-    """Simulate one path of loads with varied robots, in the calling thread.
-
-    Args:
-        chains: Chains of the robots under the path.
-        outputs: As for `solve_batch`.
-        settings: As for `solve_batch`.
-
-    Returns:
-        Arrays by name, rows and then steps as leading axes.
-    """
-    rows = varied_rows(chains, len(chains.numbers), with_converged(outputs))
-    numbers = np.array((settings or DEFAULT).numbers)
-    arrays: dict[str, np.ndarray] = {}
-    for index in rows.pieces(1):
-        for name, values in rows.run(index, numbers).items():
-            _store(arrays, name, rows.rows[index], values, len(rows.rows))
-    return Batch(arrays)
-
-
 def _simulate(
     robots: BatchRobots,
     joined: LoadPath,
@@ -361,16 +337,23 @@ def _simulate(
             "a batch needs as many robots as loads, or one of either; "
             f"got {given} robots and {paths} loads"
         )
-    numbers = np.array((settings or DEFAULT).numbers)
+    tables = tables_of(robots, joined, paths, count, names, refinement)
+    return _solved(tables, count, np.array((settings or DEFAULT).numbers), threads, progress)
+
+
+def _solved(
+    tables: Sequence[BatchRows],
+    count: int,
+    numbers: Float[np.ndarray, " settings"],
+    threads: int,
+    progress: Callable[[int, int], None] | None,
+) -> dict[str, np.ndarray]:
+    """Solve all rows of tables, on several cores."""
     arrays: dict[str, np.ndarray] = {}
     done = 0
-    work = [
-        (table, index)
-        for table in tables_of(robots, joined, paths, count, names, refinement)
-        for index in table.pieces(threads)
-    ]
+    work = [(table, index) for table in tables for index in table.pieces(threads)]
     solving = on_cores(lambda one: one[0].run(one[1], numbers), work, threads)
-    with robots.threads, closing(solving) as pieces:
+    with closing(solving) as pieces:
         for (table, index), piece in zip(work, pieces, strict=True):
             rows = table.rows[index]
             for name, values in piece.items():

@@ -399,7 +399,7 @@ def closing_tensions_of(robots: VariedRobots) -> Float[np.ndarray, "robots n"]:
     unit = np.eye(chain.tendons)[own.tendon - 1]
     load = LoadPath(np.ones((1, chain.tendons)))
     chains = varied_chains(robots, load, 0) if np.isfinite(closing_angle).all() else None
-    if chains is None:  # edges of rigid pieces, or no polynomial: one robot after the other
+    if chains is None:  # edges of rigid pieces, or few robots: one after the other
         return np.reshape([closing(one).tension for one in robots], (len(robots), -1))
     longest = arm[np.arange(len(arm)), own.tendon - 1]
     notches = np.flatnonzero((longest > 0.0) & (np.asarray(closing_angle) > 0.0))
@@ -427,7 +427,8 @@ class _Rows:
     ) -> None:
         """Store chains, notches to close, unit tensions that pull them, and their stiffness."""
         self.chains, self.notches, self.unit, self.stiffness = chains, notches, unit, stiffness
-        self.robots = chains.rows(slice(None))[0]
+        self.robots, _, wrong = chains.rows(slice(None))
+        self.robots[wrong] = np.nan
 
     def overlap(
         self, tension: Float[np.ndarray, " rows"], mask: Bool[np.ndarray, " rows"]

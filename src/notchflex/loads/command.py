@@ -47,8 +47,17 @@ class BodyLoads(NamedTuple):
     following: Float[Array, "*s bodies w"]
 
 
-def applied(load_path: LoadPath, robot: Robot, chain: Chain) -> BodyLoads:
+def applied(
+    load_path: LoadPath, robot: Robot, chain: Chain, bodies: tuple[np.ndarray, ...] | None = None
+) -> BodyLoads:
     """Sum the external loads on each body.
+
+    Args:
+        load_path: The loads.
+        robot: Their robot.
+        chain: Its chain.
+        bodies: Mass (g) and moment of mass (g mm) of every body, and the distance from the last one
+            to the tip, mm; those of the chain where not given. The sums are linear in them.
 
     Returns:
         The sums, s steps as leading axis; those on the base too. Of a flat chain those in the plane
@@ -59,16 +68,43 @@ def applied(load_path: LoadPath, robot: Robot, chain: Chain) -> BodyLoads:
     """
     frame = None if chain.frame is None else tuple(np.asarray(chain.frame).ravel().tolist())
     axes = _axes(tuple(load_path.base_rotation.tolist()), frame)
-    mass, centre = np.asarray(chain.body_mass), np.asarray(chain.body_centre)
+    mass, moment, tip = bodies or body_numbers(chain)
     sums: list[tuple[np.ndarray, ...]] = []
     for external in load_path.different:
         _check(external, robot)
-        sums.append(_sums(external, axes, mass, centre, float(chain.body_length[-1])))
+        sums.append(_sums(external, axes, mass, moment, tip))
+    rows = tip.ndim
     if len(load_path) == 1:
-        return BodyLoads(*(constant(field[None]) for field in sums[0]))
+        step = (*(slice(None),) * rows, None)
+        return BodyLoads(*(constant(field[step]) for field in sums[0]))
     # Loads that are equal over many steps are summed once.
-    every = (np.array(field)[load_path.which] for field in zip(*sums, strict=True))
-    return BodyLoads(*map(constant, every))
+    every = (np.stack(field, rows) for field in zip(*sums, strict=True))
+    return BodyLoads(*(constant(field.take(load_path.which, axis=rows)) for field in every))
+
+
+def body_numbers(chain: Chain) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what loads take of bodies: masses, their moments, and the distance of the tip."""
+    mass = np.asarray(chain.body_mass)
+    moment = mass[..., None] * np.asarray(chain.body_centre)
+    return mass, moment, np.asarray(chain.body_length)[..., -1]
+
+
+def load_slopes(load_path: LoadPath, robot: Robot, chain: Chain, change: Chain) -> BodyLoads:
+    """Differentiate the external loads along changes of masses and lengths of bodies.
+
+    Args:
+        load_path: The loads.
+        robot: Their robot.
+        chain: Its chain.
+        change: Changes of the chain, as leading axis of its masses, centres and lengths.
+    """
+    mass, centre = np.asarray(chain.body_mass), np.asarray(chain.body_centre)
+    by_mass = np.asarray(change.body_mass)
+    by_moment = by_mass[..., None] * centre + mass[:, None] * np.asarray(change.body_centre)
+    by_tip = np.asarray(change.body_length)[..., -1]
+    changed = applied(load_path, robot, chain, (by_mass, by_moment, by_tip))
+    still = applied(load_path, robot, chain, (0.0 * by_mass, 0.0 * by_moment, 0.0 * by_tip))
+    return BodyLoads(*(one - other for one, other in zip(changed, still, strict=True)))
 
 
 def in_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
@@ -140,10 +176,10 @@ def is_planar(load_path: LoadPath, robot: Robot) -> bool:
     turned_normal = normal if turn is None else turn @ normal
     for external in load_path.different:
         # Only directions matter here, not the mass or its position on the tube axis.
-        forces = list(_forces(external, 0, 0.0))
+        forces = list(_forces(external, 0))
         if external.gravity is not None:
-            forces.append((0, external.weight(1.0), _NONE, _NONE, False))
-        for _, force, moment, point, following in forces:
+            forces.append((0, external.weight(1.0), _NONE, _NONE, False, False))
+        for _, force, moment, point, following, _ in forces:
             if _sticks_out(force, moment, point, normal if following else turned_normal, normal):
                 return False
     return True
@@ -191,22 +227,22 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
 
 
 _NONE = (0.0, 0.0, 0.0)
-_Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool]
+_AXIS = (0.0, 0.0, 1.0)  # of the tube, to the tip
+_Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool, bool]
 
 
-def _forces(external: ExternalLoad, last: int, tip: float) -> Iterator[_Force]:
-    """List all loads but the robot's weight: body, force, moment, point, whether it follows.
+def _forces(external: ExternalLoad, last: int) -> Iterator[_Force]:
+    """List all loads but the robot's weight: body, force, moment, point, if it follows, if at tip.
 
-    The tip is `tip` (mm) beyond the origin of the last body.
+    Points at the tip are relative to it.
     """
     for one in external.body_forces:
-        yield one.body, one.force, one.moment, one.point, one.following
-    x, y, z = external.tip_point
-    point = (x, y, z + tip)
+        yield one.body, one.force, one.moment, one.point, one.following, False
+    point = external.tip_point
     if any(external.tip_force) or any(external.tip_moment):
-        yield last, external.tip_force, external.tip_moment, point, external.following
+        yield last, external.tip_force, external.tip_moment, point, external.following, True
     if external.tip_mass:
-        yield last, external.weight(external.tip_mass), _NONE, point, False
+        yield last, external.weight(external.tip_mass), _NONE, point, False, True
 
 
 # Axes of force and moment components in the frame of the bodies, then in the world; as plain
@@ -227,30 +263,37 @@ def _axes(base: tuple[float, ...], frame: tuple[float, ...] | None) -> _Axes:
 def _sums(
     external: ExternalLoad,
     axes: _Axes,
-    body_mass: Float[np.ndarray, " bodies"],
-    body_centre: Float[np.ndarray, "bodies 3"],
-    tip: float,
+    body_mass: Float[np.ndarray, "*rows bodies"],
+    mass_moment: Float[np.ndarray, "*rows bodies 3"],
+    tip: Float[np.ndarray, "*rows"],
 ) -> tuple[np.ndarray, ...]:
-    """Return the sums for all bodies."""
+    """Return the sums for all bodies; the tip is `tip` (mm) beyond the origin of the last one."""
     along, about, world_along, world_about = axes
-    count, d, a = len(body_mass), len(along), len(about)
+    *rows, count = body_mass.shape
+    d, a = len(along), len(about)
     moments, arms_end = d + a, d + a + d * d
-    table = np.zeros((count, arms_end + a + d))
-    for body, force, moment, point, follows in _forces(external, count - 1, tip):
+    table = np.zeros((*rows, count, arms_end + a + d))
+    for body, force, moment, point, follows, at_tip in _forces(external, count - 1):
         if follows:
             turning = [one + more for one, more in zip(moment, _cross(point, force), strict=True)]
-            table[body, arms_end:] += _components(turning, about) + _components(force, along)
+            table[..., body, arms_end:] += _components(turning, about) + _components(force, along)
+            if at_tip:
+                by_tip = _components(_cross(_AXIS, force), about)
+                table[..., body, arms_end : arms_end + a] += np.multiply.outer(tip, by_tip)
         else:
             dead = _components(force, world_along)
             arms = [part * one for part in _components(point, along) for one in dead]
-            table[body, :arms_end] += dead + _components(moment, world_about) + arms
+            table[..., body, :arms_end] += dead + _components(moment, world_about) + arms
+            if at_tip:
+                by_tip = [part * one for part in _components(_AXIS, along) for one in dead]
+                table[..., body, moments:arms_end] += np.multiply.outer(tip, by_tip)
     if external.gravity is not None:
-        weight = body_mass[:, None] * np.array(_components(external.weight(1.0), world_along))
-        arms = (body_centre @ np.array(along).T)[:, :, None] * weight[:, None]
-        table[:, :d] += weight
-        table[:, moments:arms_end] += arms.reshape(count, -1)
-    arm = table[:, moments:arms_end].reshape(count, d, d)
-    return table[:, :d], table[:, d:moments], arm, table[:, arms_end:]
+        weight = np.array(_components(external.weight(1.0), world_along))
+        arms = (mass_moment @ np.array(along).T)[..., None] * weight
+        table[..., :d] += body_mass[..., None] * weight
+        table[..., moments:arms_end] += arms.reshape(*arms.shape[:-2], -1)
+    arm = table[..., moments:arms_end].reshape(*rows, count, d, d)
+    return table[..., :d], table[..., d:moments], arm, table[..., arms_end:]
 
 
 class Command(NamedTuple):

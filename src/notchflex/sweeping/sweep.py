@@ -142,7 +142,6 @@ class Estimate(NamedTuple):
         free: Free space where the sweep would be written from, in bytes.
         solved: Rows that were solved for this.
         unsolved: How many of them have no result.
-        one_by_one: Whether robots are assembled one by one, which takes long.
     """
 
     rows: int
@@ -155,7 +154,6 @@ class Estimate(NamedTuple):
     free: int
     solved: int
     unsolved: int
-    one_by_one: bool
 
 
 def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = None) -> Estimate:
@@ -185,5 +183,5 @@ def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = 
     return Estimate(
         manifest.rows, manifest.pieces, manifest.document["piece"], cores, each,
         each * manifest.rows / cores, size, shutil.disk_usage(".").free, solved,
-        sum(head["codes"][FAILED:]), model.one_by_one,
+        sum(head["codes"][FAILED:]),
     )  # fmt: skip

@@ -37,9 +37,8 @@ class SweepWorker:
         return Recipe(sweep_worker, self.manifest.text)
 
     def prepare(self) -> None:
-        """Find scales and polynomials, which all threads need."""
+        """Find scales, which all threads need."""
         assert self.scales
-        assert self.model.chains
 
     @property
     def points(self) -> Points:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.tangent import Change, PathTangents
+from notchflex.analysis.derivatives.tangent import PathTangents
 from notchflex.analysis.uncertainty.draws import ToleranceSource, deviation, moments
 from notchflex.robot.tolerance import Tolerance
 from notchflex.solver.newton import DEFAULT
@@ -74,7 +74,7 @@ def linear_effects(study: Study) -> LinearEffects:
     for load, path in study.loads.items():
         model = ForwardModel(study.exact, path, study.settings or DEFAULT, study.refinement)
         solved = model.solve(study.exact, path)
-        changes: list[Change] = [model.change(study.exact, path, name) for name in names]
+        changes = model.changes(study.exact, path, names)
         own = [index for index, one in enumerate(study.criteria) if one.load == load]
         outputs = tuple(dict.fromkeys(study.criteria[index].quantity.name for index in own))
         tangents = PathTangents(solved, outputs)

@@ -18,11 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from notchflex.analysis.batch import simulate_batch, simulate_varied
-from notchflex.analysis.outputs import Batch
+from notchflex.analysis.batch import simulate_batch
 from notchflex.analysis.solve import simulate
 from notchflex.analysis.uncertainty.draws import ToleranceSource, sources_of, values_at
-from notchflex.analysis.varied import VariedChains, varied_chains
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.pieces.folder import (
@@ -153,7 +151,10 @@ class Study:
             own = [index for index, one in enumerate(self.criteria) if one.load == name]
             outputs = tuple(dict.fromkeys(self.criteria[index].quantity.name for index in own))
             part = _part_of(progress, number, len(self.loads))
-            quantities = self.follow(robots, name, load, outputs, part)
+            quantities = simulate_batch(
+                robots, load, outputs=outputs, settings=self.settings,
+                refinement=self.refinement, cores=self.cores, progress=part,
+            )  # fmt: skip
             for index in own:
                 criterion = self.criteria[index]
                 accepted = quantities["converged"][:, criterion.step]
@@ -163,29 +164,6 @@ class Study:
             codes[rows[failed]] = FAILED
         codes[(codes == ACCEPTED) & ~self.within(values).all(axis=1)] = REJECTED
         return Outcomes(values, codes)
-
-    def follow(
-        self,
-        robots: VariedRobots,
-        name: str,
-        load: LoadPath,
-        outputs: tuple[str, ...],
-        part: Callable[[int, int], None] | None,
-    ) -> Batch:
-        """Follow a load with all robots.
-
-        Args:
-            robots: The robots, all of them valid.
-            name: Name of the load.
-            load: The load.
-            outputs: Names of the quantities.
-            part: Called with the robots done and all of them.
-        """
-        del name
-        return simulate_batch(
-            robots, load, outputs=outputs, settings=self.settings,
-            refinement=self.refinement, cores=self.cores, progress=part,
-        )  # fmt: skip
 
     def within(self, values: Float[np.ndarray, "robots k"]) -> Bool[np.ndarray, "robots k"]:
         """Return which numbers lie within their limits; NaN does not."""
@@ -245,24 +223,18 @@ def _part_of(
 
 
 SAMPLE = 4096
-"""Rows that polynomials of chains are made and checked with, from all over the study."""
-
-_EACH = 1024
-"""Largest number of separately assembled robots at a time: a chain takes much memory."""
+"""Rows from all over a study, from which the scales of its statistics come."""
 
 _PIECES = 16
 """Approximate number of pieces of a study, unless they would be too small or too large."""
 _MIN_ROWS, _MAX_ROWS = 2**12, 2**18
-_MAX_SLOW_ROWS = 2**12
-"""Rows of a piece at most where robots are assembled one by one, which takes a thousand times as
-long: a piece that is lost, or waited for, is then no longer either."""
 _MAX_BYTES = 2**27
 """What the solver returns of one piece at most, so that a worker needs less than 1 GiB."""
 
 
 @dataclass(frozen=True, eq=False)
 class PieceStudy(Study):
-    """A study whose polynomials of chains come from a sample that is always the same.
+    """A study that is solved in pieces.
 
     Attributes:
         sample: Numbers of some rows from all over the study, by name.
@@ -272,21 +244,6 @@ class PieceStudy(Study):
         default_factory=dict[str, np.ndarray]
     )
 
-    @cached_property
-    def chains(self) -> dict[str, VariedChains | None]:
-        """Chains of varied robots under every load; None where each is assembled separately."""
-        robots = VariedRobots(self.exact, self.sample, self.ranges)
-        if not robots.valid().all():
-            return dict.fromkeys(self.loads)
-        return {
-            name: varied_chains(robots, load, self.refinement) for name, load in self.loads.items()
-        }
-
-    @property
-    def one_by_one(self) -> bool:
-        """Whether robots are assembled one by one, under any load."""
-        return None in self.chains.values()
-
     @property
     def row_bytes(self) -> int:
         """Bytes that the solver returns of one row."""
@@ -295,25 +252,6 @@ class PieceStudy(Study):
             values = self.paths[one.load].quantity(one.quantity.name)[0]
             sizes[one.load, one.quantity.name] = len(self.loads[one.load]) * max(values.size, 1)
         return 8 * sum(sizes.values())
-
-    def follow(
-        self, robots: VariedRobots, name: str, load: LoadPath, outputs: tuple[str, ...], part: Any
-    ) -> Batch:
-        """Follow a load with all robots, in the calling thread."""
-        del part
-        known = self.chains[name]
-        chains = None if known is None else known.of(robots)
-        options: dict[str, Any] = {"outputs": outputs, "settings": self.settings}
-        if chains is not None:
-            return simulate_varied(chains, **options)
-        parts = [
-            simulate_batch(
-                list(robots[start : start + _EACH]),
-                load, refinement=self.refinement, cores=1, **options,
-            )
-            for start in range(0, len(robots), _EACH)
-        ]  # fmt: skip
-        return Batch({key: np.concatenate([one[key] for one in parts]) for key in parts[0]})
 
     def at(self, numbers: Mapping[str, Float[np.ndarray, " k"]]) -> Outcomes:
         """Solve robots: numbers in the units of files, NaN where there is no result."""
@@ -332,7 +270,7 @@ def piece_rows(rows: int, study: PieceStudy) -> int:
     """
     size = 2 ** math.ceil(math.log2(max(rows / _PIECES, 1)))
     most = 2 ** int(math.log2(max(_MAX_BYTES / study.row_bytes, 16)))
-    return min(max(size, _MIN_ROWS), _MAX_SLOW_ROWS if study.one_by_one else _MAX_ROWS, most)
+    return min(max(size, _MIN_ROWS), _MAX_ROWS, most)
 
 
 Histogram = tuple[Float[np.ndarray, " edges"], Int[np.ndarray, " bins"]]
@@ -492,9 +430,8 @@ class ToleranceTask:
         return Recipe(tolerance_task, pickle.dumps((self._content, self._draws, self.seed)))
 
     def prepare(self) -> None:
-        """Find scales and polynomials, which all threads need."""
+        """Find scales, which all threads need."""
         assert self.scales
-        assert self.study.chains
 
     @cached_property
     def scales(self) -> list[Scale]:

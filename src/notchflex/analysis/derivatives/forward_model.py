@@ -1,37 +1,47 @@
 """The forward model: from numbers of a robot and its loads to solved states and derivatives.
 
-All derivatives of results use it. Compiled programs compute states and derivatives along the path;
-the arrays of a robot are differentiated by its numbers with differences of plain Python.
+All derivatives of results use it. Compiled programs compute states, and derivatives of the arrays
+of a robot and along the path.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from notchflex.analysis.derivatives.geometry_slopes import GeometrySlopes, slope
+from notchflex.analysis.derivatives.differences import nearby, slope
 from notchflex.analysis.derivatives.tangent import Change, PathTangents, gradient
 from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
-from notchflex.loads.command import make_commands
+from notchflex.loads.command import Command, load_slopes, make_commands
 from notchflex.loads.load_path import LoadPath
-from notchflex.mechanics.chain import ChainTemplate, FlexureOf, assemble, chain_template, laws
+from notchflex.mechanics.chain import ChainTemplate, chain_template, laws
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
+from notchflex.robot.value_names.numbers import (
+    PartsForm,
+    Place,
+    apart,
+    differing,
+    parts_of,
+    places_of,
+)
+from notchflex.robot.value_names.paths import parse_path
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.prepare import PreparedChain, flat, prepare
+from notchflex.solver.programs.assembled import assembled_chain, chain_slopes
+from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run
+from notchflex.solver.programs.static_structure import pad_rows
 from notchflex.solver.solver_state import SolverState
 
 # Cost of the gradient of one number, in derivatives along single directions.
 _ADJOINT = 4
-# Numbers of the material on which more depends than the section law.
-_OF_THE_CHAIN = ("density", "poisson_ratio")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +94,6 @@ class ForwardModel:
     def changes(self, robot: Robot, load: LoadPath, names: Sequence[str]) -> list[Change]:
         """Differentiate arrays and loads by numbers of the robot.
 
-        Numbers that change different parts of the robot, such as dimensions of its notches, are
-        varied together.
-
         Args:
             robot: The robot with the values at which to differentiate.
             load: The loads.
@@ -95,30 +102,32 @@ class ForwardModel:
         Raises:
             InputError: A number cannot be varied.
         """
-        by_name = {name: self._of_law(robot, name) for name in names if _is_of_law(name)}
-        others = tuple(name for name in names if name not in by_name)
-        if len(others) == 1:
-            at = number_at(robot, others[0])
-            moved = partial(robot.with_value, others[0])
-            by_name[others[0]] = self.change_along(moved, at, load)
-        elif others:
-            if others not in self._geometry:
-                self._geometry[others] = GeometrySlopes(self.ready, others)
-            slopes = self._geometry[others].at(self._moved, robot, load)
-            by_name |= zip(others, slopes, strict=True)
-        return [by_name[name] for name in names]
+        moved = {name: _moved(robot, name, names) for name in names}
+        for name in set(names) - self._can_be_varied:
+            nearby(moved[name], number_at(robot, name), 2)
+            self._can_be_varied.add(name)
+        robot = apart(robot, names)
+        # A number of one notch is not that of all notches.
+        single = {name: places_of(robot, name) for name in names if _is_of_one(name)}
+        of_one = {place for own in single.values() for place in own}
+        places = [
+            single.get(name) or [one for one in places_of(robot, name) if one not in of_one]
+            for name in names
+        ]
+        every = [place for own in places for place in own]
+        numbers = set(PartsForm.of(parts_of(robot), every).places)
+        traced = [own for own in places if numbers.issuperset(own)]
 
-    def _of_law(self, robot: Robot, name: str) -> Change:
-        """Differentiate the law of the material, or of friction, by a number of its own."""
-        section, _, key = name.partition(".")
-        part, shape = getattr(robot, section), self._shape(robot)
+        def units(form: PartsForm) -> Float[np.ndarray, "k numbers"]:
+            return np.array([[place in own for place in form.places] for own in traced], float)
 
-        def of_laws(value: float) -> np.ndarray:
-            return flat(laws(replace(part, **{key: value}), shape))
-
-        chain = np.zeros(self.ready.long.chain_layout.size)
-        chain[self._field_indices[section]] = slope(of_laws, getattr(part, key), order=2)
-        return Change(None, chain)
+        every = [place for own in traced for place in own]
+        slopes = iter((self._along(robot, load, every, units) if traced else None) or [])
+        return [
+            (next(slopes, None) if own in traced else None)
+            or self._differences(moved[name], number_at(robot, name), load)
+            for name, own in zip(names, places, strict=True)
+        ]
 
     def change_along(
         self, robot_at: Callable[[float], Robot], at: float, load: LoadPath, *, order: int = 6
@@ -129,38 +138,55 @@ class ForwardModel:
             robot_at: The robot of a number; only its geometry and loads on its mass may vary.
             at: The number at which to differentiate.
             load: The loads.
-            order: Order of accuracy, as for `slope`.
+            order: Order of accuracy of the slopes of the robot's numbers, as for `slope`.
 
         Raises:
             InputError: The number cannot be varied.
         """
+        robot, parts = robot_at(at), parts_of(robot_at(at))
+
+        def difference(form: PartsForm) -> Float[np.ndarray, "1 numbers"]:
+            return slope(lambda v: form.numbers_of(parts_of(robot_at(v))), at, order=order)[None]
+
+        varied = differing(parts, parts_of(nearby(robot_at, at, order)))
+        slopes = None if varied is None else self._along(robot, load, varied, difference)
+        return self._differences(robot_at, at, load, order) if slopes is None else slopes[0]
+
+    def _along(
+        self,
+        robot: Robot,
+        load: LoadPath,
+        varied: Collection[Place],
+        changes: Callable[[PartsForm], np.ndarray],
+    ) -> list[Change] | None:
+        """Differentiate along changes of numbers; None where the form changes with them."""
+        ready = self._prepared(robot)
+        slopes = chain_slopes(robot, ready.chain, varied, changes)
+        if slopes is None:
+            return None
+        loads: Any = [None] * len(slopes)
+        if ready.chain.loaded:
+            by = load_slopes(load, robot, ready.chain, ready.chain_layout.unpack(slopes))
+            commands = make_commands(load, robot, ready.chain)
+            none: Any = np.zeros((len(slopes), *np.shape(commands.target)))
+            form, long = ready.command_layout(commands), ready.long.command_layout(commands)
+            still = Command(none, None if commands.by_stroke is None else none, by)
+            loads = pad_rows(form.pack(still, leading=2), form, long)
+        return [Change(*both) for both in zip(loads, ready.long_slopes(slopes), strict=True)]
+
+    def _differences(
+        self, robot_at: Callable[[float], Robot], at: float, load: LoadPath, order: int = 6
+    ) -> Change:
+        """Differentiate by what decides the form, such as a direction, by differences."""
         size = self.ready.long.chain_layout.size
         by_number = slope(lambda value: self._packed(robot_at(value), load), at, order=order)
         return Change(by_number[size:].reshape(len(load), -1), by_number[:size])
 
     def _packed(self, robot: Robot, load: LoadPath) -> Float[np.ndarray, " packed"]:
         """Pack the long chain and the loads of all steps into one vector."""
-        return _vector_of(self._prepared(robot), robot, load)
-
-    def _moved(self, robot: Robot, load: LoadPath, flexures: FlexureOf) -> np.ndarray:
-        """Pack one of many robots that differ little, from given flexures."""
-        chain = self.ready.chain
-        ready = PreparedChain(
-            assemble(
-                robot,
-                chain.level,
-                loaded=chain.loaded,
-                follows=chain.follows,
-                refinement=chain.refinement,
-                flat=not self.any_load,
-                flexures=flexures,
-            )
-        )
-        return _vector_of(self._of_form(ready), robot, load)
-
-    @cached_property
-    def _geometry(self) -> dict[tuple[str, ...], GeometrySlopes]:
-        return {}
+        ready = self._prepared(robot)
+        loads, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
+        return np.concatenate([ready.long.vector, loads.ravel()])
 
     def load_change(self, path: EquilibriumPath, load: LoadPath) -> Float[np.ndarray, "s command"]:
         """Compute the difference of other loads from those of a path, packed for the long chain."""
@@ -222,17 +248,15 @@ class ForwardModel:
         return lru_cache(maxsize=4)(self._varied)
 
     def _varied(self, robot: Robot) -> PreparedChain:
-        present, shape = self.robot, self._shape(robot)
-        if robot is present:
+        if robot is self.robot:
             return self.ready
+        changed = differing(parts_of(self.robot), parts_of(robot))
         # Fits of material and friction constants vary a few numbers of the chain.
-        if shape is self._shape(present) and robot.material.density == present.material.density:
-            fields = laws(robot.material, shape) | laws(robot.friction, shape)
+        if changed is not None and not {key for part, key in changed if _is_of_chain(part, key)}:
+            fields = laws(robot.material, self._template) | laws(robot.friction, self._template)
             return self.ready.with_fields(fields)
-        return self._of_form(self._assembled(robot))
-
-    def _of_form(self, ready: PreparedChain) -> PreparedChain:
-        """Check that a robot has arrays of the same form."""
+        chain = assembled_chain(robot, self.ready.chain)
+        ready = self._assembled(robot) if chain is None else PreparedChain(chain)
         if ready.chain_layout is not self.ready.chain_layout:
             raise InputError.UNSUPPORTED(
                 "with these values the robot has another form; it must stay the same"
@@ -240,24 +264,27 @@ class ForwardModel:
         return ready
 
     @cached_property
-    def _field_indices(self) -> dict[str, np.ndarray]:
-        """Indices in the long chain's vector of the fields of material and of friction."""
-        shape = self._shape(self.robot)
-        parts = {"material": self.robot.material, "friction": self.robot.friction}
-        return {name: self.ready.field_indices(laws(part, shape)) for name, part in parts.items()}
+    def _can_be_varied(self) -> set[str]:
+        return set()
 
-    def _shape(self, robot: Robot) -> ChainTemplate:
+    @cached_property
+    def _template(self) -> ChainTemplate:
         chain = self.ready.chain
-        return chain_template(robot, chain.level, chain.refinement)
+        return chain_template(self.robot, chain.level, chain.refinement)
 
 
-def _is_of_law(name: str) -> bool:
-    """Return whether only the law of the material, or of friction, depends on a number."""
-    section, _, key = name.partition(".")
-    return section in ("material", "friction") and key not in _OF_THE_CHAIN
+def _moved(robot: Robot, name: str, names: Iterable[str]) -> Callable[[float], Robot]:
+    """Return the robot as a function of a number; what has a name of its own stays."""
+    others = [] if _is_of_one(name) else filter(_is_of_one, names)
+    kept = {other: number_at(robot, other) for other in others}
+    return lambda value: robot.with_values({name: value, **kept})
 
 
-def _vector_of(ready: PreparedChain, robot: Robot, load: LoadPath) -> np.ndarray:
-    """Pack the long chain and the loads of all steps into one vector."""
-    loads, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
-    return np.concatenate([ready.long.vector, loads.ravel()])
+def _is_of_one(name: str) -> bool:
+    """Return whether a number is of one notch or tendon."""
+    return parse_path(name).number is not None
+
+
+def _is_of_chain(part: int, key: str) -> bool:
+    """Return whether more of a chain depends on a number than the laws."""
+    return part not in (1, 2) or key in ("density", "poisson_ratio")

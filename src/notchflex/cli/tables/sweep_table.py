@@ -51,8 +51,6 @@ def print_estimate(expected: Estimate) -> None:
         ),
         ("without a result", f"{expected.unsolved} of {expected.solved} rows that were solved"),
     ]
-    if expected.one_by_one:
-        rows.append(("slow", "robots are assembled one by one: some of the ranges make no robot"))
     terminal.output().print(terminal.table(("", ""), rows, gap=2))
 
 

@@ -12,8 +12,8 @@ from jaxtyping import Float
 
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.closing_loads import Closing, closing
+from notchflex.analysis.derivatives.differences import slope
 from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.geometry_slopes import slope
 from notchflex.analysis.derivatives.tangent import Change
 from notchflex.designing.model.quantities import (
     OF_ROBOTS,
@@ -205,10 +205,10 @@ class Point:
         if not loaded and key in self.kept:  # the arrays of the robot, without its weight
             return Change(None, self.kept[key])
         by = model.change_along(lambda part: self.moved(number, part), 0.0, load, order=2)
-        assert by.loads is not None
         assert by.chain is not None
         self.kept[key] = by.chain / column.span
-        return Change(by.loads / column.span, self.kept[key])
+        loads = None if by.loads is None else by.loads / column.span
+        return Change(loads, self.kept[key])
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,12 +21,12 @@ from scipy.special import log_ndtr, ndtri
 
 from notchflex.analysis.closing_loads import closing_tensions_of
 from notchflex.analysis.uncertainty.draws import sources_of, values_at
-from notchflex.analysis.varied import PolynomialAccuracy, fit_polynomial
 from notchflex.designing.model.point import CLOSINGS, Point, Solver
 from notchflex.designing.model.quantities import CLOSING, Reading
 from notchflex.designing.model.variables import deviations_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.local import LocalOptimum, search_from
+from notchflex.designing.search.polynomial import PolynomialAccuracy, fit_polynomial
 from notchflex.designing.search.problem import (
     TOLERANCE,
     DesignProblem,

@@ -4,29 +4,26 @@ from notchflex.mechanics.chain.arrays import Chain, flexure_states, padded, stru
 from notchflex.mechanics.chain.assembly import (
     ChainTemplate,
     assemble,
-    chain_averages,
     chain_template,
     laws,
-    stiffened,
 )
-from notchflex.mechanics.chain.flexures import FlexureOf, flexure
+from notchflex.mechanics.chain.flexures import flexure
+from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
 from notchflex.mechanics.chain.sites import sites_of, unchecked_dimensions
 
 __all__ = [
     "Chain",
     "ChainTemplate",
-    "FlexureOf",
     "assemble",
     "bending_normal",
-    "chain_averages",
+    "body_lengths",
     "chain_template",
     "flexure",
     "flexure_states",
     "laws",
     "padded",
     "sites_of",
-    "stiffened",
     "structural",
     "tendons_in_plane",
     "unchecked_dimensions",

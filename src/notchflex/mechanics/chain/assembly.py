@@ -123,39 +123,8 @@ def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
         "elastic": constant(elastic) if linear else None,
         "contact_stiffness": constant(contact_stiffness),
         "contact_flexibility": None if stop is None else constant(stop / contact_stiffness),
-        **chain_averages(contact_stiffness, template.height),
-    }
-
-
-def stiffened(chain: Chain, factor: Float[np.ndarray, "*rows n"]) -> Chain:
-    """Multiply the stiffness of every notch in all directions; leading axes are of both."""
-    contact_stiffness = factor * chain.contact_stiffness
-    elastic, flexibility = chain.elastic, chain.contact_flexibility
-    section = chain.rods.section.stiffened(factor[..., None])
-    return dataclasses.replace(
-        chain,
-        rods=dataclasses.replace(chain.rods, section=section),
-        stiffness=constant(factor[..., None] * chain.stiffness),
-        elastic=None if elastic is None else constant(factor[..., None, None] * elastic),
-        contact_stiffness=constant(contact_stiffness),
-        contact_flexibility=None if flexibility is None else constant(flexibility / factor),
-        **chain_averages(contact_stiffness, xp.sum(chain.rods.length, axis=-1)),
-    )
-
-
-def chain_averages(
-    contact_stiffness: Float[np.ndarray, "*rows n"], height: Float[np.ndarray, "*rows n"]
-) -> dict[str, Any]:
-    """Return the fields of a chain that are averages over the notches, linear in each argument.
-
-    Args:
-        contact_stiffness: Stiffness of every notch against closing, N/mm.
-        height: Length of the neutral axis of every flexure, mm.
-    """
-    count = contact_stiffness.shape[-1]
-    return {
-        "closing_force": constant(xp.sum(contact_stiffness * height, axis=-1) / count),
-        "stroke_stiffness": constant(xp.sum(contact_stiffness, axis=-1) / count**2),
+        "closing_force": constant(xp.mean(contact_stiffness * template.height)),
+        "stroke_stiffness": constant(xp.mean(contact_stiffness) / len(contact_stiffness)),
     }
 
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-from notchflex._arrays import cached, xp
+from notchflex._arrays import cached
 from notchflex._jax import constant
 from notchflex.mechanics.flexure import Rod, Site, free_pose, rod_at, section_fibres, with_level
 from notchflex.mechanics.material import Fibres
@@ -19,14 +19,11 @@ from notchflex.robot.kinds import Notch
 def with_fibres(rod: Rod, notch: Any, tube: Tube, refinement: int = 0) -> Rod:
     """Return the rod of a notch with the fibres of its sections; refinement takes more of them."""
     count = FIBRES * (1 + refinement)
-    points_at, section = section_fibres(notch, tube), rod.section
-    numbers = section.edge_near, section.edge_spine, section.area, section.second_moment_weak
-    every = [
-        fitted(points_at(near, spine, count), area, second_moment)
-        for near, spine, area, second_moment in xp.stack(numbers, axis=-1)
-    ]
-    arm, area = (constant(xp.stack(part)) for part in zip(*every, strict=True))
-    return dataclasses.replace(rod, section=dataclasses.replace(section, fibres=Fibres(arm, area)))
+    section = rod.section
+    points = section_fibres(notch, tube)(section.edge_near, section.edge_spine, count)
+    points = fitted(points, section.area, section.second_moment_weak)
+    fibres = Fibres(*map(constant, points))
+    return dataclasses.replace(rod, section=dataclasses.replace(section, fibres=fibres))
 
 
 FlexureOf = Callable[..., tuple[Rod, Motion]]

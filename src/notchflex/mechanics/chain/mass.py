@@ -20,7 +20,7 @@ def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[np.ndarray, " bo
     """Return the length of each rigid piece on the tube axis, base first, mm."""
     following = (*notches[1:], None)
     spacings = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
-    return xp.array([tube.base_length, *spacings])
+    return xp.stack(xp.broadcast_arrays(tube.base_length, *spacings))
 
 
 def body_masses(

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._arrays import xp
+from notchflex._arrays import decide, xp
 from notchflex._jax import constant
 from notchflex.mechanics.contact.edge import EdgeContact
 from notchflex.mechanics.contact.pairs import ContactGroup
@@ -31,7 +31,7 @@ def build_contacts(
         body_length: Length of the rigid pieces on the tube axis, base first, mm.
     """
     groups: list[ContactGroup] = []
-    if xp.any(rods.has_closure):
+    if decide(xp.any(rods.has_closure)):
         has_contact = rods.has_closure[:, None]
         groups.append(SpineContact(has_contact, cast("Array", xp.ones(has_contact.shape, int))))
     sides = _sides(notches)

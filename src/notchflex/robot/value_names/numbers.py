@@ -1,0 +1,124 @@
+"""The numbers of a robot, apart from all that decides the form of its arrays."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Collection, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.robot.kinds import Notch
+from notchflex.robot.part import unchecked
+from notchflex.robot.robot import Robot
+from notchflex.robot.tendon import Tendon
+from notchflex.robot.value_names.paths import parse_path
+
+Place = tuple[int, str]
+"""Where a number stands: its part, counted from 0, and its key."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PartsForm:
+    """Parts of robots without their numbers: kinds, words, counts, directions, and what is 0.
+
+    Attributes:
+        content: All that is no number, as text; forms are equal where it is.
+        parts: Parts of this form.
+        places: Places of all numbers, in the order of the parts and their keys.
+    """
+
+    content: str
+    parts: tuple[Any, ...] = dataclasses.field(compare=False, repr=False)
+    places: list[Place] = dataclasses.field(compare=False, repr=False)
+
+    @classmethod
+    def of(cls, parts: Sequence[Any], varied: Collection[Place] = ()) -> PartsForm:
+        """Return the form of parts.
+
+        Args:
+            parts: The parts.
+            varied: Places that have numbers even if these are 0.
+        """
+        content, places = list[Any](), list[Place]()
+        for number, part in enumerate(parts):
+            words = dict[str, Any]()
+            for key in (field.name for field in dataclasses.fields(part)):
+                value, place = getattr(part, key), (number, key)
+                # Directions decide which notches and tendons share a plane.
+                varies = (value != 0.0 or place in varied) and key != "direction_deg"
+                if type(value) is float and math.isfinite(value) and varies:
+                    places.append(place)
+                else:
+                    words[key] = value
+            content.append((type(part).__name__, words))
+        return cls(repr((content, places)), (*parts,), places)
+
+    def numbers_of(self, parts: Sequence[Any]) -> Float[np.ndarray, " numbers"]:
+        """Return the numbers of parts of this form."""
+        return np.array([getattr(parts[number], key) for number, key in self.places])
+
+    def with_numbers(self, numbers: Any) -> tuple[Any, ...]:
+        """Return parts with other numbers, which nothing checks: plain or traced ones."""
+        changed: list[dict[str, Any]] = [{} for _ in self.parts]
+        for (number, key), value in zip(self.places, numbers, strict=True):
+            changed[number][key] = value
+        pairs = zip(self.parts, changed, strict=True)
+        return tuple(unchecked(part, **values) for part, values in pairs)
+
+
+def parts_of(robot: Robot) -> tuple[Any, ...]:
+    """Return the parts of a robot that its arrays are made of."""
+    return (robot.tube, robot.material, robot.friction, *robot.notch, *robot.tendon)
+
+
+def robot_of(parts: Sequence[Any]) -> Robot:
+    """Return a robot of parts, as `parts_of` returns them; nothing checks it."""
+    tube, material, friction, *others = parts
+    robot = object.__new__(Robot)
+    vars(robot).update({field.name: None for field in dataclasses.fields(Robot)})
+    vars(robot).update(tube=tube, material=material, friction=friction)
+    for key, kind in (("notch", Notch), ("tendon", Tendon)):
+        vars(robot)[key] = tuple(part for part in others if isinstance(part, kind))
+    return robot
+
+
+def places_of(robot: Robot, name: str) -> list[Place]:
+    """Return where a value stands among the parts of a robot.
+
+    Args:
+        robot: The robot; a notch that is named alone is not repeated.
+        name: Such as `notch[2].depth`; see `Robot.with_value`. Several notches or tendons may have
+            the value, where the name means them all.
+    """
+    path = parse_path(name)
+    first = {"tube": 0, "material": 1, "friction": 2, "notch": 3, "tendon": 3 + len(robot.notch)}
+    parts = getattr(robot, path.section)
+    numbers = range(len(parts) if isinstance(parts, tuple) else 1)
+    if path.number is not None:
+        ends = np.cumsum([getattr(part, "repeat", 1) for part in parts])
+        numbers = [int(np.searchsorted(ends, path.number))]
+    return [(first[path.section] + number, path.key) for number in numbers]
+
+
+def differing(parts: Sequence[Any], others: Sequence[Any]) -> list[Place] | None:
+    """Return the places where two robots have other numbers; None where more differs."""
+    places = list[Place]()
+    if list(map(type, parts)) != list(map(type, others)):
+        return None
+    for number, (part, other) in enumerate(zip(parts, others, strict=True)):
+        for key in (field.name for field in dataclasses.fields(part)):
+            if getattr(part, key) != getattr(other, key):
+                places.append((number, key))
+    return places if set(places) <= set(PartsForm.of(parts, places).places) else None
+
+
+def apart(robot: Robot, names: Iterable[str]) -> Robot:
+    """Return the robot with notches of their own if any name is of one, as `notch[2].depth` is."""
+    if all(parse_path(name).number is None or not name.startswith("notch") for name in names):
+        return robot
+    if all(notch.repeat == 1 for notch in robot.notch):
+        return robot
+    return robot.replace(notch=robot.notches)

@@ -1,0 +1,462 @@
+"""Chains of many robots of one form: a program for each kind of notch, and one that joins them.
+
+The rows of the first are notches, those of the second are robots. What the values of a robot decide
+about the form of its arrays belongs to the key of a program, which also says of every row whether
+its values decide alike.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Collection, Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from notchflex._arrays import Decisions
+from notchflex._jax import jax, jnp
+from notchflex.mechanics.chain import Chain, assemble, body_lengths, flexure, sites_of
+from notchflex.mechanics.ends import Side
+from notchflex.mechanics.flexure import Site
+from notchflex.robot import Robot, Tube
+from notchflex.robot.kinds import Notch
+from notchflex.robot.value_names.numbers import PartsForm, Place, parts_of, robot_of
+from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.static_structure import (
+    PytreeLayout,
+    StaticStructure,
+    without_rounding,
+)
+
+T = TypeVar("T")
+
+Rings = tuple[tuple[Any, bool], ...] | None
+"""Kind of each ring beside a notch, and whether the notch beyond is turned; None without rings."""
+
+
+class _NotchForm(NamedTuple):
+    """What the program of a kind of notch is compiled for.
+
+    Attributes:
+        parts: The form of a tube and a notch.
+        rings: What is beside it, where it occurs.
+        options: Level, refinement and whether there are fibres, as for `flexure`.
+        decisions: What the values decide.
+        flexures: Layouts of the flexures, one for each of the rings.
+    """
+
+    parts: PartsForm
+    rings: tuple[Rings, ...]
+    options: tuple[str, int, bool]
+    decisions: tuple[bool, ...]
+    flexures: tuple[StaticStructure, ...]
+
+
+@native(1, lambda *_: ())
+def _flexures(numbers: Float[Array, " numbers"], form: _NotchForm) -> dict[str, Array]:
+    """Build the flexures of a notch.
+
+    Args:
+        numbers: Those of the tube and the notch, the lengths of the rings, and Poisson's ratio.
+        form: What the program is compiled for.
+    """
+    own, beside = jnp.split(numbers, [len(form.parts.places)])
+    tube, notch = form.parts.with_numbers(own)
+    lengths = beside[:-1].reshape(-1, 2)
+    with _following(form.decisions) as decisions:
+        trees = [
+            flexure(notch, _site(rings, pair, beside[-1]), tube, *form.options)
+            for rings, pair in zip(form.rings, lengths, strict=True)
+        ]
+    packed = [
+        structure.pack(structure.form.pack(tree))
+        for structure, tree in zip(form.flexures, trees, strict=True)
+    ]
+    return {"flexures": jnp.concatenate(packed), "alike": _all(decisions)}
+
+
+@native(2, lambda *_: ())
+def _flexures_along(
+    numbers: Float[Array, " numbers"], change: Float[Array, " numbers"], form: _NotchForm
+) -> dict[str, Array]:
+    """Build the flexures of a notch, and differentiate them along a change of the numbers."""
+
+    def flexures(own: Array) -> tuple[Array, Array]:
+        made = _flexures.function(own, form)
+        return made["flexures"], made["alike"]
+
+    values, slopes, alike = jax.jvp(flexures, (numbers,), (change,), has_aux=True)
+    return {"flexures": values, "slopes": slopes, "alike": alike}
+
+
+def _site(rings: Rings, lengths: Any, poisson_ratio: Any) -> Site | None:
+    if rings is None:
+        return None
+    (kind, turned), (distal, distal_turned) = rings
+    sides = Side(kind, lengths[0], turned), Side(distal, lengths[1], distal_turned)
+    return Site(*sides, poisson_ratio)
+
+
+class _JoinedForm(NamedTuple):
+    """What a program that joins flexures is compiled for.
+
+    Attributes:
+        parts: The form of the robots' parts.
+        flexures: Layouts of the distinct flexures.
+        options: What the chain is for, as for `assemble`.
+        decisions: What the values decide.
+        structure: Layout of the chain.
+    """
+
+    parts: PartsForm
+    flexures: tuple[StaticStructure, ...]
+    options: tuple[tuple[str, Any], ...]
+    decisions: tuple[bool, ...]
+    structure: StaticStructure
+
+
+@native(2, lambda *_: ())
+def _joined(
+    numbers: Float[Array, " numbers"], flexures: Float[Array, " packed"], form: _JoinedForm
+) -> dict[str, Array]:
+    """Assemble a chain from the numbers of its robot and from its flexures."""
+    robot = robot_of(form.parts.with_numbers(numbers))
+    ends = np.cumsum([structure.size for structure in form.flexures])
+    parts = zip(form.flexures, jnp.split(flexures, ends[:-1]), strict=True)
+    built = (structure.unpack(part) for structure, part in parts)
+    with _following(form.decisions) as decisions:
+        chain = assemble(robot, **dict(form.options), flexures=lambda *_: next(built))
+    packed = form.structure.pack(PytreeLayout.of(chain).pack(chain))
+    return {"chain": packed, "alike": _all(decisions)}
+
+
+@native(4, lambda *_: ())
+def _joined_along(
+    numbers: Float[Array, " numbers"],
+    flexures: Float[Array, " packed"],
+    change: Float[Array, " numbers"],
+    flexure_change: Float[Array, " packed"],
+    form: _JoinedForm,
+) -> dict[str, Array]:
+    """Differentiate a chain along a change of the numbers of its robot and of its flexures."""
+
+    def joined(own: Array, packed: Array) -> tuple[Array, Array]:
+        made = _joined.function(own, packed, form)
+        return made["chain"], made["alike"]
+
+    at, along = (numbers, flexures), (change, flexure_change)
+    _, slopes, alike = jax.jvp(joined, at, along, has_aux=True)
+    return {"slopes": slopes, "alike": alike}
+
+
+@contextmanager
+def _following(decisions: tuple[bool, ...]) -> Generator[Decisions]:
+    """Follow the decisions of an example while a program is traced."""
+    with Decisions(decisions).deciding() as followed, jax.numpy_rank_promotion("allow"):
+        yield followed
+
+
+def _all(decisions: Decisions) -> Array:
+    """Return whether all decisions are those of the example."""
+    return jnp.stack([jnp.asarray(True), *map(jnp.asarray, decisions.alike)]).all()
+
+
+class _Notch(NamedTuple):
+    """A notch of robots, with all flexures that are made of it.
+
+    Attributes:
+        form: What its program is compiled for.
+        columns: Its numbers among those of the robot.
+        first: First notch of the robot that each flexure stands for, from 0.
+    """
+
+    form: _NotchForm
+    columns: Int[np.ndarray, " numbers"]
+    first: Int[np.ndarray, " flexures"]
+
+
+def _sparse(flexure: Any) -> StaticStructure:
+    """Return the layout of a flexure without what is 0 in it, and without whole numbers."""
+    layout = PytreeLayout.of(flexure)
+    numbers = without_rounding(layout, np.array(layout.pack(flexure)))
+    constant = numbers == 0.0
+    for indices, kind in zip(layout.indices, layout.kinds, strict=True):
+        constant[indices] |= kind != "f"
+    return StaticStructure.shared(layout, 0, constant, numbers)
+
+
+def _form_of(
+    notch: Notch,
+    tube: Tube,
+    sites: Sequence[Site | None],
+    options: tuple[str, int, bool],
+    varied: Sequence[Place],
+) -> tuple[_NotchForm, list[Any]]:
+    """Build the flexures of an example; return them after the form of their program."""
+    with Decisions().deciding() as decisions:
+        made = [flexure(notch, site, tube, *options) for site in sites]
+    rings: list[Rings] = [
+        None if site is None else tuple((side.boundary, side.turned) for side in site[:2])
+        for site in sites
+    ]
+    parts, layouts = PartsForm.of((tube, notch), varied), tuple(map(_sparse, made))
+    return _NotchForm(parts, tuple(rings), options, tuple(decisions.made), layouts), made
+
+
+@contextmanager
+def tracing_told() -> Generator[None]:
+    """Warn of a part whose formulas JAX cannot trace; nothing else happens then."""
+    try:
+        yield
+    except jax.errors.JAXTypeError as error:
+        reason = str(error).partition("\n")[0]
+        warnings.warn(
+            "robots are assembled one by one, and slopes are differences, as JAX cannot trace the "
+            f"formulas of a part: {reason} Write them with `xp` of notchflex._arrays",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+
+
+@lru_cache(maxsize=32)
+def _known(form: PartsForm, *loads: Any) -> list[AssembledRobots]:
+    """Return the list of the programs that are known for a form; it begins empty."""
+    del form, loads
+    return []
+
+
+def _first_alike(
+    robot: Robot,
+    chain: Chain,
+    varied: Collection[Place],
+    work: Callable[[AssembledRobots, np.ndarray], T | None],
+) -> T | None:
+    """Return what programs make of a robot: of those for its form the first that decide alike."""
+    form = PartsForm.of(parts_of(robot), varied)
+    numbers = form.numbers_of(form.parts)
+    loads = chain.level, chain.loaded, chain.follows, chain.refinement, chain.frame is None
+    known = _known(form, *loads)
+    with tracing_told():
+        for programs in known:
+            if (result := work(programs, numbers)) is not None:
+                return result
+        programs = AssembledRobots.of(robot, chain, varied)
+        if (result := work(programs, numbers)) is not None:
+            known.append(programs)
+        return result
+    return None
+
+
+def assembled_chain(robot: Robot, like: Chain) -> Chain | None:
+    """Assemble the chain of a robot by programs.
+
+    Args:
+        robot: The robot.
+        like: A chain for the same level and kinds of loads.
+
+    Returns:
+        The chain; None where no program has its form.
+    """
+
+    def chain_of(programs: AssembledRobots, numbers: np.ndarray) -> Chain | None:
+        chains, alike = programs.chains(numbers[None])
+        return programs.joined.structure.unpack(chains[0]) if alike[0] else None
+
+    return _first_alike(robot, like, (), chain_of)
+
+
+def chain_slopes(
+    robot: Robot,
+    chain: Chain,
+    varied: Collection[Place],
+    changes: Callable[[PartsForm], np.ndarray],
+) -> Float[np.ndarray, "k chain"] | None:
+    """Differentiate the chain of a robot along changes of its numbers.
+
+    Args:
+        robot: The robot.
+        chain: Its chain, for the level and the kinds of loads.
+        varied: Places of the numbers that change.
+        changes: Gives k changes of all numbers of a form of parts.
+
+    Returns:
+        Slopes of all numbers of the chain, packed whole; None where no program has this form.
+    """
+
+    def slopes_of(programs: AssembledRobots, numbers: np.ndarray) -> np.ndarray | None:
+        slopes = programs.along(numbers, changes(programs.form))
+        return None if slopes is None else programs.joined.structure.whole(slopes)
+
+    return _first_alike(robot, chain, varied, slopes_of)
+
+
+# Robots of one piece; more would not fit the cache.
+_ROWS = 128
+# Size of imaginary parts that stand for slopes.
+_SMALL = 1e-100
+
+
+@dataclass(frozen=True, eq=False)
+class AssembledRobots:
+    """Programs that make chains from the numbers of robots.
+
+    Attributes:
+        form: The form of the robots' parts.
+        notches: Their distinct notches.
+        joined: What the program that joins their flexures is compiled for.
+    """
+
+    form: PartsForm
+    notches: tuple[_Notch, ...]
+    joined: _JoinedForm
+
+    @classmethod
+    def of(cls, robot: Robot, chain: Chain, varied: Collection[Place] = ()) -> AssembledRobots:
+        """Find the programs for robots of one form.
+
+        What their values decide, and which numbers of their arrays are 0, is that of a robot with
+        slightly other numbers: equal numbers or an exact 0 of one robot mean nothing.
+
+        Args:
+            robot: One of them.
+            chain: Its chain, for the level and the kinds of loads.
+            varied: Places of numbers that vary, even if they are 0 in this robot.
+        """
+        form = PartsForm.of(parts_of(robot), varied)
+        numbers = form.numbers_of(form.parts)
+        shift = 1e-3 * np.random.default_rng(0).uniform(0.5, 1.0, len(numbers))
+        numbers = numbers + shift * np.where(numbers == 0.0, 1.0, numbers)
+        example = robot_of(form.with_numbers(numbers.tolist()))
+        sites = sites_of(example)
+        first = dict[tuple[int, int], int]()  # of each distinct pair of a notch and its rings
+        for number, (notch, site) in enumerate(zip(example.notches, sites, strict=True)):
+            first.setdefault((id(notch), id(site)), number)
+        group_of = np.repeat(np.arange(len(robot.notch)), [one.repeat for one in robot.notch])
+        options = chain.level, chain.refinement, robot.material.by_fibres
+        notches, trees = list[_Notch](), dict[int, Any]()
+        for same in dict.fromkeys(key for key, _ in first):
+            own = [number for (key, _), number in first.items() if key == same]
+            places = {0: 0, 3 + int(group_of[own[0]]): 1}
+            around = [sites[number] for number in own]
+            zeros = [(places[part], key) for part, key in varied if part in places]
+            notch = example.notches[own[0]]
+            notch_form, made = _form_of(notch, example.tube, around, options, zeros)
+            columns = [k for k, (part, _) in enumerate(form.places) if part in places]
+            notches.append(_Notch(notch_form, np.array(columns), np.array(own)))
+            trees.update(zip(own, made, strict=True))
+        given = iter([trees[number] for number in first.values()])
+        loads: dict[str, Any] = {
+            "level": chain.level,
+            "loaded": chain.loaded,
+            "follows": chain.follows,
+            "refinement": chain.refinement,
+            "flat": chain.frame is not None,
+        }
+        with Decisions().deciding() as decisions:
+            joined = assemble(example, **loads, flexures=lambda *_: next(given))
+        layouts = tuple(_sparse(trees[number]) for number in first.values())
+        layout = PytreeLayout.of(joined)
+        structure = StaticStructure.of(joined, layout, np.asarray(layout.pack(joined)))
+        made_for = form, layouts, tuple(loads.items()), tuple(decisions.made), structure
+        return cls(form, tuple(notches), _JoinedForm(*made_for))
+
+    @cached_property
+    def _columns(self) -> dict[int, slice]:
+        """Where flexures stand side by side, by the first notch that each stands for."""
+        first = sorted(number for one in self.notches for number in one.first.tolist())
+        ends = np.cumsum([0, *(structure.size for structure in self.joined.flexures)]).tolist()
+        return dict(zip(first, map(slice, ends, ends[1:]), strict=True))
+
+    @classmethod
+    def tried(cls, robot: Robot, chain: Chain, varied: Collection[Place]) -> AssembledRobots | None:
+        """Return programs as `of` does; None where JAX cannot trace the formulas of a part."""
+        with tracing_told():
+            programs = cls.of(robot, chain, varied)
+            programs.chains(programs.form.numbers_of(programs.form.parts)[None])
+            return programs
+        return None
+
+    def chains(
+        self, numbers: Float[np.ndarray, "robots numbers"]
+    ) -> tuple[Float[np.ndarray, "robots chain"], Bool[np.ndarray, " robots"]]:
+        """Assemble the chains of robots, packed for programs.
+
+        Returns:
+            The chains, and which of them are of the form of the example; the others are wrong.
+        """
+        starts = range(0, len(numbers), _ROWS)
+        pieces = [self._piece(numbers[start : start + _ROWS]) for start in starts]
+        chains, alike = zip(*pieces, strict=True)
+        return np.concatenate(chains), np.concatenate(alike)
+
+    def _piece(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        made = self._of_notches(numbers, lambda table, form: _flexures.rows((True,), table, form))
+        joined = _joined.rows((True, True), numbers, made["flexures"], self.joined)
+        return joined["chain"], made["alike"] & joined["alike"]
+
+    def along(
+        self, numbers: Float[np.ndarray, " numbers"], changes: Float[np.ndarray, "k numbers"]
+    ) -> Float[np.ndarray, "k chain"] | None:
+        """Differentiate the chain of a robot along changes of its numbers.
+
+        Returns:
+            The slopes, packed for programs; None where the chain is not of the example's form.
+        """
+
+        def differentiated(table: np.ndarray, form: _NotchForm) -> dict[str, np.ndarray]:
+            own, change = np.ascontiguousarray(np.real(table)), np.imag(table) / _SMALL
+            return _flexures_along.rows((True, True), own, change, form)
+
+        # Lengths of rings are sums of numbers: imaginary parts pass them as slopes do. The first
+        # row is without a change, as notches that a change does not touch.
+        rows = np.concatenate([np.zeros_like(changes[:1]), changes])
+        made = self._of_notches(numbers + 1j * _SMALL * rows, differentiated)
+        flexures, slopes = made["flexures"][0].copy(), made["slopes"]
+        by_row = (False, False, True, True)
+        joined = _joined_along.rows(by_row, numbers, flexures, rows, slopes, self.joined)
+        return joined["slopes"][1:] if (made["alike"] & joined["alike"]).all() else None
+
+    def _of_notches(
+        self, numbers: np.ndarray, program: Callable[[np.ndarray, _NotchForm], dict[str, Any]]
+    ) -> dict[str, np.ndarray]:
+        """Return what a program makes of the notches of every robot, side by side.
+
+        Notches that are equal to those of the first robot are made once.
+        """
+        count, size = len(numbers), sum(one.size for one in self.joined.flexures)
+        robot = robot_of(self.form.with_numbers(numbers.T))
+        rings = body_lengths(robot.tube, robot.notches), robot.material.poisson_ratio
+        made: dict[str, Any] = {"alike": np.ones(count, bool)}
+        for form in dict.fromkeys(one.form for one in self.notches):
+            own = [one for one in self.notches if one.form == form]
+            tables = [_table(numbers, one, *rings) for one in own]
+            others = [np.flatnonzero((table != table[:1]).any(axis=1)) for table in tables]
+            kept = [table[np.append(0, rows)] for table, rows in zip(tables, others, strict=True)]
+            results = program(np.concatenate(kept), form)
+            index = np.zeros(count, int)
+            for one, rows in zip(own, others, strict=True):
+                index[rows] += np.arange(1, len(rows) + 1)
+                made["alike"] &= results["alike"][index]
+                for name in set(results) - {"alike"}:
+                    values = made.setdefault(name, np.empty((count, size)))
+                    stop = 0
+                    for first, structure in zip(one.first.tolist(), form.flexures, strict=True):
+                        start, stop = stop, stop + structure.size
+                        values[:, self._columns[first]] = results[name][index, start:stop]
+                index[:] = index.max() + 1
+        return made
+
+
+def _table(
+    numbers: np.ndarray, notch: _Notch, lengths: np.ndarray, poisson_ratio: Any
+) -> np.ndarray:
+    """Return the numbers of a notch and its rings, robots as leading axis."""
+    beside = [lengths[k] for first in notch.first for k in (first, first + 1)]
+    if notch.form.rings[0] is None:
+        beside, poisson_ratio = [0.0] * len(beside), 0.0
+    every = [*numbers[:, notch.columns].T, *beside, poisson_ratio]
+    return np.stack([np.broadcast_to(values, len(numbers)) for values in every], axis=-1)
