@@ -26,7 +26,6 @@ from notchflex.designing.model.quantities import CLOSING, Reading
 from notchflex.designing.model.variables import deviations_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.local import LocalOptimum, search_from
-from notchflex.designing.search.polynomial import PolynomialAccuracy, fit_polynomial
 from notchflex.designing.search.problem import (
     TOLERANCE,
     DesignProblem,
@@ -42,7 +41,6 @@ from notchflex.designing.search.problem import (
 from notchflex.designing.search.search import Searches, SearchResult, solved
 from notchflex.designing.specification import DesignConstraint, DesignSpec, RobustOptions
 from notchflex.errors import InputError
-from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
 from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.tolerancing.study import TAIL
@@ -219,10 +217,6 @@ def _added(*readings: Reading) -> Reading:
     return Reading(np.sum([one.values for one in readings], axis=0), both)
 
 
-# Error of polynomials in place of robots, in standard deviations, and robots where it is measured.
-_ERROR, _CHECKS = 0.01, 12
-
-
 def levels_of(
     problem: DesignProblem, tolerances: Sequence[Tolerance], draws: int, seed: int
 ) -> Float[np.ndarray, "draws d"]:
@@ -303,43 +297,9 @@ def _of_closings(
 def _of_robots(
     wishes: Sequence[Wish], solver: Solver, x: Vector, robots: VariedRobots
 ) -> Bool[np.ndarray, "robots k"]:
-    """Tell which robots meet other constraints that need no state.
-
-    By a polynomial where there is one, as assembling a robot takes long.
-    """
-
-    def values_of(robot: Robot) -> Float[np.ndarray, " m"]:
-        point = Point(solver.variables, x, robot, solver.paths, {})
-        return np.concatenate([row_reading(one, point).values for one in wishes])
-
-    if not len(robots):
-        return np.zeros((0, len(wishes)), bool)
-    table = robots.table
-    low, high = table.min(axis=0), table.max(axis=0)
-    half = np.maximum(0.5 * (high - low), 1e-9 * np.maximum(np.abs(high), 1e-3))
-    checks = table[np.linspace(0, len(table) - 1, _CHECKS).astype(int)]
-
-    def at(numbers: Float[np.ndarray, " d"]) -> Float[np.ndarray, " m"]:
-        return values_of(robots.at(dict(zip(robots.names, numbers, strict=True))))
-
-    exact = np.stack([at(one) for one in checks])
-    spread = np.maximum(exact.std(axis=0), 1e-9 * np.abs(exact).max(axis=0) + 1e-300)
-    polynomial = fit_polynomial(
-        at,
-        0.5 * (low + high) - half,
-        0.5 * (low + high) + half,
-        [list(range(len(low)))],
-        lambda _: spread,
-        [np.arange(len(spread))],
-        accuracies=[PolynomialAccuracy(_ERROR, len(table) // 3)],
-        checks=checks,
-    )
-    if polynomial is None:
-        values = np.stack([values_of(robots[row]) for row in range(len(robots))])
-    else:
-        values = np.tile(polynomial.base, (len(robots), 1))
-        values[:, polynomial.entries] = polynomial.varied(table).T
-    return _met(wishes, values)
+    """Tell which robots meet other constraints that need no state."""
+    points = (Point(solver.variables, x, robot, solver.paths, {}) for robot in robots)
+    return _rows(wishes, points)
 
 
 def _rows(wishes: Sequence[Wish], points: Iterable[Point]) -> Bool[np.ndarray, "robots k"]:
