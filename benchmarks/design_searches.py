@@ -26,7 +26,7 @@ from notchflex.designing.design_robot import problems_of
 from notchflex.designing.search.local import search_from
 from notchflex.designing.search.problem import DesignProblem
 from notchflex.designing.specification import spec_from_table
-from notchflex.robot.value_names.varied import VariedRobots
+from notchflex.robot.numbers import VariedRobots
 
 # What a limit missed by its size adds to the sum, in sizes of the sum.
 _PENALTY = 10.0

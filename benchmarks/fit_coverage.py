@@ -28,8 +28,7 @@ from typing import Any
 import numpy as np
 
 import notchflex as nf
-from notchflex.analysis.uncertainty.assumed import tolerances_of
-from notchflex.analysis.uncertainty.draws import draw_robots
+from notchflex.analysis.draws import draw_robots, tolerances_of
 from notchflex.fit import LeastSquares, calibrate, simulate_measurements
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.robot.value_names import number_at

@@ -85,7 +85,10 @@ def analyse(ratio, depth):
 
 def places(shape):
     """Ratios and chord angles of the nodes, and the depths that they stand for."""
-    from notchflex.mechanics.section.segment import CHORD_RANGE, RATIO_RANGE
+    from notchflex.mechanics.section.cuts import (
+        CHORD_RANGE,
+        RATIO_RANGE,
+    )
 
     def nodes(count, low, high):
         x = np.cos(np.pi * (np.arange(count) + 0.5) / count)
@@ -125,8 +128,11 @@ def fit(shape, values):
     """Fit the factors: coefficients and largest relative residual of J and e."""
     from notchflex._jax import jnp
     from notchflex.mechanics.section import annular_segment
-    from notchflex.mechanics.section import segment as segment_estimates
-    from notchflex.mechanics.section.segment import CHORD_RANGE, RATIO_RANGE
+    from notchflex.mechanics.section import cuts as segment_estimates
+    from notchflex.mechanics.section.cuts import (
+        CHORD_RANGE,
+        RATIO_RANGE,
+    )
 
     ratio, angle, depth = places(shape)
     one = jnp.ones(len(ratio))

@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 import notchflex as nf
-from notchflex.robot.value_names.varied import VariedRobots
+from notchflex.robot.numbers import VariedRobots
 from notchflex.sweeping.rows import Points
 
 OUTPUTS = ("total_angle", "tip_position", "converged")

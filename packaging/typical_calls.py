@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.robot.value_names.varied import VariedRobots
+from notchflex.robot.numbers import VariedRobots
 
 WRIST, LINKS, STRIPS = map(nf.load_robot, ("pacheco2021-a", "gao2017", "liu2022"))
 SIDEWAYS = {"tip_force": (0.0, 0.1, 0.0)}

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from notchflex import load_robot
-from notchflex.loads.external import NOTHING
+from notchflex.loads.load import NOTHING
 from notchflex.mechanics.chain import assemble
 
 CENTROID = 0.6865  # mm, of the section of wrist A

@@ -56,19 +56,12 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
         "whether lips touch at rest depends on the centroid of the section; seldom asked for"
     ),
     ("robot.robot", "robot.value_names"): "`Robot.with_values`; setting a value makes a robot",
-    ("robot.robot", "robot.summary"): _SHOWN,
     ("robot.problems", "robot.robot"): "for the type only: a robot checks itself by this file",
     ("robot.problems", "robot.value_names"): "a tolerance names a value; value names make robots",
-    ("loads.load_path", "loads.summary"): _SHOWN,
-    ("results.equilibrium", "results.summary"): _SHOWN,
-    ("results.path", "results.summary"): _SHOWN,
-    ("results.state", "results.summary"): _SHOWN,
-    ("results.equilibrium", "results.files.json"): _FILES,
-    ("results.path", "results.files.dataframe"): _FILES,
-    ("results.path", "results.files.dataset"): _FILES,
-    ("results.equilibrium", "results.path"): _TYPE,
-    ("results.reason", "results.path"): _TYPE,
-    ("results.quantities.path_formulas", "results.path"): _TYPE,
+    ("results.state", "results.writing"): _FILES,
+    ("results.path", "results.io"): _FILES,
+    ("results.state", "results.path"): _TYPE,
+    ("results.quantities", "results.path"): _TYPE,
     ("fit.estimation.calibration", "fit.documents"): _SHOWN,
     ("fit.estimation.calibration", "fit.assessment.residual_tests"): (
         "a fit tests its residuals when it is asked whether to trust it"

@@ -17,22 +17,23 @@ def test_classes_have_names_of_their_own():
             for node in ast.parse(file.read_text(encoding="utf-8")).body:
                 if isinstance(node, ast.ClassDef):
                     files[node.name].append(str(file.relative_to(SOURCE)))
-    assert len(files) > 500
+    assert files
     assert not {name: where for name, where in files.items() if len(where) > 1}
 
 
 def test_few_files_of_the_solver_know_the_tension_at_the_base() -> None:
     """ARCHITECTURE.md follows it through these files; the others pass whole points."""
     solver = SOURCE / "notchflex" / "solver"
-    files = [*solver.glob("*.py"), *(solver / "linear_step").glob("*.py")]
     named = {
-        file.name for file in files if re.search(r"\b\w*base_tension\b", file.read_text("utf-8"))
+        file.name
+        for file in solver.glob("*.py")
+        if re.search(r"\b\w*base_tension\b", file.read_text("utf-8"))
     }
     assert named == {
-        "actuation.py",
         "block_elimination.py",
         "continuation.py",
-        "element.py",
-        "friction_predictor.py",
+        "newton.py",
+        "quantities.py",
         "residual.py",
+        "solved_state.py",
     }

@@ -12,7 +12,7 @@ from typing import Any
 
 import griffe
 
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 
 _DATACLASS = griffe.ExprName("dataclasses.dataclass", None)
 

@@ -1,4 +1,4 @@
-"""Writes src/notchflex/results/quantities/properties.py, a line and a title for every quantity.
+"""Writes src/notchflex/results/quantities.py, a line and a title for every quantity.
 
 `python docs/make/quantity_properties.py`; a test compares the file with `module()`. Type checkers
 and editors read written properties; everything else of them comes from the registry.
@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 
-FILE = Path(__file__).resolve().parents[2] / "src/notchflex/results/quantities/properties.py"
+FILE = Path(__file__).resolve().parents[2] / "src/notchflex/results/quantities.py"
 MARK = "    # Written by docs/make/quantity_properties.py:\n"
 KINDS = {float: "Number", bool: "Flag", int: "Count", str: "Text"}
 

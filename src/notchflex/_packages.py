@@ -1,5 +1,7 @@
 """Imports every file of a folder, so that a new part registers itself without a list."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from importlib import import_module
 from pkgutil import iter_modules
@@ -9,3 +11,21 @@ def import_all(package: str, path: Iterable[str]) -> None:
     """Import every module directly inside a package."""
     for module in iter_modules(path):
         import_module(f"{package}.{module.name}")
+
+
+# What is raised for parts of a robot that no law is registered for.
+
+
+def unregistered(wanted: str, part: object, folder: str, function: str) -> TypeError:
+    """Make the error of a kind that a function was not told of.
+
+    Args:
+        wanted: What was asked for, such as "rod".
+        part: A description.
+        folder: The folder in `mechanics` where kinds register themselves.
+        function: The function that they register for.
+    """
+    return TypeError(
+        f"no {wanted} is registered for a description of type {type(part).__name__}; "
+        f"add one to notchflex/mechanics/{folder} with @{function}.register"
+    )

@@ -120,7 +120,7 @@ class Quantity:
         n notches, t tendons, n + 1 bodies, and 3 for x, y, z.
 
         Example:
-            >>> from notchflex.results.quantities.registry import QUANTITIES
+            >>> from notchflex.results.quantities import QUANTITIES
             >>> QUANTITIES["body_position"].shape
             ('bodies', '3')
         """
@@ -131,7 +131,7 @@ class Quantity:
         r"""The label of an axis: title, symbol and unit.
 
         Example:
-            >>> from notchflex.results.quantities.registry import QUANTITIES
+            >>> from notchflex.results.quantities import QUANTITIES
             >>> QUANTITIES["total_angle"].label
             'total bending angle $\\theta$ [deg]'
         """
@@ -164,7 +164,7 @@ class Quantity:
             The header, for example `notch_3_deg`.
 
         Example:
-            >>> from notchflex.results.quantities.registry import QUANTITIES
+            >>> from notchflex.results.quantities import QUANTITIES
             >>> QUANTITIES["tension"].header(tendon="")
             'tendon_force_N'
             >>> QUANTITIES["tension"].header(tendon=2)

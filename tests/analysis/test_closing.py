@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.closing_loads import closing_tensions, closing_tensions_of
-from notchflex.robot.value_names.varied import VariedRobots
+from notchflex.analysis.closing_loads import (
+    closing_tensions,
+    closing_tensions_of,
+)
+from notchflex.robot.numbers import VariedRobots
 
 YORK = nf.load_robot("york2015")
 

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._jax import jax, jnp
-from notchflex.analysis.derivatives.differences import slope
+from notchflex._jax import (
+    jax,
+    jnp,
+)
+from notchflex.analysis.forward_model import slope
 from notchflex.errors import ErrorCode
 from refusals import refused
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.derivatives.tangent import kinks
+from notchflex.analysis.tangent import kinks
 from notchflex.errors import ErrorCode
 from notchflex.solver.programs.compiled import Native
 from refusals import refused

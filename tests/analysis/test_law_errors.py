@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.uncertainty.assumed import tolerances_of
+from notchflex.analysis.draws import tolerances_of
 from reference_data import named_rows
 
 LINEAR = nf.Linear(60_000.0)

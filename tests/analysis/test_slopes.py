@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.derivatives.forward_model import ForwardModel
+from notchflex.analysis.forward_model import ForwardModel
 from notchflex.loads import LoadPath
 from notchflex.robot.value_names import number_at
 from notchflex.solver.programs.static_structure import padded_indices

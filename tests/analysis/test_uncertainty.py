@@ -5,12 +5,12 @@ import pytest
 from scipy.special import ndtri
 
 import notchflex as nf
-from notchflex.analysis.uncertainty.assumed import tolerances_of
-from notchflex.analysis.uncertainty.closing_bands import closing_bands
+from notchflex.analysis.bands import closing_bands
+from notchflex.analysis.draws import tolerances_of
 from notchflex.plotting import picture
 from notchflex.plotting.sheet import Area
 from notchflex.robot import from_table, to_table
-from notchflex.robot.tolerance import amount
+from notchflex.robot.problems import amount
 from notchflex.robot.value_names import number_at
 
 # Of a normal distribution, 5 % lie below minus this many standard deviations.

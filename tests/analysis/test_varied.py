@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis import varied
-from notchflex.analysis.uncertainty.assumed import tolerances_of
-from notchflex.analysis.uncertainty.draws import sources_of, values_at
-from notchflex.robot.value_names.varied import VariedRobots
+from notchflex.analysis import batch as varied
+from notchflex.analysis.draws import (
+    sources_of,
+    tolerances_of,
+    values_at,
+)
+from notchflex.robot.numbers import VariedRobots
 from notchflex.solver.programs import assembled
 from refusals import refused
 

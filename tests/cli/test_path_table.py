@@ -15,7 +15,7 @@ from notchflex.cli.tables.path_table import (
     usual_groups,
 )
 from notchflex.errors import ErrorCode, InputError
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 
 
 def commanded(*tension):

@@ -12,11 +12,14 @@ import pytest
 
 import notchflex as nf
 from design_wishes import tip_first, wide_wrist
-from notchflex.analysis.uncertainty.draws import sources_of, values_at
+from notchflex.analysis.draws import (
+    sources_of,
+    values_at,
+)
 from notchflex.designing.design_robot import problems_of
 from notchflex.designing.search.robust import Hold, RobustProblem
 from notchflex.designing.specification import spec_from_table
-from notchflex.robot.value_names.varied import VariedRobots
+from notchflex.robot.numbers import VariedRobots
 
 TOLERANCE = {
     "notch.depth": {"sd": 0.01, "per_notch": True},

@@ -9,8 +9,7 @@ import pytest
 
 import notchflex as nf
 from design_wishes import bend, s_curve, s_wrist, tip_first, wide_wrist
-from notchflex.analysis.axis_points import axis_points
-from notchflex.analysis.kinematics import tip_from_angles
+from notchflex.analysis.kinematics import axis_points, tip_from_angles
 from notchflex.designing.model.quantities import target_points
 
 

@@ -24,7 +24,7 @@ from notchflex.fit import (
     posterior_document,
     repeats_of_each,
 )
-from notchflex.results.files.json import json_text
+from notchflex.results.writing import json_text
 from refusals import refused
 
 

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from lanewise.elementary import ELEMENTARY
-from notchflex._jax import jax, jnp
+from notchflex._jax import (
+    jax,
+    jnp,
+)
 
 Wide = np.longdouble
 COUNT = 20_000

@@ -18,7 +18,7 @@ from notchflex.loads.command import (
 )
 from notchflex.loads.load_path import load_path
 from notchflex.mechanics.chain import assemble
-from notchflex.mechanics.chain.mass import body_masses
+from notchflex.mechanics.chain.assembly import body_masses
 from refusals import refused
 from robots import ready
 

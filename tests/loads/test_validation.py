@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.loads.external import ExternalLoad
+from notchflex.loads.load import ExternalLoad
 from notchflex.loads.load_path import load_path
 from refusals import refused
 

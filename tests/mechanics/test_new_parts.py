@@ -26,9 +26,9 @@ SCRIPT = f"""
 import json
 import numpy as np
 import notchflex as nf
-from notchflex.mechanics.chain.flexures import with_fibres
+from notchflex.mechanics.chain.assembly import with_fibres
 from notchflex.robot.value_names import number_at
-from notchflex.robot.value_names.varied import VariedRobots
+from notchflex.robot.numbers import VariedRobots
 from notchflex.mechanics.flexure import rod
 robot = nf.Robot(
     name="new parts",

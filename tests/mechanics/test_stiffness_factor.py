@@ -10,7 +10,7 @@ from notchflex._jax import jax
 from notchflex.mechanics.chain import assemble
 from notchflex.plotting.shapes.robot_shape import shape_from_angles
 from notchflex.robot import robot_from_text, robot_text
-from notchflex.robot.value_names.varied import VariedRobots
+from notchflex.robot.numbers import VariedRobots
 
 FACTOR = "notch.stiffness_factor"
 

@@ -5,13 +5,20 @@ from __future__ import annotations
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import (
+    jax,
+    jnp,
+)
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.actuation import command_residual
-from notchflex.solver.element import Iterate, Memory, bound_side
-from notchflex.solver.residual import evaluate
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.block_elimination import command_residual
+from notchflex.solver.residual import (
+    Iterate,
+    Memory,
+    SolverState,
+    bound_side,
+    evaluate,
+)
 
 # Closed lips and tendons drawn by stroke are held by springs this much stiffer than the notches:
 # they only stiffen; without it their forces would be multipliers and the stiffness not defined.

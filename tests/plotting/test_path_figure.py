@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from fake_path import CLOSING, fake_path
-from notchflex.loads.external import BodyForce, ExternalLoad
+from notchflex.loads.load import (
+    BodyForce,
+    ExternalLoad,
+)
 from notchflex.mechanics.chain import assemble
 from notchflex.plotting import path_figure, path_picture, save
 from notchflex.plotting.curves import abscissa, branches, steps_by_branch

@@ -26,7 +26,7 @@ from notchflex.plotting import (
 from notchflex.plotting.animation import MAX_FRAMES, frames_of
 from notchflex.plotting.sheet import Area, Bars, Curve, Panel, grid
 from notchflex.plotting.style import for_browser as html
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 from refusals import refused
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 from refusals import refused
 
 

@@ -2,7 +2,11 @@
 
 import pytest
 
-from notchflex.results.quantities.registry import QUANTITIES, span_names, units
+from notchflex.results.quantities import (
+    QUANTITIES,
+    span_names,
+    units,
+)
 
 
 @pytest.mark.parametrize("part", ["key", "column"])

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.results.quantities import properties as quantity_properties
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results import quantities as quantity_properties
+from notchflex.results.quantities import QUANTITIES
 
 ROOT = Path(__file__).parents[2]
 

@@ -9,7 +9,7 @@ import notchflex as nf
 from notchflex.errors import ErrorCode
 from notchflex.mechanics.chain import assemble
 from notchflex.results.state import State
-from notchflex.solver.solver_state import at_rest
+from notchflex.solver.residual import at_rest
 from refusals import refused
 
 

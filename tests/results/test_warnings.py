@@ -3,7 +3,7 @@
 import numpy as np
 
 from fake_path import fake_path
-from notchflex.results.warnings import path_warnings
+from notchflex.results.path import path_warnings
 
 
 def test_allowed_strain_names_notches_step_and_load():

@@ -7,7 +7,7 @@ import pytest
 
 from notchflex._jax import jax
 from notchflex.mechanics.motion import Motion
-from notchflex.solver.body_poses import body_poses
+from notchflex.solver.residual import body_poses
 from twists import exponential
 
 

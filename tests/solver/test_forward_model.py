@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.tangent import Change, PathTangents, gradient
+from notchflex.analysis.forward_model import ForwardModel
+from notchflex.analysis.tangent import (
+    Change,
+    PathTangents,
+    gradient,
+)
 from notchflex.mechanics.chain import assemble
 from notchflex.solver.programs.prepare import PreparedChain
 

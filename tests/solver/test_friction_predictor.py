@@ -8,8 +8,8 @@ import pytest
 from notchflex import load_robot
 from notchflex._jax import jnp
 from notchflex.mechanics.chain import assemble
-from notchflex.solver.element import Memory
-from notchflex.solver.friction_predictor import predict_log_ratios
+from notchflex.solver.newton import predict_log_ratios
+from notchflex.solver.residual import Memory
 
 
 def marched(before: float, now: float, remembered: np.ndarray, limits: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.loads.command import make_commands
-from notchflex.results.warnings import path_warnings
+from notchflex.results.path import path_warnings
 from notchflex.solver.held_stiffness import held_stiffness
 from oracles.held_stiffness import held_stiffness as dense
 

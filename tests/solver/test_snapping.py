@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.results.warnings import path_warnings
+from notchflex.results.path import path_warnings
 
 
 def wrist(friction: float = 0.18, **material: float) -> nf.Robot:

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.uncertainty.draws import deviation, moments
+from notchflex.analysis.draws import (
+    deviation,
+    moments,
+)
 from notchflex.pieces.folder import CODES
-from notchflex.robot.tolerance import Tolerance
+from notchflex.robot.problems import Tolerance
 from notchflex.tolerancing.analysis import tolerances_for
 from notchflex.tolerancing.spec import criteria_of
 from notchflex.tolerancing.study import Study

@@ -8,22 +8,28 @@ from typing import Any, NoReturn
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import jax, jnp
-from notchflex._pytree import choose
+from notchflex._jax import (
+    choose,
+    jax,
+    jnp,
+)
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary, short
 from notchflex._values import ByValue, frozen
 from notchflex.errors import ErrorCode, InputError
-from notchflex.loads.validation import short_repr
+from notchflex.loads.load import short_repr
 from notchflex.mechanics.chain import Chain
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 from notchflex.solver.continuation import solve_load_step
-from notchflex.solver.derived.quantities import believable
-from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
-from notchflex.solver.solver_state import SolverState, at_rest
+from notchflex.solver.quantities import believable
+from notchflex.solver.residual import (
+    SolverState,
+    at_rest,
+)
+from notchflex.solver.solved_state import SolvedState
 
 _OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]
 DEFAULT_OUTPUTS = ("total_angle", "notch_angle", "tip_position", "tip_rotation", "converged")

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from lanewise import WIDTH
-from notchflex._pytree import choose
+from notchflex._jax import choose
 from notchflex.analysis.outputs import report_quantities
 from notchflex.analysis.solve import prepare_for, simulate
 from notchflex.loads import Load
@@ -25,13 +25,19 @@ from notchflex.results.path import EquilibriumPath
 from notchflex.results.state import State
 from notchflex.robot import Robot
 from notchflex.solver.continuation import solve_load_step
-from notchflex.solver.derived.quantities import believable
-from notchflex.solver.derived.solved_state import SolvedState
-from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.compiled import native
+from notchflex.solver.newton import (
+    DEFAULT,
+    Settings,
+)
+from notchflex.solver.programs.compiled import (
+    native,
+    number_of_cores,
+    on_cores,
+)
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
-from notchflex.solver.programs.threads import number_of_cores, on_cores
+from notchflex.solver.quantities import believable
+from notchflex.solver.solved_state import SolvedState
 
 States = Float[np.ndarray, "k state"]
 

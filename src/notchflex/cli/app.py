@@ -21,7 +21,7 @@ from notchflex import __version__
 from notchflex.cli import terminal
 from notchflex.cli.terminal import BAD_INPUT, DONE, INTERNAL_ERROR, INTERRUPTED
 from notchflex.errors import InputError, InputWarning
-from notchflex.results.files.writing import let_go
+from notchflex.results.writing import let_go
 
 ABOUT = """Statics of tendon-driven notched-tube robots.
 

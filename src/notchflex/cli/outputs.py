@@ -12,7 +12,7 @@ from notchflex._extras import need
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import flag
 from notchflex.errors import InputError
-from notchflex.results.files.writing import (
+from notchflex.results.writing import (
     BROWSER,
     PAPER,
     STANDARD_OUTPUT,
@@ -101,14 +101,14 @@ class Outputs:
     def write_json(self, document: Callable[[], Any]) -> None:
         """Write the document of `--json`, if it was given."""
         if target := self.targets.get("json"):
-            from notchflex.results.files.json import write_json
+            from notchflex.results.writing import write_json
 
             write_json(target, document())
 
     def write_csv(self, columns: Callable[[], Mapping[str, Any]]) -> None:
         """Write the columns of `--csv`, if it was given."""
         if target := self.targets.get("csv"):
-            from notchflex.results.files.csv import write_columns
+            from notchflex.results.writing import write_columns
 
             write_columns(target, columns())
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from notchflex._replacing import replacing
 from notchflex.cli import terminal
 from notchflex.cli.outputs import Outputs
-from notchflex.results.files.writing import MOVING
+from notchflex.results.writing import MOVING
 
 if TYPE_CHECKING:
     from notchflex.analysis import Bands
@@ -24,15 +24,14 @@ def write(
 
     Bands of tolerances go to JSON, CSV and the picture.
     """
-    from notchflex.results.files.csv import write_path_csv
-    from notchflex.results.files.dataframe import write_parquet
-    from notchflex.results.files.dataset import write_netcdf
+    from notchflex.results.io import write_netcdf, write_parquet
+    from notchflex.results.writing import write_path_csv
 
     path = next(iter(paths.values()))
     outputs.write_json(lambda: _document(paths, bands))
     writers = {"csv": write_path_csv, "nc": write_netcdf, "parquet": write_parquet}
     if bands:
-        from notchflex.analysis.uncertainty.documents import band_columns
+        from notchflex.analysis.bands import band_columns
 
         writers["csv"] = partial(write_path_csv, more=band_columns(bands))
     for name, writer in writers.items():
@@ -57,13 +56,13 @@ def is_animation(target: str) -> bool:
 
 
 def _document(paths: Mapping[str, EquilibriumPath], bands: Bands | None) -> dict[str, Any]:
-    from notchflex.results.files.io import whole_document
+    from notchflex.results.io import whole_document
 
     (_, first), *others = paths.items()
     beside = {label: whole_document(other) for label, other in others}
     document = whole_document(first) | ({"beside": beside} if beside else {})
     if bands:
-        from notchflex.analysis.uncertainty.documents import band_document
+        from notchflex.analysis.bands import band_document
 
         document["bands"] = band_document(bands)
     return document

@@ -15,7 +15,7 @@ from notchflex.errors import InputError
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.fit.measurements.simulated import solved_rows
 from notchflex.fit.model.residuals import OUTPUTS, Predicted, branch_words, misfit
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:

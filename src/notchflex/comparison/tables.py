@@ -8,12 +8,16 @@ import numpy as np
 
 from notchflex.comparison.comparison import Comparison
 from notchflex.fit.assessment.errors_of_parts import edge
-from notchflex.results.files.json import document_head
-from notchflex.results.quantities.registry import AXES, DEGREES, QUANTITIES
+from notchflex.results.quantities import (
+    AXES,
+    DEGREES,
+    QUANTITIES,
+)
+from notchflex.results.writing import document_head
 
 
 def comparison_document(comparison: Comparison) -> dict[str, Any]:
-    """Return a comparison as a document for `notchflex.results.files.json.write_json`.
+    """Return a comparison as a document for `notchflex.results.writing.write_json`.
 
     Args:
         comparison: The comparison.

@@ -19,8 +19,15 @@ from notchflex.control.search.rate import cross_dead_bands, limit_rate
 from notchflex.control.targets import DIRECTION, LARGEST_TARGET, Targets, target_shapes
 from notchflex.errors import Failure, InputError
 from notchflex.loads import Load
-from notchflex.loads.validation import check_is_robot, check_number, short_repr
-from notchflex.results.state import SavedState, State
+from notchflex.loads.load import (
+    check_is_robot,
+    check_number,
+    short_repr,
+)
+from notchflex.results.state import (
+    SavedState,
+    State,
+)
 from notchflex.robot import Robot
 
 

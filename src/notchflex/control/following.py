@@ -18,11 +18,14 @@ from notchflex.control.search.problem import Attempt
 from notchflex.control.targets import DIRECTION, Targets, unit_hint
 from notchflex.errors import Failure
 from notchflex.loads import Load, LoadPath
-from notchflex.results.equilibrium import Equilibrium
-from notchflex.results.files.io import whole_document
+from notchflex.results.io import whole_document
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.results.state import SavedState, State
+from notchflex.results.quantities import QUANTITIES
+from notchflex.results.state import (
+    Equilibrium,
+    SavedState,
+    State,
+)
 from notchflex.robot import Robot
 
 

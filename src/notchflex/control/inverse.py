@@ -16,8 +16,14 @@ from notchflex.control.search.rate import cross_dead_bands, limit_rate
 from notchflex.control.targets import Targets, make_targets, units_of
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.validation import check_is_robot, short_repr
-from notchflex.results.state import SavedState, State
+from notchflex.loads.load import (
+    check_is_robot,
+    short_repr,
+)
+from notchflex.results.state import (
+    SavedState,
+    State,
+)
 from notchflex.robot import Robot
 
 

@@ -10,7 +10,10 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.errors import InputError
-from notchflex.loads.validation import check_number, short_repr
+from notchflex.loads.load import (
+    check_number,
+    short_repr,
+)
 
 Drive = Literal["tension", "stroke"]
 

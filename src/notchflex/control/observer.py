@@ -17,8 +17,11 @@ from notchflex.control.program.drive_model import DriveModel
 from notchflex.control.search.problem import Problem
 from notchflex.errors import InputError
 from notchflex.loads import Load
+from notchflex.loads.load import (
+    check_is_robot,
+    check_number,
+)
 from notchflex.loads.load_path import load_path
-from notchflex.loads.validation import check_is_robot, check_number
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
 

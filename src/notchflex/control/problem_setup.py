@@ -13,9 +13,13 @@ from notchflex.control.search.problem import Problem, TargetSearch
 from notchflex.control.targets import Aim, Targets, aim_at
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
+from notchflex.loads.load import short_repr
 from notchflex.loads.load_path import load_path
-from notchflex.loads.validation import short_repr
-from notchflex.results.state import SavedState, State, check_robot
+from notchflex.results.state import (
+    SavedState,
+    State,
+    check_robot,
+)
 from notchflex.robot import Robot
 
 # Default limit of drives, as a multiple of about the closing value of a notch.

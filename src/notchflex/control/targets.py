@@ -13,11 +13,18 @@ from jaxtyping import Float, Int
 from notchflex._quantity import DEGREES, REGISTERED
 from notchflex.analysis.kinematics import tip_from_angles
 from notchflex.errors import InputError
-from notchflex.loads.validation import check_is_robot, check_number, short_repr
-from notchflex.results.files.csv_reading import read_data_table
-from notchflex.results.quantities.registry import AXES, QUANTITIES
+from notchflex.loads.load import (
+    check_is_robot,
+    check_number,
+    short_repr,
+)
+from notchflex.results.quantities import (
+    AXES,
+    QUANTITIES,
+)
+from notchflex.results.reading import read_data_table
 from notchflex.robot import Robot
-from notchflex.robot.error_messages import nearest
+from notchflex.robot.part import nearest
 
 DIRECTION = "tip_direction"
 """Unit vector along the tube at the tip, in the world: the last column of `tip_rotation`."""

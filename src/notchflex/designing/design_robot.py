@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.analysis.uncertainty.assumed import tolerances_of
+from notchflex.analysis.draws import tolerances_of
 from notchflex.designing.explanation import chosen_form, curves_missed, explain, yield_sentences
 from notchflex.designing.model.point import Solver
 from notchflex.designing.model.quantities import COMPLIANCE, CURVE, OF_STATES
@@ -36,10 +36,16 @@ from notchflex.designing.specification import (
     spec_from_table,
 )
 from notchflex.errors import InputError
-from notchflex.loads.validation import check_number, short_repr
+from notchflex.loads.load import (
+    check_number,
+    short_repr,
+)
 from notchflex.robot import Robot, from_table, load_robot, to_table
-from notchflex.robot.robot import remember_source, source_of
-from notchflex.robot.tolerance import Tolerance
+from notchflex.robot.problems import Tolerance
+from notchflex.robot.robot import (
+    remember_source,
+    source_of,
+)
 from notchflex.robot.value_names import numbers_at
 
 MAX_FORMS = 200

@@ -19,10 +19,14 @@ from notchflex.designing.search.robust import YieldOf
 from notchflex.designing.search.search import SearchResult
 from notchflex.designing.specification import DesignConstraint, DesignObjective, DesignSpec
 from notchflex.errors import ConvergenceError
-from notchflex.results.files.csv import write_csv
-from notchflex.results.files.json import document_head, write_json
-from notchflex.results.files.writing import check_folder, write_text
 from notchflex.results.path import EquilibriumPath
+from notchflex.results.writing import (
+    check_folder,
+    document_head,
+    write_csv,
+    write_json,
+    write_text,
+)
 from notchflex.robot import Robot
 from notchflex.robot.writing import robot_text
 

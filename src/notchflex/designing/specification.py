@@ -12,11 +12,21 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from notchflex.errors import InputError
-from notchflex.results.files.specification import read_specification, robot_named, validated
-from notchflex.robot.part import Float, FloatOrInf, Int, ProblemError, part, quantity
-from notchflex.robot.robot import Robot
-from notchflex.robot.schema import schema_of
-from notchflex.robot.tolerance import Tolerances
+from notchflex.results.reading import (
+    read_specification,
+    robot_named,
+    validated,
+)
+from notchflex.robot.part import (
+    Float,
+    FloatOrInf,
+    Int,
+    ProblemError,
+    part,
+    quantity,
+)
+from notchflex.robot.problems import Tolerances
+from notchflex.robot.robot import Robot, schema_of
 
 REFUSE = InputError.INVALID_SPECIFICATION
 

@@ -17,11 +17,10 @@ from jaxtyping import Float
 
 from notchflex._jax import constant
 from notchflex.errors import InputError
-from notchflex.mechanics.chain.mass import body_lengths
-from notchflex.mechanics.tendon.openings import passage
+from notchflex.mechanics.chain.assembly import body_lengths
+from notchflex.mechanics.tendon import passage
 from notchflex.robot import Robot, Tube
-from notchflex.robot.notches.cut import NotchCut
-from notchflex.robot.notches.profile import shrunk
+from notchflex.robot.cuts import NotchCut, shrunk
 
 
 class PlacedCut(NamedTuple):

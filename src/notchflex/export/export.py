@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from notchflex._replacing import replacing
 from notchflex.errors import InputError
 from notchflex.export.formats import FORMATS, Document, Subject, format_of
-from notchflex.results.files.writing import check_output
+from notchflex.results.writing import check_output
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:

@@ -15,7 +15,12 @@ from pydantic import BeforeValidator, Field
 
 from notchflex._extras import need
 from notchflex.errors import InputError
-from notchflex.robot.part import Float, Int, part, quantity
+from notchflex.robot.part import (
+    Float,
+    Int,
+    part,
+    quantity,
+)
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath

@@ -28,11 +28,17 @@ from notchflex.fit.estimation.intervals import Interval
 from notchflex.fit.estimation.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
 from notchflex.fit.model.constants import Unknown
 from notchflex.fit.model.residuals import SENSOR
-from notchflex.results.files.json import plain
-from notchflex.results.files.writing import check_folder, write_text
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
+from notchflex.results.writing import (
+    check_folder,
+    plain,
+    write_text,
+)
 from notchflex.robot import robot_text
-from notchflex.robot.robot import source_of, to_table
+from notchflex.robot.robot import (
+    source_of,
+    to_table,
+)
 
 HEAD = {"program": "notchflex", "version": __version__}
 # An objective's value is a sum of these; half a chi squared has no unit.

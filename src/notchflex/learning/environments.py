@@ -13,7 +13,10 @@ from gymnasium.vector.utils import batch_space
 
 from notchflex.errors import InputError
 from notchflex.learning.episode import EpisodeRows, EpisodeSettings, frame
-from notchflex.loads.validation import check_integer, short_repr
+from notchflex.loads.load import (
+    check_integer,
+    short_repr,
+)
 
 RENDER_MODES = ["rgb_array"]
 _ROW = np.zeros(1, int)

@@ -15,7 +15,11 @@ from notchflex._extras import need
 from notchflex.analysis.kinematics import tip_from_angles
 from notchflex.analysis.stepping import BatchStepper
 from notchflex.errors import InputError
-from notchflex.loads.validation import check_integer, check_number, short_repr
+from notchflex.loads.load import (
+    check_integer,
+    check_number,
+    short_repr,
+)
 from notchflex.robot import Robot, load_robot
 from notchflex.workspaces.rays import largest_tensions
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from notchflex.control import Controller, Limits, TargetSearch
 from notchflex.errors import InputError
 from notchflex.learning.environments import RobotEnv
-from notchflex.loads.validation import short_repr
+from notchflex.loads.load import short_repr
 from notchflex.robot import Frictionless
 
 _TOLERANCE, _SOLVES = 1e-4, 20  # mm; loads solved in a step

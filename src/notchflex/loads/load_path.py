@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, TypeGuard, overload
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex._summary import Displayed, Summary
+from notchflex._load_words import MOST_STEPS
+from notchflex._summary import Displayed, Summary, course, short, vector
 from notchflex._values import ByValue, read_only
 from notchflex.errors import InputError
-from notchflex.loads.external import EXTERNAL, BodyForce, ExternalLoad, external_of_steps
-from notchflex.loads.load import Load, check_turn, entries_of, rotation_of
-from notchflex.loads.validation import (
+from notchflex.loads.load import (
+    EXTERNAL,
+    BodyForce,
+    ExternalLoad,
+    Load,
+    check_integer,
+    check_number,
     check_table,
+    check_turn,
+    entries_of,
+    external_of_steps,
     one_or_several,
+    rotation_of,
     short_repr,
 )
+
+if TYPE_CHECKING:
+    from notchflex.loads.load import ExternalLoad, Load
+
 
 _TURNED = (
     "base_rotation must be the same for all loads of a path and for all paths of a batch; "
@@ -151,7 +164,6 @@ class LoadPath(ByValue, Displayed):
         )
 
     def _summary(self) -> Summary:
-        from notchflex.loads.summary import load_path_summary
 
         return load_path_summary(self)
 
@@ -335,3 +347,200 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
 
 _base_rotation = lru_cache(maxsize=64)(read_only)
 """Returns a rotation vector as an array, the same for the same vector."""
+
+
+# Summaries of loads: what `repr` and a notebook show of them.
+
+MOST = 4
+"""Tendons, notches or outputs that have a line each; of more, the first."""
+
+
+def load_path_summary(load: LoadPath) -> Summary:
+    """Summarise a load path: what is commanded of every tendon, and the external loads."""
+    rows: list[tuple[str, str]] = []
+    for name, unit, values in (("tension", "N", load.tension), ("stroke", "mm", load.stroke)):
+        rows += tendon_rows(name, unit, values, commanded=True)
+    rows += external_rows(load)
+    if load.base_rotation.any():
+        rows.append(("base rotation", f"{vector(load.base_rotation)} rad"))
+    steps = f"{len(load)} step{'s' * (len(load) != 1)}"
+    return Summary(f"Load path of {steps}", rows)
+
+
+def load_words(load: Load) -> str:
+    """Return a load in words: what is commanded of every tendon, and the external loads.
+
+    Example:
+        >>> from notchflex import Load
+        >>> load_words(Load(tension=2.0, tip_force=(0.0, 0.1, 0.0)))
+        'tension 2 N, tip force (0, 0.1, 0) N'
+    """
+    words: list[str] = []
+    for name, unit in (("tension", "N"), ("stroke", "mm")):
+        given = getattr(load, name)
+        several = given if isinstance(given, (list, tuple)) else [given]
+        for tendon, value in enumerate(several, start=1):
+            if value is not None:
+                which = f"tendon {tendon} " if len(several) > 1 else ""
+                words.append(f"{which}{name} {short(value)} {unit}")
+    words += external_words(load)
+    return ", ".join(words) or "none"
+
+
+def external_words(load: ExternalLoad) -> list[str]:
+    """Return the external loads of one step, each in words.
+
+    Example:
+        >>> from notchflex.loads import ExternalLoad
+        >>> external_words(ExternalLoad(tip_force=(0.0, 0.1, 0.0), following=True, tip_mass=20.0))
+        ['tip force (0, 0.1, 0) N following the tip', 'tip mass 20 g']
+    """
+    words: list[str] = []
+    turning = " following the tip" if load.following else ""
+    at = f" at {vector(load.tip_point)} mm from the tip" if any(load.tip_point) else ""
+    if any(load.tip_force):
+        words.append(f"tip force {vector(load.tip_force)} N{at}{turning}")
+    if any(load.tip_moment):
+        words.append(f"tip moment {vector(load.tip_moment)} N mm{turning}")
+    if load.tip_mass:
+        words.append(f"tip mass {short(load.tip_mass)} g{'' if any(load.tip_force) else at}")
+    if load.gravity is not None and any(load.gravity):
+        words.append(f"gravity {vector(load.gravity)} m/s²")
+    for one in load.body_forces:
+        point = f" at {vector(one.point)} mm" if any(one.point) else ""
+        follows = " following it" if one.following else ""
+        for name, value, where in (("force", one.force, point), ("moment", one.moment, "")):
+            if any(value):
+                unit = "N" if name == "force" else "N mm"
+                words.append(f"{name} {vector(value)} {unit} on body {one.body}{where}{follows}")
+    return words
+
+
+def external_rows(load: LoadPath) -> Iterator[tuple[str, str]]:
+    """Yield the row of the external loads of a path; none where there are none."""
+    different = [", ".join(external_words(one)) or "none" for one in load.different]
+    if different == ["none"]:
+        return
+    more = f"; {len(different) - 1} other" if len(different) > 1 else ""
+    yield ("external load", f"{different[0]}{more}")
+
+
+def tendon_rows(
+    name: str, unit: str, values: np.ndarray, *, commanded: bool = False
+) -> Iterator[tuple[str, str]]:
+    """Yield the course of every tendon; of many, the first that are not slack."""
+    count = values.shape[1]
+    moving = [i for i in range(count) if np.isfinite(values[:, i]).any()]
+    shown = moving[: MOST - 2] if len(moving) > MOST - 1 else moving
+    for index in shown:
+        which = f" {index + 1}" if count > 1 else ""
+        yield (f"tendon{which} {name}", f"{course(values[:, index])} {unit}")
+    if len(moving) > len(shown):
+        yield (f"tendon {name}", f"and {len(moving) - len(shown)} more tendons")
+    if not moving and not commanded:
+        yield (f"tendon {name}", "none")
+
+
+# The usual load paths: one tendon pulled by tension or drawn by stroke, in equal steps.
+
+_MAX_TENDONS = 1000
+Ends = float | Sequence[float | None] | np.ndarray
+"""Tension or stroke of one tendon, or of every tendon with None where it is slack."""
+
+
+def pull(start: Ends, stop: Ends, steps: int = 31, *, tendon: int = 1) -> LoadPath:
+    """Pull tendons by tension, from one value to another in equal steps.
+
+    Args:
+        start: First tension, N: of one tendon, or an entry per tendon with None where it is slack.
+        stop: Last tension, N, in the same form.
+        steps: Number of steps, both ends included.
+        tendon: Which tendon a single number pulls, counted from 1.
+
+    Returns:
+        The path; `.release()` adds the way back, `.loaded(...)` external loads.
+
+    Raises:
+        InputError: Fewer than one step or more than a million, or one step between different
+            tensions; a negative or infinite tension, no such tendon, ends of other tendons.
+
+    Example:
+        >>> pull(0.0, 3.0, steps=4).tension[:, 0].tolist()
+        [0.0, 1.0, 2.0, 3.0]
+        >>> pull((0.0, 0.5), (1.0, 0.5), steps=2).tension.tolist()
+        [[0.0, 0.5], [1.0, 0.5]]
+    """
+    return _ramp("tension", start, stop, steps, tendon)
+
+
+def stroke_path(start: Ends, stop: Ends, steps: int = 31, *, tendon: int = 1) -> LoadPath:
+    """Prescribe the stroke of tendons, from one value to another in equal steps.
+
+    Args:
+        start: First stroke, mm: of one tendon, or an entry per tendon with None where it is slack.
+        stop: Last stroke, mm, in the same form.
+        steps: Number of steps, both ends included.
+        tendon: Which tendon a single number draws, counted from 1.
+
+    Returns:
+        The path; `.release()` adds the way back, `.loaded(...)` external loads.
+
+    Raises:
+        InputError: Fewer than one step or more than a million, or one step between different
+            strokes; an infinite stroke, no such tendon, ends of other tendons.
+
+    Example:
+        >>> stroke_path(0.0, 1.0, steps=3).stroke[:, 0].tolist()
+        [0.0, 0.5, 1.0]
+    """
+    return _ramp("stroke", start, stop, steps, tendon)
+
+
+def _ramp(what: str, start: Ends, stop: Ends, steps: int, tendon: int) -> LoadPath:
+    steps, tendon = check_integer(steps, "steps"), check_integer(tendon, "tendon")
+    if steps < 1:
+        raise InputError.NO_DATA(f"a range needs at least one step; got {steps}")
+    if steps > MOST_STEPS:
+        raise InputError.OUT_OF_RANGE(
+            f"a range has at most {MOST_STEPS:,} steps; got {steps:,}. Take fewer."
+        )
+    if not 1 <= tendon <= _MAX_TENDONS:
+        raise InputError.OUT_OF_RANGE(
+            f"tendons are counted from 1, to {_MAX_TENDONS} at most; got {tendon}"
+        )
+    alone = [*[None] * (tendon - 1), 0.0]
+    several = next((ends for ends in (start, stop) if _is_several(ends)), alone)
+    first, last = (
+        one if _is_several(one) else [None if entry is None else one for entry in several]
+        for one in (start, stop)
+    )
+    if len(first) != len(last):
+        raise InputError.WRONG_SHAPE(
+            f"a {what} range needs ends for equally many tendons; got {len(first)} and {len(last)}"
+        )
+    commanded = np.full((steps, len(first)), np.nan)
+    for number, ends in enumerate(zip(first, last, strict=True)):
+        if ends != (None, None):
+            commanded[:, number] = _column(what, ends, steps)
+    return LoadPath(commanded) if what == "tension" else LoadPath(stroke=commanded)
+
+
+def _is_several(value: Ends) -> TypeGuard[Sequence[float | None]]:
+    return isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes)
+
+
+def _column(what: str, ends: tuple[Any, Any], steps: int) -> Float[np.ndarray, " s"]:
+    """Return the steps of one tendon."""
+    first, last = (
+        check_number(end, f"the {name} {what}")
+        for end, name in zip(ends, ("first", "last"), strict=True)
+    )
+    if steps == 1 and first != last:
+        raise InputError.OUT_OF_RANGE(
+            f"a range of one step cannot go from {first:g} to {last:g}; give 2 steps or more"
+        )
+    with np.errstate(over="ignore", invalid="ignore"):
+        commanded = np.linspace(first, last, steps)
+    if not np.isfinite(commanded).all():
+        raise InputError.NOT_FINITE(f"a {what} range needs finite ends; got {first:g} and {last:g}")
+    return commanded

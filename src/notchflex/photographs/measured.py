@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.fit.measurements.columns import measured_columns
-from notchflex.results.files.csv import write_columns
+from notchflex.results.writing import write_columns
 from notchflex.robot import Robot
 
 PHOTOGRAPH = "photograph"

@@ -10,7 +10,7 @@ from pathlib import Path
 from notchflex.errors import InputError
 from notchflex.photographs.measured import PHOTOGRAPH
 from notchflex.photographs.reading import head_of, photograph_bytes
-from notchflex.results.files.csv_reading import read_data_table
+from notchflex.results.reading import read_data_table
 from notchflex.robot import Robot
 
 _DESCRIPTION, _COMMENT = 0x010E, 0x9286

@@ -23,7 +23,10 @@ from notchflex._replacing import replacing, unwritable
 from notchflex.errors import InputError
 from notchflex.pieces import checksum
 from notchflex.pieces.checksum import is_whole
-from notchflex.results.files.writing import check_folder, write_text
+from notchflex.results.writing import (
+    check_folder,
+    write_text,
+)
 from notchflex.robot.reading import read_text
 from notchflex.solver.programs.compiled import backend
 

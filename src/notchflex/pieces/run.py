@@ -13,7 +13,10 @@ from threadpoolctl import threadpool_limits
 
 from notchflex._extras import need
 from notchflex.errors import ErrorCode, InputError
-from notchflex.loads.validation import check_integer, short_repr
+from notchflex.loads.load import (
+    check_integer,
+    short_repr,
+)
 from notchflex.pieces.folder import (
     Done,
     Manifest,

@@ -18,8 +18,11 @@ from notchflex.plotting.renderers.with_matplotlib import draw_panel, figure_of
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import Area, Faces, Panel, stack
 from notchflex.plotting.style import BLACK, BLUE, house_style
-from notchflex.results.files.writing import MOVING, check_picture
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
+from notchflex.results.writing import (
+    MOVING,
+    check_picture,
+)
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath

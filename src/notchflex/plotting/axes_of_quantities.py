@@ -26,10 +26,13 @@ from notchflex.plotting.path import robot_shape, state_shape
 from notchflex.plotting.renderers.with_matplotlib import draw_panel
 from notchflex.plotting.sheet import BESIDE, INSIDE, Curve, Mark, Panel
 from notchflex.plotting.style import house_style, sequence_colours
-from notchflex.results.files.csv import entries_of, is_listed
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
+from notchflex.results.writing import (
+    entries_of,
+    is_listed,
+)
 from notchflex.robot import Robot
-from notchflex.robot.error_messages import nearest
+from notchflex.robot.part import nearest
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath

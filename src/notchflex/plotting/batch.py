@@ -12,7 +12,7 @@ from notchflex.plotting.curves import TIP_LABELS
 from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from notchflex.analysis import Batch

@@ -27,7 +27,7 @@ from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import BELOW, Cell, Colour, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import GREY, rgb
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath

@@ -24,10 +24,13 @@ from notchflex.plotting.sheet import (
     dots,
 )
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.results.quantities.registry import QUANTITIES, spans_of
+from notchflex.results.quantities import (
+    QUANTITIES,
+    spans_of,
+)
 
 if TYPE_CHECKING:
-    from notchflex.analysis.uncertainty.bands import Band
+    from notchflex.analysis.bands import Band
     from notchflex.results import EquilibriumPath
 
 

@@ -21,7 +21,10 @@ from notchflex.plotting.sheet import (
     stack,
 )
 from notchflex.plotting.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, sequence_colours
-from notchflex.results.quantities.registry import AXES, QUANTITIES
+from notchflex.results.quantities import (
+    AXES,
+    QUANTITIES,
+)
 
 if TYPE_CHECKING:
     from notchflex.control import Following

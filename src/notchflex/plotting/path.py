@@ -30,13 +30,13 @@ from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from notchflex.analysis.uncertainty.bands import Band
+    from notchflex.analysis.bands import Band
     from notchflex.results import EquilibriumPath
 
 MAX_PROFILES = 2

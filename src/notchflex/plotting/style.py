@@ -22,8 +22,11 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from notchflex._replacing import replacing
-from notchflex.results.files.writing import PAPER, check_picture
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
+from notchflex.results.writing import (
+    PAPER,
+    check_picture,
+)
 
 # notation: the eight colours of Okabe and Ito (2008), made for all kinds of colour vision.
 BLACK = "#000000"

@@ -9,13 +9,18 @@ from typing import TYPE_CHECKING
 from notchflex._quantity import Quantity
 
 if TYPE_CHECKING:
-    from notchflex.results.equilibrium import Equilibrium
-    from notchflex.results.files.io import read_path, save_path
-    from notchflex.results.files.table import read_table
-    from notchflex.results.path import EquilibriumPath
-    from notchflex.results.quantities.registry import QUANTITIES
-    from notchflex.results.recorded import Recorded
-    from notchflex.results.state import SavedState, State
+    from notchflex.results.io import (
+        read_path,
+        save_path,
+    )
+    from notchflex.results.path import EquilibriumPath, Recorded
+    from notchflex.results.quantities import QUANTITIES
+    from notchflex.results.reading import read_table
+    from notchflex.results.state import (
+        Equilibrium,
+        SavedState,
+        State,
+    )
 
 __all__ = [
     "QUANTITIES",
@@ -31,13 +36,11 @@ __all__ = [
 ]
 
 _HOME = {
-    "Equilibrium": "equilibrium",
-    "EquilibriumPath": "path",
-    "Recorded": "recorded",
-    **dict.fromkeys(("SavedState", "State"), "state"),
-    **dict.fromkeys(("read_path", "save_path"), "files.io"),
-    "read_table": "files.table",
-    "QUANTITIES": "quantities.registry",
+    **dict.fromkeys(("EquilibriumPath", "Recorded"), "path"),
+    **dict.fromkeys(("Equilibrium", "SavedState", "State"), "state"),
+    **dict.fromkeys(("read_path", "save_path"), "io"),
+    "read_table": "reading",
+    "QUANTITIES": "quantities",
 }
 
 

@@ -2,38 +2,367 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
 import jax.tree_util as tree_util
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
+from numpy.linalg import norm
+from numpy.typing import ArrayLike
 
+from notchflex._jax import (
+    constant,
+    jax,
+)
 from notchflex._summary import Displayed, Summary
 from notchflex._values import ByValue, frozen, read_only
 from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import LoadPath
-from notchflex.loads.command import Command, make_commands, out_of_frame
-from notchflex.mechanics.chain import Chain
-from notchflex.results.equilibrium import Equilibrium
-from notchflex.results.quantities.path_formulas import friction_front
-from notchflex.results.quantities.properties import QUANTITIES, PathQuantities
-from notchflex.results.reason import why_not
-from notchflex.results.recorded import Recorded
-from notchflex.results.state import State
+from notchflex.loads.command import (
+    Command,
+    make_commands,
+    out_of_frame,
+)
+from notchflex.mechanics.chain import Chain, unchecked_dimensions
+from notchflex.mechanics.tendon import Straight
+from notchflex.results.quantities import (
+    QUANTITIES,
+    PathQuantities,
+    friction_front,
+)
+from notchflex.results.state import Equilibrium, State
 from notchflex.robot import Robot
-from notchflex.solver.derived.quantities import Shape
-from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.block_elimination import closing_stroke
+from notchflex.solver.newton import (
+    DEFAULT,
+    Settings,
+)
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.run import SolverRun
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.programs.run import SolverRun, run
+from notchflex.solver.quantities import (
+    Shape,
+    reported,
+)
+from notchflex.solver.residual import SolverState
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import Dataset
 
     from notchflex._plot import Picture
+
+
+# A run read back from a file: its numbers are reported without solving.
+
+REPORTED = (*Shape._fields, *reported("state"))
+"""Everything that a run reports of each state, by name."""
+
+BEFORE = ("tension", "stroke", "span_tension", "contact_slid")
+"""What is needed of the state before the first one: work is integrated from there."""
+
+FLATTENING = "flattening"
+"""What the loss of flattening is counted from, of every state; for materials that remember."""
+
+MATERIAL = "material"
+"""Memory of the material in that state, where it has any."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """States of many loads, loads as leading axis, as `SolverRun` has them.
+
+    Attributes:
+        solved: The last solved state at each load.
+        reported: What is reported of each state, by the names of `REPORTED`.
+        first: What is reported of the state before the first load, by the names of `BEFORE`;
+            the memory of the material, as `MATERIAL`, and `FLATTENING`.
+        held: Smallest eigenvalue of every stiffness, and the sign of its determinant.
+        residual: Largest scaled imbalance of the last attempt.
+        iterations: Newton iterations.
+        converged: Whether the load was reached.
+        tried: Whether it was tried at all.
+        reached: Part of the way from the load before that was reached.
+        snapped: Notches that snapped shut (1) or open (-1).
+    """
+
+    solved: SolverState
+    reported: Mapping[str, np.ndarray]
+    first: Mapping[str, np.ndarray]
+    held: tuple[np.ndarray, np.ndarray]
+    residual: Float[np.ndarray, " s"]
+    iterations: Int[np.ndarray, " s"]
+    converged: Bool[np.ndarray, " s"]
+    tried: Bool[np.ndarray, " s"]
+    reached: Float[np.ndarray, " s"]
+    snapped: Float[np.ndarray, "s n"]
+
+    def quantity(self, name: str) -> np.ndarray:
+        """Return a quantity of each state by its name in the registry."""
+        return self.reported[name]
+
+    def rows(self, some: slice) -> Recorded:
+        """Return some of the loads."""
+        start = np.arange(len(self.converged))[some][0]
+        first = dict(self.first)
+        if start:
+            every = {**self.reported, MATERIAL: self.solved.memory.material}
+            first = {name: np.asarray(every[name])[start - 1] for name in first}
+        cut = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "first"}
+        return Recorded(first=first, **jax.tree.map(lambda values: np.asarray(values)[some], cut))
+
+    def before(self, name: str) -> np.ndarray:
+        """Return a quantity of the state before the first load, by name."""
+        return self.first[name]
+
+    def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
+        """Return the smallest real part of the eigenvalues, and the determinant's sign."""
+        del commands  # they were counted when it was computed
+        return self.held
+
+    def stable(self, commands: Command) -> Bool[np.ndarray, " s"]:
+        """Return whether each state is stable."""
+        eigenvalue, sign = self.stability(commands)
+        return (eigenvalue > 0.0) & (sign > 0.0)
+
+
+# Warnings on the validity of a result.
+
+MOMENT_ERROR = 0.01
+"""Relative error of the bending moment of the strain modes above which a path has a warning."""
+
+
+def path_warnings(path: EquilibriumPath) -> list[str]:
+    """Return one sentence for each reason to doubt a path.
+
+    Args:
+        path: Solved path.
+
+    Returns:
+        Sentences on dimensions outside the range that was checked, on strains beyond what the
+        material is allowed or its law is known for, on unstable equilibria, and on too few strain
+        modes; none if there is nothing to warn of.
+    """
+    outside = unchecked_dimensions(path.robot)
+    return [*outside, *_snaps(path), *_strains(path), *_unstable(path), *_coarse(path)]
+
+
+def _snaps(path: EquilibriumPath) -> Iterator[str]:
+    """Warn of notches that pass a limit point under tension."""
+    for what, side in (("snaps shut", 1), ("snaps open", -1)):
+        steps, notches = np.nonzero(path.snap == side)
+        if len(steps):
+            names = ", ".join(str(notch + 1) for notch in dict.fromkeys(notches.tolist()))
+            yield (
+                f"notch {names} {what}, first at step {steps[0] + 1} "
+                f"({_load(path, int(steps[0]))}): it passes a limit point, where it softens as it "
+                "closes, so that no shape between is in equilibrium under this tension; prescribe "
+                "the stroke to pass through the shapes between."
+            )
+
+
+def _strains(path: EquilibriumPath) -> Iterator[str]:
+    material = path.robot.material
+    # The law is fitted in the outer strain of eq. 16, which therefore selects its branch.
+    for strain, limit, what, so in (
+        (
+            "peak strain",
+            material.allowed_strain,
+            "the allowed strain of {:.3g} %",
+            "the notch may be damaged there",
+        ),
+        (
+            "outer strain",
+            getattr(material, "plastic_strain", None),
+            "{:.3g} %, where the plastic branch begins,",
+            "that branch is a guess, and a real notch would stay bent",
+        ),
+    ):
+        if limit is None:
+            continue
+        values = getattr(path, strain.replace(" ", "_"))
+        size = np.where(np.asarray(path.converged)[:, None], np.abs(values), -np.inf)
+        beyond = size > limit
+        if not beyond.any():
+            continue
+        notches = [str(notch + 1) for notch in np.flatnonzero(beyond.any(axis=0))]
+        step = int(np.flatnonzero(beyond.any(axis=1))[0])
+        yield (
+            f"the {strain} passes {what.format(100 * limit)} in notch"
+            f"{'es' if len(notches) > 1 else ''} {', '.join(notches)}, first at step {step + 1} "
+            f"({_load(path, step)}), at most {100 * size.max():.3g} %: {so}."
+        )
+
+
+def _unstable(path: EquilibriumPath) -> Iterator[str]:
+    bad = np.flatnonzero(np.asarray(path.converged) & ~np.asarray(path.stable))
+    fixed = path.determinant_sign[bad] != 0.0 if len(bad) else np.zeros(0, bool)
+    snaps, many = "a real robot would snap to another shape", Failure.INDETERMINATE_TENSIONS
+    for steps, what, why in (
+        (bad[fixed], "unstable", snaps),
+        (bad[~fixed], "not determined", f"{many.text}; {many.remedy}"),
+    ):
+        if len(steps):
+            plural = "s are" if len(steps) > 1 else " is"
+            first = f"first step {steps[0] + 1} ({_load(path, steps[0])})"
+            yield f"{len(steps)} step{plural} {what}, {first}: {why}."
+
+
+def _coarse(path: EquilibriumPath) -> Iterator[str]:
+    error = np.where(np.asarray(path.converged), path.moment_error, -np.inf)
+    if not (error > MOMENT_ERROR).any():
+        return
+    step = int(np.argmax(error))
+    # Not at the head of the file: what only reads this table needs no solver.
+    from notchflex.mechanics.flexure import MAX_REFINEMENT
+
+    refinement = path.chain.refinement
+    remedy = (
+        f"simulate with --refinement {refinement + 1} (in Python refinement={refinement + 1}) "
+        "and see what changes"
+        if refinement < MAX_REFINEMENT
+        else "there is no finer --refinement, so take the result with care"
+    )
+    yield (
+        f"the strain modes miss the bending moment by up to {100 * error[step]:.2g} % of the "
+        f"largest one, at step {step + 1} ({_load(path, step)}): {remedy}."
+    )
+
+
+def _load(path: EquilibriumPath, step: int) -> str:
+    return ", ".join(f"{value:.4g}" for value in path.tension[step]) + " N"
+
+
+# Reasons why a step of a path did not converge, as sentences for the user.
+
+# Largest opening of a notch that counts as closed, as a fraction of its height: a stroke converges
+# up to the last state before the last notch closes.
+_CLOSED_TOLERANCE = 1e-3
+# Largest free span of a tendon at which the edges of its channel count as meeting, relative to the
+# natural span.
+_EDGES_MEET = 5e-2
+# Tension of a slack tendon, relative to what friction takes: rounding.
+_SLACK = 1e-6
+# Axial stiffnesses, in closing forces of a notch, in ratios of ten. Where only stretch allows a
+# stroke, the second step changes the tension about ten times as much as the first; where the shape
+# determines the tension, a tenth as much.
+_STIFFNESSES, _GROWS = (1e2, 1e3, 1e4), 3.0
+
+
+def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
+    """Return the failure at a step, and a sentence on it; None and "" where it converged."""
+    if path.converged[step]:
+        return None, ""
+    if not path.run.tried[step]:
+        return _said(Failure.NOT_TRIED, failed=int(np.argmin(path.converged)) + 1)
+    if path.run.converged[step]:  # but beyond the limits of the model
+        if not path.run.quantity("bend_possible")[step]:
+            return _said(Failure.BENT_TOO_FAR)
+        if path.run.quantity("friction_holds")[step]:
+            return _said(Failure.TOO_FEW_MODES, percent=100 * path.moment_error[step])
+        return _said(Failure.FRICTION_LOCKS)
+    tension = ", ".join(f"{value:.4g}" for value in path.tension[step])
+    drawn = ", ".join(f"{value:.4g}" for value in path.stroke[step])
+    last = f"; the last good state has tension {tension} N and stroke {drawn} mm"
+    opening = np.asarray(path.chain.rods.length).sum(axis=-1)
+    all_closed = (path.gap[step] < _CLOSED_TOLERANCE * opening).all()
+    if (all_closed or _past_closing(path, step)) and not np.isnan(path.load.stroke[step]).all():
+        return _said(Failure.NOTCHES_CLOSED, last)
+    if (slack := _slack_by_loss(path, step)) is not None:
+        return _said(Failure.LOSS_LEAVES_SLACK, last, tendon=slack[0] + 1, loss=slack[1])
+    tendons = [str(tendon + 1) for tendon in _drawn_by_stretch_alone(path, step)]
+    if len(tendons) == 1:
+        return _said(Failure.STROKE_OUT_OF_REACH, last, tendon=tendons[0])
+    if tendons:
+        return _said(Failure.STROKES_CONTRADICT, last, tendons=" and ".join(tendons))
+    if (met := _edges_that_meet(path, step)) is not None:
+        return _said(Failure.TENDON_EDGES_MEET, last, tendon=met[0] + 1, notch=met[1] + 1)
+    reached, left = 100.0 * float(path.run.reached[step]), float(path.residual[step])
+    return _said(Failure.NO_EQUILIBRIUM, last, percent=reached, residual=left)
+
+
+def _said(failure: Failure, last: str = "", **values: object) -> tuple[Failure, str]:
+    return failure, f"{failure.text.format(**values)}{last}; {failure.remedy}"
+
+
+def _past_closing(path: EquilibriumPath, step: int) -> bool:
+    """Return whether a stroke of a step exceeds the closing stroke of an inextensible tendon."""
+    reach = closing_stroke(path.chain)
+    inextensible = np.isinf(np.asarray(path.chain.axial_stiffness))
+    return bool((inextensible & (path.load.stroke[step] >= reach)).any())
+
+
+def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None:
+    """Return a straight tendon and a notch, from 0, where its free span vanishes.
+
+    Where the edges of its channel meet before those of the notch, the span between them has no
+    direction. A compliant contact lets a closed notch reach that state.
+    """
+    chain = path.chain
+    position, rotation = path.body_position[step], path.body_rotation[step]
+    for group in chain.groups:
+        if not isinstance(group, Straight):
+            continue
+        leaves, enters = (_in_space(chain, one) for one in (group.leaves, group.enters))
+        runs, natural = np.asarray(group.runs), np.asarray(group.natural_gap)
+        for (notch, one), before in np.ndenumerate(np.asarray(group.back)):
+            at, anchor = notch + 1, notch + 1 - int(before)
+            entered = position[at] + rotation[at] @ enters[notch, one]
+            left = position[anchor] + rotation[anchor] @ leaves[notch, one]
+            if runs[notch, one] and norm(entered - left) < _EDGES_MEET * natural[notch, one]:
+                return group.numbers[one], notch
+    return None
+
+
+def _slack_by_loss(path: EquilibriumPath, step: int) -> tuple[int, float] | None:
+    """Return a tendon driven by stroke, from 0, that its constant losses leave slack; their sum, N.
+
+    While the slack passes from a closed notch to the next, the tension rises at the same stroke.
+    """
+    for tendon in np.flatnonzero(np.isfinite(path.load.stroke[step])):
+        turning = path.contact_turning[step, tendon]
+        losses = path.chain.friction.constant_loss(turning, turning)
+        loss = 0.0 if losses is None else float(np.nansum(losses[0]))
+        tension = path.span_tension[step, tendon]
+        if np.nanmin(tension) < _SLACK * loss < np.nanmax(tension):
+            return int(tendon), loss
+    return None
+
+
+def _in_space(chain: Chain, points: ArrayLike) -> Float[np.ndarray, "n t 3"]:
+    """Transform points of the tendons to the frames of the bodies."""
+    points = np.asarray(points)
+    if chain.frame is None:
+        return points
+    return np.insert(points, 1, 0.0, axis=-1) @ np.asarray(chain.frame).T
+
+
+def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray, " some"]:
+    """Return the inextensible tendons, from 0, whose stroke no shape of the robot allows.
+
+    Solved again with extensible tendons, their tension grows with their stiffness.
+    """
+    chain = path.chain
+    inextensible = np.isinf(np.asarray(chain.axial_stiffness))
+    asked = inextensible & np.isfinite(path.load.stroke[step])
+    tensions: list[np.ndarray] = []
+    for forces in _STIFFNESSES if asked.any() else ():
+        stiffness = np.where(inextensible, forces * chain.closing_force, chain.axial_stiffness)
+        softer = PreparedChain(dataclasses.replace(chain, axial_stiffness=constant(stiffness)))
+        command = jax.tree.map(lambda leaf: np.asarray(leaf)[step : step + 1], path.commands)
+        start = jax.tree.map(lambda leaf: np.asarray(leaf)[step], path.run.solved)
+        came = run(softer, command, start, path.settings, each_from_start=True)
+        if not came.converged[0]:
+            return np.zeros(0, int)
+        tensions.append(came.quantity("tension")[0])
+    if not tensions:
+        return np.zeros(0, int)
+    threshold = 1e-3 * float(chain.closing_force)
+    first, second = np.diff(tensions, axis=0)
+    return np.flatnonzero(asked & (second > np.maximum(_GROWS * first, threshold)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -181,7 +510,7 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
             >>> path.to_xarray()["notch_angle"].dims
             ('step', 'notch')
         """
-        from notchflex.results.files.dataset import dataset_of
+        from notchflex.results.io import dataset_of
 
         return dataset_of(self)
 
@@ -205,7 +534,7 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
             >>> path.to_dataframe().select("tendon_force_N", "notch_5_deg").shape
             (3, 2)
         """
-        from notchflex.results.files.dataframe import dataframe_of
+        from notchflex.results.io import dataframe_of
 
         return dataframe_of(self, library)
 
@@ -234,7 +563,7 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
         return plot(self, x, y, ax=ax)
 
     def _summary(self) -> Summary:
-        from notchflex.results.summary import path_summary
+        from notchflex.results.state import path_summary
 
         return path_summary(self)
 

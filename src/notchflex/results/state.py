@@ -7,23 +7,46 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 import jax.tree_util as tree_util
 import numpy as np
+from jaxtyping import Float, Int
 
 from notchflex._replacing import replacing
-from notchflex._summary import Displayed, Summary
+from notchflex._summary import Displayed, Summary, course, short, vector
 from notchflex._values import ByValue
-from notchflex.errors import InputError
-from notchflex.loads.command import in_frame, out_of_frame
-from notchflex.loads.validation import short_repr
+from notchflex.errors import ConvergenceError, InputError
+from notchflex.loads import Load
+from notchflex.loads.command import (
+    in_frame,
+    out_of_frame,
+)
+from notchflex.loads.load import short_repr
+from notchflex.loads.load_path import (
+    MOST,
+    external_rows,
+    load_words,
+    tendon_rows,
+)
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
+from notchflex.results.quantities import QUANTITIES, EquilibriumQuantities
 from notchflex.robot import Robot
 from notchflex.robot.reading import read_text
 from notchflex.robot.robot import to_table
-from notchflex.solver.solver_state import SolverState, at_rest
+from notchflex.solver.residual import (
+    SolverState,
+    at_rest,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from xarray import Dataset
+
+    from notchflex._plot import Picture
+    from notchflex.results.path import EquilibriumPath
+
 
 # Values without effect on states: name, limit of strain warnings, tolerances, title block.
 _NO_EFFECT = ("name", "material.allowed_strain", "tolerance.", "drawing.")
@@ -169,7 +192,6 @@ class State(ByValue, Displayed):
             temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
     def _summary(self) -> Summary:
-        from notchflex.results.summary import state_summary
 
         return state_summary(self)
 
@@ -353,3 +375,199 @@ def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solver
     if solved.applied is not None and frame is not None:
         solved = solved._replace(applied=in_frame(solved.applied, frame))
     return solved
+
+
+# One state of a path.
+
+
+class Equilibrium(EquilibriumQuantities, Displayed):
+    """One state of a path: every quantity of `EquilibriumPath`, without the axis of steps.
+
+    Example:
+        >>> from notchflex import Load, load_robot, solve
+        >>> solve(load_robot("pacheco2021-a"), Load(tension=1.0))
+        Equilibrium of Pacheco 2021, wrist A
+          load            tension 1 N
+          total angle     51.50 deg
+          notch angles    11.2, 10.4, 10.2, 9.9, 9.7 deg
+          tip position    (4.513, 0.000, 7.879) mm
+          tendon tension  1 N
+          tendon stroke   1.246 mm
+          converged       yes
+    """
+
+    def __init__(self, path: EquilibriumPath, step: int) -> None:
+        """Look at one step of a path."""
+        self._path = path
+        self._step = step
+
+    @property
+    def path(self) -> EquilibriumPath:
+        """The path that it is a state of."""
+        return self._path
+
+    @property
+    def step(self) -> int:
+        """Which step of the path it is, counted from 0."""
+        return self._step
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._path.robot
+
+    @property
+    def load(self) -> Load:
+        """The load of this step."""
+        return self._path.load[self._step]
+
+    def quantity(self, name: str) -> Any:
+        """Return a quantity by its name: a number, or an array without the axis of steps.
+
+        Args:
+            name: Name of a property, such as "notch_angle".
+        """
+        value = self._path.quantity(name)[self._step]
+        return value.item() if isinstance(value, np.generic) else value
+
+    @property
+    def front(self) -> tuple[Int[np.ndarray, " t"], Float[np.ndarray, " t"]]:
+        """Friction front along every tendon, m and eta; see `EquilibriumPath.front`."""
+        return self.front_contact, self.front_eta
+
+    @property
+    def state(self) -> State:
+        """This state, to save or continue from."""
+        return self._path.state_at(self._step)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return this state as plain values: a step of the JSON document of its path.
+
+        Returns:
+            Values by the JSON keys, whose names end with the unit; angles in deg.
+
+        Example:
+            >>> from notchflex import Load, load_robot, solve
+            >>> step = solve(load_robot("pacheco2021-a"), Load(tension=1.0)).to_dict()
+            >>> step["load"], round(step["total_angle_deg"], 1)
+            ({'tension_N': [1.0], 'stroke_mm': [None]}, 51.5)
+        """
+        from notchflex.results.writing import step_document
+
+        return step_document(self._path, self._step)
+
+    def to_xarray(self) -> Dataset:
+        """Convert the state to a labelled data set, as `EquilibriumPath.to_xarray` at this step."""
+        return self._path.to_xarray().isel(step=self._step)
+
+    @overload
+    def plot(self) -> Picture: ...
+    @overload
+    def plot(self, *, ax: Axes) -> Axes: ...
+    def plot(self, *, ax: Axes | None = None) -> Picture | Axes:
+        """Draw this state; see `notchflex.plot`.
+
+        Args:
+            ax: Axes of matplotlib to draw the bent robot into.
+
+        Returns:
+            The picture of robot, notch angles and tensions, which a notebook shows; the axes if
+            some were given.
+        """
+        from notchflex._plot import plot
+
+        return plot(self, ax=ax)
+
+    def raise_if_failed(self) -> Equilibrium:
+        """Return itself, if it converged.
+
+        Raises:
+            ConvergenceError: It did not; the message says why.
+        """
+        if not self.converged:
+            raise ConvergenceError(self.reason, self.path.failures[self.step][0])
+        return self
+
+    def _summary(self) -> Summary:
+
+        return equilibrium_summary(self)
+
+
+# Summaries of results for `repr` and notebooks.
+#
+# They show only quantities of the first compiled program, so that a summary never compiles another.
+
+_ANGLE = QUANTITIES["total_angle"]
+_HINT = "[step] is one state; also .plot(), .to_dataframe(), .to_xarray()"
+
+
+def equilibrium_summary(state: Equilibrium) -> Summary:
+    """Summarise one state: load, angle, tip, tendons, and whether it converged."""
+    path = state.path
+    of = f", step {state.step + 1} of {len(path)}" if len(path) > 1 else ""
+    rows = [
+        ("load", load_words(state.load)),
+        ("total angle", f"{state.total_angle * _ANGLE.scale:.2f} {_ANGLE.unit}"),
+        ("notch angles", f"{_few(state.notch_angle * _ANGLE.scale, 1)} {_ANGLE.unit}"),
+        ("tip position", f"{vector(state.tip_position, 3)} mm"),
+        ("tendon tension", f"{_few(state.tension)} N"),
+        ("tendon stroke", f"{_few(state.stroke)} mm"),
+    ]
+    if not state.converged:
+        rows.insert(1, ("not converged", state.reason))
+        return Summary(f"Last good state of {path.robot.name}{of}", rows)
+    return Summary(f"Equilibrium of {path.robot.name}{of}", [*rows, ("converged", "yes")])
+
+
+def path_summary(path: EquilibriumPath) -> Summary:
+    """Summarise a path: how load, angle and tip change along it, and whether it converged."""
+    converged = np.asarray(path.converged)
+    rows = list(external_rows(path.load))
+    for name, unit, values in (
+        ("tension", "N", path.tension),
+        ("stroke", "mm", path.stroke),
+    ):
+        rows += tendon_rows(name, unit, np.where(converged[:, None], values, np.nan))
+    angle = np.where(converged, path.total_angle * _ANGLE.scale, np.nan)
+    rows.append(("total angle", f"{course(angle, 1)} {_ANGLE.unit}"))
+    tips = path.tip_position[converged]
+    if len(tips):
+        ends = dict.fromkeys(
+            vector(tips[step], 2)
+            for step in (0, int(np.nanargmax(np.abs(path.total_angle[converged]))), -1)
+        )
+        rows.append(("tip position", f"{' to '.join(ends)} mm"))
+    rows.append(("converged", _converged(path)))
+    steps = f"{len(path)} step{'s' * (len(path) != 1)}"
+    from_rest = ", each from rest" if path.each_from_rest else ""
+    return Summary(f"Path of {path.robot.name}, {steps}{from_rest}", rows, _HINT)
+
+
+def state_summary(state: State) -> Summary:
+    """Summarise a saved state: its robot, and the tensions and strokes of its tendons."""
+    point = state.solved.point
+    rows = [
+        ("tendon tension", f"{_few(np.asarray(point.base_tension))} N"),
+        ("tendon stroke", f"{_few(np.asarray(state.solved.stroke))} mm"),
+    ]
+    hint = "simulate(..., from_state=...) continues from it; .save(file) writes it"
+    return Summary(f"State of {state.robot}", rows, hint)
+
+
+def _converged(path: EquilibriumPath) -> str:
+    converged = np.asarray(path.converged)
+    if converged.all():
+        return "all steps"
+    first = int(np.argmin(converged))
+    return f"{int(converged.sum())} of {len(path)} steps; step {first + 1}: {path.reason[first]}"
+
+
+def _few(values: np.ndarray, digits: int | None = None) -> str:
+    """Format numbers as a list, of many the first and the last."""
+    texts = [
+        short(float(value)) if digits is None else f"{round(float(value), digits) + 0.0:.{digits}f}"
+        for value in values
+    ]
+    if len(texts) > 2 * MOST:
+        texts = [*texts[:MOST], "…", *texts[-MOST:]]
+    return ", ".join(texts)

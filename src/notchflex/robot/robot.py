@@ -3,24 +3,47 @@
 import dataclasses
 import datetime
 import functools
+import math
 import unicodedata
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, overload
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from notchflex import __version__
+from notchflex._summary import Summary, short
 from notchflex.errors import InputError, InputWarning
-from notchflex.robot.error_messages import sentences
-from notchflex.robot.fields import fields_of, is_unsaid
-from notchflex.robot.kinds import Friction, Material, Notch, one_of
-from notchflex.robot.part import ProblemError, part
-from notchflex.robot.problems import robot_problems, robot_warnings
-from notchflex.robot.tendon import Tendon
-from notchflex.robot.tolerance import Tolerances
-from notchflex.robot.tube import Tube
+from notchflex.robot.kinds import (
+    Friction,
+    Material,
+    Notch,
+    Tendon,
+    Tube,
+    one_of,
+)
+from notchflex.robot.part import (
+    ProblemError,
+    fields_of,
+    is_list,
+    is_unsaid,
+    part,
+    sentences,
+)
+from notchflex.robot.problems import (
+    Tolerances,
+    robot_problems,
+    robot_warnings,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -151,12 +174,9 @@ class Robot:
 
     def __repr__(self) -> str:
         """Return a summary of a few lines."""
-        from notchflex.robot.summary import robot_summary
-
         return robot_summary(self).text
 
     def _repr_html_(self) -> str:
-        from notchflex.robot.summary import robot_summary
 
         return robot_summary(self).html
 
@@ -255,9 +275,7 @@ class Robot:
         Raises:
             InputError: There is no such value, or a new one is not allowed.
         """
-        from notchflex.robot.value_names import (
-            set_values,  # it makes robots, and so imports this file
-        )
+        from notchflex.robot.value_names import set_values
 
         return set_values(self, values).robot
 
@@ -331,3 +349,127 @@ def _repeats(table: Mapping[str, Any]) -> list[int]:
         for one in (notches if isinstance(notches, list) else [])
     ]
     return [one if isinstance(one, int) and one > 0 else 1 for one in repeated]
+
+
+# The JSON Schema of robot files, for editors that check and complete them.
+
+# pydantic's words for bounds, which it leaves as they are behind a check of our own
+_BOUNDS = {
+    "gt": "exclusiveMinimum",
+    "ge": "minimum",
+    "lt": "exclusiveMaximum",
+    "le": "maximum",
+}
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a robot file (draft 2020-12).
+
+    Returns:
+        The schema; every number has its unit under `unit`.  It holds nothing that JSON lacks: an
+        infinite default is left out and stated in the description.
+
+    Example:
+        >>> sorted(json_schema()["required"])
+        ['friction', 'material', 'name', 'notch', 'tendon', 'tube']
+    """
+    return schema_of(
+        Robot, "notchflex robot file", "A tendon-driven notched tube, in mm, N, MPa and deg."
+    )
+
+
+def schema_of(cls: type, title: str, description: str) -> dict[str, Any]:
+    """Return the JSON Schema of a file that a part describes.
+
+    Args:
+        cls: The part.
+        title: What the file is called.
+        description: What it holds.
+    """
+    schema = TypeAdapter(cls).json_schema()
+    for one in [schema, *schema["$defs"].values()]:
+        _tidy(one)
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": title,
+        "description": description,
+    }
+
+
+def _tidy(model: dict[str, Any]) -> None:
+    """Make the schema of a class say what a file must hold."""
+    # the rest of a docstring speaks of Python
+    model["description"] = str(model.get("description", "")).partition("\n")[0]
+    properties: dict[str, dict[str, Any]] = model["properties"]
+    for value in properties.values():
+        value.pop("title", None)
+        default = value.get("default")
+        if default in (None, []) or (isinstance(default, float) and math.isinf(default)):
+            value.pop("default", None)  # TOML has no null: such a key is left out
+        choices = [one for one in value.get("anyOf", ()) if one != {"type": "null"}]
+        if len(choices) == 1:
+            del value["anyOf"]
+            value.update(choices[0])
+        for ours, theirs in _BOUNDS.items():
+            if ours in value:
+                value[theirs] = value.pop(ours)
+    if "kind" in properties:  # it has a default in Python, but a file must name it
+        model["required"] = ["kind", *model.get("required", [])]
+        properties["kind"].pop("default", None)
+
+
+# The summary of a robot: what `repr` and a notebook show of it.
+
+MOST = 4
+"""Different values of one key that are listed; of more, their range."""
+
+# A longer row goes on below.
+_WIDTH = 145
+
+_HINT = ".plot() draws it; .with_value(...) returns a changed copy"
+
+
+def robot_summary(robot: Robot) -> Summary:
+    """Summarise a robot: its tube, notches, tendons, material and friction."""
+    kinds: dict[str, list[Any]] = {}
+    for notch in robot.notches:
+        kinds.setdefault(getattr(notch, "kind"), []).append(notch)  # noqa: B009
+    rows = [("tube", _words([robot.tube]))]
+    rows += [("notches", f"{len(same)} {kind}: {_words(same)}") for kind, same in kinds.items()]
+    rows.append(("tendons", f"{len(robot.tendon)}: {_words(robot.tendon)}"))
+    for name in ("material", "friction"):
+        part = getattr(robot, name)
+        rows.append((name, ", ".join(one for one in (part.kind, _words([part])) if one)))
+    lines = [
+        (name if number == 0 else "", line)
+        for name, words in rows
+        for number, line in enumerate(wrap(words, _WIDTH) or [""])
+    ]
+    return Summary(f"Robot {robot.name}", lines, _HINT)
+
+
+def _words(parts: Sequence[Any]) -> str:
+    """Return the values of parts of one kind that are not their defaults."""
+    words: list[str] = []
+    for name, field in fields_of(type(parts[0])).items():
+        values = list(dict.fromkeys(getattr(part, name) for part in parts))
+        if name in ("kind", "repeat") or values in ([None], [field.default]):
+            continue
+        extra = field.json_schema_extra
+        unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+        title = name.removesuffix(f"_{unit}").replace("_", " ")
+        shown = " and ".join(_curve(one) for one in values if one) if is_list(field) else ""
+        words.append(f"{title} {shown or _values(values)} {unit}".strip())
+    return ", ".join(words)
+
+
+def _curve(values: Sequence[float]) -> str:
+    return f"{short(values[0])} to {short(values[-1])} ({len(values)} values)"
+
+
+def _values(values: Sequence[Any]) -> str:
+    numbers = all(isinstance(one, (int, float)) for one in values)
+    if numbers and len(values) > MOST:
+        return f"{short(min(values))} to {short(max(values))}"
+    return "/".join(short(one) if isinstance(one, float) else str(one) for one in values)

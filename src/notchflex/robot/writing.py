@@ -12,11 +12,20 @@ from tomlkit.exceptions import ParseError
 
 from notchflex._replacing import replacing
 from notchflex.errors import InputError, RobotFileError
-from notchflex.robot.comments import FITTED_TO, add_note, set_value
-from notchflex.robot.fields import fields_of, is_unsaid
-from notchflex.robot.reading import read_text, robot_from_text
-from notchflex.robot.robot import Robot, source_of, to_table
-from notchflex.robot.tolerance import read_tolerances
+from notchflex.robot.part import (
+    fields_of,
+    is_unsaid,
+)
+from notchflex.robot.problems import read_tolerances
+from notchflex.robot.reading import (
+    read_text,
+    robot_from_text,
+)
+from notchflex.robot.robot import (
+    Robot,
+    source_of,
+    to_table,
+)
 from notchflex.robot.value_names import defaults_of
 
 _HEADER = re.compile(r"""\s*\[{1,2}\s*["']?(\w+)["']?\s*\]{1,2}\s*(#.*)?""")
@@ -269,3 +278,47 @@ def _update(table: Any, values: dict[str, Any], section: str, notes: _Notes) -> 
             set_value(table, key, value)
         if key in notes and key in table:
             add_note(table[key], notes[key])
+
+
+# Comments beside the values of a robot file: from what a value changed, to what it was fitted.
+
+FITTED_TO = "fitted by notchflex to"
+"""Begins what a fit says of a value, behind the comment that stood there before."""
+
+_CHANGED = re.compile(r"\s*\(changed from (.*)\)$")
+_FITTED = re.compile(rf"(?:;|#)\s*{FITTED_TO} .*$")
+
+
+def set_value(table: Any, key: str, value: object) -> None:
+    """Set a value, and note the old one in a comment."""
+    was, comment = table[key].as_string(), table[key].trivia.comment
+    table[key] = value
+    if not comment:
+        return
+    changed = _CHANGED.search(comment)
+    if changed:
+        comment, was = comment[: changed.start()], changed[1]
+    # What a fit said of the value is not true of another.
+    comment = _FITTED.sub("", comment).rstrip()
+    same = tomllib.loads(f"x = {was}")["x"] == value
+    if not same:
+        comment = f"{comment or '#'} (changed from {was})"
+    _put(table[key], comment)
+
+
+def add_note(item: Any, note: str) -> None:
+    """Add to what a value was fitted, between its comment and what it was changed from."""
+    comment = item.trivia.comment
+    changed = _CHANGED.search(comment)
+    if changed:
+        comment = comment[: changed.start()]
+    comment = _FITTED.sub("", comment).rstrip()
+    comment = f"{comment}; {FITTED_TO} {note}" if comment.strip("# ") else f"# {FITTED_TO} {note}"
+    _put(item, comment + (changed[0] if changed else ""))
+
+
+def _put(item: Any, comment: str) -> None:
+    """Put a comment beside a value, two blanks behind it where there was none."""
+    if comment and not item.trivia.comment:
+        item.trivia.comment_ws = "  "
+    item.trivia.comment = comment

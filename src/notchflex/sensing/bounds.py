@@ -17,7 +17,7 @@ from scipy.stats import chi2
 from notchflex.sensing.history import History, Progress, whitening_of
 from notchflex.sensing.own_reading import OwnReading
 from notchflex.sensing.search import Known, ReadingProblem, bad_fit, best, best_of_all, extreme
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.residual import SolverState
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.analysis.derivatives.tangent import Change, PathTangents
+from notchflex.analysis.tangent import (
+    Change,
+    PathTangents,
+)
 from notchflex.results.path import EquilibriumPath
 from notchflex.sensing.model import SensingModel, Step
 from notchflex.sensing.search import Candidate, ReadingProblem, best, best_of_all
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.residual import SolverState
 
 Progress = Callable[[int, int], None]
 

@@ -10,20 +10,28 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex._jax import constant
-from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.tangent import Change, PathTangents
+from notchflex.analysis.forward_model import ForwardModel
+from notchflex.analysis.tangent import (
+    Change,
+    PathTangents,
+)
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.loads.command import make_commands
-from notchflex.loads.external import NO_VECTOR, BodyForce, ExternalLoad
-from notchflex.loads.validation import check_integer, short_repr
+from notchflex.loads.load import (
+    NO_VECTOR,
+    BodyForce,
+    ExternalLoad,
+    check_integer,
+    short_repr,
+)
 from notchflex.mechanics.chain import bending_normal
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.quantities.registry import AXES
+from notchflex.results.quantities import AXES
 from notchflex.robot import Robot
 from notchflex.sensing.readings import Readings
 from notchflex.solver.newton import Settings
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.residual import SolverState
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,12 @@ from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
 from notchflex.errors import InputError
-from notchflex.loads.validation import check_number, check_pulls, short_repr
-from notchflex.results.quantities.registry import AXES
+from notchflex.loads.load import (
+    check_number,
+    check_pulls,
+    short_repr,
+)
+from notchflex.results.quantities import AXES
 from notchflex.robot import Robot
 
 MAX_READINGS = 2000

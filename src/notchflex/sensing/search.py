@@ -11,7 +11,7 @@ from jaxtyping import Float
 from notchflex.results.path import EquilibriumPath
 from notchflex.sensing.model import SensingModel, Step
 from notchflex.solver.programs.run import SolverRun
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.residual import SolverState
 
 # Part of the range over which differences approximate slopes.
 _NARROW_STEP = 1e-5

@@ -10,8 +10,11 @@ from jaxtyping import Int
 from numpy.typing import ArrayLike
 
 from notchflex.errors import InputError
-from notchflex.loads.external import ExternalLoad
-from notchflex.loads.validation import check_is_robot, check_number
+from notchflex.loads.load import (
+    ExternalLoad,
+    check_is_robot,
+    check_number,
+)
 from notchflex.robot import Robot
 from notchflex.sensing.bounds import Bounds, bounds
 from notchflex.sensing.history import estimate, with_noise

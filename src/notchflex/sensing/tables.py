@@ -9,14 +9,17 @@ import numpy as np
 
 from notchflex._quantity import DEGREES
 from notchflex.errors import InputError
-from notchflex.results.files.csv_reading import (
+from notchflex.results.quantities import (
+    AXES,
+    QUANTITIES,
+)
+from notchflex.results.reading import (
     Table,
     no_tendon_column,
     read_data_table,
     tendon_columns,
 )
-from notchflex.results.files.json import document_head
-from notchflex.results.quantities.registry import AXES, QUANTITIES
+from notchflex.results.writing import document_head
 from notchflex.robot import Robot
 from notchflex.sensing.sensed import SensedForce
 

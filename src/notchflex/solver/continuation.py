@@ -8,14 +8,25 @@ from typing import NamedTuple
 
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import jax, jnp
-from notchflex._pytree import choose
+from notchflex._jax import (
+    choose,
+    jax,
+    jnp,
+)
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.element import Iterate, Memory
-from notchflex.solver.friction_predictor import predict_log_ratios
-from notchflex.solver.newton import NewtonProblem, NewtonResult, Settings, newton
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.newton import (
+    NewtonProblem,
+    NewtonResult,
+    Settings,
+    newton,
+    predict_log_ratios,
+)
+from notchflex.solver.residual import (
+    Iterate,
+    Memory,
+    SolverState,
+)
 
 
 class LoadStepResult(NamedTuple):

@@ -22,10 +22,13 @@ from jaxtyping import Array, Bool, Float
 from notchflex._jax import jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.actuation import command_slopes
-from notchflex.solver.element import Memory, bound_side
-from notchflex.solver.linear_step.linearisation import LinearisedRows, linearise
-from notchflex.solver.linear_step.rows import RowLayout, row_layout
+from notchflex.solver.block_elimination import command_slopes
+from notchflex.solver.linear_step import (
+    LinearisedRows,
+    RowLayout,
+    linearise,
+    row_layout,
+)
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import (
@@ -34,8 +37,12 @@ from notchflex.solver.programs.static_structure import (
     lane_sizes,
     pad_rows,
 )
-from notchflex.solver.residual import evaluate
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.residual import (
+    Memory,
+    SolverState,
+    bound_side,
+    evaluate,
+)
 
 # Springs this much stiffer than the notches hold closed contacts and tendons driven by stroke;
 # otherwise their forces would be multipliers and the stiffness undefined.

@@ -7,38 +7,328 @@ external loads from the tip.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Bool, Float
 
-from notchflex._jax import jax, jnp
-from notchflex.loads.command import BodyLoads
+from notchflex._jax import (
+    constant,
+    jax,
+    jnp,
+)
+from notchflex.loads.command import (
+    BodyLoads,
+    body_wrench,
+)
 from notchflex.mechanics.chain import Chain, flexure_states
-from notchflex.mechanics.contact import GapResponse
+from notchflex.mechanics.contact import ContactGroup, GapResponse
 from notchflex.mechanics.flexure import FlexureState
-from notchflex.mechanics.motion import Motion
-from notchflex.mechanics.tendon import Crossing
-from notchflex.solver.body_poses import (
-    anchor_poses,
-    external_wrenches,
-    select_anchors,
-    shift_from_base,
+from notchflex.mechanics.motion import Motion, identity
+from notchflex.mechanics.tendon import (
+    Crossing,
+    TendonGroup,
 )
-from notchflex.solver.element import (
-    Iterate,
-    Memory,
-    Unknowns,
-    clip_symmetric,
-    signorini,
-    trial_log_ratio,
-)
-from notchflex.solver.tendon_spans import (
-    TendonSpans,
-    crossings,
-    in_tendon_order,
-    of_group,
-    slip_mask,
-)
+
+# Poses of bodies: against the base, with the external loads on them, and against those before.
+
+
+def body_poses(relative: Motion) -> Motion:
+    """Return the poses of bodies 0 to n in the frame of the base, from those between neighbours.
+
+    A prefix product: first over pairs, then over fours, until all start at the base.
+    """
+    dimensions = relative.translation.shape[-1]
+    poses = jax.tree.map(
+        lambda first, rest: jnp.concatenate([first[None], rest]), identity(dimensions), relative
+    )
+    reach = 1
+    while reach < len(poses.translation):
+        joined = jax.vmap(Motion.then)(
+            jax.tree.map(lambda leaf, reach=reach: leaf[:-reach], poses),
+            jax.tree.map(lambda leaf, reach=reach: leaf[reach:], poses),
+        )
+        poses = jax.tree.map(
+            lambda near, far, reach=reach: jnp.concatenate([near[:reach], far]), poses, joined
+        )
+        poses = jax.lax.optimization_barrier(poses)
+        reach *= 2
+    return poses
+
+
+def external_wrenches(
+    pose: Motion, applied: BodyLoads | None
+) -> tuple[Float[Array, "n d d"] | None, Float[Array, "n w"] | None, Float[Array, " w"] | None]:
+    """Return rotations of the bodies, and the loads on each with all beyond and on the whole robot.
+
+    All are None where there are no loads.
+    """
+    if applied is None:
+        return None, None, None
+    bodies = body_poses(pose)
+    distal: Motion = jax.tree.map(lambda leaf: leaf[1:], bodies)
+    wrench = jax.vmap(body_wrench)(distal.rotation, jax.tree.map(lambda leaf: leaf[1:], applied))
+    in_base = jax.vmap(Motion.wrench)(distal, wrench)
+    summed = jnp.cumsum(in_base[::-1], axis=0)[::-1]
+    inside = jax.vmap(Motion.wrench_inside)(distal, summed)
+    return distal.rotation, inside, summed[0]
+
+
+def anchor_poses(chain: Chain, pose: Motion | None) -> Motion | None:
+    """Return the pose of every body in the frames of those before it, within the window."""
+    if pose is None:
+        return None
+    poses = [pose]
+    before = pose
+    for _ in range(chain.window - 1):
+        first = identity(pose.translation.shape[-1])
+        before: Motion = jax.tree.map(shift_from_base, before, first)
+        poses.append(jax.vmap(Motion.then)(before, poses[-1]))
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves, axis=1), *poses)
+
+
+def select_anchors(anchors: Motion | None, back: Array) -> Motion | None:
+    """Select the anchor of every tendon or contact among the bodies before."""
+    if anchors is None:
+        return None
+
+    def of_leaf(leaf: Array) -> Array:
+        return select_back([leaf[:, number] for number in range(leaf.shape[1])], back)
+
+    return jax.tree.map(of_leaf, anchors)
+
+
+def select_back(by_body: Sequence[Array], back: Array) -> Float[Array, "n t *k"]:
+    """Select for every tendon or contact the values of its anchor, of those by body before."""
+    selected = by_body[0][:, None]
+    for number, values in enumerate(by_body[1:], start=2):
+        selects = (back == number).reshape(*back.shape, *(1,) * (values.ndim - 1))
+        selected = jnp.where(selects, values[:, None], selected)
+    return jnp.broadcast_to(selected, (*back.shape, *by_body[0].shape[1:]))
+
+
+def shift_from_base(values: Array, first: Array) -> Array:
+    """Shift values by one flexure: each gets that of the one before, the first gets `first`."""
+    return jnp.concatenate([jnp.asarray(first)[None], values[:-1]])
+
+
+# Spans of the tendons over all gaps: tensions, released lengths and bounds of friction.
+
+
+class TendonSpans(NamedTuple):
+    """Tensions and lengths of a group of t tendons over all flexures, n by t (mm, N).
+
+    Attributes:
+        crossing: Its path over every gap.
+        tension_ratio: Tension beyond each edge of the gap over the tension before it.
+        gap_tension: Tension in the gap; 0 where the tendon has no span there.
+        body_tension: Tension inside the distal body, likewise.
+        released_beyond: Tendon length released by the flexures beyond the distal body.
+        tension_length_beyond: Sum of tension times length beyond it, N mm.
+        released_length: As `released_beyond`, with this gap.
+        tension_length: As `tension_length_beyond`, with this gap and the distal body.
+        slid: Tendon slid over both edges toward the base, with the stiffness of the friction law.
+        bound: Largest log ratio at both edges, in the direction of the present one.
+    """
+
+    crossing: Crossing
+    tension_ratio: Float[Array, "n t 2"]
+    gap_tension: Float[Array, "n t"]
+    body_tension: Float[Array, "n t"]
+    released_beyond: Float[Array, "n t"]
+    tension_length_beyond: Float[Array, "n t"]
+    released_length: Float[Array, "n t"]
+    tension_length: Float[Array, "n t"]
+    slid: Float[Array, "n t 2"]
+    bound: Float[Array, "n t 2"]
+
+
+def crossings(
+    group: TendonGroup, chain: Chain, flexure: FlexureState, anchors: Motion | None
+) -> Crossing:
+    """Return the paths of a group of tendons over all gaps."""
+    selected = select_anchors(anchors, group.back) if group.acts_on_bodies else None
+    return jax.vmap(type(group).cross)(group, chain.rods, flexure, selected)
+
+
+def of_group(values: Float[Array, " all"], group: TendonGroup) -> Float[Array, " t"]:
+    """Select the tendons of a group by slices, whose adjoint the native compiler supports."""
+    return jnp.stack([values[number] for number in group.numbers])
+
+
+def slip_mask(group: TendonGroup) -> Float[Array, "n t 2"]:
+    """Return 1 where a tendon can slide over an edge: where it runs and is not fixed."""
+    return jnp.stack([group.visits, group.visits * (1.0 - group.ends)], axis=-1)
+
+
+def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...]) -> Array:
+    """Order values per group of tendons as the robot's tendons, along the last axis."""
+    if not grouped:
+        return jnp.zeros(0)
+    together = jnp.concatenate(grouped, axis=-1)
+    return jnp.stack([together[..., column] for column in np.argsort(chain.tendon_order)], axis=-1)
+
+
+# Unknowns and history of every flexure, and its two complementarity laws: contact and friction.
+#
+# Each law is written as one equation that Newton's method solves together with the equilibrium.
+
+# Friction law: x = clip(x + r (slip - c (x - x_prev))). The augmentation parameter r only affects
+# convergence and drops out at the solution; the compliance c of sticking contacts keeps the law
+# regular where a slack tendon leaves the tension ratio undefined. Slip is in heights of the notch,
+# so that a scaled robot is solved in the same way.
+AUGMENTATION = 8.0
+MIN_STICK_COMPLIANCE = 1e-15
+
+
+class Unknowns(NamedTuple):
+    """Unknowns of all flexures, flexures as leading axis.
+
+    Attributes:
+        modes: Amplitudes of the strain modes.
+        contact_force: Contact forces, N, for each kind of contacts.
+        log_ratio: ln(tension on the base side / tip side) at both edges of the gap, for each
+            group of tendons.
+    """
+
+    modes: Float[Array, "*n modes"]
+    contact_force: tuple[Float[Array, "*n l"], ...]
+    log_ratio: tuple[Float[Array, "*n t 2"], ...]
+
+
+class Iterate(NamedTuple):
+    """A point of Newton's method, or a step between two.
+
+    Attributes:
+        unknowns: The unknowns of all flexures.
+        base_tension: The base tensions, N.
+    """
+
+    unknowns: Unknowns
+    base_tension: Float[Array, " t"]
+
+
+class Memory(NamedTuple):
+    """History of the friction contacts and of the material, as of the last solved state.
+
+    Attributes:
+        log_ratio: Their log ratios.
+        slid: Tendon slid over them, mm.
+        bound: Their largest log ratios, for the predictor of the next state alone.
+        material: Memory of the material at every node; () where it has none.
+        damping: While a notch snaps: viscosity as a fraction of the stiffness at rest, and the
+            modes that it refers to; None otherwise.
+        stick_compliance: Additional slip over a sticking contact, in heights of the notch, per
+            change of its log ratio; None for none.
+    """
+
+    log_ratio: tuple[Float[Array, "*n t 2"], ...]
+    slid: tuple[Float[Array, "*n t 2"], ...]
+    bound: tuple[Float[Array, "*n t 2"], ...]
+    material: Any = ()
+    damping: tuple[Float[Array, ""], Float[Array, "*n modes"]] | None = None
+    stick_compliance: Float[Array, ""] | None = None
+
+    @property
+    def slip_per_log_ratio(self) -> Float[Array, ""] | float:
+        """Slip over a sticking contact per change of its log ratio, in heights of the notch."""
+        return (
+            MIN_STICK_COMPLIANCE
+            if self.stick_compliance is None
+            else MIN_STICK_COMPLIANCE + self.stick_compliance
+        )
+
+
+def notch_heights(chain: Chain) -> Float[Array, " n"]:
+    """Return the length of every flexure, mm: the scale of lengths."""
+    return jnp.sum(chain.rods.length, axis=-1)
+
+
+def trial_log_ratio(
+    chain: Chain,
+    log_ratio: Float[Array, "n t 2"],
+    slid: Float[Array, "n t 2"],
+    memory: Memory,
+    k: int,
+) -> Float[Array, "n t 2"]:
+    """Compute the trial log ratios of the k-th group from the slip, before they are clipped."""
+    slip = (slid - memory.slid[k]) / notch_heights(chain)[:, None, None]
+    return log_ratio + AUGMENTATION * (
+        slip - memory.slip_per_log_ratio * (log_ratio - memory.log_ratio[k])
+    )
+
+
+def clip_symmetric(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
+    """Clip to +-limit; an equal value counts as the limit, so that a contact at rest can slide."""
+    return jnp.where(value >= limit, limit, jnp.where(value <= -limit, -limit, value))
+
+
+def bound_side(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
+    """Return +1 where a log ratio lies on its upper bound, -1 on its lower, 0 inside."""
+    near = 1e-9
+    return jnp.where(value >= limit - near, 1, jnp.where(value <= -limit + near, -1, 0))
+
+
+def is_active(
+    chain: Chain, group: ContactGroup, force: Float[Array, "n l"], gap: Float[Array, "n l"]
+) -> Bool[Array, "n l"]:
+    """Return which contacts press, by Signorini's condition: force >= 0, gap >= 0, product 0."""
+    return (force - chain.contact_stiffness[:, None] * gap > 0.0) & (group.has_contact > 0.0)
+
+
+def signorini(
+    chain: Chain, group: ContactGroup, force: Float[Array, "n l"], gap: Float[Array, "n l"]
+) -> Float[Array, "n l"]:
+    """Compute the residual of Signorini's condition, as a fraction of the notch's height."""
+    by_force = force / (chain.contact_stiffness * notch_heights(chain))[:, None]
+    by_gap = gap / notch_heights(chain)[:, None]
+    return jnp.where(is_active(chain, group, force, gap), by_gap, by_force)
+
+
+# Solved states with their memory; the first is the free robot.
+
+
+class SolverState(NamedTuple):
+    """A solved state with its memory, which the next state needs; it can be saved.
+
+    Attributes:
+        point: Unknowns and base tensions.
+        memory: History of contacts and material, as of this state.
+        stroke: Tendon drawn out at the base, mm.
+        applied: External loads on the bodies; None for a chain assembled for tendons alone.
+    """
+
+    point: Iterate
+    memory: Memory
+    stroke: Float[Array, " t"]
+    applied: BodyLoads | None
+
+
+def at_rest(chain: Chain) -> SolverState:
+    """Return the state of the free robot, with slack tendons."""
+    none = tuple(constant(np.zeros((*group.present.shape, 2))) for group in chain.groups)
+    unknowns = Unknowns(
+        modes=constant(np.zeros(chain.stiffness.shape)),
+        contact_force=tuple(
+            constant(np.zeros(group.has_contact.shape)) for group in chain.contact_pairs
+        ),
+        log_ratio=none,
+    )
+    slack = constant(np.zeros(chain.tendons))
+    memory = Memory(none, none, none, chain.law.rest(chain.rods.section))
+    return SolverState(Iterate(unknowns, slack), memory, slack, unloaded(chain))
+
+
+def unloaded(chain: Chain) -> BodyLoads | None:
+    """Return zero loads on all bodies of the chain; None where it takes no loads."""
+    if not chain.loaded:
+        return None
+    bodies = chain.flexures + 1
+    d, a = (3, 3) if chain.frame is None else (2, 1)
+    shapes = ((d,), (a,), (d, d), (a + d,))
+    return BodyLoads(*(constant(np.zeros((bodies, *shape))) for shape in shapes))
+
 
 _MAX_ROUNDING_GROWTH = 1e4
 

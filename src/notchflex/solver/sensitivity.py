@@ -11,15 +11,15 @@ from typing import Any, NamedTuple
 
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import (
+    jax,
+    jnp,
+)
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.actuation import stroke
+from notchflex.solver.block_elimination import linear_step, stroke
 from notchflex.solver.continuation import interpolate_command
-from notchflex.solver.element import Memory
-from notchflex.solver.linear_step.block_elimination import linear_step
-from notchflex.solver.residual import evaluate
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.residual import Memory, SolverState, evaluate
 
 
 class SubstepHistory(NamedTuple):

@@ -11,10 +11,18 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter, model_validator
 
 from notchflex.errors import InputError
-from notchflex.results.files.specification import read_specification, robot_named, validated
-from notchflex.robot.part import Float, Int, ProblemError, part
-from notchflex.robot.robot import Robot
-from notchflex.robot.schema import schema_of
+from notchflex.results.reading import (
+    read_specification,
+    robot_named,
+    validated,
+)
+from notchflex.robot.part import (
+    Float,
+    Int,
+    ProblemError,
+    part,
+)
+from notchflex.robot.robot import Robot, schema_of
 from notchflex.tolerancing.spec import LOAD_KEYS
 
 _REFUSE = InputError.INVALID_SPECIFICATION

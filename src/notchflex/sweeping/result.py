@@ -17,10 +17,13 @@ from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import InputError
 from notchflex.pieces.folder import CODES, Manifest, check_own, head_of, manifest_in, piece_file
 from notchflex.pieces.sketch import Scale, Sketch
-from notchflex.results.files.json import write_json
+from notchflex.results.writing import write_json
 from notchflex.robot import Robot
-from notchflex.robot.error_messages import nearest
-from notchflex.robot.robot import from_table, to_table
+from notchflex.robot.part import nearest
+from notchflex.robot.robot import (
+    from_table,
+    to_table,
+)
 from notchflex.sweeping.plan import SweepPlan, plan_from_table, plan_table
 from notchflex.sweeping.rows import SweepModel, axis_values
 from notchflex.tolerancing.study import piece_rows

@@ -19,7 +19,7 @@ from notchflex.analysis.solve import simulate
 from notchflex.errors import ErrorCode, InputError
 from notchflex.pieces.sobol import SobolPart
 from notchflex.robot import Robot
-from notchflex.robot.error_messages import nearest
+from notchflex.robot.part import nearest
 from notchflex.robot.value_names import number_at
 from notchflex.sweeping.plan import KeptQuantity, Sampling, SweepPlan, SweepVariable
 from notchflex.tolerancing.spec import (

@@ -15,14 +15,18 @@ from scipy.optimize import brentq
 from scipy.stats import qmc, sobol_indices
 
 from notchflex._summary import Displayed, Summary, short
-from notchflex.analysis.uncertainty.assumed import tolerances_of
+from notchflex.analysis.draws import tolerances_of
 from notchflex.errors import InputError
-from notchflex.loads.validation import check_integer, check_is_robot, short_repr
+from notchflex.loads.load import (
+    check_integer,
+    check_is_robot,
+    short_repr,
+)
 from notchflex.pieces.folder import ACCEPTED, CODES, FAILED, INVALID
 from notchflex.pieces.run import PieceFolder
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.robot.tolerance import Tolerance
+from notchflex.robot.problems import Tolerance
 from notchflex.solver.newton import Settings
 from notchflex.tolerancing.linear import LinearEffects, linear_effects
 from notchflex.tolerancing.spec import Criterion, ToleranceSpec, read_tolerance_spec

@@ -9,10 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.tangent import PathTangents
-from notchflex.analysis.uncertainty.draws import ToleranceSource, deviation, moments
-from notchflex.robot.tolerance import Tolerance
+from notchflex.analysis.draws import (
+    ToleranceSource,
+    deviation,
+    moments,
+)
+from notchflex.analysis.forward_model import ForwardModel
+from notchflex.analysis.tangent import PathTangents
+from notchflex.robot.problems import Tolerance
 from notchflex.solver.newton import DEFAULT
 from notchflex.tolerancing.study import Study
 

@@ -16,12 +16,22 @@ from notchflex._quantity import REGISTERED, Quantity
 from notchflex.analysis.outputs import OUTPUTS
 from notchflex.errors import InputError
 from notchflex.loads import BodyForce, Load, LoadPath
-from notchflex.loads.validation import check_integer, check_number, short_repr
+from notchflex.loads.load import (
+    check_integer,
+    check_number,
+    short_repr,
+)
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.quantities.registry import holds
+from notchflex.results.quantities import holds
 from notchflex.robot import Robot
-from notchflex.robot.error_messages import nearest, unknown_key
-from notchflex.robot.reading import parse_toml, read_text
+from notchflex.robot.part import (
+    nearest,
+    unknown_key,
+)
+from notchflex.robot.reading import (
+    parse_toml,
+    read_text,
+)
 
 INDICES = ("tendon", "notch", "body", "axis", "span", "contact")
 """Keys of a limit that say which entry of a quantity is meant."""

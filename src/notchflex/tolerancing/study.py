@@ -19,8 +19,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from notchflex.analysis.batch import simulate_batch
+from notchflex.analysis.draws import (
+    ToleranceSource,
+    sources_of,
+    values_at,
+)
 from notchflex.analysis.solve import simulate
-from notchflex.analysis.uncertainty.draws import ToleranceSource, sources_of, values_at
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.pieces.folder import (
@@ -40,9 +44,9 @@ from notchflex.pieces.sketch import Scale, Sketch
 from notchflex.pieces.sobol import SobolPart
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
+from notchflex.robot.numbers import VariedRobots
+from notchflex.robot.problems import Tolerance
 from notchflex.robot.robot import to_table
-from notchflex.robot.tolerance import Tolerance
-from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.solver.newton import Settings
 from notchflex.tolerancing.spec import Criterion, ToleranceSpec, criteria_of
 from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicate

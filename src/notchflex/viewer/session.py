@@ -16,7 +16,10 @@ from notchflex.errors import InputError
 from notchflex.loads import Load
 from notchflex.results import Equilibrium, EquilibriumPath
 from notchflex.robot import Friction, Material, Robot, kinds_of, list_robots, load_robot, to_table
-from notchflex.robot.fields import fields_of, is_list
+from notchflex.robot.part import (
+    fields_of,
+    is_list,
+)
 from notchflex.viewer.controls import POINTING, STROKE, TENSION, ControlRanges, Controls
 
 

@@ -16,11 +16,10 @@ from notchflex._extras import need
 from notchflex._quantity import DEGREES
 from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import InputError
-from notchflex.loads.external import ExternalLoad
-from notchflex.loads.validation import check_number
-from notchflex.results.files.dataset import write_groups
-from notchflex.results.files.json import document_head
-from notchflex.results.quantities.registry import AXES
+from notchflex.loads.load import ExternalLoad, check_number
+from notchflex.results.io import write_groups
+from notchflex.results.quantities import AXES
+from notchflex.results.writing import document_head
 from notchflex.robot import Robot
 from notchflex.workspaces.limits import Limit
 

@@ -18,10 +18,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
-from notchflex.analysis.derivatives.tip_response import tip_response
+from notchflex.analysis.forward_model import tip_response
 from notchflex.errors import InputError
 from notchflex.loads import ExternalLoad
-from notchflex.loads.validation import check_integer, check_is_robot, check_number, short_repr
+from notchflex.loads.load import (
+    check_integer,
+    check_is_robot,
+    check_number,
+    short_repr,
+)
 from notchflex.pieces.folder import Manifest, Piece, Recipe, finished_head, piece_file, plain
 from notchflex.pieces.run import PieceFolder
 from notchflex.robot import Robot

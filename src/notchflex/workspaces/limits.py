@@ -11,8 +11,11 @@ from jaxtyping import Bool, Float
 
 from notchflex.analysis.outputs import OUTPUTS
 from notchflex.errors import InputError
-from notchflex.loads.validation import check_number, short_repr
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.loads.load import (
+    check_number,
+    short_repr,
+)
+from notchflex.results.quantities import QUANTITIES
 
 ALIASES = {"strain": "peak_strain", "angle": "total_angle", "force": "contact_force"}
 """Short names of quantities that are often limited."""

@@ -18,8 +18,7 @@ from notchflex.analysis.batch import simulate_batch
 from notchflex.analysis.closing_loads import closing
 from notchflex.errors import InputError
 from notchflex.loads import ExternalLoad, LoadPath
-from notchflex.loads.external import NO_VECTOR
-from notchflex.loads.validation import short_repr
+from notchflex.loads.load import NO_VECTOR, short_repr
 from notchflex.pieces.sobol import SobolPart
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings

@@ -5,7 +5,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.cli import run
-from notchflex.results.files.csv_reading import read_data_table
+from notchflex.results.reading import read_data_table
 from refusals import refused
 
 WRIST = nf.load_robot("pacheco2021-a")

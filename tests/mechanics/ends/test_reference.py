@@ -5,8 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from notchflex.mechanics.ends import Side, flattening, notch_stiffness, ring
-from notchflex.mechanics.ends.edge_loads import arc_harmonics, arc_of, end_compliance
+from notchflex.mechanics.ends import (
+    Side,
+    notch_stiffness,
+    ring,
+)
+from notchflex.mechanics.ends import (
+    effective_notch as flattening,
+)
+from notchflex.mechanics.ends.ring import (
+    arc_harmonics,
+    arc_of,
+    end_compliance,
+)
 from notchflex.mechanics.section import SECTION_OF_CUT
 from reference_data import named_rows
 

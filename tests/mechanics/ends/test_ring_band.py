@@ -11,7 +11,13 @@ from scipy.linalg import null_space
 
 from lanewise import Program, lower, machine_code
 from notchflex._arrays import Decisions, xp
-from notchflex.mechanics.ends import Side, edge_loads, ring
+from notchflex.mechanics.ends import (
+    Side,
+    ring,
+)
+from notchflex.mechanics.ends import (
+    ring as edge_loads,
+)
 from notchflex.mechanics.section import annular_sector
 
 BOUNDARIES = ("between", "clamped", "free")

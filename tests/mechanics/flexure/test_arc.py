@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_simpson
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.mechanics.contact.spine import SpineContact
+from notchflex.mechanics.contact import SpineContact
 from notchflex.mechanics.flexure import Rod, fibre_stretch, relative_pose, rod, with_level
 from notchflex.mechanics.flexure import flexure_state as plain_flexure_state
 from notchflex.mechanics.material import section_law

@@ -8,7 +8,7 @@ import pytest
 import notchflex as nf
 from notchflex.mechanics.ends import Side
 from notchflex.mechanics.flexure import Site, rod
-from notchflex.mechanics.flexure.roots.rooted_strip import (
+from notchflex.mechanics.flexure.roots import (
     ROUND,
     SHARP,
     Walls,

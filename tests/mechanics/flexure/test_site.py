@@ -39,7 +39,7 @@ def test_dimensions_outside_the_range_are_named():
     assert "up to 3 % off (all notches)" in sentence
     assert "`notch.stiffness_factor`" in sentence
     shallow = nf.simulate(wrist(depth=1.2), nf.Load(tension=0.5))
-    from notchflex.results.warnings import path_warnings
+    from notchflex.results.path import path_warnings
 
     assert sentence in path_warnings(shallow)
 

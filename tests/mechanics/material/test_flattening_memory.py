@@ -13,9 +13,12 @@ import pytest
 import notchflex as nf
 from fibre_sections import ENDS, bending, energy, respond, section
 from margins import Margin
-from notchflex._jax import jax, jnp
+from notchflex._jax import (
+    jax,
+    jnp,
+)
 from notchflex.mechanics.material import section_law
-from notchflex.mechanics.material.flattening import Flattening
+from notchflex.mechanics.material.law import Flattening
 
 NITINOL = nf.Nitinol(42000.0, 350.0, 6000.0, compression_ratio=1.3, unloading_stress=150.0)
 LAW = section_law(NITINOL)

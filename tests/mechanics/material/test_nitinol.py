@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 import notchflex as nf
 from fibre_sections import ENDS, bending, energy, fine_fibres, moment, respond, section
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
-from notchflex.mechanics.section.fibres import (
+from notchflex.mechanics.section.section import (
     FIBRES,
     Points,
     gauss_rule,

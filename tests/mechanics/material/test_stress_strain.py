@@ -13,7 +13,10 @@ import notchflex as nf
 from fibre_sections import ENDS, PLAIN, bending, energy, fine_fibres, moment, respond, section
 from notchflex._jax import jax
 from notchflex.mechanics.material import Fibres, section_law
-from notchflex.mechanics.section.fibres import FIBRES, two_walls_fibres
+from notchflex.mechanics.section.section import (
+    FIBRES,
+    two_walls_fibres,
+)
 from notchflex.robot import robot_from_text, robot_text
 from refusals import refused
 

@@ -10,7 +10,7 @@ from numpy.polynomial import legendre
 
 from lanewise import Program, lower, machine_code
 from notchflex._arrays import Decisions
-from notchflex.mechanics.section.fibres import (
+from notchflex.mechanics.section.section import (
     FIBRES,
     cut_fibres,
     gauss_rule,

@@ -7,7 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import (
+    jax,
+    jnp,
+)
 from notchflex.mechanics.section import Section, annular_sector, annular_segment
 
 SECTIONS = {"on-axis": annular_sector, "off-axis": annular_segment}

@@ -9,8 +9,11 @@ import xarray
 
 import notchflex as nf
 from notchflex.errors import ErrorCode
-from notchflex.results.files.dataset import dataset_of, record_dataset
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.io import (
+    dataset_of,
+    record_dataset,
+)
+from notchflex.results.quantities import QUANTITIES
 from refusals import refused
 
 

@@ -14,7 +14,10 @@ import pytest
 
 import notchflex as nf
 from notchflex import _replacing
-from notchflex.robot import reading, robot_text
+from notchflex.robot import (
+    reading,
+    robot_text,
+)
 from refusals import refused
 
 WRITE = """

@@ -8,7 +8,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.errors import ErrorCode, InputError
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities import QUANTITIES
 from notchflex.robot import robot_text
 from refusals import refused
 

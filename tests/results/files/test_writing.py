@@ -6,7 +6,7 @@ import stat
 import pytest
 
 from notchflex.errors import ErrorCode
-from notchflex.results.files.writing import (
+from notchflex.results.writing import (
     check_distinct,
     check_output,
     check_picture,

@@ -10,7 +10,7 @@ from contextlib import closing
 
 import pytest
 
-from notchflex.solver.programs.threads import on_cores
+from notchflex.solver.programs.compiled import on_cores
 
 
 def test_results_come_in_order_of_the_pieces() -> None:

@@ -20,8 +20,17 @@ from notchflex.cli.interview.ask import (
 )
 from notchflex.errors import InputError
 from notchflex.robot import Nitinol, Robot, Superelastic, Tendon, Tube
-from notchflex.robot.fields import fields_of, is_list, kind_of
-from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
+from notchflex.robot.kinds import (
+    Friction,
+    Material,
+    Notch,
+    kinds_of,
+)
+from notchflex.robot.part import (
+    fields_of,
+    is_list,
+    kind_of,
+)
 from notchflex.robot.problems import MOST_NOTCHES
 
 

@@ -11,7 +11,10 @@ import numpy as np
 
 from notchflex.cli import terminal
 from notchflex.robot import Robot
-from notchflex.robot.fields import fields_of, is_unsaid
+from notchflex.robot.part import (
+    fields_of,
+    is_unsaid,
+)
 from notchflex.robot.robot import to_table
 
 if TYPE_CHECKING:
@@ -62,7 +65,7 @@ def print_robot(robot: Robot, title: str, length: float, notches: list[dict[str,
 
 def description_tables(robot: Robot) -> list[Table]:
     """Return how the notches are cut, with one table for each kind; equal notches share a row."""
-    from notchflex.analysis.notch_table import named_values
+    from notchflex.analysis.closing_loads import named_values
 
     kinds: dict[str, dict[tuple[Any, ...], list[int]]] = {}
     names: dict[str, list[str]] = {}

@@ -14,15 +14,20 @@ from notchflex._quantity import Quantity
 from notchflex.cli import terminal
 from notchflex.cli.tables.tolerance_tables import tolerance_lines
 from notchflex.errors import InputError
-from notchflex.loads.summary import external_words
-from notchflex.results.quantities.registry import AXES, CONTACT_STATES, QUANTITIES, holds
-from notchflex.robot.error_messages import nearest
+from notchflex.loads.load_path import external_words
+from notchflex.results.quantities import (
+    AXES,
+    CONTACT_STATES,
+    QUANTITIES,
+    holds,
+)
+from notchflex.robot.part import nearest
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from notchflex.analysis import Bands
-    from notchflex.loads.external import ExternalLoad
+    from notchflex.loads.load import ExternalLoad
     from notchflex.results import EquilibriumPath
 
 

@@ -8,14 +8,17 @@ from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING
 
 from notchflex.cli import terminal
-from notchflex.results.quantities.registry import DEGREES
+from notchflex.results.quantities import DEGREES
 from notchflex.robot.value_names import described_at
 
 if TYPE_CHECKING:
-    from notchflex.analysis.uncertainty.bands import Band, Bands
-    from notchflex.analysis.uncertainty.closing_bands import ClosingBands
+    from notchflex.analysis.bands import (
+        Band,
+        Bands,
+        ClosingBands,
+    )
     from notchflex.robot import Robot
-    from notchflex.robot.tolerance import Tolerance
+    from notchflex.robot.problems import Tolerance
     from notchflex.tolerancing import ToleranceAnalysis
 
 

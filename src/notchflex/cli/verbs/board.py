@@ -10,7 +10,7 @@ from notchflex.cli import terminal
 from notchflex.cli.outputs import output_file
 from notchflex.cli.terminal import DONE
 from notchflex.errors import InputError
-from notchflex.results.files.writing import check_output
+from notchflex.results.writing import check_output
 
 
 def board(

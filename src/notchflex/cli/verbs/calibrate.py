@@ -16,7 +16,7 @@ from notchflex.cli.arguments.robots import Columns, MeasuredAs, OnePath, Setting
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile
 from notchflex.cli.terminal import BAD_INPUT, DONE, NOT_CONVERGED
 from notchflex.errors import InputError
-from notchflex.results.files.writing import check_folder
+from notchflex.results.writing import check_folder
 
 if TYPE_CHECKING:
     from notchflex.fit import Calibration

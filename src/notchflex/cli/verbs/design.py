@@ -13,7 +13,7 @@ from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
-from notchflex.results.files.writing import check_folder
+from notchflex.results.writing import check_folder
 
 if TYPE_CHECKING:
     from notchflex.designing import Design

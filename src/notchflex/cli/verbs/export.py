@@ -144,8 +144,8 @@ def _report(robot: Robot, written: list[Exported], outputs: Outputs) -> int:
     """Write the document of `--json`, warnings, and what was written."""
 
     def document() -> dict[str, Any]:
-        from notchflex.results.files.json import document_head
         from notchflex.results.state import robot_digest
+        from notchflex.results.writing import document_head
 
         files = [{"file": one.file, "warnings": list(one.warnings), **one.facts} for one in written]
         return {**document_head(robot), "robot_hash": robot_digest(robot), "files": files}

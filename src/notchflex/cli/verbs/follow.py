@@ -166,7 +166,7 @@ def follow(
 def _write(following: Following, outputs: Outputs, title: str) -> None:
     from notchflex._replacing import replacing
     from notchflex.control.following import following_columns, following_document
-    from notchflex.results.files.csv import write_path_csv
+    from notchflex.results.writing import write_path_csv
 
     def picture() -> Any:
         from notchflex.plotting import following_picture

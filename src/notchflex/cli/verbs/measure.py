@@ -21,7 +21,10 @@ from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, Quiet, output_file
 from notchflex.cli.tables.measured_cut import write_cut
 from notchflex.cli.terminal import DONE, INTERRUPTED, NOT_CONVERGED
 from notchflex.errors import InputError
-from notchflex.results.files.writing import check_folder, check_output
+from notchflex.results.writing import (
+    check_folder,
+    check_output,
+)
 from notchflex.viewer import HOST, PORT, check_host, check_installed
 
 if TYPE_CHECKING:

@@ -32,7 +32,11 @@ from notchflex.cli.outputs import (
 )
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
-from notchflex.results.files.writing import BROWSER, MOVING, PAPER
+from notchflex.results.writing import (
+    BROWSER,
+    MOVING,
+    PAPER,
+)
 
 if TYPE_CHECKING:
     from notchflex.analysis import Bands
@@ -190,7 +194,7 @@ def simulate(
         bands = None
         if uncertain:
             from notchflex import analysis
-            from notchflex.analysis.uncertainty.bands import DRAWS
+            from notchflex.analysis.bands import DRAWS
 
             bands = analysis.uncertain(
                 chosen,
@@ -278,7 +282,7 @@ def _start(file: str) -> SavedState:
 
 def _report(path: EquilibriumPath, label: str) -> int:
     """Write warnings and the first failure, after the label if given; return the exit code."""
-    from notchflex.results.warnings import path_warnings
+    from notchflex.results.path import path_warnings
 
     prefix = f"{label}: " if label else ""
     for sentence in path_warnings(path):

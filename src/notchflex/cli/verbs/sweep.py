@@ -15,7 +15,7 @@ from notchflex.cli.arguments.pieces import Scheduler, Workers
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
-from notchflex.results.files.writing import check_picture
+from notchflex.results.writing import check_picture
 
 if TYPE_CHECKING:
     from notchflex.sweeping import Sweep

@@ -17,7 +17,10 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import (
+    jax,
+    jnp,
+)
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import report_quantities
 from notchflex.control.program.drive_step import (
@@ -30,18 +33,25 @@ from notchflex.control.program.drive_step import (
 )
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
+from notchflex.solver.block_elimination import (
+    command_residual,
+    linear_step,
+    stroke,
+    tension_is_bounded,
+)
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
-from notchflex.solver.derived.quantities import believable
-from notchflex.solver.derived.solved_state import SolvedState
-from notchflex.solver.element import Iterate, Memory
-from notchflex.solver.friction_predictor import limit_slack
-from notchflex.solver.linear_step.block_elimination import linear_step
-from notchflex.solver.newton import Settings
+from notchflex.solver.newton import Settings, limit_slack
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
-from notchflex.solver.residual import Evaluation, evaluate
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.quantities import believable
+from notchflex.solver.residual import (
+    Evaluation,
+    Iterate,
+    Memory,
+    SolverState,
+    evaluate,
+)
+from notchflex.solver.solved_state import SolvedState
 
 
 class SearchState(NamedTuple):

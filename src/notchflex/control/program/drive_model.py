@@ -21,13 +21,20 @@ from notchflex.control.program.compiled_search import SearchLayouts, Task, blank
 from notchflex.control.program.drive_step import dead_band
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import LoadPath
-from notchflex.results.state import SavedState, State, fitted
+from notchflex.results.state import (
+    SavedState,
+    State,
+    fitted,
+)
 from notchflex.robot import Robot
-from notchflex.solver.derived.quantities import unpad_quantity
-from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.newton import (
+    DEFAULT,
+    Settings,
+)
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import PytreeLayout, pad_rows
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.quantities import unpad_quantity
+from notchflex.solver.residual import SolverState
 
 
 class Response(NamedTuple):

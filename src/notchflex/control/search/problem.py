@@ -12,7 +12,10 @@ from jaxtyping import Float
 from notchflex.control.limits import Bound
 from notchflex.control.program.drive_model import DriveModel, Response
 from notchflex.errors import Failure, InputError
-from notchflex.loads.validation import check_integer, check_number
+from notchflex.loads.load import (
+    check_integer,
+    check_number,
+)
 
 
 def size_of(vector: Float[np.ndarray, " k"]) -> float:

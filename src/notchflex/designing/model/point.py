@@ -11,10 +11,12 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex._quantity import REGISTERED
-from notchflex.analysis.closing_loads import Closing, closing
-from notchflex.analysis.derivatives.differences import slope
-from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.tangent import Change
+from notchflex.analysis.closing_loads import (
+    Closing,
+    closing,
+)
+from notchflex.analysis.forward_model import ForwardModel, slope
+from notchflex.analysis.tangent import Change
 from notchflex.designing.model.quantities import (
     OF_ROBOTS,
     Bodies,
@@ -38,7 +40,7 @@ from notchflex.designing.model.variables import (
 from notchflex.designing.specification import TargetCurve
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
-from notchflex.mechanics.chain.mass import body_lengths
+from notchflex.mechanics.chain.assembly import body_lengths
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import numbers_at

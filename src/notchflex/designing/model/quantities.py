@@ -15,22 +15,28 @@ from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 from notchflex._jax import constant
-from notchflex.analysis.axis_points import (
+from notchflex.analysis.closing_loads import Closing
+from notchflex.analysis.forward_model import ForwardModel
+from notchflex.analysis.kinematics import (
     AxisPlaces,
     axis_places,
     axis_point_changes,
+    bodies_from_angles,
     points_on_axis,
 )
-from notchflex.analysis.closing_loads import Closing
-from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.tangent import Change
-from notchflex.analysis.kinematics import bodies_from_angles
+from notchflex.analysis.tangent import Change
 from notchflex.designing.specification import TargetCurve
 from notchflex.loads import LoadPath
 from notchflex.mechanics.chain import assemble
-from notchflex.mechanics.chain.mass import body_lengths
-from notchflex.mechanics.contact import closing_angles, free_angle
-from notchflex.results.quantities.registry import DEGREES, QUANTITIES
+from notchflex.mechanics.chain.assembly import body_lengths
+from notchflex.mechanics.contact import (
+    closing_angles,
+    free_angle,
+)
+from notchflex.results.quantities import (
+    DEGREES,
+    QUANTITIES,
+)
 from notchflex.robot import Robot
 
 OF_STATES = {

@@ -29,8 +29,11 @@ from notchflex.designing.specification import (
 )
 from notchflex.errors import InputError
 from notchflex.robot import Robot
-from notchflex.robot.error_messages import nearest
-from notchflex.robot.value_names import described_at, numbers_at
+from notchflex.robot.part import nearest
+from notchflex.robot.value_names import (
+    described_at,
+    numbers_at,
+)
 from notchflex.tolerancing.spec import check_percent
 
 

@@ -20,7 +20,10 @@ from jaxtyping import Bool, Float
 from scipy.special import log_ndtr, ndtri
 
 from notchflex.analysis.closing_loads import closing_tensions_of
-from notchflex.analysis.uncertainty.draws import sources_of, values_at
+from notchflex.analysis.draws import (
+    sources_of,
+    values_at,
+)
 from notchflex.designing.model.point import CLOSINGS, Point, Solver
 from notchflex.designing.model.quantities import CLOSING, Reading
 from notchflex.designing.model.variables import deviations_of
@@ -41,8 +44,8 @@ from notchflex.designing.search.problem import (
 from notchflex.designing.search.search import Searches, SearchResult, solved
 from notchflex.designing.specification import DesignConstraint, DesignSpec, RobustOptions
 from notchflex.errors import InputError
-from notchflex.robot.tolerance import Tolerance
-from notchflex.robot.value_names.varied import VariedRobots
+from notchflex.robot.numbers import VariedRobots
+from notchflex.robot.problems import Tolerance
 from notchflex.tolerancing.study import TAIL
 from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicates, yield_interval
 

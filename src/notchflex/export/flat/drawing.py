@@ -14,7 +14,7 @@ from notchflex.export.flat.pattern import FlatPattern, flat_pattern
 from notchflex.export.formats import Document, PatternOptions, Subject
 from notchflex.results.state import robot_digest
 from notchflex.robot import Robot
-from notchflex.robot.notches.cut import Point
+from notchflex.robot.cuts import Point
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

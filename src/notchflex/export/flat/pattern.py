@@ -24,8 +24,13 @@ from notchflex.export.cuts import PlacedCut, angle_at, cuts_of, naming
 from notchflex.export.formats import PatternOptions, Subject
 from notchflex.results.state import robot_digest
 from notchflex.robot import Robot, Tube
-from notchflex.robot.notches.cut import NotchCut, Point
-from notchflex.robot.notches.profile import Arc, Line, pieces
+from notchflex.robot.cuts import (
+    Arc,
+    Line,
+    NotchCut,
+    Point,
+    pieces,
+)
 
 _DEEPEST = 14
 """Halvings of a piece at most: 16384 chords."""

@@ -29,8 +29,8 @@ from notchflex.export.simulators.text import (
     printable,
     roll_pitch_yaw,
 )
-from notchflex.results.files.csv import csv_text
 from notchflex.results.state import robot_digest
+from notchflex.results.writing import csv_text
 from notchflex.robot import Robot
 
 _ANGLES = 11

@@ -24,9 +24,9 @@ from notchflex.analysis import closing, simulate
 from notchflex.errors import InputError
 from notchflex.export.cuts import Hole, tendon_holes
 from notchflex.loads import pull
-from notchflex.loads.validation import check_number
+from notchflex.loads.load import check_number
 from notchflex.mechanics.chain import assemble
-from notchflex.mechanics.chain.mass import body_lengths
+from notchflex.mechanics.chain.assembly import body_lengths
 from notchflex.mechanics.contact import closing_angles
 from notchflex.robot import Robot
 

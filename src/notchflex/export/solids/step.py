@@ -28,8 +28,11 @@ from notchflex.export.solids.straight import (
 )
 from notchflex.results.state import robot_digest
 from notchflex.robot import Robot
-from notchflex.robot.notches.cut import NotchCut
-from notchflex.robot.notches.profile import Line, pieces
+from notchflex.robot.cuts import (
+    Line,
+    NotchCut,
+    pieces,
+)
 
 _RADIUS_FACTOR = 2.0
 """How far a cutting solid reaches, in outer radii."""

@@ -28,8 +28,7 @@ from notchflex.plotting.shapes.outline import fair_growth, prism, tube_wall
 from notchflex.plotting.shapes.robot_shape import RobotShape, shape_at, shape_from_angles
 from notchflex.results.state import robot_digest
 from notchflex.robot import Robot, Tube
-from notchflex.robot.notches.cut import NotchCut
-from notchflex.robot.notches.profile import outline
+from notchflex.robot.cuts import NotchCut, outline
 
 if TYPE_CHECKING:
     from manifold3d import Manifold

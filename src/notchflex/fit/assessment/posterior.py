@@ -14,13 +14,16 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex._extras import need
-from notchflex._jax import jax, jnp
+from notchflex._jax import (
+    jax,
+    jnp,
+)
 from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import InputError
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.intervals import LEVEL
 from notchflex.fit.estimation.problem import Progress
-from notchflex.results.files.dataframe import frame
+from notchflex.results.io import frame
 
 if TYPE_CHECKING:
     from xarray import Dataset

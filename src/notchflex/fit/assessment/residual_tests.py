@@ -22,7 +22,7 @@ from notchflex.fit.measurements.measurements import OBSERVED
 from notchflex.fit.model.constants import Unknown, unknowns
 from notchflex.fit.model.drawing import numbers_set
 from notchflex.fit.model.residuals import SENSOR
-from notchflex.robot.fields import fields_of
+from notchflex.robot.part import fields_of
 
 # Probability below which noise does not make a pattern; of constants for all of them together.
 _UNLIKELY = 0.01

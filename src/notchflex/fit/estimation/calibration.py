@@ -30,7 +30,7 @@ from notchflex.fit.estimation.problem import FitProblem
 from notchflex.fit.model.constants import Unknown
 from notchflex.fit.model.drawing import deviated
 from notchflex.fit.model.residuals import Residuals
-from notchflex.results.files.dataframe import frame
+from notchflex.results.io import frame
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings
 

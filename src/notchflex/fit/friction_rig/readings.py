@@ -19,7 +19,7 @@ from notchflex.fit.friction_rig.two_weights import (
     slopes_of_coefficient,
 )
 from notchflex.fit.measurements.csv import check_deviation
-from notchflex.results.files.csv_reading import read_data_table
+from notchflex.results.reading import read_data_table
 
 COLUMNS = {
     "weight_1": ("weight_1_g", "weight_1_sd_g"),

@@ -20,7 +20,7 @@ from notchflex.fit.friction_rig.scattered import (
     outliers,
 )
 from notchflex.fit.friction_rig.two_weights import LAWS
-from notchflex.results.quantities.registry import DEGREES
+from notchflex.results.quantities import DEGREES
 
 # A larger coefficient of a tendon is more likely a wrong unit.
 _RARE = 1.0
@@ -173,7 +173,7 @@ def friction_rig(readings: FrictionReadings) -> FrictionRig:
 
 
 def friction_document(rig: FrictionRig) -> dict[str, Any]:
-    """Return an estimate as a document for `notchflex.results.files.json.write_json`.
+    """Return an estimate as a document for `notchflex.results.writing.write_json`.
 
     Args:
         rig: The estimate.

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from notchflex.results.quantities.registry import AXES, QUANTITIES
+from notchflex.results.quantities import (
+    AXES,
+    QUANTITIES,
+)
 
 PULL = ("pull", "trial")
 FROM_REST = "from_rest"

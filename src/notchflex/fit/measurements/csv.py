@@ -19,15 +19,21 @@ from notchflex.fit.measurements import columns as layout
 from notchflex.fit.measurements.loading_order import Order, commands_of, loading_order
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.loads import BodyForce, ExternalLoad, LoadPath
-from notchflex.loads.validation import check_is_robot, check_pulls
-from notchflex.results.files.csv import write_columns
-from notchflex.results.files.csv_reading import (
+from notchflex.loads.load import (
+    check_is_robot,
+    check_pulls,
+)
+from notchflex.results.quantities import (
+    AXES,
+    QUANTITIES,
+)
+from notchflex.results.reading import (
     Table,
     no_tendon_column,
     read_data_table,
     tendon_columns,
 )
-from notchflex.results.quantities.registry import AXES, QUANTITIES
+from notchflex.results.writing import write_columns
 from notchflex.robot import Robot
 
 _YES_OR_NO = {"0": False, "1": True, "false": False, "true": True}

@@ -18,7 +18,7 @@ from notchflex.fit.measurements.measurements import (
 )
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.load_path import load_path
-from notchflex.results.quantities.registry import spans_of
+from notchflex.results.quantities import spans_of
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:

@@ -11,7 +11,11 @@ import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.robot import Robot
-from notchflex.robot.value_names import described_at, number_at, numbers_at
+from notchflex.robot.value_names import (
+    described_at,
+    number_at,
+    numbers_at,
+)
 
 
 @dataclass(frozen=True)

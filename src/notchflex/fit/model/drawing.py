@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from notchflex.analysis.uncertainty.assumed import tolerances_of
-from notchflex.analysis.uncertainty.draws import moments, sources_of
+from notchflex.analysis.draws import (
+    moments,
+    sources_of,
+    tolerances_of,
+)
 from notchflex.fit.model.constants import RobotNumber, Unknown
 from notchflex.fit.model.residuals import SENSOR
 from notchflex.robot import Robot

@@ -13,19 +13,22 @@ from scipy.stats import mannwhitneyu
 from scipy.stats import t as student
 
 from notchflex._jax import constant
-from notchflex.analysis.axis_points import (
+from notchflex.analysis.forward_model import (
+    Change,
+    ForwardModel,
+)
+from notchflex.analysis.kinematics import (
     AxisPlaces,
     axis_places,
     axis_point_changes,
     points_on_axis,
 )
-from notchflex.analysis.derivatives.forward_model import Change, ForwardModel
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.constants import RobotNumber
 from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.motion import left_slope
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.quantities.registry import DEGREES
+from notchflex.results.quantities import DEGREES
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings
 

@@ -15,7 +15,10 @@ from notchflex.fit.model.constants import Unknown
 from notchflex.fit.model.drawing import deviated
 from notchflex.fit.model.residuals import Residuals, Sample, misfit
 from notchflex.robot import Robot
-from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.newton import (
+    DEFAULT,
+    Settings,
+)
 
 
 @dataclass(eq=False)

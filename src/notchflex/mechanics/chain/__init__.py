@@ -4,13 +4,15 @@ from notchflex.mechanics.chain.arrays import Chain, flexure_states, padded, stru
 from notchflex.mechanics.chain.assembly import (
     ChainTemplate,
     assemble,
+    bending_normal,
+    body_lengths,
     chain_template,
+    flexure,
     laws,
+    sites_of,
+    tendons_in_plane,
+    unchecked_dimensions,
 )
-from notchflex.mechanics.chain.flexures import flexure
-from notchflex.mechanics.chain.mass import body_lengths
-from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
-from notchflex.mechanics.chain.sites import sites_of, unchecked_dimensions
 
 __all__ = [
     "Chain",

@@ -16,8 +16,13 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from notchflex._arrays import xp
-from notchflex._jax import constant, jax, jnp
-from notchflex._pytree import Pytree, static
+from notchflex._jax import (
+    Pytree,
+    constant,
+    jax,
+    jnp,
+    static,
+)
 from notchflex.mechanics.contact import ContactGroup
 from notchflex.mechanics.flexure import FlexureState, Rod, flexure_state, in_space
 from notchflex.mechanics.friction import FrictionLaw

@@ -3,35 +3,249 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from notchflex._arrays import cached, xp
-from notchflex._jax import constant, jax
+from notchflex._arrays import cached, plain_number, xp
+from notchflex._jax import (
+    constant,
+    jax,
+)
 from notchflex.mechanics.chain.arrays import Chain
-from notchflex.mechanics.chain.flexures import FlexureOf, flexure
-from notchflex.mechanics.chain.mass import body_lengths, body_masses
-from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
-from notchflex.mechanics.chain.sites import sites_of
-from notchflex.mechanics.contact import ContactGroup, build_contacts
+from notchflex.mechanics.contact import (
+    ContactGroup,
+    build_contacts,
+)
+from notchflex.mechanics.ends import Side
 from notchflex.mechanics.flexure import (
     Rod,
     Site,
     fibre_stretch,
     flattened,
+    free_pose,
+    rod_at,
+    section_fibres,
     stack,
+    validity_warnings,
+    with_level,
 )
 from notchflex.mechanics.flexure.rod import planar_points
 from notchflex.mechanics.friction import friction_law
-from notchflex.mechanics.material import SectionLaw, section_law
+from notchflex.mechanics.material import Fibres, SectionLaw, section_law
 from notchflex.mechanics.motion import Motion, rotation_about
-from notchflex.mechanics.tendon import RoutedTendons, RoutingContext, TendonGroup, route
+from notchflex.mechanics.section.section import (
+    FIBRES,
+    fitted,
+)
+from notchflex.mechanics.tendon import (
+    RoutedTendons,
+    RoutingContext,
+    TendonGroup,
+    route,
+)
 from notchflex.robot import Robot, Tendon, Tube
-from notchflex.robot.kinds import Friction, Material, Notch
+from notchflex.robot.kinds import (
+    Friction,
+    Material,
+    Notch,
+)
 from notchflex.robot.part import unchecked
+
+# Masses of the pieces of a robot: uncut tube, and the sections that the notches leave.
+
+# From kg/m3 to g/mm3.
+_GRAMS = 1e-6
+
+
+def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[np.ndarray, " bodies"]:
+    """Return the length of each rigid piece on the tube axis, base first, mm."""
+    following = (*notches[1:], None)
+    spacings = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
+    return xp.stack(xp.broadcast_arrays(tube.base_length, *spacings))
+
+
+def body_masses(
+    robot: Robot, rods: Rod
+) -> tuple[Float[np.ndarray, " bodies"], Float[np.ndarray, "bodies 3"]]:
+    """Compute mass and centre of mass of each body, with its share of the notches.
+
+    A body is a piece of uncut tube: the area of the tube's wall times the body's axial length,
+    its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure (area
+    of its sections times the length of the neutral axis) is lumped: half at the start of the
+    neutral axis on the body before it, half at its end on the body after it.
+
+    Args:
+        robot: The robot, n notches.
+        rods: Its flexures, each starting from the proximal body, without factors on stiffness.
+
+    Returns:
+        Masses (g, (n + 1,)), base first, and centres (mm, (n + 1, 3)) in the frames of the
+        bodies; zero masses where the material's density is not known.
+    """
+    bodies = len(robot.notches) + 1
+    density = robot.material.density
+    if density is None:
+        return np.zeros(bodies), np.zeros((bodies, 3))
+    length = body_lengths(robot.tube, robot.notches)
+    wall = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2)
+    piece = wall * length
+    half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1)
+    end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
+    nothing = np.zeros(1)
+    before, behind = xp.concatenate([half, nothing]), xp.concatenate([nothing, half])
+    # Every body has a volume: where no tube is left between two notches, half of each flexure.
+    volume = piece + before + behind
+    on_axis = (0.5 * length * piece)[:, None] * np.eye(3)[2]
+    at_starts = before[:, None] * xp.pad(rods.start_offset, ((0, 1), (0, 0)))
+    at_ends = behind[:, None] * xp.pad(end, ((1, 0), (0, 0)))
+    return _GRAMS * density * volume, (on_axis + at_starts + at_ends) / volume[:, None]
+
+
+# Whether a robot stays in one plane under its tendons alone.
+
+# Tolerance of a direction's component out of the plane.
+_ROUNDING = 1e-12
+
+
+@cached(64)
+def bending_normal(robot: Robot) -> Float[np.ndarray, " 3"] | None:
+    """Return the normal of the plane in which all notches bend, in the base frame, or None."""
+    direction = xp.radians([notch.direction_deg for notch in robot.notches])
+    if (xp.abs(xp.sin(direction - direction[0])) > _ROUNDING).any():
+        return None
+    return xp.array([-xp.sin(direction[0]), xp.cos(direction[0]), 0.0])
+
+
+@cached(64)
+def tendons_in_plane(robot: Robot) -> bool:
+    """Return whether every tendon runs in the one plane in which all notches bend."""
+    normal = bending_normal(robot)
+    if normal is None:
+        return False
+    direction = xp.radians([tendon.direction_deg for tendon in robot.tendon])
+    return bool(
+        (xp.abs(xp.cos(direction) * normal[0] + xp.sin(direction) * normal[1]) < 1e-9).all()
+    )
+
+
+# The rings beside every notch, as notches with elastic ends need them.
+
+_SAME_DIRECTION = 1e-6
+"""Notches open to one side if their directions differ by less, deg: rounding of sums of angles."""
+
+
+def sites_of(robot: Robot) -> tuple[Site | None, ...]:
+    """Return the rings beside every notch; None for notches that do not depend on them.
+
+    A rigid plate holds the base at its length before the first notch. The ring after the last notch
+    is free. Where neighbours differ, each models the ring between them as if both were of its own
+    kind and opened to its own side.
+
+    Args:
+        robot: The robot, n notches.
+
+    Returns:
+        n sites, base to tip.
+    """
+    notches = robot.notches
+    if not any(notch.has_elastic_ends for notch in notches):
+        return (None,) * len(notches)
+    lengths = [plain_number(length) for length in body_lengths(robot.tube, notches)]
+    last = len(notches) - 1
+    ratio = robot.material.poisson_ratio
+
+    sites: dict[tuple[int | None, ...], Site] = {}  # shared where all around is of the same parts
+
+    def site(index: int) -> Site:
+        before, after = lengths[index], lengths[index + 1]
+        neighbours = notches[max(index - 1, 0)], notches[min(index + 1, last)]
+        turned = [_is_turned(notches[index], one) for one in neighbours]
+        proximal = Side("clamped" if index == 0 else "between", before, turned[0])
+        distal = Side("free" if index == last else "between", after, turned[1])
+        parts = (neighbours[0], notches[index], neighbours[1])
+        key = (*map(id, parts), index == 0, index == last)
+        return sites.setdefault(key, Site(proximal, distal, ratio))
+
+    return tuple(
+        site(index) if notch.has_elastic_ends else None for index, notch in enumerate(notches)
+    )
+
+
+def _is_turned(notch: Notch, other: Notch) -> bool:
+    apart = (notch.direction_deg - other.direction_deg + 180.0) % 360.0 - 180.0
+    return abs(apart) > _SAME_DIRECTION
+
+
+def unchecked_dimensions(robot: Robot) -> list[str]:
+    """Say where dimensions of notches with elastic ends leave the range that was checked.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        One sentence with each dimension, the notches that it belongs to, and what to do; none where
+        all lie inside, or the ends are rigid.
+    """
+    notches_of: dict[str, list[str]] = {}
+    sites = sites_of(robot)
+    for number, (notch, site) in enumerate(zip(robot.notches, sites, strict=True), 1):
+        if site is not None:
+            for found in validity_warnings(notch, robot.tube, site):
+                notches_of.setdefault(found, []).append(str(number))
+    if not notches_of:
+        return []
+    every = [f"{found} ({_numbered(numbers, len(sites))})" for found, numbers in notches_of.items()]
+    return [
+        f"finite elements did not check all dimensions of this robot: {'; '.join(every)}. Widen "
+        "the band by a tolerance of `notch.stiffness_factor`, or check a notch by `export`."
+    ]
+
+
+def _numbered(numbers: list[str], count: int) -> str:
+    if len(numbers) == count > 1:
+        return "all notches"
+    return f"notch{'es' if len(numbers) > 1 else ''} {', '.join(numbers)}"
+
+
+# One flexure of a chain: the rod of a notch with the modes that the loads need, and its fibres.
+
+
+def with_fibres(rod: Rod, notch: Any, tube: Tube, refinement: int = 0) -> Rod:
+    """Return the rod of a notch with the fibres of its sections; refinement takes more of them."""
+    count = FIBRES * (1 + refinement)
+    section = rod.section
+    points = section_fibres(notch, tube)(section.edge_near, section.edge_spine, count)
+    points = fitted(points, section.area, section.second_moment_weak)
+    fibres = Fibres(*map(constant, points))
+    return dataclasses.replace(rod, section=dataclasses.replace(section, fibres=fibres))
+
+
+FlexureOf = Callable[..., tuple[Rod, Motion]]
+"""Makes a flexure, and its pose in the free robot; for the arguments see `flexure`."""
+
+
+@cached(512)
+def flexure(
+    notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int, by_fibres: bool
+) -> tuple[Rod, Motion]:
+    """Make a flexure without its factor on stiffness, and its pose in the free robot; cached.
+
+    Args:
+        notch: The notch.
+        site: Its surroundings, where its ends are elastic.
+        tube: The tube that it is cut into.
+        level: For which loads, as for `assemble`.
+        refinement: As for `assemble`.
+        by_fibres: Whether the material needs the fibres of sections.
+    """
+    rod = with_level(rod_at(site, notch, tube, refinement), level)
+    rod = with_fibres(rod, notch, tube, refinement) if by_fibres else rod
+    return rod, free_pose(rod)
+
 
 _UP = xp.array([0.0, 0.0, 1.0])
 

@@ -2,5 +2,5 @@
 
 from notchflex.mechanics.ends.effective_notch import NotchStiffness as NotchStiffness
 from notchflex.mechanics.ends.effective_notch import notch_stiffness as notch_stiffness
-from notchflex.mechanics.ends.side import Side as Side
-from notchflex.mechanics.ends.validity import validity as validity
+from notchflex.mechanics.ends.effective_notch import validity as validity
+from notchflex.mechanics.ends.ring import Side as Side

@@ -2,24 +2,22 @@
 
 from notchflex._packages import import_all
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
-from notchflex.mechanics.flexure.geometric_stiffness import geometric_stiffness
-from notchflex.mechanics.flexure.registry import (
-    Site,
-    rod,
-    rod_at,
-    section_fibres,
-    validity_warnings,
-)
 from notchflex.mechanics.flexure.rod import (
     LEVELS,
     MAX_REFINEMENT,
     Rod,
+    Site,
     flattened,
+    rod,
+    rod_at,
+    section_fibres,
     stack,
+    validity_warnings,
     with_level,
 )
 from notchflex.mechanics.flexure.rod_kinematics import (
     free_pose,
+    geometric_stiffness,
     relative_pose,
     rod_end,
     rotation_error_estimate,

@@ -28,12 +28,20 @@ from notchflex.mechanics.flexure.notch_rod import (
     legendre_modes,
     shifted,
 )
-from notchflex.mechanics.flexure.registry import Site, rod, section_fibres, validity_warnings
-from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod import (
+    Rod,
+    Site,
+    rod,
+    section_fibres,
+    validity_warnings,
+)
 from notchflex.mechanics.flexure.rod_kinematics import rod_quadrature
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.section import SECTION_OF_CUT, Section
-from notchflex.mechanics.section.fibres import FibresAt, cut_fibres
+from notchflex.mechanics.section.section import (
+    FibresAt,
+    cut_fibres,
+)
 from notchflex.robot import ArcNotch, Tube
 
 # Part of the end compliance that follows the material beyond its elastic limit (finite elements).

@@ -7,8 +7,11 @@ from typing import Any
 from jaxtyping import Array, Float
 
 from notchflex._arrays import xp
-from notchflex._jax import jax, jnp
-from notchflex._pytree import Pytree
+from notchflex._jax import (
+    Pytree,
+    jax,
+    jnp,
+)
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.rod_kinematics import (
     RodConfiguration,

@@ -20,8 +20,13 @@ from notchflex.mechanics.flexure.notch_rod import (
     build_rod,
     legendre_modes,
 )
-from notchflex.mechanics.flexure.registry import Site, rod, section_fibres, validity_warnings
-from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod import (
+    Rod,
+    Site,
+    rod,
+    section_fibres,
+    validity_warnings,
+)
 from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
 from notchflex.mechanics.flexure.roots import (
     CheckedRange,
@@ -32,7 +37,10 @@ from notchflex.mechanics.flexure.roots import (
 )
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls
-from notchflex.mechanics.section.fibres import FibresAt, two_walls_fibres
+from notchflex.mechanics.section.section import (
+    FibresAt,
+    two_walls_fibres,
+)
 from notchflex.robot import StripNotch, Tube
 
 # Polynomials of the sideways curvature and of the twist.

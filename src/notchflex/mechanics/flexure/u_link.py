@@ -32,9 +32,15 @@ from notchflex.mechanics.flexure.notch_rod import (
     between,
     build_rod,
     shifted,
+    wrench_modes,
 )
-from notchflex.mechanics.flexure.registry import Site, rod, section_fibres, validity_warnings
-from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod import (
+    Rod,
+    Site,
+    rod,
+    section_fibres,
+    validity_warnings,
+)
 from notchflex.mechanics.flexure.rod_kinematics import rod_quadrature
 from notchflex.mechanics.flexure.roots import (
     CheckedRange,
@@ -43,11 +49,13 @@ from notchflex.mechanics.flexure.roots import (
     round_strip,
     wall_ranges,
 )
-from notchflex.mechanics.flexure.wrench_modes import wrench_modes
 from notchflex.mechanics.material import FibreSection
 from notchflex.mechanics.motion import Motion, rotation_about
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls
-from notchflex.mechanics.section.fibres import FibresAt, two_walls_fibres
+from notchflex.mechanics.section.section import (
+    FibresAt,
+    two_walls_fibres,
+)
 from notchflex.robot import Tube, ULink
 
 # The arc length is a smooth integral over t, a third of a turn at most: ten nodes are exact.

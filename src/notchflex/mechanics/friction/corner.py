@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from jaxtyping import Array, Bool, Float
 
-from notchflex._jax import constant, jnp
+from notchflex._jax import (
+    constant,
+    jnp,
+)
 from notchflex.mechanics.friction.registry import FrictionLaw, friction_law
 from notchflex.robot import Corner
 

@@ -12,9 +12,8 @@ from typing import Any, ClassVar
 
 from jaxtyping import Array, Bool, Float
 
-from notchflex._jax import jnp
-from notchflex._pytree import Pytree
-from notchflex.mechanics.registration import unregistered
+from notchflex._jax import Pytree, jnp
+from notchflex._packages import unregistered
 
 # N; keeps the formulas finite where the loss is zero.
 _MIN_LOSS = 1e-100

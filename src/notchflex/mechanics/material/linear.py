@@ -7,8 +7,11 @@ from typing import Any
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant
-from notchflex.mechanics.material.fibre_section import FibreSection
-from notchflex.mechanics.material.law import SectionLaw, section_law
+from notchflex.mechanics.material.law import (
+    FibreSection,
+    SectionLaw,
+    section_law,
+)
 from notchflex.robot import Linear
 
 

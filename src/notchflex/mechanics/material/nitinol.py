@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from notchflex._arrays import xp
 from notchflex._jax import constant
-from notchflex.mechanics.material.fibre_law import FLATTEST, FibreLaw
+from notchflex.mechanics.material.fibre_law import (
+    FLATTEST,
+    FibreLaw,
+)
 from notchflex.mechanics.material.law import section_law
 from notchflex.robot import Nitinol
 

@@ -8,7 +8,10 @@ import numpy as np
 
 from notchflex._arrays import xp
 from notchflex._jax import constant
-from notchflex.mechanics.material.fibre_law import FLATTEST, FibreLaw
+from notchflex.mechanics.material.fibre_law import (
+    FLATTEST,
+    FibreLaw,
+)
 from notchflex.mechanics.material.law import section_law
 from notchflex.robot import StressStrain
 

@@ -12,10 +12,17 @@ from typing import Any
 
 from jaxtyping import Array, Float
 
-from notchflex._jax import constant, jnp
-from notchflex.mechanics.material.fibre_section import FibreSection
-from notchflex.mechanics.material.flattening import NODES, WEIGHTS
-from notchflex.mechanics.material.law import SectionLaw, section_law
+from notchflex._jax import (
+    constant,
+    jnp,
+)
+from notchflex.mechanics.material.law import (
+    NODES,
+    WEIGHTS,
+    FibreSection,
+    SectionLaw,
+    section_law,
+)
 from notchflex.robot import Superelastic
 
 

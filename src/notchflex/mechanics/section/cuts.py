@@ -1,6 +1,532 @@
 """Which section each cut of an asymmetric notch leaves."""
 
-from notchflex.mechanics.section.sector import annular_sector
-from notchflex.mechanics.section.segment import annular_segment
+from fractions import Fraction
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from notchflex._arrays import xp
+from notchflex._jax import jax
+from notchflex.mechanics.section.section import (
+    Section,
+    broadcast_terms,
+    cancelling_sum,
+    half_angle,
+    of_any_shape,
+)
+
+# Annular sector: what an on-axis cut leaves, with radial cut edges.
+#
+# The logarithm of the radius, $\xi = \ln(r/r_i)$ from 0 to $L = \ln(r_o/r_i)$, turns the sector
+# into a rectangle and leaves Laplace's equation as it is, so Saint-Venant's problem has a series
+# solution for every wall thickness and angle; the thin wall with corrected ends,
+# $J = 2amt^3/3 - 0.21\,t^4$ and $e = 2m(\sin a - a\cos a)/(a - \sin a\cos a)$, is its limit.
+# With $\lambda = n\pi/L$ and $\rho = r_o/r_i$, from the stress function (sine series over $\xi$)
+#
+# $$J = \frac{16 r_i^4}{L}\sum_{n\ge1}\frac{[1 - (-1)^n\rho^2]^2}{(4+\lambda^2)^2}
+# \Big(a - \frac{\tanh\lambda a}{\lambda}\Big)$$
+#
+# and from the warping function (cosine series), $e = \int\omega x\,dA / I$ with x sideways
+# (Trefftz),
+#
+# $$eI = \frac{(r_o^2-r_i^2)(r_o^3-r_i^3)}{3L}(\sin a - a\cos a)
+# + \frac{24 r_i^5}{L}\sum_{n\ge1}\frac{[1-(-1)^n\rho^2][1-(-1)^n\rho^3]}
+# {(4+\lambda^2)(9+\lambda^2)}\frac{\sin a - \cos a\tanh(\lambda a)/\lambda}{1+\lambda^2}.$$
+#
+# Series derived for this program after the textbook case of the circular sector (Timoshenko and
+# Goodier, Theory of Elasticity, §109); checked against `sectionproperties` in the tests.
+#
+# A laser that points at the tube axis while the tube turns leaves the wall within an angle
+# a = arccos((g − r_o) / r_o) on either side of the spine (Pacheco 2021; physics of the sector
+# after York 2015). Every depth opens the tube, even one that leaves part of the inner wall.
+
+_SUMMED = 24  # terms added one by one; even, so that odd and even terms pair up
+_TAIL_NODES = 12
+
+
+def _series_nodes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return index, parity and weight of the terms; the tail is integrated, not summed.
+
+    Terms of one parity are smooth in n, and their sum beyond N is half of the integral from N
+    (odd) or N + 1 (even) by the midpoint rule; the substitution n = N / u makes it a Gauss
+    rule. With it slivers (a much less than the wall over the radius) keep their accuracy,
+    where terms decay only as n⁻² up to n = L / a.
+    """
+    n = xp.arange(1, _SUMMED + 1)
+    x, weight = np.polynomial.legendre.leggauss(_TAIL_NODES)
+    u, weight = 0.5 * (1.0 + x), 0.5 * weight
+    index, parity, weights = [n.astype(float)], [(-1.0) ** n], [xp.ones(_SUMMED)]
+    for start, sign in ((_SUMMED, -1.0), (_SUMMED + 1, 1.0)):
+        index.append(start / u)
+        parity.append(xp.full(_TAIL_NODES, sign))
+        weights.append(0.5 * weight * start / u**2)
+    return xp.concatenate(index), xp.concatenate(parity), xp.concatenate(weights)
+
+
+_INDEX, _PARITY, _WEIGHT = _series_nodes()
+
+
+def sector_torsion_constant(outer: jax.Array, inner: jax.Array, angle: jax.Array) -> jax.Array:
+    """Compute the Saint-Venant torsion constant of an annular sector.
+
+    Args:
+        outer: Outer radius, mm.
+        inner: Inner radius, mm, greater than 0; of the same shape.
+        angle: Half-angle a, rad, 0 < a ≤ π; of the same shape.
+
+    Returns:
+        Torsion constant, mm⁴. At a = π that of the slit tube.
+    """
+    n, parity, weight = (broadcast_terms(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
+    outer, inner, angle = outer[None], inner[None], angle[None]
+    length = xp.log(outer / inner)
+    rate = n * xp.pi / length
+    square = (inner**2 - parity * outer**2) ** 2 / (4.0 + rate**2) ** 2
+    terms = square * (angle - xp.tanh(rate * angle) / rate)
+    return xp.sum(16.0 * weight * terms / length, axis=0)
+
+
+def sector_shear_centre(
+    outer: jax.Array, inner: jax.Array, angle: jax.Array, bow: jax.Array, strong: jax.Array
+) -> jax.Array:
+    """Compute the distance from the tube axis to the shear centre of an annular sector.
+
+    Args:
+        outer: Outer radius, mm.
+        inner: Inner radius, mm, greater than 0; of the same shape.
+        angle: Half-angle a, rad, 0 < a ≤ π; of the same shape.
+        bow: sin a − a cos a, without cancellation.
+        strong: Second moment for bending sideways, mm⁴.
+
+    Returns:
+        Distance of the shear centre from the tube axis, toward the spine, mm. It lies outside
+        the material, up to two mean radii from the axis.
+    """
+    n, parity, weight = (broadcast_terms(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
+    outer_, inner_, angle_ = outer[None], inner[None], angle[None]
+    length = xp.log(outer_ / inner_)
+    rate = n * xp.pi / length
+    radial = (inner_**2 - parity * outer_**2) * (inner_**3 - parity * outer_**3)
+    radial = radial / ((4.0 + rate**2) * (9.0 + rate**2))
+    around = xp.sin(angle_) - xp.cos(angle_) * xp.tanh(rate * angle_) / rate
+    terms = 24.0 * weight / length * radial * around / (1.0 + rate**2)
+    even = (outer**2 - inner**2) * (outer**3 - inner**3) / (3.0 * xp.log(outer / inner)) * bow
+    return (even + xp.sum(terms, axis=0)) / strong
+
+
+# a − sin a cos a
+_angle_minus = cancelling_sum([(1, 1, "cos", 0), (Fraction(-1, 2), 0, "sin", 2)])
+# a² (⟨cos²⟩ − ⟨cos⟩²) over −a … a, that is a²/2 + a sin a cos a / 2 − sin² a
+_spread = cancelling_sum(
+    [
+        (Fraction(1, 2), 2, "cos", 0),
+        (Fraction(1, 4), 1, "sin", 2),
+        (Fraction(-1, 2), 0, "cos", 0),
+        (Fraction(1, 2), 0, "cos", 2),
+    ]
+)
+# sin a − a cos a
+_bow = cancelling_sum([(1, 0, "sin", 1), (-1, 1, "cos", 1)])
+# a − sin a
+_sag = cancelling_sum([(1, 1, "cos", 0), (-1, 0, "sin", 1)])
+
+
+def annular_sector(
+    outer_radius: jax.typing.ArrayLike,
+    inner_radius: jax.typing.ArrayLike,
+    depth: jax.typing.ArrayLike,
+) -> Section:
+    r"""Compute the section that an on-axis cut leaves of a tube.
+
+    With the half-angle $a = \arccos((g - r_o)/r_o)$, the mean radius $m$, the wall $t$,
+    $\langle r\rangle = m + t^2/12m$ and
+    $\langle r^2\rangle - \langle r\rangle^2 = t^2/12\,(1 - t^2/12m^2)$:
+
+    $$A = 2amt,\quad \bar y = \langle r\rangle\frac{\sin a}{a},\quad
+    I = A\,[(\langle r^2\rangle - \langle r\rangle^2)\langle\cos^2\rangle
+    + \langle r\rangle^2(\langle\cos^2\rangle - \langle\cos\rangle^2)]$$
+
+    which is $\frac14(r_o^4 - r_i^4)(a + \sin a\cos a) - A\bar y^2$ written without the
+    cancellation. Sideways $I = \frac14(r_o^4 - r_i^4)(a - \sin a\cos a)$. Torsion constant and
+    shear centre are exact series, see `sector_torsion`.
+
+    Every depth opens the tube: for g → 0 area and second moments tend to those of the full
+    tube, the torsion constant to that of the slit tube.
+
+    Args:
+        outer_radius: Outer radius r_o of the tube, mm; any shape.
+        inner_radius: Inner radius r_i, 0 < r_i < r_o, mm; broadcast with the others.
+        depth: Depth g of the cut, measured from the outer surface opposite the spine,
+            0 < g < 2 r_o, mm. Values outside give no error (they may be traced) but no
+            sensible numbers either; a robot file refuses them.
+
+    Returns:
+        The section, every field of the common shape. Derivatives are finite for every depth
+        inside the range; `edge_near` has a kink where the cut reaches the tube axis.
+
+    Reference:
+        P. York et al., "A wrist for needle-sized surgical robots", ICRA 2015;
+        N. Pacheco et al., J. Med. Robot. Res. 6, 2140004 (2021).
+
+    Example:
+        >>> section = annular_sector(0.81, 0.70, 1.40)
+        >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
+        0.125376 mm², 0.686533 mm
+    """
+    return _sector(outer_radius, inner_radius, depth)
+
+
+def _sector_properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
+    """Compute all properties of arrays of one shape."""
+    left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
+    a = half_angle(outer, left, depth)
+    # Sine and cosine from the lengths: exact to rounding also near a = π.
+    sine = xp.sqrt(left * depth) / outer
+    cosine = (depth - outer) / outer
+
+    mean = 0.5 * (outer + inner)
+    wall = outer - inner
+    area = 2.0 * a * mean * wall
+    radius_mean = mean + wall**2 / (12.0 * mean)  # ⟨r⟩ over the wall, weighted by area
+    radius_spread = wall**2 / 12.0 * (1.0 - wall**2 / (12.0 * mean**2))  # ⟨r²⟩ − ⟨r⟩²
+    polar = 4.0 * mean * wall * (mean**2 + 0.25 * wall**2)  # r_o⁴ − r_i⁴
+
+    centroid = radius_mean * sine / a
+    cosine_square = 0.5 * (1.0 + sine * cosine / a)
+    weak = area * (radius_spread * cosine_square + radius_mean**2 * _spread(a) / a**2)
+    strong = 0.25 * polar * _angle_minus(a)
+
+    # The farthest fibre on the cut side: the inner edge of the cut, or the outer one past the
+    # axis. Both sums below are without cancellation: ȳ − r_i cos a, and r_o − ȳ.
+    inner_edge = (wall / 2.0 + wall**2 / (12.0 * mean)) * sine / a + inner * _bow(a) / a
+    outer_edge = centroid - outer * cosine
+    edge_near = xp.where(cosine > 0.0, inner_edge, outer_edge)
+    edge_spine = wall / 2.0 - wall**2 / (12.0 * mean) + radius_mean * _sag(a) / a
+    return Section(
+        area=area,
+        centroid=centroid,
+        second_moment_weak=weak,
+        second_moment_strong=strong,
+        torsion_constant=sector_torsion_constant(outer, inner, a),
+        shear_centre=sector_shear_centre(outer, inner, a, _bow(a), strong),
+        edge_near=edge_near,
+        edge_spine=edge_spine,
+        edge_across=xp.where(cosine > 0.0, inner, outer) * sine,
+        outer_radius=outer,
+        half_angle=a,
+    )
+
+
+_sector = of_any_shape(_sector_properties)
+
+
+# Annular segment: what an off-axis cut leaves, with one flat cut plane.
+#
+# They have the right form (Bredt's closed tube, the thin open arc, the flat solid), so that the
+# factors which correct them, see `segment_torsion`, are smooth and of the order of one.
+#
+# There is no closed form, so a simple estimate for each of the three shapes is multiplied by a
+# factor that `benchmarks/segment_table.py` computed once with `sectionproperties` (warping
+# analysis) and fitted with Chebyshev polynomials in two coordinates that make it smooth:
+# √(1 − r_i/r_o), and the angle of the chord that the cut plane makes.
+#
+# The table covers 0.2 ≤ r_i/r_o ≤ 0.98 for every depth of the open arc, the solid segment down to
+# a height of 0.005 r_o, and the closed tube as long as 1 % of the wall is left under the flat;
+# beyond, the factors keep their value at its edge (right for slivers, not checked for the rest).
+# Measured against other meshes of `sectionproperties`: torsion constant within 0.2 %; shear centre
+# within 0.1 % open or solid and 1 % closed, where a barely cut tube has it nearly on the axis.
+#
+# A saw or wire across the tube leaves everything beyond the plane at y = d = g − r_o from the
+# tube axis (York 2015, Swaney 2017). Three shapes follow, as d passes the inner wall at −r_i and
+# at r_i: a closed tube with a flat, an open arc with bevelled ends, a solid segment of the wall.
+
+
+def closed_estimate(
+    outer: jax.Array, inner: jax.Array, depth: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    r"""Estimate the closed tube with a flat after Bredt.
+
+    $J \approx 4A_m^2/C + \int t^3 ds/3$ with $C = \oint ds/t$. Under the flat, within an angle
+    b of the middle of the cut, the wall is $|d|/\cos\varphi - r_i$ thick, which integrates in
+    closed form. The part f of C that the flat adds moves the shear centre from the tube axis
+    to $2mf$; with f = 1 this is that of a slit tube.
+
+    Args:
+        outer: Outer radius, mm.
+        inner: Inner radius, mm.
+        depth: Depth of the cut, mm, greater than 0 and less than the wall.
+
+    Returns:
+        Torsion constant, mm⁴, and shear centre, mm.
+    """
+    mean, wall = 0.5 * (outer + inner), outer - inner
+    height = outer - depth  # |d|, from the tube axis to the flat
+    tangent = xp.sqrt(depth / (2.0 * outer - depth))  # tan(b / 2)
+    flat = 2.0 * xp.arctan(tangent)
+    above, below = height + inner, height - inner
+    thin = 4.0 * height / xp.sqrt(above * below) * xp.arctan(xp.sqrt(above / below) * tangent)
+    round_part = 2.0 * (xp.pi - flat)
+    flexibility = thin - flat + round_part * mean / wall
+    inside_outer = outer**2 * (xp.pi - flat) + height * xp.sqrt(depth * (2.0 * outer - depth))
+    enclosed = 0.5 * (inside_outer + xp.pi * inner**2)
+    torsion = 4.0 * enclosed**2 / flexibility + round_part * mean * wall**3 / 3.0
+    added = 1.0 - 2.0 * xp.pi * mean / wall / flexibility
+    return torsion, 2.0 * mean * added
+
+
+def open_estimate(
+    outer: jax.Array, inner: jax.Array, depth: jax.Array, area: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Estimate the open arc: J = A t²/3 and the shear centre of the thin arc.
+
+    Args:
+        outer: Outer radius, mm.
+        inner: Inner radius, mm.
+        depth: Depth of the cut, mm, such that the plane passes through the bore.
+        area: Area of the section, mm².
+
+    Returns:
+        Torsion constant, mm⁴, and shear centre, mm.
+    """
+    mean, wall = 0.5 * (outer + inner), outer - inner
+    a = half_angle(mean, mean + outer - depth, mean - outer + depth)
+    sine, cosine = xp.sin(a), xp.cos(a)
+    shear = 2.0 * mean * (sine - a * cosine) / (a - sine * cosine)
+    return area * wall**2 / 3.0, shear
+
+
+# Where the factors were computed; benchmarks/segment_table.py reads these.
+RATIO_RANGE = (0.2, 0.98)  # r_i / r_o
+LIGAMENT_LEFT = 0.01  # least thickness left under the flat of a closed tube, over the wall
+CHORD_RANGE = {  # of the angle in rad, see `chord_angle`
+    "closed": (2.0 * xp.arcsin(xp.sqrt(LIGAMENT_LEFT)), np.pi),
+    "open": (0.0, np.pi),
+    "solid": (0.1, np.pi / 2.0),
+}
+
+
+@cache
+def _read_table() -> dict[tuple[str, str], np.ndarray]:
+    """Read the coefficients, by shape and quantity, shape (ratio orders, angle orders)."""
+    text = (files("notchflex.mechanics.section") / "segment_table.csv").read_text(encoding="utf-8")
+    table: dict[tuple[str, str], list[list[float]]] = {}
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            shape, quantity, *coefficients = line.split(",")
+            table.setdefault((shape, quantity), []).append([float(c) for c in coefficients])
+    return {key: xp.array(rows) for key, rows in table.items()}
+
+
+def _chebyshev(count: int, value: jax.Array, low: float, high: float) -> jax.Array:
+    """Evaluate the first Chebyshev polynomials (count, …), constant outside low … high."""
+    # The ends are moved in by 1e-12, because the arccosine has no derivative there.
+    x = (2.0 * value - low - high) / (high - low)
+    x = xp.clip(x, -1.0 + 1e-12, 1.0 - 1e-12)
+    return xp.cos(broadcast_terms(xp.arange(count, dtype=float), x) * xp.arccos(x)[None])
+
+
+def chord_angle(shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array) -> jax.Array:
+    """Return the table's coordinate along the depth, an angle in rad.
+
+    Args:
+        shape: "closed", "open" or "solid".
+        outer: Outer radius, mm.
+        inner: Inner radius, mm.
+        depth: Depth of the cut, mm.
+
+    Returns:
+        For the solid segment the half-angle of the outer circle beyond the cut plane, for the
+        open arc that of the inner circle, for the closed tube 2 arccos √(g / wall): all of them
+        make the square roots at the ends of their range smooth.
+    """
+    if shape == "closed":
+        return half_angle(outer, outer - inner - depth, depth)
+    if shape == "open":
+        return half_angle(inner, inner + outer - depth, inner - outer + depth)
+    return half_angle(outer, 2.0 * outer - depth, depth)
+
+
+def _factors(
+    shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Interpolate the factors on the torsion constant and on the shear centre."""
+    low, high = (float(xp.sqrt(1.0 - ratio)) for ratio in reversed(RATIO_RANGE))
+    table = _read_table()
+    both = xp.stack([table[shape, "torsion"], table[shape, "shear"]])
+    _, rows, columns = both.shape
+    across = _chebyshev(rows, xp.sqrt(1.0 - inner / outer), low, high)
+    along = _chebyshev(
+        columns, chord_angle(shape, outer, inner, depth), *map(float, CHORD_RANGE[shape])
+    )
+    torsion, shear = xp.einsum("kpq,p...,q...->k...", both, across, along)
+    return torsion, shear
+
+
+def segment_torsion(
+    outer: jax.Array, inner: jax.Array, depth: jax.Array, area: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Compute torsion constant and shear centre of an annular segment.
+
+    Args:
+        outer: Outer radius, mm.
+        inner: Inner radius, mm, greater than 0; of the same shape.
+        depth: Depth of the cut, mm; of the same shape.
+        area: Area of the section, mm²; of the same shape.
+
+    Returns:
+        Torsion constant, mm⁴, and distance of the (Trefftz) shear centre from the tube axis,
+        toward the spine, mm.
+    """
+    wall, plane = outer - inner, depth - outer
+    closed = (plane < -inner) & (depth < wall)  # both: they may differ by rounding
+    solid = plane >= inner
+    # All three are computed; outside its own range each one gets a depth in the middle of it,
+    # so that no derivative becomes NaN.
+    shallow = xp.where(closed, depth, 0.5 * wall)
+    through = xp.where(closed | solid, outer, depth)
+    deep = xp.where(solid, depth, outer + inner)
+
+    estimates = {
+        "closed": closed_estimate(outer, inner, shallow),
+        "open": open_estimate(outer, inner, through, area),
+        # J = A h²/3 and the top of the circle: the cut passes beyond the bore
+        "solid": (area * (2.0 * outer - deep) ** 2 / 3.0, outer),
+    }
+    torsion, shear = {}, {}
+    for (shape, (first, second)), at in zip(
+        estimates.items(), (shallow, through, deep), strict=True
+    ):
+        on_torsion, on_shear = _factors(shape, outer, inner, at)
+        torsion[shape], shear[shape] = first * on_torsion, second * on_shear
+
+    def choose(of: dict[str, jax.Array]) -> jax.Array:
+        return xp.where(closed, of["closed"], xp.where(solid, of["solid"], of["open"]))
+
+    return choose(torsion), choose(shear)
+
+
+# Moments of a segment of the unit circle beyond the chord at height cos α, w measured from the
+# chord: ∫dA, ∫w dA, ∫w² dA, ∫x² dA. (The forms about the circle's centre lose all digits for
+# small α: the last three are of order α⁵, α⁷, α⁵.)
+_area = cancelling_sum([(1, 1, "cos", 0), (Fraction(-1, 2), 0, "sin", 2)])
+_first = cancelling_sum(
+    [(Fraction(3, 4), 0, "sin", 1), (Fraction(1, 12), 0, "sin", 3), (-1, 1, "cos", 1)]
+)
+_second = cancelling_sum(
+    [
+        (Fraction(3, 4), 1, "cos", 0),
+        (Fraction(1, 2), 1, "cos", 2),
+        (Fraction(-7, 12), 0, "sin", 2),
+        (Fraction(-1, 48), 0, "sin", 4),
+    ]
+)
+_sideways = cancelling_sum(
+    [(Fraction(1, 4), 1, "cos", 0), (Fraction(-1, 6), 0, "sin", 2), (Fraction(1, 48), 0, "sin", 4)]
+)
+
+
+def annular_segment(
+    outer_radius: jax.typing.ArrayLike,
+    inner_radius: jax.typing.ArrayLike,
+    depth: jax.typing.ArrayLike,
+) -> Section:
+    r"""Compute the section that an off-axis cut leaves of a tube.
+
+    The section is a segment of the outer circle less a segment of the inner one. With the
+    half-angles $\alpha_r = \arccos(d/r)$, clipped to 0 … π, the moments of each about the cut
+    plane are
+
+    $$A_r = r^2(\alpha - \tfrac12\sin2\alpha),\quad
+    Q_r = r^3(\tfrac34\sin\alpha + \tfrac1{12}\sin3\alpha - \alpha\cos\alpha),\quad
+    J_r = r^4(\tfrac34\alpha + \tfrac12\alpha\cos2\alpha - \tfrac7{12}\sin2\alpha
+    - \tfrac1{48}\sin4\alpha)$$
+
+    and $I = J - Q^2/A$ of their differences; these are York's formulas moved to the cut plane,
+    where they keep their digits. Sideways
+    $\frac{r^4}{12}(3\alpha - 3\sin\alpha\cos\alpha - 2\sin^3\alpha\cos\alpha)$.
+
+    The torsion constant drops by two or three orders of magnitude where the cut plane reaches the
+    inner wall, g = r_o − r_i, and opens the tube. On the closed side it falls as the square
+    root of the thickness that is left under the flat, half of it being lost at about
+    (r_o − r_i)²/(r_o + r_i); the slope there is unbounded. Take it for a jump: either side has
+    its own law, see `segment_torsion`, and at the very place that of the open one holds.
+
+    Args:
+        outer_radius: Outer radius r_o of the tube, mm; any shape.
+        inner_radius: Inner radius r_i, 0 < r_i < r_o, mm; broadcast with the others.
+        depth: Depth g of the cut, measured from the outer surface opposite the spine,
+            0 < g < 2 r_o, mm. Values outside give no error (they may be traced) but no
+            sensible numbers either; a robot file refuses them.
+
+    Returns:
+        The section, every field of the common shape. Derivatives are finite for every depth
+        inside the range.
+
+    Reference:
+        P. York et al., "A wrist for needle-sized surgical robots", ICRA 2015;
+        P. Swaney et al., J. Med. Devices 11, 014501 (2017).
+
+    Example:
+        >>> section = annular_segment(0.81, 0.70, 1.40)
+        >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
+        0.111621 mm², 0.701661 mm
+    """
+    return _segment(outer_radius, inner_radius, depth)
+
+
+def _segment_properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
+    """Compute all properties of arrays of one shape."""
+    left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
+    plane = depth - outer  # d
+    alpha = half_angle(outer, left, depth)
+    beta = half_angle(inner, inner - plane, inner + plane)
+
+    # A bore that the plane does not reach lies this far above it.
+    lift = xp.maximum(-(inner + plane), 0.0)
+    bore_area = inner**2 * _area(beta)
+    bore_first = inner**3 * _first(beta)
+    bore_second = inner**4 * _second(beta) + lift * (2.0 * bore_first + lift * bore_area)
+
+    area = outer**2 * _area(alpha) - bore_area
+    first = outer**3 * _first(alpha) - (bore_first + lift * bore_area)
+    second = outer**4 * _second(alpha) - bore_second
+    from_plane = first / area
+    weak = second - first * from_plane
+    strong = outer**4 * _sideways(alpha) - inner**4 * _sideways(beta)
+
+    # Half chords x_o, x_i give the first moment about the tube axis, ⅔(x_o³ − x_i³), without
+    # cancellation for shallow cuts; where both are there, x_o² − x_i² = r_o² − r_i².
+    outer_square = left * depth
+    chord_outer = xp.sqrt(outer_square)
+    is_cut = xp.abs(plane) < inner
+    inner_square = (inner - plane) * (inner + plane)
+    chord_inner = xp.where(is_cut, xp.sqrt(xp.where(is_cut, inner_square, 1.0)), 0.0)
+    gap_square = xp.where(is_cut, (outer - inner) * (outer + inner), outer_square)
+    cubes = (
+        gap_square
+        * (outer_square + chord_outer * chord_inner + chord_inner**2)
+        / (chord_outer + chord_inner)
+    )
+    centroid = 2.0 / 3.0 * cubes / area
+
+    torsion_constant, shear_centre = segment_torsion(outer, inner, depth, area)
+    return Section(
+        area=area,
+        centroid=centroid,
+        second_moment_weak=weak,
+        second_moment_strong=strong,
+        torsion_constant=torsion_constant,
+        shear_centre=shear_centre,
+        edge_near=from_plane,
+        edge_spine=left - from_plane,
+        edge_across=chord_outer,
+        outer_radius=outer,
+        half_angle=alpha,
+    )
+
+
+_segment = of_any_shape(_segment_properties)
+
 
 SECTION_OF_CUT = {"on-axis": annular_sector, "off-axis": annular_segment}

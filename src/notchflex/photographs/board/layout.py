@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from notchflex._extras import need
 from notchflex.errors import InputError
 from notchflex.photographs.chain.chain_table import Numbers
-from notchflex.results.files.writing import write_text
+from notchflex.results.writing import write_text
 
 DICTIONARIES = (
     *(f"{bits}x{bits}_{count}" for bits in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),

@@ -32,8 +32,7 @@ from notchflex.photographs.measure import NO_TUBE, judged_photograph, refused_ph
 from notchflex.photographs.measured import MeasuredPhotograph
 from notchflex.photographs.missing import MAX_RESIDUAL
 from notchflex.photographs.reading import read_photograph
-from notchflex.results.files.csv import write_columns
-from notchflex.results.files.writing import write_text
+from notchflex.results.writing import write_columns, write_text
 from notchflex.robot import ArcNotch, Robot, robot_text
 
 LENGTHS = ("height", "depth", "uncut_length")

@@ -18,8 +18,8 @@ from notchflex.plotting.drawings.notch_views import NotchView, notch_view
 from notchflex.plotting.style import BLUE, VERMILLION, house_style
 from notchflex.robot import Robot
 from notchflex.robot.kinds import Notch
-from notchflex.robot.tolerance import with_limits
-from notchflex.robot.value_names.reading import number_at
+from notchflex.robot.problems import with_limits
+from notchflex.robot.value_names import number_at
 
 Centre = tuple[float, float]
 

@@ -29,7 +29,10 @@ from notchflex.plotting.sheet import (
     grid,
 )
 from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, sequence_colours
-from notchflex.results.quantities.registry import DEGREES, QUANTITIES
+from notchflex.results.quantities import (
+    DEGREES,
+    QUANTITIES,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -28,7 +28,7 @@ from notchflex.plotting.sheet import (
     Span,
 )
 from notchflex.plotting.style import diverging_colours, for_browser, heading_lines, rgb
-from notchflex.results.files.writing import write_text
+from notchflex.results.writing import write_text
 
 Layout = dict[str, Any]
 """A trace, a layout or a part of it, as plotly takes it."""

@@ -193,7 +193,7 @@ def _radial(radius: float, direction_deg: float) -> Points:
 def _walls(robot: Robot, body_length: tuple[float, ...], side_deg: float) -> Walls:
     # Imported late: the pictures alone need no solver.
     from notchflex._jax import constant
-    from notchflex.mechanics.tendon.openings import passage
+    from notchflex.mechanics.tendon import passage
 
     line = passage(robot.notches, constant(body_length), side_deg)
     walls: Walls = [(-HELD * robot.tube.outer_radius, float(line.base_leaves))]

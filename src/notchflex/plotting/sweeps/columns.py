@@ -12,7 +12,7 @@ from notchflex.plotting.axes_of_quantities import entry_label
 from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BESIDE, Area, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, ORANGE, VERMILLION
-from notchflex.robot.error_messages import nearest
+from notchflex.robot.part import nearest
 from notchflex.robot.value_names import described_at
 
 if TYPE_CHECKING:

@@ -7,7 +7,13 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from notchflex.robot.kinds import Material
-from notchflex.robot.part import MOST_STRAIN, Float, ProblemError, part, quantity
+from notchflex.robot.part import (
+    MOST_STRAIN,
+    Float,
+    ProblemError,
+    part,
+    quantity,
+)
 
 
 @part

@@ -8,7 +8,13 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from notchflex.robot.kinds import Material
-from notchflex.robot.part import MOST_STRAIN, Float, ProblemError, part, quantity
+from notchflex.robot.part import (
+    MOST_STRAIN,
+    Float,
+    ProblemError,
+    part,
+    quantity,
+)
 
 _MIN_POINTS, _MAX_POINTS = 2, 10_000
 

@@ -5,8 +5,17 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import model_validator
 
-from notchflex.robot.kinds import PACHECO, Material
-from notchflex.robot.part import MOST_STRAIN, Float, ProblemError, part, quantity
+from notchflex.robot.kinds import (
+    PACHECO,
+    Material,
+)
+from notchflex.robot.part import (
+    MOST_STRAIN,
+    Float,
+    ProblemError,
+    part,
+    quantity,
+)
 
 
 @part

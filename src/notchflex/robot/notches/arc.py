@@ -7,10 +7,21 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from notchflex.robot.kinds import PACHECO, YORK, Notch
-from notchflex.robot.notches.cut import CutLayout, slot
-from notchflex.robot.part import Float, part, quantity
-from notchflex.robot.tube import Tube
+from notchflex.robot.cuts import (
+    CutLayout,
+    slot,
+)
+from notchflex.robot.kinds import (
+    PACHECO,
+    YORK,
+    Notch,
+    Tube,
+)
+from notchflex.robot.part import (
+    Float,
+    part,
+    quantity,
+)
 
 
 @part

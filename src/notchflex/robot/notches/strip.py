@@ -7,12 +7,22 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from notchflex.robot.kinds import LIU, Notch
-from notchflex.robot.notches.cut import CutLayout, NotchCut
-from notchflex.robot.notches.opening import Opening
-from notchflex.robot.part import Float, part, quantity
-from notchflex.robot.tendon import Tendon
-from notchflex.robot.tube import Tube
+from notchflex.robot.cuts import (
+    CutLayout,
+    NotchCut,
+    Opening,
+)
+from notchflex.robot.kinds import (
+    LIU,
+    Notch,
+    Tendon,
+    Tube,
+)
+from notchflex.robot.part import (
+    Float,
+    part,
+    quantity,
+)
 
 LEAST_COSINE = 0.5  # a cable farther round the tube than 60 deg would twist the strip
 

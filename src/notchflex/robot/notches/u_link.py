@@ -7,12 +7,23 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from notchflex.robot.kinds import GAO, Notch
-from notchflex.robot.notches.cut import CutLayout, slot
-from notchflex.robot.notches.opening import Opening
-from notchflex.robot.part import Float, part, quantity, unchecked
-from notchflex.robot.tendon import Tendon
-from notchflex.robot.tube import Tube
+from notchflex.robot.cuts import (
+    CutLayout,
+    Opening,
+    slot,
+)
+from notchflex.robot.kinds import (
+    GAO,
+    Notch,
+    Tendon,
+    Tube,
+)
+from notchflex.robot.part import (
+    Float,
+    part,
+    quantity,
+    unchecked,
+)
 
 OTHER = {"away": "toward", "toward": "away"}
 

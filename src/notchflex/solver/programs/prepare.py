@@ -13,18 +13,21 @@ from jaxtyping import Float, Int
 
 from lanewise import FixedVector
 from notchflex._jax import jax
-from notchflex.loads.command import Command
-from notchflex.loads.plausibility import usual_loads
+from notchflex.loads.command import Command, usual_loads
 from notchflex.mechanics.chain import Chain, assemble, padded
 from notchflex.robot import Robot
-from notchflex.solver.derived.quantities import Shape
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,
     StaticStructure,
     capacity,
     pad_rows,
 )
-from notchflex.solver.solver_state import SolverState, at_rest, unloaded
+from notchflex.solver.quantities import Shape
+from notchflex.solver.residual import (
+    SolverState,
+    at_rest,
+    unloaded,
+)
 
 
 @dataclass(frozen=True, eq=False)

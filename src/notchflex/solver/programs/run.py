@@ -2,7 +2,7 @@
 
 A program is compiled once for a form (kinds of flexures, modes, tendons and laws); a new load or a
 new robot of the same form runs the same program. The number of loads is an argument, and chains are
-padded to one of few numbers of flexures (`capacity.py`). Another program computes derived
+padded to one of few numbers of flexures (`static_structure.py`). Another program computes derived
 quantities of the states on demand.
 """
 
@@ -15,16 +15,19 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from lanewise import FixedVector
-from notchflex._jax import jax, jnp
+from notchflex._jax import (
+    jax,
+    jnp,
+)
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
-from notchflex.solver.derived.limit_points import snapped_notches
-from notchflex.solver.derived.quantities import Shape, quantities, shape, unpad_quantity
-from notchflex.solver.derived.solved_state import notch_contact
 from notchflex.solver.held_stiffness import stability, stable
 from notchflex.solver.newton import Settings
-from notchflex.solver.programs.compiled import native, runs_uncompiled
+from notchflex.solver.programs.compiled import (
+    native,
+    runs_uncompiled,
+)
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,
@@ -33,8 +36,15 @@ from notchflex.solver.programs.static_structure import (
     pad_rows,
     padded_indices,
 )
-from notchflex.solver.residual import evaluate
-from notchflex.solver.solver_state import SolverState
+from notchflex.solver.quantities import (
+    Shape,
+    quantities,
+    shape,
+    snapped_notches,
+    unpad_quantity,
+)
+from notchflex.solver.residual import SolverState, evaluate
+from notchflex.solver.solved_state import notch_contact
 
 # Columns behind the two states and the shape, see `_status`.
 _STATUS = 7

@@ -9,7 +9,10 @@ import numpy as np
 
 from notchflex.plotting.curves import COLOUR
 from notchflex.plotting.style import BLUE, VERMILLION
-from notchflex.results.quantities.registry import CONTACT_STATES, QUANTITIES
+from notchflex.results.quantities import (
+    CONTACT_STATES,
+    QUANTITIES,
+)
 from notchflex.robot import Robot
 from notchflex.viewer.page.chart import axis
 from notchflex.viewer.scene.marks import (

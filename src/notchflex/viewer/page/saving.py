@@ -16,7 +16,7 @@ from notchflex.plotting.renderers.with_matplotlib import draw_panel
 from notchflex.plotting.shapes.panel import applied_loads
 from notchflex.plotting.shapes.robot_shape import shape_at
 from notchflex.plotting.style import house_style
-from notchflex.results.files.csv import write_path_csv
+from notchflex.results.writing import write_path_csv
 from notchflex.robot import robot_text
 from notchflex.viewer.page.chart import loop
 from notchflex.viewer.page.readout import BALL, entries, rows, strain_scale

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import flag
 from notchflex.errors import InputError
-from notchflex.results.files.writing import write_document
+from notchflex.results.writing import write_document
 
 Shell = Literal["bash", "zsh", "fish", "powershell"]
 

@@ -16,7 +16,10 @@ from notchflex.cli.arguments.robots import warn_unlikely
 from notchflex.cli.interview.ask import Interview
 from notchflex.cli.interview.questions import commented, interviewed
 from notchflex.errors import InputError, InputWarning
-from notchflex.results.files.writing import check_output, write_text
+from notchflex.results.writing import (
+    check_output,
+    write_text,
+)
 from notchflex.robot.reading import read_text
 from notchflex.robot.writing import robot_text
 

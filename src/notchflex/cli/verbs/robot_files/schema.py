@@ -7,7 +7,7 @@ from typing import Annotated
 
 from notchflex.cli.arguments.conversion import flag
 from notchflex.errors import InputError
-from notchflex.results.files.writing import write_document
+from notchflex.results.writing import write_document
 from notchflex.robot import json_schema
 
 

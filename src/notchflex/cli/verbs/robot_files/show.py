@@ -14,7 +14,7 @@ from notchflex.cli.arguments.robots import (
 )
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
 from notchflex.errors import InputError
-from notchflex.results.files.writing import PAPER
+from notchflex.results.writing import PAPER
 
 DrawingFile = Annotated[
     str | None,
@@ -46,10 +46,13 @@ def show(
 
         terminal.use_compile_cache()
         from notchflex.analysis import closing, tip_from_angles
-        from notchflex.analysis.notch_table import notch_table
-        from notchflex.analysis.uncertainty.closing_bands import closing_bands, closing_document
+        from notchflex.analysis.bands import (
+            closing_bands,
+            closing_document,
+        )
+        from notchflex.analysis.closing_loads import notch_table
         from notchflex.mechanics.chain import unchecked_dimensions
-        from notchflex.results.files.json import document_head
+        from notchflex.results.writing import document_head
 
         table = closing(chosen)
         notches = notch_table(chosen, table)

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from notchflex.errors import InputError
 from notchflex.robot import Robot
+from notchflex.robot.cuts import NotchCut, outline
 from notchflex.robot.kinds import Notch
-from notchflex.robot.notches.cut import NotchCut
-from notchflex.robot.notches.profile import outline
-from notchflex.robot.tolerance import with_limits
+from notchflex.robot.problems import with_limits
 
 Points = NDArray[np.float64]
 

@@ -1,11 +1,14 @@
 """The rod of a flat strip."""
 
 from notchflex.mechanics.flexure import notch_rod as nr
-from notchflex.mechanics.flexure.registry import rod, section_fibres
-from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod import (
+    Rod,
+    rod,
+    section_fibres,
+)
 from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
 from notchflex.mechanics.section import two_walls
-from notchflex.mechanics.section.fibres import two_walls_fibres
+from notchflex.mechanics.section.section import two_walls_fibres
 from notchflex.robot import Tube
 from notchflex.robot.notches.flat import FlatNotch
 

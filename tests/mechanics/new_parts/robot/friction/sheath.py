@@ -4,7 +4,11 @@ from dataclasses import KW_ONLY
 from typing import Annotated, Literal
 
 from notchflex.robot.kinds import Friction
-from notchflex.robot.part import Float, part, quantity
+from notchflex.robot.part import (
+    Float,
+    part,
+    quantity,
+)
 
 
 @part

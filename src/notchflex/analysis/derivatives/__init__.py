@@ -1,1 +1,0 @@
-"""Derivatives of results by loads and by numbers of the robot file."""

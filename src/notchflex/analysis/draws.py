@@ -1,0 +1,319 @@
+"""Robots drawn within tolerances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.errors import InputError
+from notchflex.robot import Nitinol, Robot
+from notchflex.robot.part import fields_of
+from notchflex.robot.problems import (
+    Tolerance,
+    amount,
+)
+from notchflex.robot.value_names import (
+    number_at,
+    numbers_at,
+)
+
+_TRIES = 100
+"""How often a draw that makes no valid robot is drawn again."""
+
+
+class Draws(NamedTuple):
+    """Robots within tolerances.
+
+    Attributes:
+        robots: The robots, without tolerances of their own.
+        values: The numbers that were drawn, by name, one per robot.
+        redrawn: How many draws made no valid robot and were drawn again.
+    """
+
+    robots: list[Robot]
+    values: Mapping[str, Float[np.ndarray, " draws"]]
+    redrawn: int
+
+
+class ToleranceSource(NamedTuple):
+    """One number drawn, and the values that follow it.
+
+    Attributes:
+        tolerance: How it deviates.
+        nominal: The values of the drawing by name.
+    """
+
+    tolerance: Tolerance
+    nominal: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        """Name of what deviates: that of the tolerance, or of a single notch."""
+        return next(iter(self.nominal)) if self.tolerance.per_notch else self.tolerance.value
+
+    def values(self, level: Any) -> dict[str, Any]:
+        """Return the values at levels of the distribution, each between 0 and 1."""
+        return {
+            name: one + deviation(self.tolerance, one, level) for name, one in self.nominal.items()
+        }
+
+
+def deviation(tolerance: Tolerance, value: float, level: Any) -> Any:
+    """Return the deviation from a value that a part `level` of all deviations stays below.
+
+    Args:
+        tolerance: How the value deviates.
+        value: The value of the drawing.
+        level: Between 0 and 1; an array gives an array.
+
+    Example:
+        >>> deviation(Tolerance("material.elastic_modulus", plus="20 %", minus="10 %"), 4e4, 0.5)
+        2000.0
+    """
+    sd = amount(tolerance.sd, value)
+    plus, minus = amount(tolerance.plus, value), amount(tolerance.minus, value)
+    if tolerance.sd is None:
+        return level * (plus + minus) - minus
+    if sd == 0.0:
+        return 0.0 * level
+    from scipy.special import ndtr, ndtri  # takes a fifth of a second, and most commands do without
+
+    lower, upper = ndtr(-minus / sd), ndtr(plus / sd)
+    return sd * ndtri(lower + level * (upper - lower))
+
+
+def moments(tolerance: Tolerance, value: float) -> tuple[float, float]:
+    """Return mean and standard deviation of the deviation from a value.
+
+    Example:
+        >>> moments(Tolerance("notch.depth", plus=0.03, minus=0.03), 1.4)
+        (0.0, 0.017320508075688773)
+    """
+    sd = amount(tolerance.sd, value)
+    plus, minus = amount(tolerance.plus, value), amount(tolerance.minus, value)
+    if tolerance.sd is None:
+        return 0.5 * (plus - minus), (plus + minus) / math.sqrt(12.0)
+    if sd == 0.0 or (math.isinf(plus) and math.isinf(minus)):
+        return 0.0, sd
+    from scipy.special import ndtr
+
+    # A normal distribution that is cut off at a and b, in standard deviations.
+    a, b = -minus / sd, plus / sd
+    part = ndtr(b) - ndtr(a)
+    low, high = (math.exp(-0.5 * end**2) / math.sqrt(2.0 * math.pi) for end in (a, b))
+    mean = (low - high) / part
+    ends = sum(end * one for end, one in ((a, low), (-b, high)) if one)
+    return float(sd * mean), float(sd * math.sqrt(1.0 + ends / part - mean**2))
+
+
+def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed: int) -> Draws:
+    """Draw robots within tolerances, as a Latin hypercube.
+
+    Args:
+        robot: The robot with the values of the drawing.
+        tolerances: What deviates; one of a single notch replaces that of all notches there.
+        draws: How many robots.
+        seed: The same seed makes the same robots.
+
+    Raises:
+        InputError: Hardly any draw makes a valid robot.
+    """
+    exact = robot.replace(tolerance=None)
+    sources = sources_of(exact, tolerances)
+    random = np.random.default_rng(seed)
+    robots: list[Robot] = []
+    values: list[dict[str, float]] = []
+    redrawn = 0
+    for level in _levels(draws, len(sources), random):
+        for tried in range(_TRIES):
+            drawn = {name: float(one) for name, one in values_at(sources, level).items()}
+            try:
+                robots.append(exact.with_values(drawn))
+            except InputError as error:
+                if tried + 1 == _TRIES:
+                    raise InputError.OUT_OF_RANGE(
+                        f"{_TRIES} draws within the tolerances made no valid robot; make the "
+                        f"tolerances smaller. The last one: {error}"
+                    ) from None
+                level = random.random(len(sources))
+                continue
+            values.append(drawn)
+            redrawn += tried > 0
+            break
+    names = values[0] if values else {}
+    return Draws(robots, {name: np.array([one[name] for one in values]) for name in names}, redrawn)
+
+
+def _levels(
+    draws: int, count: int, random: np.random.Generator
+) -> Float[np.ndarray, "draws count"]:
+    """Draw a Latin hypercube whose columns do not correlate (Iman and Conover 1982).
+
+    In every column one draw lies in each of as many equal parts. Their random pairing alone would
+    make spreads wrong by 4 % at 256 draws; without its correlations it is 0.5 %.
+    """
+    part = random.permuted(np.tile(np.arange(draws), (count, 1)), axis=1).T
+    if draws > count + 1 > 2:
+        from scipy.special import ndtri
+
+        normal = ndtri((part + 0.5) / draws)
+        root = np.linalg.cholesky(np.corrcoef(normal, rowvar=False))
+        part = np.linalg.solve(root, normal.T).T.argsort(axis=0).argsort(axis=0)
+    return (part + random.random(part.shape)) / draws
+
+
+def values_at(
+    sources: Sequence[ToleranceSource], levels: Float[np.ndarray, "... d"]
+) -> dict[str, Any]:
+    """Return the values of robots by name, at levels of the sources between 0 and 1."""
+    drawn: dict[str, Any] = {}
+    for source, level in zip(sources, np.moveaxis(levels, -1, 0), strict=True):
+        drawn |= source.values(level)
+    return drawn
+
+
+def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[ToleranceSource]:
+    """Return what is drawn; the tolerance of a single notch replaces that of all notches there.
+
+    Args:
+        robot: The robot with the values of the drawing.
+        tolerances: What deviates.
+    """
+    sources: list[ToleranceSource] = []
+    alone = {one.value for one in tolerances if "[" in one.value}
+    for one in tolerances:
+        numbers = numbers_at(robot, one.value)
+        others = {name: value for name, value in numbers.items() if name not in alone}
+        if one.value not in alone and len(others) < len(numbers):
+            names = [[name] for name in others] if one.per_notch else [list(others)]
+            sources += [
+                ToleranceSource(one, {name: others[name] for name in each})
+                for each in names
+                if each
+            ]
+        elif one.per_notch:
+            sources += [ToleranceSource(one, {name: value}) for name, value in numbers.items()]
+        elif len(set(numbers.values())) == 1:  # by one name: equal notches stay a group
+            sources.append(ToleranceSource(one, {one.value: number_at(robot, one.value)}))
+        else:
+            sources.append(ToleranceSource(one, numbers))
+    return sources
+
+
+# Tolerances that are assumed where the robot file gives none.
+
+CUT, CUT_OF_DIAMETER = 0.010, 0.005
+"""Standard deviation of what is cut [mm], and at least this part of the outer diameter."""
+WALL, WALL_OF_DIAMETER = 0.006, 0.003
+"""The same for the wall of the tube [mm]."""
+
+# Nitinol of an unknown tube: lower, usual and upper value, in proportion to the value of the file.
+# Data sheets of tubing: austenite of 40 to 65 GPa and, partly R-phase, from 30; upper plateau 250
+# to 520 MPa at room temperature; the slope of the plateau as tubes of publications have it.
+_NITINOL = {
+    "elastic_modulus": (30e3, 42e3, 65e3),
+    "plateau_stress": (250.0, 350.0, 520.0),
+    "plateau_modulus": (2e3, 6e3, 9e3),
+}
+_MODULUS = (0.9, 1.0, 1.1)
+# Friction belongs to the set-up: pulls of one wrist on different days differed three- to fourfold.
+# Normal about the file's value, so that the prediction keeps its middle, and cut off at a quarter
+# of it and at four times.
+_FRICTION = Tolerance("friction.coefficient", sd="60 %", plus="300 %", minus="75 %")
+# Where in the lumen a tendon runs is seldom known: York's is read as 0.43 or 0.38 mm.
+_RADIUS = Tolerance("tendon.radius", sd="6 %", plus="12 %", minus="12 %")
+
+# Error of the law of fibres: moments of yielding notches with hardening by finite elements.
+_LAW_OF_FIBRES = 0.034
+
+# Of no effect before a notch is destroyed.
+_LEFT_OUT = ("plastic_modulus",)
+
+
+def tolerances_of(robot: Robot) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]:
+    """Return the tolerances of a robot, those that its file lacks assumed.
+
+    Returns:
+        The tolerances, and the names of the values whose tolerance is assumed.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> wrist = load_robot("pacheco2021-a").replace(tolerance={"notch.depth": 0.005})
+        >>> tolerances_of(wrist)[1][0]
+        'notch.height'
+    """
+    given = {one.value: one for one in robot.tolerance}
+    assumed = {one.value: one for one in _assumed(robot) if one.value not in given}
+    return (*given.values(), *assumed.values()), tuple(assumed)
+
+
+def _assumed(robot: Robot) -> Iterator[Tolerance]:
+    diameter = robot.tube.outer_diameter
+    cut = _rounded(max(CUT, CUT_OF_DIAMETER * diameter))
+    cuts = [
+        name
+        for notch in robot.notch
+        for name, field in fields_of(type(notch)).items()
+        if (field.json_schema_extra or {}).get("unit") == "mm" and name != "uncut_length"
+    ]
+    for name in dict.fromkeys(cuts):
+        if _is_number(robot, f"notch.{name}"):
+            yield Tolerance(f"notch.{name}", sd=cut)
+    wall = max(WALL, WALL_OF_DIAMETER * diameter)
+    yield Tolerance("tube.inner_diameter", sd=_rounded(2.0 * wall))
+    material = robot.material
+    nitinol = isinstance(material, Nitinol)
+    for name, field in fields_of(type(material)).items():
+        is_modulus = (field.json_schema_extra or {}).get("unit") == "MPa"
+        if is_modulus and name not in _LEFT_OUT and _is_number(robot, f"material.{name}"):
+            limits = _NITINOL.get(name, _MODULUS) if nitinol else _MODULUS
+            yield _between(f"material.{name}", *limits)
+    if _is_number(robot, "friction.coefficient"):
+        yield _FRICTION
+    yield from _tendon_radius(robot)
+    yield from _law(robot)
+
+
+def _tendon_radius(robot: Robot) -> Iterator[Tolerance]:
+    inner, tendons = 0.5 * robot.tube.inner_diameter, robot.tendon
+    play = inner - max(tendon.radius + 0.5 * (tendon.diameter or 0.0) for tendon in tendons)
+    if play >= 0.0 and all(tendon.diameter for tendon in tendons):
+        play = _rounded(min(play, 0.5 * min(tendon.radius for tendon in tendons)))
+        yield Tolerance("tendon.radius", plus=play, minus=play)
+    elif play >= 0.0:
+        yield _RADIUS
+
+
+def _law(robot: Robot) -> Iterator[Tolerance]:
+    """Yield the error of the law of notches with elastic ends, larger for the last notch.
+
+    Papers' laws of rigid ends come with constants that were fitted by them, error included.
+    """
+    notches = robot.notches
+    all_of_them = max(notch.law_errors[0] for notch in notches)
+    last = notches[-1].law_errors[1]
+    names = ("notch", all_of_them), (f"notch[{len(notches)}]", last)
+    for name, error in names if all_of_them != last else names[:1]:
+        if error:
+            both = math.hypot(error, _LAW_OF_FIBRES * robot.material.by_fibres)
+            yield Tolerance(f"{name}.stiffness_factor", sd=f"{100 * both:.2g} %")
+
+
+def _rounded(size: float) -> float:
+    return float(f"{size:.2g}")
+
+
+def _between(name: str, lower: float, usual: float, upper: float) -> Tolerance:
+    plus, minus = upper / usual - 1.0, 1.0 - lower / usual
+    return Tolerance(name, plus=f"{100 * plus:.3g} %", minus=f"{100 * minus:.3g} %")
+
+
+def _is_number(robot: Robot, path: str) -> bool:
+    try:
+        return any(numbers_at(robot, path).values())
+    except InputError:
+        return False

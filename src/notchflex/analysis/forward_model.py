@@ -1,0 +1,499 @@
+"""The forward model: from numbers of a robot and its loads to solved states and derivatives.
+
+All derivatives of results use it. Compiled programs compute states, and derivatives of the arrays
+of a robot and along the path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, TypeVar
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from notchflex._jax import constant
+from notchflex._quantity import REGISTERED
+from notchflex._summary import Displayed, Summary
+from notchflex.analysis.solve import check_refinement, prepare_for
+from notchflex.analysis.tangent import (
+    Change,
+    Kink,
+    PathTangents,
+    gradient,
+    kinks,
+)
+from notchflex.errors import InputError
+from notchflex.loads import Load
+from notchflex.loads.command import (
+    BodyLoads,
+    Command,
+    load_slopes,
+    make_commands,
+)
+from notchflex.loads.load import check_is_robot
+from notchflex.loads.load_path import LoadPath, load_path
+from notchflex.mechanics.chain import ChainTemplate, chain_template, laws
+from notchflex.results.path import EquilibriumPath
+from notchflex.robot import Robot
+from notchflex.robot.numbers import (
+    PartsForm,
+    Place,
+    apart,
+    differing,
+    parts_of,
+    places_of,
+)
+from notchflex.robot.value_names import number_at, parse_path
+from notchflex.solver.newton import (
+    DEFAULT,
+    Settings,
+)
+from notchflex.solver.programs.assembled import assembled_chain, chain_slopes
+from notchflex.solver.programs.prepare import PreparedChain, prepare
+from notchflex.solver.programs.run import run
+from notchflex.solver.programs.static_structure import pad_rows
+from notchflex.solver.residual import SolverState
+
+# Derivatives of plain functions by differences, accurate to about 1e-10.
+
+T = TypeVar("T")
+
+# Width of a difference relative to the number, by order of accuracy. A short formula is accurate to
+# rounding and allows a small width; integrals and special functions do not.
+_WIDTHS = {2: 5e-6, 6: 1.3e-3}
+
+
+def slope(
+    vector_of: Callable[[float], Float[np.ndarray, "*m"]], value: float, *, order: int = 6
+) -> Float[np.ndarray, "*m"]:
+    """Differentiate by a number.
+
+    Args:
+        vector_of: The arrays of a value; entries may be infinite, and count as constant.
+        value: Where. At the end of its range, such as a friction of 0, the derivative is inward.
+        order: Order of accuracy: 6, or 2 with a third of the evaluations, for plain formulas.
+
+    Returns:
+        The derivative, accurate to about 1e-10.
+
+    Raises:
+        InputError: The number cannot be varied.
+    """
+    width, reason = _width(value, order), ""
+    for side in (0, 1, -1):
+        points, weights = _stencil(order, side)
+        try:
+            vectors = np.stack([vector_of(float(value + width * point)) for point in points])
+        except InputError as error:  # out of range
+            reason = str(error)
+            continue
+        vectors = np.where(np.isfinite(vectors), vectors, 0.0)
+        # Constant entries give exactly 0, without rounding errors.
+        return np.tensordot(weights, vectors - vectors[0], 1) / width
+    raise InputError.OUT_OF_RANGE(f"the number cannot be varied around {value:g}: {reason}")
+
+
+def nearby(robot_at: Callable[[float], T], value: float, order: int = 6) -> T:
+    """Return what a function gives beside a number, to the side where it gives something.
+
+    Raises:
+        InputError: The number cannot be varied.
+    """
+    width, reason = _width(value, order), ""
+    for moved in (value + width, value - width):
+        try:
+            return robot_at(moved)
+        except InputError as error:
+            reason = str(error)
+    raise InputError.OUT_OF_RANGE(f"the number cannot be varied around {value:g}: {reason}")
+
+
+def _width(value: float, order: int) -> float:
+    """Return the width of differences: relative to the number, or to 1 for 0."""
+    return _WIDTHS[order] * (abs(value) or 1.0)
+
+
+@lru_cache
+def _stencil(order: int, side: int) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
+    """Return points, in widths, and weights of the slope at 0 of their interpolant."""
+    half = order // 2
+    central = np.concatenate([np.arange(-half, 0.0), np.arange(1.0, half + 1.0)])
+    points = side * np.arange(order + 1.0) if side else central
+    powers = np.vander(points, increasing=True).T
+    return points, np.linalg.solve(powers, np.eye(len(points))[1])
+
+
+# Cost of the gradient of one number, in derivatives along single directions.
+_ADJOINT = 4
+
+
+@dataclass(frozen=True, eq=False)
+class ForwardModel:
+    """A robot under loads as a function of its numbers and of the loads.
+
+    Attributes:
+        robot: The nominal robot.
+        load: The nominal loads.
+        settings: Tolerance and limits of the solver.
+        refinement: More strain modes, as for `simulate`.
+        from_rest: Which steps start from rest, (s,); the others from the step before.
+        any_load: Whether loads on the bodies may vary, and so may point anywhere.
+    """
+
+    robot: Robot
+    load: LoadPath
+    settings: Settings = DEFAULT
+    refinement: int = 0
+    from_rest: bool | Bool[np.ndarray, " s"] = False
+    any_load: bool = False
+
+    @cached_property
+    def ready(self) -> PreparedChain:
+        """The nominal robot as arrays."""
+        return self._assembled(self.robot)
+
+    def solve(
+        self, robot: Robot, load: LoadPath, start: SolverState | None = None
+    ) -> EquilibriumPath:
+        """Solve loads with a robot that has other numbers.
+
+        Args:
+            robot: The robot.
+            load: Loads of the same kind as those of the model.
+            start: The state to start from; rest where not given.
+
+        Raises:
+            InputError: The arrays of the robot have another form than those of the model's.
+        """
+        ready = self._prepared(robot)
+        commands = make_commands(load, robot, ready.chain)
+        came = run(ready, commands, start, self.settings, each_from_start=self.from_rest)
+        return EquilibriumPath(robot, load, ready, came, settings=self.settings)
+
+    def change(self, robot: Robot, load: LoadPath, name: str) -> Change:
+        """Differentiate arrays and loads by a number of the robot; as `changes` does."""
+        return self.changes(robot, load, (name,))[0]
+
+    def changes(self, robot: Robot, load: LoadPath, names: Sequence[str]) -> list[Change]:
+        """Differentiate arrays and loads by numbers of the robot.
+
+        Args:
+            robot: The robot with the values at which to differentiate.
+            load: The loads.
+            names: Names of the numbers.
+
+        Raises:
+            InputError: A number cannot be varied.
+        """
+        moved = {name: _moved(robot, name, names) for name in names}
+        for name in set(names) - self._can_be_varied:
+            nearby(moved[name], number_at(robot, name), 2)
+            self._can_be_varied.add(name)
+        robot = apart(robot, names)
+        # A number of one notch is not that of all notches.
+        single = {name: places_of(robot, name) for name in names if _is_of_one(name)}
+        of_one = {place for own in single.values() for place in own}
+        places = [
+            single.get(name) or [one for one in places_of(robot, name) if one not in of_one]
+            for name in names
+        ]
+        every = [place for own in places for place in own]
+        numbers = set(PartsForm.of(parts_of(robot), every).places)
+        traced = [own for own in places if numbers.issuperset(own)]
+
+        def units(form: PartsForm) -> Float[np.ndarray, "k numbers"]:
+            return np.array([[place in own for place in form.places] for own in traced], float)
+
+        every = [place for own in traced for place in own]
+        slopes = iter((self._along(robot, load, every, units) if traced else None) or [])
+        return [
+            (next(slopes, None) if own in traced else None)
+            or self._differences(moved[name], number_at(robot, name), load)
+            for name, own in zip(names, places, strict=True)
+        ]
+
+    def change_along(
+        self, robot_at: Callable[[float], Robot], at: float, load: LoadPath, *, order: int = 6
+    ) -> Change:
+        """Differentiate arrays and loads along a family of robots.
+
+        Args:
+            robot_at: The robot of a number; only its geometry and loads on its mass may vary.
+            at: The number at which to differentiate.
+            load: The loads.
+            order: Order of accuracy of the slopes of the robot's numbers, as for `slope`.
+
+        Raises:
+            InputError: The number cannot be varied.
+        """
+        robot, parts = robot_at(at), parts_of(robot_at(at))
+
+        def difference(form: PartsForm) -> Float[np.ndarray, "1 numbers"]:
+            return slope(lambda v: form.numbers_of(parts_of(robot_at(v))), at, order=order)[None]
+
+        varied = differing(parts, parts_of(nearby(robot_at, at, order)))
+        slopes = None if varied is None else self._along(robot, load, varied, difference)
+        return self._differences(robot_at, at, load, order) if slopes is None else slopes[0]
+
+    def _along(
+        self,
+        robot: Robot,
+        load: LoadPath,
+        varied: Collection[Place],
+        changes: Callable[[PartsForm], np.ndarray],
+    ) -> list[Change] | None:
+        """Differentiate along changes of numbers; None where the form changes with them."""
+        ready = self._prepared(robot)
+        slopes = chain_slopes(robot, ready.chain, varied, changes)
+        if slopes is None:
+            return None
+        loads: Any = [None] * len(slopes)
+        if ready.chain.loaded:
+            by = load_slopes(load, robot, ready.chain, ready.chain_layout.unpack(slopes))
+            commands = make_commands(load, robot, ready.chain)
+            none: Any = np.zeros((len(slopes), *np.shape(commands.target)))
+            form, long = ready.command_layout(commands), ready.long.command_layout(commands)
+            still = Command(none, None if commands.by_stroke is None else none, by)
+            loads = pad_rows(form.pack(still, leading=2), form, long)
+        return [Change(*both) for both in zip(loads, ready.long_slopes(slopes), strict=True)]
+
+    def _differences(
+        self, robot_at: Callable[[float], Robot], at: float, load: LoadPath, order: int = 6
+    ) -> Change:
+        """Differentiate by what decides the form, such as a direction, by differences."""
+        size = self.ready.long.chain_layout.size
+        by_number = slope(lambda value: self._packed(robot_at(value), load), at, order=order)
+        return Change(by_number[size:].reshape(len(load), -1), by_number[:size])
+
+    def _packed(self, robot: Robot, load: LoadPath) -> Float[np.ndarray, " packed"]:
+        """Pack the long chain and the loads of all steps into one vector."""
+        ready = self._prepared(robot)
+        loads, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
+        return np.concatenate([ready.long.vector, loads.ravel()])
+
+    def load_change(self, path: EquilibriumPath, load: LoadPath) -> Float[np.ndarray, "s command"]:
+        """Compute the difference of other loads from those of a path, packed for the long chain."""
+        ready, robot = path.prepared, path.robot
+        present, _ = ready.padded_commands(path.commands)
+        target, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
+        return target - present
+
+    def derivatives(
+        self,
+        path: EquilibriumPath,
+        changes: Iterable[Change],
+        outputs: tuple[str, ...],
+        *,
+        remembers: bool = True,
+    ) -> dict[str, np.ndarray]:
+        """Differentiate a solved path.
+
+        Args:
+            path: As `solve` returns it.
+            changes: Directions, one or more.
+            outputs: Quantities that the solver reports as floats.
+            remembers: Whether changes pass from state to state through the memory of the contacts.
+
+        Returns:
+            By name, directions and then steps as leading axes, in the world. NaN from the first
+            step that did not converge, or whose derivatives are not known.
+        """
+        directions = tuple(changes)
+        shapes = {name: np.shape(path.quantity(name)) for name in outputs}
+        if not remembers or not self.takes_adjoint(path, outputs, len(directions)):
+            tangents = PathTangents(path, outputs, remembers)
+            columns = [tangents.along(one) for one in directions]
+            return {name: np.stack([one[name] for one in columns]) for name in outputs}
+        derivatives = {name: np.empty((len(directions), *shape)) for name, shape in shapes.items()}
+        for name, shape in shapes.items():
+            for index in np.ndindex(shape):
+                weight = np.zeros(shape)
+                weight[index] = 1.0
+                by = gradient(path, {name: weight})
+                derivatives[name][:, *index] = [by.along(one) for one in directions]
+        return derivatives
+
+    def takes_adjoint(
+        self, path: EquilibriumPath, outputs: tuple[str, ...], directions: int
+    ) -> bool:
+        """Return whether the adjoint is cheaper for a number of directions."""
+        numbers = sum(np.asarray(path.quantity(name)).size for name in outputs)
+        return _ADJOINT * numbers <= directions
+
+    def _assembled(self, robot: Robot) -> PreparedChain:
+        if self.any_load:
+            return prepare(robot, "space", loaded=True, refinement=self.refinement, flat=False)
+        return prepare_for(robot, self.load, None, self.refinement)
+
+    @cached_property
+    def _prepared(self) -> Callable[[Robot], PreparedChain]:
+        """Function that prepares a robot with other numbers; the last results are cached."""
+        return lru_cache(maxsize=4)(self._varied)
+
+    def _varied(self, robot: Robot) -> PreparedChain:
+        if robot is self.robot:
+            return self.ready
+        changed = differing(parts_of(self.robot), parts_of(robot))
+        # Fits of material and friction constants vary a few numbers of the chain.
+        if changed is not None and not {key for part, key in changed if _is_of_chain(part, key)}:
+            fields = laws(robot.material, self._template) | laws(robot.friction, self._template)
+            return self.ready.with_fields(fields)
+        chain = assembled_chain(robot, self.ready.chain)
+        ready = self._assembled(robot) if chain is None else PreparedChain(chain)
+        if ready.chain_layout is not self.ready.chain_layout:
+            raise InputError.UNSUPPORTED(
+                "with these values the robot has another form; it must stay the same"
+            )
+        return ready
+
+    @cached_property
+    def _can_be_varied(self) -> set[str]:
+        return set()
+
+    @cached_property
+    def _template(self) -> ChainTemplate:
+        chain = self.ready.chain
+        return chain_template(self.robot, chain.level, chain.refinement)
+
+
+def _moved(robot: Robot, name: str, names: Iterable[str]) -> Callable[[float], Robot]:
+    """Return the robot as a function of a number; what has a name of its own stays."""
+    others = [] if _is_of_one(name) else filter(_is_of_one, names)
+    kept = {other: number_at(robot, other) for other in others}
+    return lambda value: robot.with_values({name: value, **kept})
+
+
+def _is_of_one(name: str) -> bool:
+    """Return whether a number is of one notch or tendon."""
+    return parse_path(name).number is not None
+
+
+def _is_of_chain(part: int, key: str) -> bool:
+    """Return whether more of a chain depends on a number than the laws."""
+    return part not in (1, 2) or key in ("density", "poisson_ratio")
+
+
+# How the tip answers small changes of its drives and of what pushes at it: for control.
+
+_POSE = ("tip_rotation", "tip_position")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TipResponse(Displayed):
+    """Slopes of the tip's pose along a path of loads; s steps, t tendons.
+
+    Rows are (rotation vector, rad; position, mm), all in the world. NaN where a step did not
+    converge, and with friction where it was so hard that it was solved in three parts or more: what
+    contacts remember of the parts is not followed.
+
+    Attributes:
+        path: The states.
+        jacobian: Change of the pose per unit of what each tendon is commanded, a tension (N) or a
+            stroke (mm), (s, 6, t).
+        compliance: Change of the pose per moment (N mm) and force (N) at the tip, dead in the
+            world, (s, 6, 6).
+    """
+
+    path: EquilibriumPath
+    jacobian: Float[np.ndarray, "s 6 t"]
+    compliance: Float[np.ndarray, "s 6 6"]
+
+    @cached_property
+    def kinks(self) -> list[Kink]:
+        """Contacts and notches at a switch: there the slopes are those of one side only."""
+        return kinks(self.path)
+
+    def _summary(self) -> Summary:
+        steps, _, tendons = self.jacobian.shape
+        finite = np.isfinite(self.jacobian).all(axis=(1, 2))
+        rows = [
+            ("jacobian", f"{steps} steps x 6 x {tendons} tendons: rad or mm per N or mm"),
+            ("compliance", f"{steps} steps x 6 x 6: rad or mm per N mm or N"),
+            ("steps with slopes", f"{int(finite.sum())} of {steps}"),
+        ]
+        hint = ".kinks lists where slopes are those of one side; .path holds the states"
+        return Summary(f"Response of the tip of {self.path.robot.name}", rows, hint)
+
+
+def tip_response(
+    robot: Robot,
+    loads: Load | LoadPath | Iterable[Load],
+    *,
+    settings: Settings | None = None,
+    refinement: int = 0,
+    each_from_rest: bool = False,
+) -> TipResponse:
+    """Follow loads, and find at every state how the tip answers its drives and what pushes at it.
+
+    With friction the answer depends on the way: it is that of going on as the load went. A contact
+    that slid in the last step goes on sliding, one that stuck goes on sticking. Where a contact is
+    about to slip or a notch to close, the slopes are those of one side; `kinks` lists these.
+
+    Args:
+        robot: The robot.
+        loads: A path, or loads in order.
+        settings: How hard the solver tries.
+        refinement: More strain modes, as for `simulate`.
+        each_from_rest: Whether every load starts from rest instead of from the one before.
+
+    Returns:
+        The slopes, and the path they belong to, followed with modes for loads in space.
+
+    Raises:
+        InputError: A load that is none.
+
+    Example:
+        >>> from notchflex import load_robot, pull
+        >>> response = tip_response(load_robot("pacheco2021-a"), pull(0.5, 1.0, steps=2))
+        >>> response.jacobian.shape, response.compliance.shape
+        ((2, 6, 1), (2, 6, 6))
+    """
+    load = load_path(loads, check_is_robot(robot).number_of_tendons)
+    check_refinement(refinement)
+    model = ForwardModel(
+        robot, load, settings or DEFAULT, refinement, from_rest=each_from_rest, any_load=True
+    )
+    path = model.solve(robot, load)
+    changes = [Change(loads, None) for loads in _unit_loads(path)]
+    # Each state is varied alone: what the contacts remember of the state before stays.
+    by_loads = model.derivatives(path, changes, _POSE, remembers=False)
+    # Rotation vectors and displacements of the tip, in the world.
+    spin = by_loads["tip_rotation"] @ np.swapaxes(path.tip_rotation, -1, -2)
+    turned = [0.5 * (spin[..., b, a] - spin[..., a, b]) for a, b in ((1, 2), (2, 0), (0, 1))]
+    poses = np.concatenate([np.stack(turned, axis=-1), by_loads["tip_position"]], axis=-1)
+    slopes = np.moveaxis(poses, 0, -1)
+    by_drive, by_wrench = np.split(slopes, [path.chain.tendons], axis=-1)
+    moment_and_force = by_wrench.reshape(*by_wrench.shape[:-1], 2, 3)
+    in_world = REGISTERED["base_force"].turned(moment_and_force, load.base_to_world)
+    return TipResponse(path, by_drive, in_world.reshape(by_wrench.shape))
+
+
+def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"]]:
+    """Pack unit changes of the loads: of every drive, then of tip moment and force."""
+    long = path.prepared.long
+    packed, form = path.prepared.padded_commands(path.commands)
+    none: Command = form.unpack(np.zeros(form.size))
+    assert none.applied is not None  # the chain is assembled for loads
+    units = [none._replace(target=constant(row)) for row in np.eye(long.chain.tendons)]
+    for row in np.eye(6):
+        applied = _with_tip(none.applied, row, np.asarray(long.chain.body_length)[-1])
+        units.append(none._replace(applied=applied))
+    for unit in units:
+        yield np.broadcast_to(np.asarray(form.pack(unit)), packed.shape)
+
+
+def _with_tip(applied: BodyLoads, wrench: Float[np.ndarray, " 6"], length: float) -> BodyLoads:
+    """Add a moment and a force at the tip to loads, dead in the base frame."""
+    moment, force = wrench[:3], wrench[3:]
+    last = np.zeros(len(applied.dead_force))
+    last[-1] = 1.0
+    arm = np.zeros((3, 3))
+    arm[2] = length * force
+    return applied._replace(
+        dead_force=constant(applied.dead_force + np.multiply.outer(last, force)),
+        dead_moment=constant(applied.dead_moment + np.multiply.outer(last, moment)),
+        dead_arm=constant(applied.dead_arm + np.multiply.outer(last, arm)),
+    )

@@ -1,0 +1,412 @@
+"""How the states of a solved path change with the numbers they were found from.
+
+One compiled program follows one direction of change along the path, through the memory of the
+contacts (forward derivatives by the implicit function theorem, `solver/sensitivity.py`). Jacobians
+are such directions one after the other; so the program is compiled once, however many there are.
+
+One compiled program runs backwards over the path, through the memory of the contacts. Its time does
+not depend on the number of parameters.
+
+A contact about to slip and a notch just closing are switches: the slopes differ on their two sides.
+A contact that slid in a step has a slip
+and lies on its bound; one that stuck has neither. At the switch it lies on its bound without a
+slip, as after a step that changed nothing. A notch at the switch is closed without a force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from notchflex._jax import (
+    jax,
+    jnp,
+)
+from notchflex._quantity import REGISTERED
+from notchflex.analysis.outputs import report_quantities
+from notchflex.mechanics.chain import Chain
+from notchflex.results.path import EquilibriumPath
+from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.run import SolverRun
+from notchflex.solver.programs.static_structure import (
+    PytreeLayout,
+    StaticStructure,
+    lane_sizes,
+    pad_rows,
+)
+from notchflex.solver.quantities import unpad_quantity
+from notchflex.solver.residual import SolverState, slip_mask
+from notchflex.solver.sensitivity import SubstepHistory, attach_derivatives
+
+
+class StepLayouts(NamedTuple):
+    """How a program takes chain, load and state as vectors, and what it reports.
+
+    Attributes:
+        chain: Structure and layout of the chain.
+        command: Layout of one load.
+        state: Layout of a state.
+        outputs: Names of the quantities.
+        chain_varies: Whether a change of the chain is followed.
+    """
+
+    chain: StaticStructure
+    command: PytreeLayout
+    state: PytreeLayout
+    outputs: tuple[str, ...]
+    chain_varies: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Change of what a path is computed from, per unit of a number.
+
+    Attributes:
+        loads: Of the loads, packed for the long chain, steps as leading axis; None for none.
+        chain: Of the long chain, packed whole; None for none.
+    """
+
+    loads: Float[np.ndarray, "s command"] | None
+    chain: Float[np.ndarray, " chain"] | None
+
+    def entries(
+        self, structure: StaticStructure
+    ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+        """Return where the chain changes, as packed for programs, and by how much."""
+        if structure not in self._entries:
+            chain = np.zeros(0) if self.chain is None else self.chain
+            indices = np.flatnonzero(chain)
+            self._entries[structure] = structure.indices_of(indices), chain[indices]
+        return self._entries[structure]
+
+    @cached_property
+    def _entries(self) -> dict[StaticStructure, tuple[np.ndarray, np.ndarray]]:
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class PathTangents:
+    """Directional derivatives of a solved path.
+
+    Attributes:
+        path: The path, as solved.
+        outputs: Names of what is differentiated: quantities of `EquilibriumPath` that the solver
+            reports as floats.
+        remembers: Whether changes pass from state to state through the memory of the contacts.
+    """
+
+    path: EquilibriumPath
+    outputs: tuple[str, ...]
+    remembers: bool = True
+
+    def along(self, direction: Change) -> dict[str, np.ndarray]:
+        """Differentiate along one direction.
+
+        Returns:
+            Change of every output by name, in the world, steps as leading axis. NaN from a step on
+            that did not converge, or was so hard that its derivatives are not known.
+        """
+        loads, chain = direction.loads, direction.chain
+        long = self.path.prepared.long
+        layouts = self.layouts._replace(chain_varies=chain is not None)
+        change = np.zeros(1) if chain is None else layouts.chain.pack(chain)
+        constant = (np.zeros(long.state.size), long.dynamic_vector, change)
+        load_change = np.zeros_like(self.loads) if loads is None else loads
+        steps = (*self.steps, self.loads, load_change)
+        by_row = (*(False,) * len(constant), *(True,) * len(steps))
+        changes = _tangent.along(by_row, *constant, *steps, layouts)
+        turn = self.path.load.base_to_world
+        for name, values in changes.items():
+            values = unpad_quantity(self.path.chain, name, values)
+            changes[name] = REGISTERED[name].turned(values, turn)
+        return changes
+
+    @cached_property
+    def layouts(self) -> StepLayouts:
+        """How programs take chain, load and state, for the long chain."""
+        long = self.path.prepared.long
+        return StepLayouts(long.static_structure, self._commands[1], long.state, self.outputs)
+
+    @property
+    def loads(self) -> Float[np.ndarray, "s command"]:
+        """The loads, packed for the long chain."""
+        return self._commands[0]
+
+    @cached_property
+    def _commands(self) -> tuple[np.ndarray, PytreeLayout]:
+        return self.path.prepared.padded_commands(self.path.commands)
+
+    @cached_property
+    def steps(self) -> tuple[np.ndarray, ...]:
+        """What programs take of every step beside its load, for the long chain.
+
+        The states before and at the load and between, and how it was found: parts of the substeps,
+        whether it converged, and whether a change of the state before passes on.
+        """
+        ready, run = self.path.prepared, self.path.run
+        assert isinstance(run, SolverRun)
+        states = (
+            pad_rows(one, ready.state, ready.long.state)
+            for one in (run.states_before, run.states, run.between)
+        )
+        remembers = self.remembers & (run.from_start[:, 0] == 0.0)
+        how = np.stack([run.fraction_before, run.substeps, self.path.converged, remembers], axis=1)
+        return (*states, how.astype(float))
+
+
+def step_function(
+    state: Float[Array, " state"],
+    between: Float[Array, " state"],
+    how: Float[Array, " 4"],
+    layouts: StepLayouts,
+) -> Callable[[Chain, Array, Array], tuple[Array, dict[str, Array]]]:
+    """Return a solved step as a function that can be differentiated.
+
+    Args:
+        state: The solved state, packed.
+        between: The state before its last part, packed.
+        how: How it was found, as `PathTangents.steps` has it.
+        layouts: How things are packed, and what is reported.
+
+    Returns:
+        A function of a chain, a packed load and the packed state before; it returns the packed
+        state and the outputs.
+    """
+    solved, halfway = layouts.state.unpack(state), layouts.state.unpack(between)
+    history = SubstepHistory(halfway, how[0], how[1].astype(int), how[2] > 0.0)
+
+    def step(chain: Chain, load: Array, before: Array) -> tuple[Array, dict[str, Array]]:
+        command, last = layouts.command.unpack(load), layouts.state.unpack(before)
+        result = attach_derivatives(chain, command, last, solved, history)
+        return layouts.state.pack(result), report_quantities(chain, result, layouts.outputs)
+
+    return step
+
+
+def lanes_of(layouts: StepLayouts) -> tuple[int, int]:
+    """Return the sizes of the axes that run along the chain."""
+    chain: Any = layouts.chain
+    return lane_sizes(chain)
+
+
+@native(9, lanes_of)
+def _tangent(
+    last_change: Float[Array, " state"],
+    chain: Float[Array, " chain"],
+    chain_change: Float[Array, " chain"],
+    before: Float[Array, " state"],
+    state: Float[Array, " state"],
+    between: Float[Array, " state"],
+    how: Float[Array, " 4"],
+    load: Float[Array, " command"],
+    load_change: Float[Array, " command"],
+    layouts: StepLayouts,
+) -> tuple[Float[Array, " state"], dict[str, Array]]:
+    """Compute the change of a solved state, carried to the next, and of its reported quantities.
+
+    The program for loads alone, where the chain does not vary, is a fifth shorter.
+    """
+    step = step_function(state, between, how, layouts)
+
+    def packed(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
+        return step(layouts.chain.unpack(varied), load, before)
+
+    at = (load, before)
+    changes = (load_change, jnp.where(how[3] > 0.0, last_change, 0.0))
+    if layouts.chain_varies:
+        at, changes = (*at, chain), (*changes, chain_change)
+    return jax.jvp(packed, at, changes)[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """Derivatives of a number by all that a path is computed from.
+
+    Attributes:
+        loads: By the loads, packed for the long chain, steps as leading axis.
+        chain: By the long chain, packed for programs.
+        structure: How it is packed.
+    """
+
+    loads: Float[np.ndarray, "s command"]
+    chain: Float[np.ndarray, " unknown"]
+    structure: StaticStructure
+
+    def along(self, change: Change) -> float:
+        """Return the derivative of the number along a change."""
+        indices, sizes = change.entries(self.structure)
+        by_chain = float(self.chain[indices] @ sizes)
+        if change.loads is None:
+            return by_chain
+        return by_chain + float(self.loads.ravel() @ change.loads.ravel())
+
+
+def gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradient:
+    """Differentiate a weighted sum of quantities by all loads and by all numbers of the chain.
+
+    Args:
+        path: The path, as solved.
+        weights: By name of quantities that the solver reports as floats, in the world, the weight
+            of each number of a quantity, steps as leading axis.
+
+    Returns:
+        Its derivatives. NaN if a step of any weight, or one before it, did not converge, or was so
+        hard that its derivatives are not known.
+    """
+    long = path.prepared.long
+    tangents = PathTangents(path, tuple(weights))
+    layouts = tangents.layouts
+    seeds = _packed(path, weights, _shapes(layouts))
+    # No step beyond the last that counts: one that failed there must not matter.
+    backwards = slice(int(np.flatnonzero(seeds.any(axis=1)).max(initial=0)), None, -1)
+    steps = [one[backwards] for one in (*tangents.steps, tangents.loads, seeds)]
+    by_row = (False, False, *(True,) * len(steps))
+    start = (np.zeros(long.state.size), long.dynamic_vector)
+    result = _adjoint.along(by_row, *start, *steps, layouts)
+    loads = np.zeros_like(tangents.loads)
+    loads[backwards] = result["load"]
+    return Gradient(loads, result["chain"].sum(axis=0), layouts.chain)
+
+
+def _packed(
+    path: EquilibriumPath, weights: Mapping[str, np.ndarray], shapes: dict[str, tuple[int, ...]]
+) -> Float[np.ndarray, "s outputs"]:
+    """Pack weights in the frame of the base, for the outputs of the long chain."""
+    seeds: list[np.ndarray] = []
+    turn = path.load.base_to_world
+    back = None if turn is None else turn.T
+    for name, in_world in weights.items():
+        weight = REGISTERED[name].turned(in_world, back)
+        size = int(np.prod(shapes[name]))
+        padded = np.arange(float(size)).reshape(1, *shapes[name])
+        indices = unpad_quantity(path.chain, name, padded)[0]
+        is_there = np.isfinite(indices)  # tendons may meet fewer edges than there are
+        whole = np.zeros((len(weight), size))
+        whole[:, indices[is_there].astype(int)] = weight[:, is_there]
+        seeds.append(whole)
+    return np.concatenate(seeds, axis=1)
+
+
+@lru_cache(maxsize=64)
+def _shapes(layouts: StepLayouts) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of the outputs of the long chain."""
+
+    def report(chain: Array, state: Array) -> dict[str, Array]:
+        unpacked = layouts.chain.unpack(chain), layouts.state.unpack(state)
+        return report_quantities(*unpacked, layouts.outputs)
+
+    vectors = (jax.ShapeDtypeStruct((one.size,), float) for one in (layouts.chain, layouts.state))
+    return {name: one.shape for name, one in jax.eval_shape(report, *vectors).items()}
+
+
+@native(8, lanes_of)
+def _adjoint(
+    seed: Float[Array, " state"],
+    chain: Float[Array, " chain"],
+    before: Float[Array, " state"],
+    state: Float[Array, " state"],
+    between: Float[Array, " state"],
+    how: Float[Array, " 4"],
+    load: Float[Array, " command"],
+    weights: Float[Array, " outputs"],
+    layouts: StepLayouts,
+) -> tuple[Float[Array, " state"], dict[str, Array]]:
+    """Compute the adjoint of a state, carried to the previous one, and of its load and chain."""
+    step = step_function(state, between, how, layouts)
+    leaves, structure = jax.tree.flatten(layouts.chain.unpack(chain))
+    varies = [jnp.issubdtype(leaf.dtype, jnp.floating) for leaf in leaves]
+
+    def packed(load: Array, before: Array, numbers: list[Array]) -> tuple[Array, Array]:
+        rest = iter(numbers)
+        every = [next(rest) if one else leaf for one, leaf in zip(varies, leaves, strict=True)]
+        solved, values = step(jax.tree.unflatten(structure, every), load, before)
+        return solved, jnp.concatenate([values[one].ravel() for one in layouts.outputs])
+
+    numbers = [jnp.asarray(leaf) for one, leaf in zip(varies, leaves, strict=True) if one]
+    pull_back = jax.vjp(packed, load, before, numbers)[1]
+    by_load, by_before, by_numbers = pull_back((seed, weights))
+    rest = iter(by_numbers)
+    every = [
+        next(rest).ravel() if one else jnp.zeros(leaf.size)
+        for one, leaf in zip(varies, leaves, strict=True)
+    ]
+    by_chain = layouts.chain.pack(jnp.concatenate(every))
+    return jnp.where(how[3] > 0.0, by_before, 0.0), {"load": by_load, "chain": by_chain}
+
+
+@dataclass(frozen=True)
+class Kink:
+    """A contact or a notch at a switch, where derivatives are one-sided.
+
+    Attributes:
+        step: Step of the path, from 0.
+        kind: "contact" (about to slip, or to stop) or "notch" (about to close or to open).
+        index: Which contact along its tendon, from 1 at the base, or which notch, from 1.
+        tendon: The tendon of a contact, from 1; None for a notch.
+        distance: Distance of the state from the switch: for a contact the log ratio to its bound,
+            or its slip in heights of the notch; for a notch its gap, or its contact force over its
+            stiffness, in heights.
+    """
+
+    step: int
+    kind: Literal["contact", "notch"]
+    index: int
+    tendon: int | None
+    distance: float
+
+
+def kinks(path: EquilibriumPath, within: float = 1e-6) -> list[Kink]:
+    """List the contacts and notches of a path that lie at a switch, or nearly so.
+
+    Args:
+        path: The path, as solved (not as read from a file).
+        within: Distance from the switch up to which they count.
+
+    Returns:
+        One record each, by step; none where a step did not converge.
+    """
+    if not isinstance(path.run, SolverRun):
+        return []
+    solved, before = path.run.solved, path.prepared.state.unpack(path.run.between)
+    every = [*_contacts(path.chain, solved, before, within), *_notches(path, within)]
+    converged = np.asarray(path.converged)
+    return sorted((one for one in every if converged[one.step]), key=lambda one: one.step)
+
+
+def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: float) -> list[Kink]:
+    height = np.asarray(chain.rods.length).sum(-1)[:, None, None]
+    edges = np.asarray(chain.contacts)
+    contacts: list[Kink] = []
+    for k, group in enumerate(chain.groups):
+        ratio, bound = (
+            np.asarray(one[k]) for one in (solved.memory.log_ratio, solved.memory.bound)
+        )
+        slip = np.abs(np.asarray(solved.memory.slid[k]) - np.asarray(before.memory.slid[k]))
+        left = np.maximum(bound - np.abs(ratio), 0.0)
+        distance = np.maximum(left, slip / height)
+        can_slide = np.asarray(slip_mask(group)) > 0.0
+        tension = np.asarray(solved.point.base_tension)[:, list(group.numbers)]
+        loaded = (tension > 0.0)[:, None, :, None]
+        at_switch = (distance < within) & can_slide & loaded & (bound > 0.0)
+        for step, flexure, column, edge in np.argwhere(at_switch):
+            tendon = group.numbers[column]
+            index = int(np.flatnonzero(edges[tendon] == 2 * flexure + edge)[0])
+            gap = float(distance[step, flexure, column, edge])
+            contacts.append(Kink(int(step), "contact", index + 1, tendon + 1, gap))
+    return contacts
+
+
+def _notches(path: EquilibriumPath, within: float) -> list[Kink]:
+    chain = path.chain
+    height = np.asarray(chain.rods.length).sum(-1)
+    travel = path.contact_force / np.asarray(chain.contact_stiffness)
+    distance: Float[np.ndarray, "s n"] = np.maximum(np.abs(path.gap), travel) / height
+    return [
+        Kink(int(step), "notch", int(notch) + 1, None, float(distance[step, notch]))
+        for step, notch in np.argwhere(distance < within)  # NaN where a notch has no contact
+    ]

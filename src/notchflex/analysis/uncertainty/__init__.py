@@ -1,1 +1,0 @@
-"""Accuracy of predictions: tolerances of a robot carried through the solver as bands."""

@@ -1,0 +1,215 @@
+"""Contact between the edges of a notch that close it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple, cast
+
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from notchflex._arrays import decide, xp
+from notchflex._jax import Pytree, constant, jax
+from notchflex.mechanics.flexure import (
+    FlexureState,
+    Rod,
+    fibre_slope,
+    fibre_stretch,
+    in_space,
+    of_rod,
+)
+from notchflex.mechanics.motion import Motion, wrench_at
+from notchflex.mechanics.tendon import passages
+from notchflex.robot import Tube
+from notchflex.robot.kinds import Notch
+
+# Contact between the edges of a notch: gap and contact force.
+#
+# Like a tendon's span, a contact connects an anchor, the body with the face, and the body with the
+# edge. The gap depends on their relative pose, or on the flexure's strains alone.
+
+
+class GapResponse(NamedTuple):
+    """Contacts of one kind at one flexure (mm).
+
+    Attributes:
+        gap: Gap, >= 0 in a solved state.
+        wrench: Moment and force on the distal body per unit of contact force, about and along its
+            frame; its opposite acts on the anchor. None for contacts that act only on the modes.
+        slope: Change of the gap per unit of mode; None for contacts that act on bodies.
+    """
+
+    gap: Float[Array, " l"]
+    wrench: Float[Array, "l w"] | None
+    slope: Float[Array, "l modes"] | None
+
+
+class ContactGroup(Pytree, ABC):
+    """Contacts of one kind. Arrays have the flexures as leading axis, then the contacts.
+
+    Attributes:
+        acts_on_bodies: Whether the contact is a force on bodies.
+        has_contact: 1 where a flexure has such a contact.
+        back: Number of bodies from the distal one back to the anchor.
+    """
+
+    acts_on_bodies: ClassVar[bool]
+    has_contact: Float[Array, "*n l"]
+    back: Int[Array, "*n l"]
+
+    def fibre(self, rods: Rod) -> Float[Array, "*n 2"] | None:
+        """Locate the fibre along which the contact force acts, mm from the neutral axis.
+
+        Args:
+            rods: All flexures.
+
+        Returns:
+            Its position in the section; None where the force acts on bodies.
+        """
+        del rods
+
+    @abstractmethod
+    def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
+        """Compute the contacts at one flexure (of a group without its leading axis).
+
+        Args:
+            rod: The flexure.
+            flexure: Its state.
+            anchors: Pose of the distal body seen from each anchor, contacts as leading axis; None
+                where nothing acts on bodies.
+        """
+
+
+# Contact of two rigid pieces across a slot or a triangular notch.
+#
+# The edge of the distal piece touches the face of the proximal one, which may be several bodies
+# back, as in a row of slots cut alternately from both sides. The gap is the distance of the edge
+# from the plane of that face, and the force is normal to the plane (no friction).
+
+
+class EdgeContact(ContactGroup):
+    """Edges on several sides of the tube.
+
+    Attributes:
+        leaves: A point of the face, in the frame of the anchor, mm.
+        enters: Edge of the distal body, in its frame, mm.
+        normal: Normal of the face, in the frame of the anchor.
+    """
+
+    acts_on_bodies = True
+    leaves: Float[Array, "*n l d"]
+    enters: Float[Array, "*n l d"]
+    normal: Float[Array, "*n l d"]
+
+    def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
+        """Compute the distance of the edge from the face, and the wrench of a unit normal force."""
+        del rod, flexure
+        assert anchors is not None  # acts_on_bodies asks for it
+
+        def one(anchor: Motion, leaves: Array, enters: Array, normal: Array) -> tuple[Array, Array]:
+            along = normal @ anchor.rotation
+            gap = (enters - anchor.point_inside(leaves)) @ along
+            return gap, wrench_at(enters, along)
+
+        gap, wrench = jax.vmap(one)(anchors, self.leaves, self.enters, self.normal)
+        return GapResponse(gap, wrench, slope=None)
+
+
+# Contact opposite a solid spine: it closes where its fibre between the edges has zero length.
+#
+# On the concentric arc of Pacheco 2021 the gap is h - (r_o + ybar) theta.
+
+
+class SpineContact(ContactGroup):
+    """One contact at every notch that has a spine."""
+
+    acts_on_bodies = False
+
+    def fibre(self, rods: Rod) -> Float[Array, "*n 2"]:
+        """Locate the fibre between the edges, mm from the neutral axis."""
+        return rods.closure
+
+    def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
+        """Return the length of the fibre between the edges."""
+        del anchors
+        weights = of_rod(rod, fibre_stretch(rod.closure))[None]
+        strain = rod.length @ (rod.reference_strain + flexure.strain)
+        return GapResponse(gap=weights @ strain, wrench=None, slope=fibre_slope(rod, weights))
+
+
+def closing_angles(rods: Rod) -> Float[np.ndarray, " n"]:
+    """Compute the elastic angle at which every notch closes, rad; infinite without a spine.
+
+    It is the amplitude of the first mode at which the fibre between the edges has zero length: for
+    an arc h / (r_o + ybar) less the precurvature.
+    """
+    weights = of_rod(rods, fibre_stretch(constant(rods.closure)))
+    free = xp.einsum("nc,nic,ni->n", weights, rods.reference_strain, rods.length)
+    slope = xp.einsum("nc,nic,ni->n", weights, xp.asarray(rods.basis)[..., 0], rods.length)
+    spine = xp.asarray(rods.has_closure) > 0.0
+    return xp.where(spine, -free / xp.where(spine, slope, 1.0), np.inf)
+
+
+def free_angle(rods: Rod) -> Float[np.ndarray, " n"]:
+    """Return the precurvature of every notch with a spine, rad."""
+    bending = xp.asarray(in_space(rods.reference_strain))[..., 1]
+    return xp.einsum("ni,ni->n", rods.length, bending)
+
+
+# Contacts that may close the notches of a robot.
+
+
+def build_contacts(
+    notches: Sequence[Notch], tube: Tube, rods: Rod, body_length: Float[Array, " bodies"]
+) -> tuple[ContactGroup, ...]:
+    """Build the contacts of every kind that the notches have.
+
+    Args:
+        notches: Every notch, base to tip.
+        tube: The tube, whose outer edges meet.
+        rods: All flexures of the chain.
+        body_length: Length of the rigid pieces on the tube axis, base first, mm.
+    """
+    groups: list[ContactGroup] = []
+    if decide(xp.any(rods.has_closure)):
+        has_contact = rods.has_closure[:, None]
+        groups.append(SpineContact(has_contact, cast("Array", xp.ones(has_contact.shape, int))))
+    sides = _sides(notches)
+    if sides:
+        line = passages(notches, body_length, sides)
+        angle = xp.radians(sides)
+        across = tube.outer_radius * xp.stack([xp.cos(angle), xp.sin(angle), 0.0 * angle], axis=-1)
+        along = xp.array([0.0, 0.0, 1.0])
+        # Keep as many contacts as close at one flexure, on any side.
+        count = int(line.on_side.sum(axis=1).max(initial=1.0))
+        chosen = xp.argsort(-line.on_side, axis=1, kind="stable")[:, :count]
+
+        def own(values: np.ndarray) -> np.ndarray:
+            index = chosen.reshape(*chosen.shape, *(1,) * (values.ndim - 2))
+            return xp.take_along_axis(values, index, axis=1)
+
+        has_contact = own(line.on_side)
+        groups.append(
+            EdgeContact(
+                has_contact=constant(has_contact),
+                back=cast("Array", xp.where(has_contact > 0.0, own(line.back), 1)),
+                leaves=constant(own(across + line.left[..., None] * along)),
+                enters=constant(own(across + line.enters[..., None] * along)),
+                normal=constant(xp.broadcast_to(along, (*has_contact.shape, 3))),
+            )
+        )
+    return tuple(groups)
+
+
+def _sides(notches: Sequence[Notch]) -> list[float]:
+    """List the sides on which a notch without a spine opens the wall, once each but for rounding.
+
+    Two edges on one side would share the force that presses there, in no determined way.
+    """
+    neighbours, sides = [None, *notches, None], list[float]()
+    for before, notch, after in zip(neighbours, neighbours[1:], neighbours[2:], strict=False):
+        for opening in () if notch is None else notch.openings(before, after):
+            if opening.side_deg is not None and not any(map(opening.faces, sides)):
+                sides.append(opening.side_deg % 360.0)
+    return sorted(sides)

@@ -1,0 +1,507 @@
+"""Tendons: their way through the bodies, with lengths, turning angles and pulls."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from notchflex._arrays import xp
+from notchflex._jax import (
+    Pytree,
+    constant,
+    jax,
+    jnp,
+    static,
+)
+from notchflex.errors import InputError
+from notchflex.mechanics.flexure import FlexureState, Rod, fibre_slope, fibre_stretch, of_rod
+from notchflex.mechanics.motion import Motion, moment_of, wrench_at
+from notchflex.robot import Tendon
+from notchflex.robot.kinds import (
+    Notch,
+    openings_along,
+)
+
+# How a group of tendons crosses one gap: its way as a function of where the two bodies are.
+#
+# A span leads from the body that the tendon visited last, its anchor, to the next one that it
+# visits. All that it does depends on the pose of the one seen from the other (or, along the wall of
+# a bent notch, on that notch's strains alone); tension, friction and balance are the chain's
+# business.
+
+
+class Crossing(NamedTuple):
+    """A group of t tendons over one gap (mm, rad).
+
+    Attributes:
+        length: Length of the way across the gap.
+        exit_turning: Turning angle at the edge of the body before, >= 0.
+        entry_turning: Turning angle at the edge of the distal body, >= 0.
+        wrench: Moment and force on the distal body per unit of the span's tension, reversed,
+            about and along its frame; its opposite acts on the anchor. None for a group that does
+            not act on bodies.
+        slope: Change of the length per unit of mode; None for a group that acts on bodies.
+    """
+
+    length: Float[Array, " t"]
+    exit_turning: Float[Array, " t"]
+    entry_turning: Float[Array, " t"]
+    wrench: Float[Array, "t w"] | None
+    slope: Float[Array, "t modes"] | None
+
+
+class TendonGroup(Pytree, ABC):
+    """Tendons of one kind of path. Arrays carry the flexures as leading axis, then the tendons.
+
+    Attributes:
+        acts_on_bodies: Whether its pull is a force on the bodies (and poses are needed), or
+            acts on the modes of each flexure alone.
+        by_modes: Whether its way depends on the modes of the flexure, beside the bodies' poses.
+        numbers: Which tendons of the robot these are, from 0.
+        present: 1 where the tendon crosses this gap.
+        visits: 1 where it passes through (or ends in) the distal body.
+        ends: 1 where it is fixed in the distal body.
+        back: How many bodies before the distal one its anchor is, 1 where it skips none.
+        body_length: Length of tendon inside the distal body.
+        natural_gap: Length of its way across the gap in the free robot.
+    """
+
+    acts_on_bodies: ClassVar[bool]
+    numbers: tuple[int, ...] = static()
+    present: Float[Array, "*n t"]
+    visits: Float[Array, "*n t"]
+    ends: Float[Array, "*n t"]
+    back: Int[Array, "*n t"]
+    body_length: Float[Array, "*n t"]
+    natural_gap: Float[Array, "*n t"]
+
+    @property
+    def by_modes(self) -> bool:
+        """Whether the way depends on the modes of the flexure, beside the bodies' poses."""
+        return not self.acts_on_bodies
+
+    @property
+    def runs(self) -> Float[Array, "*n t"]:
+        """1 where the tendon has a span that ends at the distal body."""
+        return self.visits
+
+    @property
+    def fibre(self) -> Float[Array, "*n t 2"] | None:
+        """Where the tendon crosses a rod's section, mm from its neutral axis.
+
+        None for a tendon that does not run along the rod, as a fibre of it.
+        """
+        return None
+
+    @abstractmethod
+    def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
+        """Cross one gap (of a group without its leading axis).
+
+        Args:
+            rod: The flexure.
+            flexure: Its state.
+            anchors: Pose of the distal body seen from every tendon's anchor, tendons as leading
+                axis; None where nothing acts on bodies.
+        """
+
+
+def guarded_norm(
+    vector: Float[Array, "*s d"],
+    slope: Float[Array, "*s d"] | None = None,
+    rounding: float = 0.0,
+) -> Float[Array, "*s"]:
+    """Return the length of vectors, with a stated derivative where it is 0.
+
+    Args:
+        vector: The vectors.
+        slope: Derivative of the length by a vector that is 0; 0 where not given.
+        rounding: Up to this length a vector has the stated derivative.
+    """
+    squared = jnp.sum(vector * vector, axis=-1)
+    zero = squared == 0.0
+    length = jnp.where(zero, 0.0, jnp.sqrt(jnp.where(zero, 1.0, squared)))
+    if slope is None:
+        return length
+    along, stop = jnp.sum(vector * slope, axis=-1), jax.lax.stop_gradient
+    return jnp.where(squared <= rounding**2, stop(length) + (along - stop(along)), length)
+
+
+def direction(vector: Float[Array, "*s d"]) -> Float[Array, "*s d"]:
+    """Return unit vectors; 0 for vectors that are 0."""
+    length = guarded_norm(vector)
+    return vector / jnp.where(length == 0.0, 1.0, length)[..., None]
+
+
+# A tendon pulled straight from the edge of one body to the edge of the next it visits.
+#
+# It may skip bodies. The pull between two bodies is a force along the straight span on each of
+# them; cutting beam and tendon in a gap shows that contact forces need not be summed
+# (physics of both Gao 2017 and Liu 2022).
+#
+# Liu 2022 also reads the pull as a dead load or a follower: it then stands along the channel of
+# the proximal or the distal body, on the same point, while the way and its turning stay as they
+# are. That is a reading of a paper; it is not a tendon whose work is tension times length.
+
+# Products of unit vectors that are parallel are off 0 by less.
+_ROUNDING = 1e-15
+
+
+class Straight(TendonGroup):
+    """Tendons straight across the gaps.
+
+    Attributes:
+        leaves: Where the tendon leaves its anchor, in the anchor's frame, mm.
+        enters: Where it enters the distal body, in that body's frame, mm.
+        along: Unit direction of its channels, in the frames of the bodies.
+        pulls: Along what it pulls: the "gap", or the channel of the body before ("dead") or
+            behind ("follower").
+        turns_with_chord: Whether it turns at the distal body by the turn of the flexure's chord
+            rather than that of the body (the reading of Liu 2022), behind a strip; other notches
+            have no chord.
+    """
+
+    acts_on_bodies = True
+
+    leaves: Float[Array, "*n t d"]
+    enters: Float[Array, "*n t d"]
+    along: Float[Array, "*n t d"]
+    pulls: str = static()
+    turns_with_chord: bool = static()
+
+    @property
+    def by_modes(self) -> bool:
+        """Only where the chord of the flexure tells how the tendon turns."""
+        return self.turns_with_chord
+
+    def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
+        """Straight span from the anchor to the entry of the distal body."""
+        assert anchors is not None  # acts_on_bodies asks for it
+        chord = rod.chord if self.turns_with_chord else None
+
+        def one(anchor: Motion, leaves: Array, enters: Array, channel: Array) -> tuple[Array, ...]:
+            span = enters - anchor.point_inside(leaves)
+            length = guarded_norm(span)
+            gap = span / jnp.where(length == 0.0, 1.0, length)
+            before = channel @ anchor.rotation
+            onward = channel
+            if chord is not None:
+                onward = jnp.where(chord > 0.0, self._onward(flexure, before), channel)
+            pulled = {"gap": gap, "dead": before, "follower": channel}[self.pulls]
+            # A pull turns the distal body toward the tendon's side.
+            axis = direction(moment_of(channel, enters))
+            turns = turning(before, gap, axis), turning(gap, onward, axis)
+            return length, *turns, wrench_at(enters, pulled)
+
+        found = jax.vmap(one)(anchors, self.leaves, self.enters, self.along)
+        return Crossing(*found, slope=None)
+
+    def _onward(self, flexure: FlexureState, channel: Float[Array, " d"]) -> Float[Array, " d"]:
+        """Direction in which the tendon goes on by the chord's turn, in the distal body's frame."""
+        pose, turn = flexure.pose, flexure.chord_turn
+        assert pose is not None
+        assert turn is not None
+        before = pose.rotation @ channel
+        return (turn @ before) @ pose.rotation
+
+
+def turning(
+    before: Float[Array, " d"], after: Float[Array, " d"], axis: Float[Array, " a"]
+) -> Float[Array, ""]:
+    """Return the angle between two unit directions, exact for small angles.
+
+    A straight tendon turns with any rotation, to whichever side; its slope here is that of the
+    rotation that its own pull causes. With it the first step from rest knows the friction.
+    A span without length has no direction (its vector is 0) and turns nothing, with slope 0.
+
+    Args:
+        before: The one direction.
+        after: The other.
+        axis: Unit axis about which a pull turns the distal body; 0 where it turns nothing.
+    """
+    across, cosine = moment_of(before, after), jnp.sum(before * after)
+    nowhere = jnp.all(across == 0.0) & (cosine == 0.0)
+    sine = guarded_norm(across, jnp.where(nowhere, 0.0, axis), _ROUNDING)
+    return jnp.atan2(sine, jnp.where(nowhere, 1.0, cosine))
+
+
+# A tendon that follows the wall of the bent tube: Pacheco's l = h - theta (r_i + ybar).
+#
+# Across a gap it lies on the arc concentric with the neutral axis, so its length and turning are
+# functions of that notch's own modes. It follows the wall over every notch up to its end body,
+# whichever way the notch faces.
+
+
+class WallArc(TendonGroup):
+    """Tendons along the wall.
+
+    Attributes:
+        across: Where the tendon crosses the rod's section, from the neutral axis, mm.
+    """
+
+    acts_on_bodies = False
+
+    across: Float[Array, "*n t 2"]
+
+    @property
+    def fibre(self) -> Float[Array, "*n t 2"]:
+        """Where the tendon crosses the rod's section, mm from its neutral axis."""
+        return self.across
+
+    @property
+    def runs(self) -> Float[Array, "*n t"]:
+        """Over every notch up to its end."""
+        return self.present
+
+    def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
+        """Return the length and turning on the wall arc; half the turning at each edge."""
+        del anchors
+        weights = of_rod(rod, fibre_stretch(self.across))
+        bend = jnp.broadcast_to(flexure.bend, (len(self.across), len(flexure.bend)))
+        half_turning = 0.5 * guarded_norm(bend, self._pulls(len(flexure.bend)))
+        return Crossing(
+            length=self.natural_gap + (rod.length @ flexure.strain) @ weights.T,
+            exit_turning=half_turning,
+            entry_turning=half_turning,
+            wrench=None,
+            slope=fibre_slope(rod, weights),
+        )
+
+    def _pulls(self, axes: int) -> Float[Array, "t axes"]:
+        """Unit axes about which the tendons bend the rod, the slope of the turning at rest."""
+        x, y = self.across[:, 0], self.across[:, 1]
+        return direction(jnp.stack([x] if axes == 1 else [-y, x], axis=-1))
+
+
+# Where a line along the wall leaves one rigid piece of the tube and enters the next.
+#
+# A tendon is such a line, and so are the edges of the notches. What a notch opens, on which side,
+# its description knows (`Notch.openings`).
+
+
+class Passage(NamedTuple):
+    """One line along the wall over n flexures (mm, in the frames of the bodies behind them).
+
+    Attributes:
+        visits: 1 where the body behind the flexure has wall on that side.
+        on_side: 1 where the opening is on that very side, not all round.
+        back: How many bodies before that one it visited the last one, its anchor; 1 where it does
+            not visit.
+        left: Where it left the anchor, along the tube in the anchor's frame.
+        enters: Where the line enters that body, along the tube.
+        leaves: Where it leaves that body again.
+        base_leaves: Where it leaves the base.
+    """
+
+    visits: Float[np.ndarray, " n"]
+    on_side: Float[np.ndarray, " n"]
+    back: Int[np.ndarray, " n"]
+    left: Float[Array, " n"]
+    enters: Float[Array, " n"]
+    leaves: Float[Array, " n"]
+    base_leaves: Float[Array, ""]
+
+
+def passage(
+    notches: Sequence[Notch],
+    body_length: Float[Array, " bodies"],
+    direction_deg: float,
+    outer_radius: float = 0.0,
+    radius: float | None = None,
+) -> Passage:
+    """Follow a line along the wall.
+
+    Args:
+        notches: Every notch, base to tip.
+        body_length: Length of the rigid pieces on the tube axis, base first, mm.
+        direction_deg: Side of the tube.
+        outer_radius: Outer radius of the tube, mm, for a line inside the wall.
+        radius: Distance of the line from the tube axis, mm; None for one on the outer surface, in
+            the middle of the openings.
+    """
+    count = len(notches)
+    visits, on_side, back = xp.zeros(count), xp.zeros(count), xp.ones(count, int)
+    left: list[Any] = [0.0] * count
+    enters: list[Any] = [0.0] * count
+    leaves, last = list(body_length), 0
+    for body, opening in openings_along(notches, direction_deg):
+        inside = 0.0
+        if radius is not None:
+            inside = opening.inside(direction_deg, outer_radius, radius)
+        visits[body - 1] = 1.0
+        enters[body - 1] = opening.enters + inside * opening.enters_rise
+        on_side[body - 1] = opening.faces(direction_deg)
+        leaves[last] += opening.leaves + inside * opening.leaves_rise
+        back[body - 1], left[body - 1] = body - last, leaves[last]
+        last = body
+    along = map(constant, (left, enters, leaves[1:], leaves[0]))
+    return Passage(visits, on_side, back, *along)
+
+
+def passages(
+    notches: Sequence[Notch],
+    body_length: Float[Array, " bodies"],
+    directions_deg: Sequence[float],
+    outer_radius: float = 0.0,
+    radii: Sequence[float] | None = None,
+) -> Passage:
+    """Follow several lines; they are the last axis."""
+    distances = [None] * len(directions_deg) if radii is None else radii
+    lines = [
+        passage(notches, body_length, direction, outer_radius, radius)
+        for direction, radius in zip(directions_deg, distances, strict=True)
+    ]
+    return Passage(*(xp.stack(values, axis=-1) for values in zip(*lines, strict=True)))
+
+
+# From the tendons of a robot file to the groups that the chain walks with.
+
+_PULLS = {"straight": "gap", "straight-dead": "dead", "straight-follower": "follower"}
+
+
+class RoutingContext(NamedTuple):
+    """What tendons are laid through.
+
+    Attributes:
+        notches: Every notch, base to tip.
+        outer_radius: Outer radius of the tube, mm.
+        rods: All flexures of the chain.
+        free: Relative poses of all flexures in the free robot.
+        body_length: Length of the rigid pieces on the tube axis, base first, mm.
+        turns_with_chord: Whether tendons turn with the chords of the flexures.
+    """
+
+    notches: Sequence[Notch]
+    outer_radius: float
+    rods: Rod
+    free: Motion
+    body_length: Float[Array, " bodies"]
+    turns_with_chord: bool
+
+
+class RoutedTendons(NamedTuple):
+    """Tendons laid through a robot.
+
+    Attributes:
+        groups: One group per kind of path in use.
+        place: Where every tendon crosses a section of the tube, mm from its axis.
+        base_length: Length of every tendon inside the base, mm.
+    """
+
+    groups: tuple[TendonGroup, ...]
+    place: Float[Array, "t 3"]
+    base_length: Float[Array, " t"]
+
+
+def route(tendons: Sequence[Tendon], ground: RoutingContext) -> RoutedTendons:
+    """Group the tendons by the way they run and lay them through the chain.
+
+    Raises:
+        InputError: A tendon ends in a body that has no wall on its side.
+    """
+    line = passages(
+        ground.notches,
+        ground.body_length,
+        [tendon.direction_deg for tendon in tendons],
+        ground.outer_radius,
+        [tendon.radius for tendon in tendons],
+    )
+    groups: list[TendonGroup] = []
+    for path in ("wall-arc", *_PULLS):
+        numbers = tuple(i for i, tendon in enumerate(tendons) if tendon.path == path)
+        if numbers:
+            chosen = [tendons[i] for i in numbers]
+            some: Any = (values[..., np.array(numbers)] for values in line)
+            own = Passage(*some)
+            masks = _masks(numbers, chosen, own)
+            lay = _wall_arc if path == "wall-arc" else _straight
+            groups.append(lay(masks, chosen, own, ground, path))
+    return RoutedTendons(tuple(groups), _on_tube(tendons), constant(line.base_leaves))
+
+
+def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -> dict[str, Any]:
+    """Where each tendon is: flexures as rows, tendons as columns."""
+    count = line.visits.shape[0]
+    end = xp.array([tendon.end_body or count for tendon in tendons])
+    body = xp.arange(1, count + 1)[:, None]
+    present = (body <= end).astype(float)
+    visits = present * line.visits
+    ends = (body == end).astype(float)
+    for column, number in enumerate(numbers):
+        if not (ends * visits)[:, column].any():
+            on_its_side = ", ".join(str(j + 1) for j in xp.flatnonzero(line.visits[:, column]))
+            raise InputError.UNSUPPORTED(
+                f"tendon[{number + 1}].end_body has no wall on the tendon's side; "
+                f"the bodies there are {on_its_side}"
+            )
+    return {
+        "numbers": numbers,
+        "present": present,
+        "visits": visits,
+        "ends": ends,
+        "back": xp.where(visits > 0.0, line.back, 1),
+        # A cable may end at an edge beyond the axial length of the last piece.
+        "body_length": visits * xp.maximum(line.leaves - line.enters, 0.0),
+    }
+
+
+def _on_tube(tendons: Sequence[Tendon]) -> Float[Array, "t 3"]:
+    """Where the tendons cross a section of the tube, mm from its axis."""
+    radius = xp.array([tendon.radius for tendon in tendons], float)
+    direction = xp.deg2rad(xp.array([tendon.direction_deg for tendon in tendons], float))
+    return constant(
+        xp.stack([radius * xp.cos(direction), radius * xp.sin(direction), 0.0 * radius], axis=-1)
+    )
+
+
+def _wall_arc(
+    masks: dict[str, Any],
+    tendons: Sequence[Tendon],
+    line: Passage,
+    ground: RoutingContext,
+    path: str,
+) -> WallArc:
+    del line, path
+    rods = ground.rods
+    across = (
+        xp.einsum("nab,tb->nta", rods.end_rotation, _on_tube(tendons)) + rods.end_offset[:, None]
+    )[..., :2]
+    return WallArc(
+        **masks,
+        natural_gap=xp.einsum(
+            "ntc,nic,ni->nt", fibre_stretch(across), rods.reference_strain, rods.length
+        ),
+        across=across,
+    )
+
+
+def _straight(
+    masks: dict[str, Any],
+    tendons: Sequence[Tendon],
+    line: Passage,
+    ground: RoutingContext,
+    path: str,
+) -> Straight:
+    along = xp.array([0.0, 0.0, 1.0])
+    place = xp.asarray(_on_tube(tendons))
+    entry = place + line.enters[..., None] * along
+    leave = place + line.leaves[..., None] * along
+    # Every straight span in the free robot; 0 where a tendon passes by.
+    point, across = place + xp.asarray(line.base_leaves)[:, None] * along, list[Any]()
+    spans = zip(masks["visits"], entry, leave, *ground.free, strict=True)
+    for visits, enters, leaves, rotation, translation in spans:
+        point = (point - translation) @ rotation
+        across.append(enters - point)
+        point = xp.where(visits[:, None] > 0.0, leaves, point)
+    return Straight(
+        **masks,
+        natural_gap=constant(masks["visits"] * xp.linalg.norm(xp.stack(across), axis=-1)),
+        leaves=constant(place + line.left[..., None] * along),
+        enters=constant(entry),
+        along=constant(xp.broadcast_to(along, entry.shape)),
+        pulls=_PULLS[path],
+        turns_with_chord=ground.turns_with_chord,
+    )

@@ -1,1 +1,0 @@
-"""Results as files and tables: JSON, CSV, NetCDF, Parquet, data frames."""

@@ -1,0 +1,287 @@
+"""Newton's linear step by elimination along the chain: O(n), never a dense matrix.
+
+Linearised, an element couples only to its neighbours:
+
+    residual + A du + B dcarried + C dbeyond = 0
+    dnext = Yu du + Yc dcarried,   dprevious = Zu du + Zc dcarried + Zb dbeyond
+
+All elements eliminate their own unknowns at once, which leaves
+
+    dnext = y + Y1 dcarried + Y2 dbeyond,   dprevious = z + Z1 dcarried + Z2 dbeyond
+
+`_condense` eliminates dbeyond of one element after the other from the tip, until only the tensions
+at the base are unknown; `_back_substitute` then goes from the base to the tip. This is the
+elimination of a block-tridiagonal matrix, in two loops: the program does not grow with the chain.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Bool, Float
+
+from notchflex._jax import (
+    constant,
+    jax,
+    jnp,
+)
+from notchflex.loads.command import Command
+from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.contact import closing_angles
+from notchflex.mechanics.flexure import fibre_stretch, of_rod
+from notchflex.solver.linear_step import (
+    RowLayout,
+    linearise,
+    row_layout,
+)
+from notchflex.solver.residual import (
+    BaseReaction,
+    Evaluation,
+    Iterate,
+    Memory,
+)
+
+# Actuation of the tendons at the base: by a tension, or by a stroke.
+
+
+def stroke(chain: Chain, base: BaseReaction) -> Float[Array, " t"]:
+    """Compute the stroke from the free robot (mm), with the tendon stiffness of the file."""
+    tension_length = base.tension_length + base.base_tension * chain.free_length
+    return base.released_length + tension_length / chain.axial_stiffness
+
+
+def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
+    """Compute the stroke at which every notch is closed (mm); infinite where no formula exists.
+
+    Where every notch closes against its spine, a tendon on the wall shortens by the closing angle
+    times its lever arm. A tendon that lengthens as a notch closes has no such limit.
+    """
+    closing = np.full(chain.tendons, np.inf)
+    rods = jax.tree.map(np.asarray, chain.rods)
+    travel = closing_angles(rods)
+    if not np.isfinite(travel).all():
+        return closing
+    for group in chain.groups:
+        if group.fibre is not None:
+            weights = of_rod(chain.rods, fibre_stretch(constant(group.fibre)))
+            slope = np.einsum("ntc,nic,ni->nt", weights, rods.basis[..., 0], rods.length)
+            shortening = np.asarray(group.present) * -slope * travel[:, None]
+            closing[list(group.numbers)] = np.where(shortening < 0.0, np.inf, shortening).sum(
+                axis=0
+            )
+    return closing
+
+
+def command_residual(chain: Chain, command: Command, base: BaseReaction) -> Float[Array, " t"]:
+    """Compute the deviation of the tendons from their command, scaled like angles.
+
+    A tendon driven by stroke is slack where the robot has released more than is drawn:
+    tension >= 0, stroke released >= stroke commanded, product 0.
+    """
+    scale, base_tension = chain.stroke_stiffness, base.base_tension
+    missing = stroke(chain, base) - command.target
+    # Switching keeps the digits that a difference with a large tension would lose.
+    by_stroke = jnp.where(base_tension >= scale * missing, missing, base_tension / scale)
+    by_tension = (base_tension - command.target) / scale
+    return command.either(by_stroke, by_tension)
+
+
+def without_slack(
+    chain: Chain, command: Command, point: Iterate, reached: Float[Array, " t"]
+) -> Iterate:
+    """Set the tensions of slack tendons at a solved point to zero, given the strokes reached."""
+    if command.by_stroke is None:
+        return point
+    missing = chain.stroke_stiffness * (reached - command.target)
+    slack = command.by_stroke & (point.base_tension < missing)
+    return point._replace(base_tension=jnp.where(slack, 0.0, point.base_tension))
+
+
+def command_slopes(
+    chain: Chain, command: Command, base: BaseReaction
+) -> tuple[Float[Array, "t t"], Float[Array, "t t"], Float[Array, "t t"]]:
+    """Differentiate `command_residual` by base tension, released length, tension times length."""
+
+    def residual(tension: Array, released: Array, tension_length: Array) -> Array:
+        moved = BaseReaction(tension, released, tension_length, base.external)
+        return command_residual(chain, command, moved)
+
+    at = (base.base_tension, base.released_length, base.tension_length)
+    return jax.jacfwd(residual, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, at))
+
+
+# Largest tension of an inextensible tendon driven by stroke, in closing forces of a notch.
+_MAX_CLOSING_FORCES = 1e5
+
+
+def tension_is_bounded(chain: Chain, command: Command, point: Iterate) -> Bool[Array, ""] | bool:
+    """Return whether the tensions of tendons driven by stroke are bounded.
+
+    Once the shape is rigid, an inextensible tendon cannot be drawn further; rounding would then
+    determine its tension. An extensible tendon bounds its tension itself.
+    """
+    if command.by_stroke is None:
+        return True
+    limit = _MAX_CLOSING_FORCES * chain.closing_force
+    limit = jnp.where(chain.axial_stiffness < jnp.inf, jnp.inf, limit)
+    return jnp.all(jnp.where(command.by_stroke, point.base_tension, 0.0) <= limit)
+
+
+# Slopes of a stroke below the second count as zero; the first is added to their pivots.
+_PIVOT_SHIFT, _ZERO_SLOPE = 1e-9, 1e-7
+
+
+class _Condensed(NamedTuple):
+    """Blocks of every element after condensation, as rows over (1, carried to it).
+
+    Attributes:
+        to_next: What it carries to the next element.
+        returned: What it receives from the next element.
+    """
+
+    to_next: Float[Array, "n c 1+c"]
+    returned: Float[Array, "n b 1+c"]
+
+
+def linear_step(
+    chain: Chain,
+    command: Command,
+    point: Iterate,
+    memory: Memory,
+    at: Evaluation,
+) -> Iterate:
+    """Solve the linearised balance for the step to equilibrium.
+
+    Derivatives of the step are those of the residual, not those of the linear system: a step
+    from a solved state then changes as the solution does (implicit function theorem).
+
+    Args:
+        chain: The chain.
+        command: Tensions and strokes commanded, external loads.
+        point: The point to step from.
+        memory: History of the contacts.
+        at: Evaluation there.
+
+    Returns:
+        The step.
+    """
+    form = row_layout(chain, by_stroke=command.by_stroke is not None)
+    unknowns = point.unknowns
+    state = (chain, unknowns, memory, command.applied, at)
+    rows = linearise(*jax.tree.map(jax.lax.stop_gradient, state), form=form)
+    residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.residual)
+    size = form.unknowns
+    # Own unknowns as functions of 1, carried and beyond: du = response @ (1, c, b).
+    right = jnp.concatenate([residual[..., None], rows.residual[..., size:]], axis=-1)
+    response = -gauss_jordan(rows.residual[..., :size], right)
+
+    def insert(row: Array) -> Array:
+        rest = jnp.pad(row[..., size:], ((0, 0), (0, 0), (1, 0)))
+        return rest + row[..., :size] @ response
+
+    at_base = _tensions_carried(chain, form)
+    condensed, back = _condense(insert(rows.to_next), insert(rows.to_previous), form)
+    tension_step = command.target - point.base_tension
+    if command.by_stroke is not None:
+        by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ at_base], axis=1)
+        tension_step = _tension_step(chain, command, at.base, by_tension)
+    surroundings = _back_substitute(condensed, jnp.asarray(at_base) @ tension_step)
+    steps = jnp.einsum("nuz,nz->nu", response, surroundings)
+    _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
+    return Iterate(jax.vmap(unknowns_of)(steps), tension_step)
+
+
+def _tension_step(
+    chain: Chain,
+    command: Command,
+    base: BaseReaction,
+    back: Float[Array, "b 1+t"],
+) -> Float[Array, " t"]:
+    """Solve for the step of the base tensions to the commanded strokes."""
+    assert command.by_stroke is not None
+    slopes = command_slopes(chain, command, base)
+    order = chain.tendon_order
+    back = back[len(back) - 2 * len(order) :].reshape(2, len(order), -1)
+    # Rows in the order of the robot's tendons.
+    released_length, tension_length = jnp.stack([back[:, row] for row in np.argsort(order)], axis=1)
+    by_base = slopes[1] @ released_length + slopes[2] @ tension_length
+    matrix = slopes[0] + by_base[:, 1:]
+    # Where every contact sticks, the stroke does not depend on the tension; a small pivot keeps the
+    # step finite.
+    undetermined = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _ZERO_SLOPE)
+    missing = command_residual(chain, command, base) + by_base[:, 0]
+    return -gauss_jordan(
+        matrix + _PIVOT_SHIFT * jnp.diag(undetermined.astype(float)), missing[:, None]
+    )[:, 0]
+
+
+def _tensions_carried(chain: Chain, form: RowLayout) -> Float[np.ndarray, "c t"]:
+    """Return what is carried to the first flexure per unit of base tension: the tension itself."""
+    order, carried = chain.tendon_order, form.carried
+    at_base = np.zeros((carried, chain.tendons))
+    at_base[carried - len(order) + np.arange(len(order)), order] = 1.0
+    return at_base
+
+
+def _condense(
+    to_next: Float[Array, "n c z"], to_previous: Float[Array, "n b z"], form: RowLayout
+) -> tuple[_Condensed, Float[Array, "b 1+c"]]:
+    """Eliminate the couplings between neighbours, from the tip.
+
+    Both arguments are rows over (1, carried, from beyond). Returns the condensed blocks, and the
+    rows that the first element passes to the base.
+    """
+    size = 1 + form.carried
+    one = constant(np.eye(form.carried))
+
+    def join(back: Array, item: tuple[Array, Array]) -> tuple[Array, _Condensed]:
+        to_next, to_previous = item
+        by_back = to_next[:, size:]
+        right = _add_constant(to_next[:, :size], by_back @ back[:, 0])
+        carried_on = gauss_jordan(one - by_back @ back[:, 1:], right)
+        returned = _add_constant(back[:, 1:] @ carried_on, back[:, 0])
+        return to_previous[:, :size] + to_previous[:, size:] @ returned, _Condensed(
+            carried_on, returned
+        )
+
+    at_tip = jnp.zeros((form.beyond, size))
+    back, condensed = jax.lax.scan(join, at_tip, (to_next, to_previous), reverse=True)
+    return condensed, back
+
+
+def _add_constant(rows: Float[Array, "k z"], by: Float[Array, " k"]) -> Float[Array, "k z"]:
+    """Add constants to the first column of rows, that of 1."""
+    return jnp.concatenate([rows[:, :1] + by[:, None], rows[:, 1:]], axis=1)
+
+
+def _back_substitute(condensed: _Condensed, carried: Float[Array, " c"]) -> Float[Array, "n z"]:
+    """Return (1, carried, from beyond) of every element, from what is carried to the first."""
+
+    def follow(carried: Array, blocks: _Condensed) -> tuple[Array, Array]:
+        own = jnp.concatenate([jnp.ones(1), carried])
+        return blocks.to_next @ own, jnp.concatenate([own, blocks.returned @ own])
+
+    return jax.lax.scan(follow, carried, condensed)[1]
+
+
+def gauss_jordan(
+    matrix: Float[Array, "*n u u"], right: Float[Array, "*n u r"]
+) -> Float[Array, "*n u r"]:
+    """Solve small systems by Gauss-Jordan elimination without pivoting.
+
+    Modes come first: their stiffness makes their pivots safe. A step drops the column that it has
+    cleared. The barrier keeps the compiler from recomputing earlier steps for every later one; a
+    loop takes twice as long, and many small factorisations by LAPACK two to seven times.
+    """
+    size = matrix.shape[-1]
+    table = jnp.concatenate([matrix, right], axis=-1)
+    for number in range(size):
+        is_pivot = (np.arange(size) == number)[:, None]
+        row = table[..., number : number + 1, :]
+        pivot = row[..., 1:] * (1.0 / row[..., :1])  # one division costs as much as ten products
+        # The pivot's row is inserted, since a difference would lose its digits.
+        table = jnp.where(is_pivot, pivot, table[..., 1:] - table[..., :1] * pivot)
+        table = jax.lax.optimization_barrier(table)
+    return table

@@ -1,1 +1,0 @@
-"""Quantities that follow from a converged state."""

@@ -1,1 +1,0 @@
-"""Newton's linear step: rows of every element, eliminated along the chain."""
