@@ -5,10 +5,12 @@ as lines.
 """
 
 import ast
+import tomllib
 from functools import cache
 from pathlib import Path
 
 import notchflex
+from tokens import BUDGET, sizes
 
 SOURCE = Path(notchflex.__file__).parents[1]
 
@@ -67,6 +69,15 @@ def test_files_are_short():
     }
     long = {file: n for file, n in lines.items() if n > MOST_LINES_OF_A_FILE}
     assert not long, f"a file has at most {MOST_LINES_OF_A_FILE} lines; {long}"
+
+
+def test_folders_keep_to_their_budgets():
+    budget, counted = tomllib.loads(BUDGET.read_text(encoding="utf-8")), sizes()
+    assert counted.keys() == budget.keys()
+    grown = {folder: n for folder, n in counted.items() if n > budget[folder]}
+    assert not grown, f"more tokens than `budget.toml` allows: {grown}; take something away"
+    shrunk = {folder: n for folder, n in counted.items() if n < 0.98 * budget[folder]}
+    assert not shrunk, f"`python tests/tokens.py` lowers the budgets of {', '.join(shrunk)}"
 
 
 def test_functions_are_short():
