@@ -1,7 +1,7 @@
 """Size of the sources in tokens, which neither a formatter nor comments change.
 
-Not counted are comments, docstrings, line ends, brackets and commas. `python tests/tokens.py` writes
-the sizes of today into `budget.toml`.
+Not counted are comments, docstrings, line ends, brackets and commas. `python tests/tokens.py`
+writes the sizes of today into `budget.toml`.
 """
 
 import ast
