@@ -1,4 +1,4 @@
-"""Make segment_table.csv of notchflex.mechanics.section with sectionproperties (half an hour).
+"""Make segment_table.csv of notchflex.mechanics with sectionproperties (half an hour).
 
     python benchmarks/segment_table.py --raw FILE     # writes the table
     python benchmarks/segment_table.py 0.864 0.7      # prints one section: r_i, depth over r_o
@@ -20,7 +20,7 @@ from sectionproperties.analysis import Section
 from sectionproperties.pre import Geometry
 from shapely import Polygon, affinity
 
-TABLE = Path(__file__).parents[1] / "src/notchflex/mechanics/section/segment_table.csv"
+TABLE = Path(__file__).parents[1] / "src/notchflex/mechanics/segment_table.csv"
 LAYERS = 3  # elements across the wall
 COARSEST = 0.1  # size of an element over the outer radius
 NODES = {"closed": (9, 16), "open": (9, 20), "solid": (1, 12)}  # ratios, chord angles
@@ -85,10 +85,7 @@ def analyse(ratio, depth):
 
 def places(shape):
     """Ratios and chord angles of the nodes, and the depths that they stand for."""
-    from notchflex.mechanics.section.cuts import (
-        CHORD_RANGE,
-        RATIO_RANGE,
-    )
+    from notchflex.mechanics.cuts import CHORD_RANGE, RATIO_RANGE
 
     def nodes(count, low, high):
         x = np.cos(np.pi * (np.arange(count) + 0.5) / count)
@@ -127,12 +124,8 @@ def analyse_all(raw):
 def fit(shape, values):
     """Fit the factors: coefficients and largest relative residual of J and e."""
     from notchflex._jax import jnp
-    from notchflex.mechanics.section import annular_segment
-    from notchflex.mechanics.section import cuts as segment_estimates
-    from notchflex.mechanics.section.cuts import (
-        CHORD_RANGE,
-        RATIO_RANGE,
-    )
+    from notchflex.mechanics import cuts as segment_estimates
+    from notchflex.mechanics.cuts import CHORD_RANGE, RATIO_RANGE, annular_segment
 
     ratio, angle, depth = places(shape)
     one = jnp.ones(len(ratio))

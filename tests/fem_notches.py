@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.mechanics.ends import Side, notch_stiffness, validity
-from notchflex.mechanics.section import SECTION_OF_CUT
+from notchflex.mechanics.cuts import SECTION_OF_CUT
+from notchflex.mechanics.ends import notch_stiffness, validity
+from notchflex.mechanics.ring import Side
 from reference_data import named_rows
 
 YOUNG = 60e3

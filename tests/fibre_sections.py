@@ -8,7 +8,7 @@ import numpy as np
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.mechanics.chain.assembly import with_fibres
+from notchflex.mechanics.chain import with_fibres
 from notchflex.mechanics.flexure import rod
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw
 

@@ -52,7 +52,7 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("_plot", "plotting"): _PICTURE,
     ("_plot", "plotting.axes_of_quantities"): _PICTURE,
     ("_plot", "plotting.picture"): _PICTURE,
-    ("robot.notches.arc", "mechanics.section"): (
+    ("robot.notches.arc", "mechanics.cuts"): (
         "whether lips touch at rest depends on the centroid of the section; seldom asked for"
     ),
     ("robot.robot", "robot.value_names"): "`Robot.with_values`; setting a value makes a robot",

@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from notchflex.mechanics.ends import NotchStiffness, Side, notch_stiffness
+from notchflex.mechanics.ends import NotchStiffness, notch_stiffness
+from notchflex.mechanics.ring import Side
 
 OUTER, INNER = 0.81, 0.70  # mm
 # Depths, height and uncut length, mm.

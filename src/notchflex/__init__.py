@@ -52,14 +52,8 @@ _HOME = {
         "notchflex.robot",
     ),
     "plot": "notchflex._plot",
-    **dict.fromkeys(
-        (
-            "Section",
-            "annular_sector",
-            "annular_segment",
-        ),
-        "notchflex.mechanics.section",
-    ),
+    "Section": "notchflex.mechanics.section",
+    **dict.fromkeys(("annular_sector", "annular_segment"), "notchflex.mechanics.cuts"),
     **dict.fromkeys(
         (
             "Elastica",

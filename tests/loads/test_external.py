@@ -17,8 +17,7 @@ from notchflex.loads.command import (
     is_unloaded,
 )
 from notchflex.loads.load_path import load_path
-from notchflex.mechanics.chain import assemble
-from notchflex.mechanics.chain.assembly import body_masses
+from notchflex.mechanics.chain import assemble, body_masses
 from refusals import refused
 from robots import ready
 

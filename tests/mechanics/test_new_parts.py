@@ -26,7 +26,7 @@ SCRIPT = f"""
 import json
 import numpy as np
 import notchflex as nf
-from notchflex.mechanics.chain.assembly import with_fibres
+from notchflex.mechanics.chain import with_fibres
 from notchflex.robot.value_names import number_at
 from notchflex.robot.numbers import VariedRobots
 from notchflex.mechanics.flexure import rod

@@ -7,7 +7,7 @@ import pytest
 
 import notchflex as nf
 from levels import simulate_at
-from notchflex.mechanics.section import annular_segment
+from notchflex.mechanics.cuts import annular_segment
 
 ELASTIC = nf.Linear(60_000.0, poisson_ratio=0.33)
 

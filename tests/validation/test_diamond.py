@@ -22,7 +22,7 @@ from notchflex._jax import (
     jnp,
 )
 from notchflex.mechanics.material import Fibres, FibreSection, SectionLaw, section_law
-from notchflex.mechanics.section.section import two_walls_fibres
+from notchflex.mechanics.section import two_walls_fibres
 from shared_data import measured, numbers
 
 # Places along half a strut from the point without moment, and what each stands for.

@@ -18,8 +18,7 @@ from notchflex._jax import (
     jnp,
 )
 from notchflex.errors import InputError
-from notchflex.mechanics.chain import Chain, assemble
-from notchflex.mechanics.chain.assembly import body_lengths
+from notchflex.mechanics.chain import Chain, assemble, body_lengths
 from notchflex.mechanics.contact import (
     closing_angles,
     free_angle,

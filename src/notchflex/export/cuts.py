@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from notchflex._jax import constant
 from notchflex.errors import InputError
-from notchflex.mechanics.chain.assembly import body_lengths
+from notchflex.mechanics.chain import body_lengths
 from notchflex.mechanics.tendon import passage
 from notchflex.robot import Robot, Tube
 from notchflex.robot.cuts import NotchCut, shrunk

@@ -31,54 +31,32 @@ from notchflex.robot.kinds import Notch
 
 
 class GapResponse(NamedTuple):
-    """Contacts of one kind at one flexure (mm).
+    """Contacts of one kind at one flexure (mm)."""
 
-    Attributes:
-        gap: Gap, >= 0 in a solved state.
-        wrench: Moment and force on the distal body per unit of contact force, about and along its
-            frame; its opposite acts on the anchor. None for contacts that act only on the modes.
-        slope: Change of the gap per unit of mode; None for contacts that act on bodies.
-    """
-
-    gap: Float[Array, " l"]
+    gap: Float[Array, " l"]  # Gap, >= 0 in a solved state
+    # Moment and force on the distal body per unit of contact force, about and along its frame; its
+    # opposite acts on the anchor. None for contacts that act only on the modes
     wrench: Float[Array, "l w"] | None
+    # Change of the gap per unit of mode; None for contacts that act on bodies
     slope: Float[Array, "l modes"] | None
 
 
 class ContactGroup(Pytree, ABC):
-    """Contacts of one kind. Arrays have the flexures as leading axis, then the contacts.
+    """Contacts of one kind."""
 
-    Attributes:
-        acts_on_bodies: Whether the contact is a force on bodies.
-        has_contact: 1 where a flexure has such a contact.
-        back: Number of bodies from the distal one back to the anchor.
-    """
+    # Arrays have the flexures as leading axis, then the contacts.
 
-    acts_on_bodies: ClassVar[bool]
-    has_contact: Float[Array, "*n l"]
-    back: Int[Array, "*n l"]
+    acts_on_bodies: ClassVar[bool]  # Whether the contact is a force on bodies
+    has_contact: Float[Array, "*n l"]  # 1 where a flexure has such a contact
+    back: Int[Array, "*n l"]  # Number of bodies from the distal one back to the anchor
 
     def fibre(self, rods: Rod) -> Float[Array, "*n 2"] | None:
-        """Locate the fibre along which the contact force acts, mm from the neutral axis.
-
-        Args:
-            rods: All flexures.
-
-        Returns:
-            Its position in the section; None where the force acts on bodies.
-        """
+        """Locate the fibre along which the contact force acts, mm from the neutral axis."""
         del rods
 
     @abstractmethod
     def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
-        """Compute the contacts at one flexure (of a group without its leading axis).
-
-        Args:
-            rod: The flexure.
-            flexure: Its state.
-            anchors: Pose of the distal body seen from each anchor, contacts as leading axis; None
-                where nothing acts on bodies.
-        """
+        """Compute the contacts at one flexure (of a group without its leading axis)."""
 
 
 # Contact of two rigid pieces across a slot or a triangular notch.
@@ -89,18 +67,12 @@ class ContactGroup(Pytree, ABC):
 
 
 class EdgeContact(ContactGroup):
-    """Edges on several sides of the tube.
-
-    Attributes:
-        leaves: A point of the face, in the frame of the anchor, mm.
-        enters: Edge of the distal body, in its frame, mm.
-        normal: Normal of the face, in the frame of the anchor.
-    """
+    """Edges on several sides of the tube."""
 
     acts_on_bodies = True
-    leaves: Float[Array, "*n l d"]
-    enters: Float[Array, "*n l d"]
-    normal: Float[Array, "*n l d"]
+    leaves: Float[Array, "*n l d"]  # A point of the face, in the frame of the anchor, mm
+    enters: Float[Array, "*n l d"]  # Edge of the distal body, in its frame, mm
+    normal: Float[Array, "*n l d"]  # Normal of the face, in the frame of the anchor
 
     def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
         """Compute the distance of the edge from the face, and the wrench of a unit normal force."""
@@ -138,12 +110,10 @@ class SpineContact(ContactGroup):
         return GapResponse(gap=weights @ strain, wrench=None, slope=fibre_slope(rod, weights))
 
 
-def closing_angles(rods: Rod) -> Float[np.ndarray, " n"]:
-    """Compute the elastic angle at which every notch closes, rad; infinite without a spine.
-
-    It is the amplitude of the first mode at which the fibre between the edges has zero length: for
-    an arc h / (r_o + ybar) less the precurvature.
-    """
+def closing_angles(rods: Rod) -> Float[Array, " n"]:
+    """Compute the elastic angle at which every notch closes, rad; infinite without a spine."""
+    # It is the amplitude of the first mode at which the fibre between the edges has zero length:
+    # for an arc h / (r_o + ybar) less the precurvature.
     weights = of_rod(rods, fibre_stretch(constant(rods.closure)))
     free = xp.einsum("nc,nic,ni->n", weights, rods.reference_strain, rods.length)
     slope = xp.einsum("nc,nic,ni->n", weights, xp.asarray(rods.basis)[..., 0], rods.length)
@@ -151,7 +121,7 @@ def closing_angles(rods: Rod) -> Float[np.ndarray, " n"]:
     return xp.where(spine, -free / xp.where(spine, slope, 1.0), np.inf)
 
 
-def free_angle(rods: Rod) -> Float[np.ndarray, " n"]:
+def free_angle(rods: Rod) -> Float[Array, " n"]:
     """Return the precurvature of every notch with a spine, rad."""
     bending = xp.asarray(in_space(rods.reference_strain))[..., 1]
     return xp.einsum("ni,ni->n", rods.length, bending)
@@ -163,14 +133,7 @@ def free_angle(rods: Rod) -> Float[np.ndarray, " n"]:
 def build_contacts(
     notches: Sequence[Notch], tube: Tube, rods: Rod, body_length: Float[Array, " bodies"]
 ) -> tuple[ContactGroup, ...]:
-    """Build the contacts of every kind that the notches have.
-
-    Args:
-        notches: Every notch, base to tip.
-        tube: The tube, whose outer edges meet.
-        rods: All flexures of the chain.
-        body_length: Length of the rigid pieces on the tube axis, base first, mm.
-    """
+    """Build the contacts of every kind that the notches have."""
     groups: list[ContactGroup] = []
     if decide(xp.any(rods.has_closure)):
         has_contact = rods.has_closure[:, None]
@@ -185,7 +148,7 @@ def build_contacts(
         count = int(line.on_side.sum(axis=1).max(initial=1.0))
         chosen = xp.argsort(-line.on_side, axis=1, kind="stable")[:, :count]
 
-        def own(values: np.ndarray) -> np.ndarray:
+        def own(values: Array) -> Array:
             index = chosen.reshape(*chosen.shape, *(1,) * (values.ndim - 2))
             return xp.take_along_axis(values, index, axis=1)
 
@@ -203,10 +166,8 @@ def build_contacts(
 
 
 def _sides(notches: Sequence[Notch]) -> list[float]:
-    """List the sides on which a notch without a spine opens the wall, once each but for rounding.
-
-    Two edges on one side would share the force that presses there, in no determined way.
-    """
+    """List the sides on which notches without a spine open the wall, deg, each once."""
+    # Two edges on one side would share the force that presses there, in no determined way.
     neighbours, sides = [None, *notches, None], list[float]()
     for before, notch, after in zip(neighbours, neighbours[1:], neighbours[2:], strict=False):
         for opening in () if notch is None else notch.openings(before, after):

@@ -58,10 +58,8 @@ class Motion(NamedTuple):
         return _times(self.rotation.T, (outside - self.translation).T).T
 
     def wrench(self, inside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
-        """Transform a wrench (moment, force) from the inner to the outer frame.
-
-        This and the two methods below also accept many, as columns.
-        """
+        """Transform a wrench (moment, force) from the inner to the outer frame."""
+        # This and the two methods below also accept many, as columns.
         axes = angular(inside)
         force = _times(self.rotation, inside[axes:])
         moment = turned(self.rotation, inside[:axes]) + moment_of(self.translation, force)
@@ -85,11 +83,9 @@ class Motion(NamedTuple):
 
 
 def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[Array, "d ..."]:
-    """Multiply by a vector or by columns.
-
-    In compiled code the product is written out, so that it fuses with its surroundings: for such
-    small matrices the overhead of a separate product exceeds its cost.
-    """
+    """Multiply by a vector or by columns."""
+    # In compiled code the product is written out, so that it fuses with its surroundings: for such
+    # small matrices the overhead of a separate product exceeds its cost.
     if not is_traced((matrix, other)):
         return matrix @ other
     every = matrix.reshape(*matrix.shape, *(1,) * (other.ndim - 1))
@@ -114,10 +110,8 @@ def turned(rotation: Float[Array, "d d"], axis: Float[Array, "a ..."]) -> Float[
 
 
 def skew(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
-    """Return the matrix of the cross product with an angular vector: `skew(a) @ b = a x b`.
-
-    In space it accepts many vectors.
-    """
+    """Return the matrix of the cross product with an angular vector: `skew(a) @ b = a x b`."""
+    # In space it accepts many vectors.
     if vector.shape[-1] == 1:
         return vector[0] * _TURN
     x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
@@ -127,10 +121,8 @@ def skew(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
 
 
 def cross(first: Float[Array, "a ..."], second: Float[Array, "d ..."]) -> Float[Array, "d ..."]:
-    """Compute the cross product of an angular vector and a linear one (in space, of any two).
-
-    Written out it compiles and runs faster than as a matrix.
-    """
+    """Compute the cross product of an angular vector and a linear one (in space, of any two)."""
+    # Written out it compiles and runs faster than as a matrix.
     if first.shape[0] == 1:
         return xp.stack([first[0] * second[1], -first[0] * second[0]])
     (a, b, c), (x, y, z) = first, second
@@ -175,11 +167,9 @@ def _polynomial(coefficients: list[float], at: Float[Array, ""]) -> Float[Array,
 
 
 def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
-    """Compute sine and cosine to rounding accuracy.
-
-    In compiled code this is several times as fast as the scalar C library. The angle is reduced to
-    half a turn, a quarter of it is put into the series, and the result is doubled twice.
-    """
+    """Compute sine and cosine to rounding accuracy."""
+    # In compiled code this is several times as fast as the scalar C library. The angle is reduced
+    # to half a turn, a quarter of it is put into the series, and the result is doubled twice.
     if not is_traced(angle):
         return cast("tuple[Array, Array]", (xp.sin(angle), xp.cos(angle)))
     quarter = 0.25 * (angle - _WHOLE_TURN * jnp.round(angle / _WHOLE_TURN))
@@ -201,10 +191,8 @@ def wrench_at(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Arr
 
 
 def wrench_turn(wrench: Float[Array, " w"]) -> Float[Array, "w w"]:
-    """Differentiate a wrench that moves with a frame by the twist of the frame.
-
-    With moment m and force f, a twist (omega, v) changes it by (omega x m + v x f, omega x f).
-    """
+    """Differentiate a wrench that moves with a frame by the twist of the frame."""
+    # With moment m and force f, a twist (omega, v) changes it by (omega x m + v x f, omega x f).
     axes = angular(wrench)
     units = constant(xp.eye(len(wrench)))
     moment, force = wrench[:axes], wrench[axes:]
@@ -219,10 +207,8 @@ def wrench_turn(wrench: Float[Array, " w"]) -> Float[Array, "w w"]:
 
 
 def outer_twists(motion: Motion, twists: Float[Array, "*n 6 k"]) -> Float[Array, "*n 6 k"]:
-    """Transform twists, as columns, from the inner to the outer frame; in space, of many motions.
-
-    For NumPy arrays only.
-    """
+    """Transform twists, as columns, to the outer frame; in space, of many motions."""
+    # For NumPy arrays only.
     turn = motion.rotation @ twists[..., :3, :]
     offset = motion.translation[..., None]
     moved = motion.rotation @ twists[..., 3:, :] + xp.cross(offset, turn, axis=-2)
@@ -249,11 +235,9 @@ def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
 def left_slope_change(
     vector: Float[Array, " 3"], constant_vector: Float[Array, " 3"]
 ) -> Float[Array, "3 3"]:
-    """Differentiate `left_slope(vector).T @ constant_vector` by the rotation vector.
-
-    With a the constant vector the product is a - b (v x a) + c v x (v x a), with coefficients b and
-    c of |v|^2.
-    """
+    """Differentiate `left_slope(vector).T @ constant_vector` by the rotation vector."""
+    # With a the constant vector the product is a - b (v x a) + c v x (v x a), with coefficients b
+    # and c of |v|^2.
     squared = vector @ vector
     (_, second, third), (_, by_second, by_third) = jax.jvp(
         _coefficients, (squared,), (jnp.ones_like(squared),)

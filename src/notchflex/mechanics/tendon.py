@@ -35,49 +35,34 @@ from notchflex.robot.kinds import (
 
 
 class Crossing(NamedTuple):
-    """A group of t tendons over one gap (mm, rad).
+    """A group of t tendons over one gap (mm, rad)."""
 
-    Attributes:
-        length: Length of the way across the gap.
-        exit_turning: Turning angle at the edge of the body before, >= 0.
-        entry_turning: Turning angle at the edge of the distal body, >= 0.
-        wrench: Moment and force on the distal body per unit of the span's tension, reversed,
-            about and along its frame; its opposite acts on the anchor. None for a group that does
-            not act on bodies.
-        slope: Change of the length per unit of mode; None for a group that acts on bodies.
-    """
-
-    length: Float[Array, " t"]
-    exit_turning: Float[Array, " t"]
-    entry_turning: Float[Array, " t"]
+    length: Float[Array, " t"]  # Length of the way across the gap
+    exit_turning: Float[Array, " t"]  # Turning angle at the edge of the body before, >= 0
+    entry_turning: Float[Array, " t"]  # Turning angle at the edge of the distal body, >= 0
+    # Moment and force on the distal body per unit of the span's tension, reversed, about and along
+    # its frame; its opposite acts on the anchor. None for a group that does not act on bodies
     wrench: Float[Array, "t w"] | None
+    # Change of the length per unit of mode; None for a group that acts on bodies
     slope: Float[Array, "t modes"] | None
 
 
 class TendonGroup(Pytree, ABC):
-    """Tendons of one kind of path. Arrays carry the flexures as leading axis, then the tendons.
+    """Tendons of one kind of path."""
 
-    Attributes:
-        acts_on_bodies: Whether its pull is a force on the bodies (and poses are needed), or
-            acts on the modes of each flexure alone.
-        by_modes: Whether its way depends on the modes of the flexure, beside the bodies' poses.
-        numbers: Which tendons of the robot these are, from 0.
-        present: 1 where the tendon crosses this gap.
-        visits: 1 where it passes through (or ends in) the distal body.
-        ends: 1 where it is fixed in the distal body.
-        back: How many bodies before the distal one its anchor is, 1 where it skips none.
-        body_length: Length of tendon inside the distal body.
-        natural_gap: Length of its way across the gap in the free robot.
-    """
+    # Arrays carry the flexures as leading axis, then the tendons.
 
+    # Whether its pull is a force on the bodies (and poses are needed), or acts on the modes of each
+    # flexure alone
     acts_on_bodies: ClassVar[bool]
-    numbers: tuple[int, ...] = static()
-    present: Float[Array, "*n t"]
-    visits: Float[Array, "*n t"]
-    ends: Float[Array, "*n t"]
+    numbers: tuple[int, ...] = static()  # Which tendons of the robot these are, from 0
+    present: Float[Array, "*n t"]  # 1 where the tendon crosses this gap
+    visits: Float[Array, "*n t"]  # 1 where it passes through (or ends in) the distal body
+    ends: Float[Array, "*n t"]  # 1 where it is fixed in the distal body
+    # How many bodies before the distal one its anchor is, 1 where it skips none
     back: Int[Array, "*n t"]
-    body_length: Float[Array, "*n t"]
-    natural_gap: Float[Array, "*n t"]
+    body_length: Float[Array, "*n t"]  # Length of tendon inside the distal body
+    natural_gap: Float[Array, "*n t"]  # Length of its way across the gap in the free robot
 
     @property
     def by_modes(self) -> bool:
@@ -91,22 +76,13 @@ class TendonGroup(Pytree, ABC):
 
     @property
     def fibre(self) -> Float[Array, "*n t 2"] | None:
-        """Where the tendon crosses a rod's section, mm from its neutral axis.
-
-        None for a tendon that does not run along the rod, as a fibre of it.
-        """
+        """Where the tendon crosses a rod's section, mm from its neutral axis."""
+        # None for a tendon that does not run along the rod, as a fibre of it.
         return None
 
     @abstractmethod
     def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
-        """Cross one gap (of a group without its leading axis).
-
-        Args:
-            rod: The flexure.
-            flexure: Its state.
-            anchors: Pose of the distal body seen from every tendon's anchor, tendons as leading
-                axis; None where nothing acts on bodies.
-        """
+        """Cross one gap (of a group without its leading axis)."""
 
 
 def guarded_norm(
@@ -114,13 +90,7 @@ def guarded_norm(
     slope: Float[Array, "*s d"] | None = None,
     rounding: float = 0.0,
 ) -> Float[Array, "*s"]:
-    """Return the length of vectors, with a stated derivative where it is 0.
-
-    Args:
-        vector: The vectors.
-        slope: Derivative of the length by a vector that is 0; 0 where not given.
-        rounding: Up to this length a vector has the stated derivative.
-    """
+    """Return the length of vectors, with a stated derivative where it is 0."""
     squared = jnp.sum(vector * vector, axis=-1)
     zero = squared == 0.0
     length = jnp.where(zero, 0.0, jnp.sqrt(jnp.where(zero, 1.0, squared)))
@@ -151,25 +121,18 @@ _ROUNDING = 1e-15
 
 
 class Straight(TendonGroup):
-    """Tendons straight across the gaps.
-
-    Attributes:
-        leaves: Where the tendon leaves its anchor, in the anchor's frame, mm.
-        enters: Where it enters the distal body, in that body's frame, mm.
-        along: Unit direction of its channels, in the frames of the bodies.
-        pulls: Along what it pulls: the "gap", or the channel of the body before ("dead") or
-            behind ("follower").
-        turns_with_chord: Whether it turns at the distal body by the turn of the flexure's chord
-            rather than that of the body (the reading of Liu 2022), behind a strip; other notches
-            have no chord.
-    """
+    """Tendons straight across the gaps."""
 
     acts_on_bodies = True
 
-    leaves: Float[Array, "*n t d"]
-    enters: Float[Array, "*n t d"]
-    along: Float[Array, "*n t d"]
+    leaves: Float[Array, "*n t d"]  # Where the tendon leaves its anchor, in the anchor's frame, mm
+    enters: Float[Array, "*n t d"]  # Where it enters the distal body, in that body's frame, mm
+    along: Float[Array, "*n t d"]  # Unit direction of its channels, in the frames of the bodies
+    # Along what it pulls: the "gap", or the channel of the body before ("dead") or behind
+    # ("follower")
     pulls: str = static()
+    # Whether it turns at the distal body by the turn of the flexure's chord rather than that of the
+    # body (the reading of Liu 2022), behind a strip; other notches have no chord
     turns_with_chord: bool = static()
 
     @property
@@ -211,17 +174,10 @@ class Straight(TendonGroup):
 def turning(
     before: Float[Array, " d"], after: Float[Array, " d"], axis: Float[Array, " a"]
 ) -> Float[Array, ""]:
-    """Return the angle between two unit directions, exact for small angles.
-
-    A straight tendon turns with any rotation, to whichever side; its slope here is that of the
-    rotation that its own pull causes. With it the first step from rest knows the friction.
-    A span without length has no direction (its vector is 0) and turns nothing, with slope 0.
-
-    Args:
-        before: The one direction.
-        after: The other.
-        axis: Unit axis about which a pull turns the distal body; 0 where it turns nothing.
-    """
+    """Return the angle between two unit directions, exact for small angles."""
+    # A straight tendon turns with any rotation, to whichever side; its slope here is that of the
+    # rotation that its own pull causes. With it the first step from rest knows the friction. A span
+    # without length has no direction (its vector is 0) and turns nothing, with slope 0.
     across, cosine = moment_of(before, after), jnp.sum(before * after)
     nowhere = jnp.all(across == 0.0) & (cosine == 0.0)
     sine = guarded_norm(across, jnp.where(nowhere, 0.0, axis), _ROUNDING)
@@ -236,14 +192,11 @@ def turning(
 
 
 class WallArc(TendonGroup):
-    """Tendons along the wall.
-
-    Attributes:
-        across: Where the tendon crosses the rod's section, from the neutral axis, mm.
-    """
+    """Tendons along the wall."""
 
     acts_on_bodies = False
 
+    # Where the tendon crosses the rod's section, from the neutral axis, mm
     across: Float[Array, "*n t 2"]
 
     @property
@@ -283,26 +236,16 @@ class WallArc(TendonGroup):
 
 
 class Passage(NamedTuple):
-    """One line along the wall over n flexures (mm, in the frames of the bodies behind them).
+    """One line along the wall over n flexures (mm, in the frames of the bodies behind them)."""
 
-    Attributes:
-        visits: 1 where the body behind the flexure has wall on that side.
-        on_side: 1 where the opening is on that very side, not all round.
-        back: How many bodies before that one it visited the last one, its anchor; 1 where it does
-            not visit.
-        left: Where it left the anchor, along the tube in the anchor's frame.
-        enters: Where the line enters that body, along the tube.
-        leaves: Where it leaves that body again.
-        base_leaves: Where it leaves the base.
-    """
-
-    visits: Float[np.ndarray, " n"]
-    on_side: Float[np.ndarray, " n"]
-    back: Int[np.ndarray, " n"]
-    left: Float[Array, " n"]
-    enters: Float[Array, " n"]
-    leaves: Float[Array, " n"]
-    base_leaves: Float[Array, ""]
+    visits: Float[Array, " n"]  # 1 where the body behind the flexure has wall on that side
+    on_side: Float[Array, " n"]  # 1 where the opening is on that very side, not all round
+    # How many bodies before that one it visited the last one, its anchor; 1 where it does not visit
+    back: Int[Array, " n"]
+    left: Float[Array, " n"]  # Where it left the anchor, along the tube in the anchor's frame
+    enters: Float[Array, " n"]  # Where the line enters that body, along the tube
+    leaves: Float[Array, " n"]  # Where it leaves that body again
+    base_leaves: Float[Array, ""]  # Where it leaves the base
 
 
 def passage(
@@ -312,16 +255,7 @@ def passage(
     outer_radius: float = 0.0,
     radius: float | None = None,
 ) -> Passage:
-    """Follow a line along the wall.
-
-    Args:
-        notches: Every notch, base to tip.
-        body_length: Length of the rigid pieces on the tube axis, base first, mm.
-        direction_deg: Side of the tube.
-        outer_radius: Outer radius of the tube, mm, for a line inside the wall.
-        radius: Distance of the line from the tube axis, mm; None for one on the outer surface, in
-            the middle of the openings.
-    """
+    """Follow a line along the wall."""
     count = len(notches)
     visits, on_side, back = xp.zeros(count), xp.zeros(count), xp.ones(count, int)
     left: list[Any] = [0.0] * count
@@ -363,45 +297,28 @@ _PULLS = {"straight": "gap", "straight-dead": "dead", "straight-follower": "foll
 
 
 class RoutingContext(NamedTuple):
-    """What tendons are laid through.
+    """What tendons are laid through."""
 
-    Attributes:
-        notches: Every notch, base to tip.
-        outer_radius: Outer radius of the tube, mm.
-        rods: All flexures of the chain.
-        free: Relative poses of all flexures in the free robot.
-        body_length: Length of the rigid pieces on the tube axis, base first, mm.
-        turns_with_chord: Whether tendons turn with the chords of the flexures.
-    """
-
-    notches: Sequence[Notch]
-    outer_radius: float
-    rods: Rod
-    free: Motion
+    notches: Sequence[Notch]  # Every notch, base to tip
+    outer_radius: float  # Outer radius of the tube, mm
+    rods: Rod  # All flexures of the chain
+    free: Motion  # Relative poses of all flexures in the free robot
+    # Length of the rigid pieces on the tube axis, base first, mm
     body_length: Float[Array, " bodies"]
-    turns_with_chord: bool
+    turns_with_chord: bool  # Whether tendons turn with the chords of the flexures
 
 
 class RoutedTendons(NamedTuple):
-    """Tendons laid through a robot.
+    """Tendons laid through a robot."""
 
-    Attributes:
-        groups: One group per kind of path in use.
-        place: Where every tendon crosses a section of the tube, mm from its axis.
-        base_length: Length of every tendon inside the base, mm.
-    """
-
-    groups: tuple[TendonGroup, ...]
+    groups: tuple[TendonGroup, ...]  # One group per kind of path in use
+    # Where every tendon crosses a section of the tube, mm from its axis
     place: Float[Array, "t 3"]
-    base_length: Float[Array, " t"]
+    base_length: Float[Array, " t"]  # Length of every tendon inside the base, mm
 
 
 def route(tendons: Sequence[Tendon], ground: RoutingContext) -> RoutedTendons:
-    """Group the tendons by the way they run and lay them through the chain.
-
-    Raises:
-        InputError: A tendon ends in a body that has no wall on its side.
-    """
+    """Group the tendons by the way they run and lay them through the chain."""
     line = passages(
         ground.notches,
         ground.body_length,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from notchflex.mechanics.ends import Side, notch_stiffness
+from notchflex.mechanics.ends import notch_stiffness
+from notchflex.mechanics.ring import Side
 
 NUMBERS = np.array([0.81, 0.70, 1.4, 0.8, 0.33, 1.2, 1.0])
 

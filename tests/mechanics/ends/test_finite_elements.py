@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fem_notches import YOUNG, chain_bending, moments, other_directions, single_notch
-from notchflex.mechanics.ends import Side, notch_stiffness, validity
-from notchflex.mechanics.section import SECTION_OF_CUT
+from notchflex.mechanics.cuts import SECTION_OF_CUT
+from notchflex.mechanics.ends import notch_stiffness, validity
+from notchflex.mechanics.ring import Side
 
 
 def judge(margin, what, error, rms, largest):

@@ -5,20 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from notchflex.mechanics.ends import (
-    Side,
-    notch_stiffness,
-    ring,
-)
-from notchflex.mechanics.ends import (
-    effective_notch as flattening,
-)
-from notchflex.mechanics.ends.ring import (
-    arc_harmonics,
-    arc_of,
-    end_compliance,
-)
-from notchflex.mechanics.section import SECTION_OF_CUT
+from notchflex.mechanics import ends as flattening
+from notchflex.mechanics import ring
+from notchflex.mechanics.cuts import SECTION_OF_CUT
+from notchflex.mechanics.ends import notch_stiffness
+from notchflex.mechanics.ring import Side, arc_harmonics, arc_of, end_compliance
 from reference_data import named_rows
 
 BOUNDARIES = {"sym": "between", "clamp": "clamped", "free": "free"}

@@ -4,16 +4,9 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.mechanics.ends import Side
-from notchflex.mechanics.ends.effective_notch import (
-    notch_stiffness,
-    reach_of,
-)
-from notchflex.mechanics.ends.ring import (
-    arc_of,
-    end_compliance,
-)
-from notchflex.mechanics.section import annular_sector
+from notchflex.mechanics.cuts import annular_sector
+from notchflex.mechanics.ends import notch_stiffness, reach_of
+from notchflex.mechanics.ring import Side, arc_of, end_compliance
 
 LENGTHS = (10.0, 20.0, 100.0, 1e3, 1e4, 1e5, 1e6)
 

@@ -11,14 +11,10 @@ from scipy.linalg import null_space
 
 from lanewise import Program, lower, machine_code
 from notchflex._arrays import Decisions, xp
-from notchflex.mechanics.ends import (
-    Side,
-    ring,
-)
-from notchflex.mechanics.ends import (
-    ring as edge_loads,
-)
-from notchflex.mechanics.section import annular_sector
+from notchflex.mechanics import ring
+from notchflex.mechanics import ring as edge_loads
+from notchflex.mechanics.cuts import annular_sector
+from notchflex.mechanics.ring import Side
 
 BOUNDARIES = ("between", "clamped", "free")
 DEGREE = 18

@@ -10,11 +10,11 @@ from scipy.integrate import cumulative_simpson
 import notchflex as nf
 from notchflex._jax import jax
 from notchflex.mechanics.contact import SpineContact
+from notchflex.mechanics.cuts import SECTION_OF_CUT
 from notchflex.mechanics.flexure import Rod, fibre_stretch, relative_pose, rod, with_level
 from notchflex.mechanics.flexure import flexure_state as plain_flexure_state
 from notchflex.mechanics.material import section_law
 from notchflex.mechanics.motion import Motion
-from notchflex.mechanics.section import SECTION_OF_CUT
 from twists import exponential
 
 flexure_state = jax.jit(plain_flexure_state, static_argnames="with_pose")

@@ -7,7 +7,7 @@ import pytest
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.mechanics.chain.assembly import (
+from notchflex.mechanics.chain import (
     flexure,
     with_fibres,
 )

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.mechanics.ends import Side
 from notchflex.mechanics.flexure import Site, rod
 from notchflex.mechanics.flexure.roots import (
     ROUND,
@@ -16,6 +15,7 @@ from notchflex.mechanics.flexure.roots import (
     with_sideways,
 )
 from notchflex.mechanics.material import FibreSection, NotchEnds, section_law
+from notchflex.mechanics.ring import Side
 
 LENGTH = np.array([0.2, 0.5, 0.7, 0.3])
 ON_WALL = np.array([True, False, False, True])

@@ -10,8 +10,9 @@ import pytest
 import notchflex as nf
 from fem_wrists import LINEAR, rigid, sideways, wrist
 from notchflex.mechanics.chain import sites_of, unchecked_dimensions
-from notchflex.mechanics.ends import Side, notch_stiffness
-from notchflex.mechanics.section import SECTION_OF_CUT
+from notchflex.mechanics.cuts import SECTION_OF_CUT
+from notchflex.mechanics.ends import notch_stiffness
+from notchflex.mechanics.ring import Side
 
 
 def test_sites_from_base_to_tip():

@@ -12,14 +12,9 @@ from scipy.optimize import brentq
 
 import notchflex as nf
 from fibre_sections import ENDS, bending, energy, fine_fibres, moment, respond, section
+from notchflex.mechanics.cuts import sector_fibres, segment_fibres
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
-from notchflex.mechanics.section.section import (
-    FIBRES,
-    Points,
-    gauss_rule,
-    sector_fibres,
-    segment_fibres,
-)
+from notchflex.mechanics.section import FIBRES, Points, gauss_rule
 from refusals import refused
 
 STRAIGHT = dataclasses.replace(ENDS, odd=0.0, even=0.0)

@@ -13,10 +13,7 @@ import notchflex as nf
 from fibre_sections import ENDS, PLAIN, bending, energy, fine_fibres, moment, respond, section
 from notchflex._jax import jax
 from notchflex.mechanics.material import Fibres, section_law
-from notchflex.mechanics.section.section import (
-    FIBRES,
-    two_walls_fibres,
-)
+from notchflex.mechanics.section import FIBRES, two_walls_fibres
 from notchflex.robot import robot_from_text, robot_text
 from refusals import refused
 

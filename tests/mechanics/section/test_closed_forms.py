@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from notchflex.mechanics.section import Section, annular_sector, annular_segment
+from notchflex.mechanics.cuts import annular_sector, annular_segment
+from notchflex.mechanics.section import Section
 from oracles import section_quadrature
 from reference_data import reference
 from shared_data import measured

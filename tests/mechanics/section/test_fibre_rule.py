@@ -10,14 +10,8 @@ from numpy.polynomial import legendre
 
 from lanewise import Program, lower, machine_code
 from notchflex._arrays import Decisions
-from notchflex.mechanics.section.section import (
-    FIBRES,
-    cut_fibres,
-    gauss_rule,
-    sector_fibres,
-    segment_fibres,
-    two_walls_fibres,
-)
+from notchflex.mechanics.cuts import cut_fibres, sector_fibres, segment_fibres
+from notchflex.mechanics.section import FIBRES, gauss_rule, two_walls_fibres
 
 STRIPS = {"on-axis": sector_fibres, "off-axis": segment_fibres}
 COUNTS = [FIBRES * refined for refined in (1, 2, 3, 4)]

@@ -11,7 +11,8 @@ from notchflex._jax import (
     jax,
     jnp,
 )
-from notchflex.mechanics.section import Section, annular_sector, annular_segment
+from notchflex.mechanics.cuts import annular_sector, annular_segment
+from notchflex.mechanics.section import Section
 
 SECTIONS = {"on-axis": annular_sector, "off-axis": annular_segment}
 TUBES = [(0.81, 0.70), (1.0, 0.25), (1.0, 0.5), (1.0, 0.97), (1.0, 0.995)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from notchflex.mechanics.section import annular_sector, annular_segment
+from notchflex.mechanics.cuts import annular_sector, annular_segment
 from oracles.section_analysis import torsions
 
 SECTIONS = {"on-axis": annular_sector, "off-axis": annular_segment}

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from notchflex.mechanics.section import clamped_torsion_constant, two_walls
-from notchflex.mechanics.section.section import rectangle_torsion_constant
+from notchflex.mechanics.section import (
+    clamped_torsion_constant,
+    rectangle_torsion_constant,
+    two_walls,
+)
 
 SHAPES = [(2.0, 1.5, 4.0), (1.0, 0.7, 2.5), (0.3, 2.0, 1.0), (1.0, 1.0, 0.5)]
 

@@ -40,7 +40,7 @@ from notchflex.designing.model.variables import (
 from notchflex.designing.specification import TargetCurve
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
-from notchflex.mechanics.chain.assembly import body_lengths
+from notchflex.mechanics.chain import body_lengths
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import numbers_at

@@ -27,8 +27,7 @@ from notchflex.analysis.kinematics import (
 from notchflex.analysis.tangent import Change
 from notchflex.designing.specification import TargetCurve
 from notchflex.loads import LoadPath
-from notchflex.mechanics.chain import assemble
-from notchflex.mechanics.chain.assembly import body_lengths
+from notchflex.mechanics.chain import assemble, body_lengths
 from notchflex.mechanics.contact import (
     closing_angles,
     free_angle,

@@ -17,8 +17,7 @@ from notchflex.export.finite_elements.meshes import TubeMesh, check_shape, mesh_
 from notchflex.export.formats import DeckOptions, Document, Subject
 from notchflex.loads import pull
 from notchflex.loads.load import NOTHING
-from notchflex.mechanics.chain import unchecked_dimensions
-from notchflex.mechanics.chain.assembly import body_lengths
+from notchflex.mechanics.chain import body_lengths, unchecked_dimensions
 from notchflex.results import EquilibriumPath
 from notchflex.results.state import robot_digest
 from notchflex.robot import ArcNotch, Linear, Nitinol, Robot, StressStrain, Superelastic

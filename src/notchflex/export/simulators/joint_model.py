@@ -25,8 +25,7 @@ from notchflex.errors import InputError
 from notchflex.export.cuts import Hole, tendon_holes
 from notchflex.loads import pull
 from notchflex.loads.load import check_number
-from notchflex.mechanics.chain import assemble
-from notchflex.mechanics.chain.assembly import body_lengths
+from notchflex.mechanics.chain import assemble, body_lengths
 from notchflex.mechanics.contact import closing_angles
 from notchflex.robot import Robot
 

@@ -19,6 +19,7 @@ import dataclasses
 
 from notchflex._arrays import cached, plain_number, xp
 from notchflex._jax import constant
+from notchflex.mechanics.cuts import SECTION_OF_CUT, cut_fibres
 from notchflex.mechanics.ends import NotchStiffness, notch_stiffness, validity
 from notchflex.mechanics.flexure.notch_rod import (
     STRAIGHT,
@@ -37,11 +38,7 @@ from notchflex.mechanics.flexure.rod import (
 )
 from notchflex.mechanics.flexure.rod_kinematics import rod_quadrature
 from notchflex.mechanics.material import NotchEnds
-from notchflex.mechanics.section import SECTION_OF_CUT, Section
-from notchflex.mechanics.section.section import (
-    FibresAt,
-    cut_fibres,
-)
+from notchflex.mechanics.section import FibresAt, Section
 from notchflex.robot import ArcNotch, Tube
 
 # Part of the end compliance that follows the material beyond its elastic limit (finite elements).
@@ -95,12 +92,7 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
 def _ends(
     stiffness: NotchStiffness, height: float, cut: Section, poisson_ratio: float
 ) -> tuple[NotchEnds, tuple[float, float]]:
-    """Refer the effective lengths and the softening to the arc, over which they are spread.
-
-    Returns:
-        The ends, and the shift of the rings in the plane and sideways, mm, under the force whose
-        moment has the curvature P_1(s)/h.
-    """
+    """Refer the effective lengths and the softening to the arc, over which they are spread."""
     bending = (stiffness.weak, stiffness.strong)
     seconds = (plain_number(cut.second_moment_weak), plain_number(cut.second_moment_strong))
     # Beyond what the linear part of the bending gives: h^2 l/(12 I).

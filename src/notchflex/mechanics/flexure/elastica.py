@@ -156,11 +156,9 @@ def _tangent(slope: np.ndarray, clamp: np.ndarray, rest: np.ndarray) -> np.ndarr
 
 
 def _slope_for(scaled: np.ndarray, clamp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the slope of the free end, and π - ω there, for a given λ and ω(L).
-
-    λ = F(am(λ), k) rises with the slope from 0 to infinity. The unknown is the logit of the slope
-    over its range, so that both ends keep their relative precision.
-    """
+    """Find the slope of the free end, and π - ω there, for a given λ and ω(L)."""
+    # λ = F(am(λ), k) rises with the slope from 0 to infinity. The unknown is the logit of the slope
+    # over its range, so that both ends keep their relative precision.
     from scipy.optimize import elementwise
     from scipy.special import elliprf, expit
 

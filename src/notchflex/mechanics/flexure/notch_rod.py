@@ -49,7 +49,7 @@ class NeutralAxis(NamedTuple):
     start: Motion
     end: Motion
     curve: Motion | None = None
-    strain: Float[np.ndarray, "every 6"] | None = None
+    strain: Float[Array, "every 6"] | None = None
 
 
 class StrainModes(NamedTuple):
@@ -61,7 +61,7 @@ class StrainModes(NamedTuple):
             bending (about y), and for loads in space (all).
     """
 
-    basis: Float[np.ndarray, "every 6 modes"]
+    basis: Float[Array, "every 6 modes"]
     levels: tuple[int, int, int]
 
 
@@ -217,36 +217,20 @@ _X, _Y, _Z = xp.eye(3)
 
 def wrench_modes(
     poses: Motion,
-    part: Float[np.ndarray, " nodes"],
-    length: Float[np.ndarray, " nodes"],
+    part: Float[Array, " nodes"],
+    length: Float[Array, " nodes"],
     section: FibreSection,
-    middle: Float[np.ndarray, " 3"],
+    middle: Float[Array, " 3"],
     moment_modes: int,
     force_modes: int,
     poisson_ratio: float,
-) -> Float[np.ndarray, "nodes 6 modes"]:
-    """Compute the modes of a rod in the x-z plane, those out of the plane last.
-
-    In the plane the moment about y is constant, or goes with a lever along x or z, and from the
-    fourth mode on with the Legendre polynomials P_2, P_3 ... of arc length (P_1 is nearly a
-    lever); then come forces along x and along z, times P_0, P_1 ... in pairs. Out of the plane
-    come a constant moment about x, one about z and the moment of a sideways force at the middle,
-    then moments about x and z times P_2, P_3 ... as far as in the plane, and that force.
-
-    Args:
-        poses: Pose of the free rod at every node, base to tip, as leading axis.
-        part: Position of every node along the rod, from -1 to 1.
-        length: Quadrature weight of each node, mm.
-        section: Its section at every node, with the shear centre in the centroid.
-        middle: Point from which levers are counted, mm.
-        moment_modes: Modes of the moment in the plane, 3 or more.
-        force_modes: Pairs of modes of the force in the plane.
-        poisson_ratio: For the ratio of the moduli.
-
-    Returns:
-        Strain at each node per unit of mode, which is about 1 rad of the end for a moment, and a
-        mean strain of 1 for a force.
-    """
+) -> Float[Array, "nodes 6 modes"]:
+    """Compute the modes of a rod in the x-z plane, those out of the plane last."""
+    # In the plane the moment about y is constant, or goes with a lever along x or z, and from the
+    # fourth mode on with the Legendre polynomials P_2, P_3 ... of arc length (P_1 is nearly a
+    # lever); then come forces along x and along z, times P_0, P_1 ... in pairs. Out of the plane
+    # come a constant moment about x, one about z and the moment of a sideways force at the middle,
+    # then moments about x and z times P_2, P_3 ... as far as in the plane, and that force.
     whole = length.sum()
     rotation, lever = poses.rotation, poses.translation - middle
     reach = xp.abs(lever).max(axis=0)
@@ -278,8 +262,8 @@ def wrench_modes(
 
 
 def _strains(
-    section: FibreSection, poisson_ratio: float, resultants: Float[np.ndarray, "nodes modes 6"]
-) -> Float[np.ndarray, "nodes modes 6"]:
+    section: FibreSection, poisson_ratio: float, resultants: Float[Array, "nodes modes 6"]
+) -> Float[Array, "nodes modes 6"]:
     """Compute strains by resultants, times Young's modulus."""
     compliance = _compliance(section, poisson_ratio)[:, None]
     strain = compliance * resultants
@@ -294,7 +278,7 @@ def _strains(
     return xp.stack([about_x, strain[..., 1], twist, *xp.moveaxis(strain[..., 3:], -1, 0)], axis=-1)
 
 
-def _compliance(section: FibreSection, poisson_ratio: float) -> Float[np.ndarray, "nodes 6"]:
+def _compliance(section: FibreSection, poisson_ratio: float) -> Float[Array, "nodes 6"]:
     """Compute strains per resultant, times Young's modulus."""
     ratio = 2.0 * (1.0 + poisson_ratio)  # E / G
     stiffness = [

@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
-import numpy as np
 from jaxtyping import Array, Float, Int
 
 from notchflex._arrays import decide, xp
@@ -27,11 +26,11 @@ from notchflex._jax import (
     static,
 )
 from notchflex._packages import unregistered
-from notchflex.mechanics.ends import Side
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.material.law import FibreSection
 from notchflex.mechanics.motion import IN_PLANE, PLANE
-from notchflex.mechanics.section.section import FibresAt
+from notchflex.mechanics.ring import Side
+from notchflex.mechanics.section import FibresAt
 from notchflex.robot import Tube
 
 _TWISTS = ("reference_strain", "basis")
@@ -110,16 +109,8 @@ class Rod(Pytree):
         return self.basis.shape[-1]
 
 
-def flattened(rods: Rod, frame: Float[np.ndarray, "3 3"]) -> Rod:
-    """Reduce spatial rods to the plane that their robot stays in.
-
-    Args:
-        rods: All flexures of a chain, with no modes that leave the plane.
-        frame: Rotation from a frame whose x and z span the plane to that of the bodies.
-
-    Returns:
-        The rods with twists of three components and points of two, in that frame.
-    """
+def flattened(rods: Rod, frame: Float[Array, "3 3"]) -> Rod:
+    """Reduce spatial rods to the plane that their robot stays in."""
     turned = {
         "start_rotation": frame.T @ rods.start_rotation,
         "start_offset": rods.start_offset @ frame,
@@ -280,14 +271,8 @@ def rod(notch: Any, tube: Tube, refinement: int = 0, site: Site | None = None) -
 
 
 def rod_at(site: Site | None, notch: Any, tube: Tube, refinement: int = 0) -> Rod:
-    """Make the rod of a notch where it stands; kinds whose ends are rigid need not know of sites.
-
-    Args:
-        site: What surrounds it; None where its ends are rigid.
-        notch: A notch description.
-        tube: The tube it is cut into.
-        refinement: As for `rod`.
-    """
+    """Make the rod of a notch where it stands."""
+    # Kinds whose ends are rigid need not know of sites.
     return rod(notch, tube, refinement) if site is None else rod(notch, tube, refinement, site)
 
 

@@ -24,7 +24,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
-from numpy.polynomial.legendre import leggauss
 
 from notchflex._arrays import cached, is_traced, xp
 from notchflex._jax import (
@@ -43,25 +42,19 @@ from notchflex.mechanics.motion import (
     sine_cosine,
     unskew,
 )
+from notchflex.mechanics.section import leggauss
 
 
 class RodConfiguration(NamedTuple):
-    """A rod relative to its curve; "places" are the nodes of the pose and then the end.
+    """A rod relative to its curve; "places" are the nodes of the pose and then the end."""
 
-    Attributes:
-        rotation: Rotation at every place.
-        turn: Change of that rotation per unit of mode, along the axes of the start.
-        step: The rotated steps at the nodes.
-        stepped: The rotated steps per unit of mode.
-        from_place: Rotation vectors from place to place, their slopes by the modes, and the change
-            of rotation by these, along the axes of the start; None in the plane, where rotations
-            commute.
-    """
-
-    rotation: Float[Array, "places d d"]
+    rotation: Float[Array, "places d d"]  # Rotation at every place
+    # Change of that rotation per unit of mode, along the axes of the start
     turn: Float[Array, "places a modes"]
-    step: Float[Array, "gauss d"]
-    stepped: Float[Array, "gauss d modes"]
+    step: Float[Array, "gauss d"]  # The rotated steps at the nodes
+    stepped: Float[Array, "gauss d modes"]  # The rotated steps per unit of mode
+    # Rotation vectors from place to place, their slopes by the modes, and the change of rotation by
+    # these, along the axes of the start; None in the plane, where rotations commute
     from_place: tuple[Array, Array, Array] | None
 
     @property
@@ -86,10 +79,8 @@ def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
 
 
 def free_pose(rod: Rod) -> Motion:
-    """Return the pose of the distal body in the proximal frame, of a free rod in space.
-
-    It equals `relative_pose` without modes, and omits terms that only the derivatives need.
-    """
+    """Return the pose of the distal body in the proximal frame, of a free rod in space."""
+    # It equals `relative_pose` without modes, and omits terms that only the derivatives need.
     assert rod.turn_pair is not None
     turns = xp.diff(rod.turn[..., 0], axis=0, prepend=0.0) + rod.turn_pair[..., 0, 0]
     rotation = _products(_rotations(constant(turns)))
@@ -122,12 +113,10 @@ def _by_pair(rod: Rod, hat: Float[Array, " hat"]) -> Float[Array, "places 3 hat"
 
 
 def rotation_error_estimate(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, ""]:
-    """Estimate the error of the rotation of a rod's end, rad; 0 in the plane.
-
-    The Magnus series is truncated after its second term. The next term is of the size of the
-    rotations from place to place times their second terms; a twentieth of the sum of these was the
-    error for a notch bent by 105 degrees, twisted and sideways (against more places).
-    """
+    """Estimate the error of the rotation of a rod's end, rad; 0 in the plane."""
+    # The Magnus series is truncated after its second term. The next term is of the size of the
+    # rotations from place to place times their second terms; a twentieth of the sum of these was
+    # the error for a notch bent by 105 degrees, twisted and sideways (against more places).
     if rod.turn_pair is None:
         return jnp.zeros(())
     hat = jnp.concatenate([jnp.ones(1), modes])
@@ -234,11 +223,9 @@ def small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w mode
 def node_poses(
     rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration | None = None
 ) -> Motion:
-    """Return the poses of the sections at the nodes of the strains, in the proximal frame.
-
-    Between the nodes of the rotation the Magnus terms are omitted, and polynomials interpolate the
-    steps: accurate enough for error estimates, not for the solution.
-    """
+    """Return the poses of the sections at the nodes of the strains, in the proximal frame."""
+    # Between the nodes of the rotation the Magnus terms are omitted, and polynomials interpolate
+    # the steps: accurate enough for error estimates, not for the solution.
     own = integrate_rod(rod, modes) if own is None else own
     start = Motion(rod.start_rotation, rod.start_offset)
     turns = jnp.concatenate([jnp.zeros_like(rod.turn[:1]), rod.turn])
@@ -259,38 +246,16 @@ def node_poses(
 _BETWEEN = 4
 
 
-@lru_cache(maxsize=64)
-def _rule(count: int) -> tuple[Float[np.ndarray, " nodes"], Float[np.ndarray, " nodes"]]:
-    """Return Gauss's nodes from -1 to 1 and their weights, cached."""
-    rule = leggauss(count)
-    for values in rule:
-        values.setflags(write=False)
-    return rule
-
-
 def gauss_nodes(
-    ends: Sequence[float] | Float[np.ndarray, " k"], per_interval: int | Sequence[int] = 3
-) -> tuple[Float[np.ndarray, " nodes"], Float[np.ndarray, " nodes"]]:
-    """Return Gauss's nodes and weights in every interval between neighbouring numbers.
-
-    Args:
-        ends: Ends of the intervals, rising.
-        per_interval: Nodes in each; one number, or one per interval.
-
-    Returns:
-        Positions and weights.
-
-    Example:
-        >>> positions, weights = gauss_nodes([0.0, 1.0, 3.0])
-        >>> print(f"{weights @ positions**2:.6f}")
-        9.000000
-    """
+    ends: Sequence[float] | Float[Array, " k"], per_interval: int | Sequence[int] = 3
+) -> tuple[Float[Array, " nodes"], Float[Array, " nodes"]]:
+    """Return Gauss's nodes and weights in every interval between neighbouring numbers."""
     half = 0.5 * xp.diff(xp.asarray(ends, float))
     if isinstance(per_interval, int):
-        points, weight = _rule(per_interval)
+        points, weight = leggauss(per_interval)
         positions = xp.asarray(ends[:-1])[:, None] + half[:, None] * (1.0 + points)
         return positions.ravel(), (half[:, None] * weight).ravel()
-    rules = [_rule(count) for count in per_interval]
+    rules = [leggauss(count) for count in per_interval]
     positions = [low + h * (1.0 + x) for low, h, (x, _) in zip(ends, half, rules, strict=False)]
     weights = [h * w for h, (_, w) in zip(half, rules, strict=True)]
     return xp.concatenate(positions), xp.concatenate(weights)
@@ -304,7 +269,7 @@ def rod_quadrature(
     return RodQuadrature(ends, nodes, poses)
 
 
-def legendre(at: Float[np.ndarray, " k"], count: int) -> Float[np.ndarray, "k count"]:
+def legendre(at: Float[Array, " k"], count: int) -> Float[Array, "k count"]:
     """Return the first Legendre polynomials at points between -1 and 1."""
     values = [xp.ones_like(at), at]
     for degree in range(2, count):
@@ -314,13 +279,13 @@ def legendre(at: Float[np.ndarray, " k"], count: int) -> Float[np.ndarray, "k co
 
 
 @lru_cache(maxsize=64)
-def _projection(count: int) -> Float[np.ndarray, "count nodes"]:
+def _projection(count: int) -> Float[Array, "count nodes"]:
     """Return the coefficients, of Legendre polynomials, of Lagrange's at Gauss's nodes."""
-    points, weights = _rule(count)
+    points, weights = leggauss(count)
     return (xp.arange(count) + 0.5)[:, None] * (weights[:, None] * legendre(points, count)).T
 
 
-def up_to(count: int, parts: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k nodes"]:
+def up_to(count: int, parts: Float[Array, " k"]) -> Float[Array, "k nodes"]:
     """Integrate the Lagrange polynomials of Gauss's nodes on (0, 1) from 0 to given parts."""
     values = legendre(2.0 * xp.asarray(parts) - 1.0, count + 1)
     higher = (values[:, 2:] - values[:, :-2]) / (2.0 * xp.arange(1, count) + 1.0)
@@ -328,7 +293,7 @@ def up_to(count: int, parts: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k no
     return 0.5 * integrals @ _projection(count)
 
 
-_BEFORE = up_to(_BETWEEN, 0.5 * (1.0 + _rule(_BETWEEN)[0]))
+_BEFORE = up_to(_BETWEEN, 0.5 * (1.0 + leggauss(_BETWEEN)[0]))
 
 
 @dataclass(frozen=True)
@@ -346,17 +311,15 @@ class RodQuadrature:
     poses: tuple[int, ...]
 
     @cached_property
-    def at_nodes(self) -> tuple[Float[np.ndarray, " nodes"], Float[np.ndarray, " nodes"]]:
+    def at_nodes(self) -> tuple[Float[Array, " nodes"], Float[Array, " nodes"]]:
         """Nodes of the strains, and their weights, mm."""
         return gauss_nodes(self.ends, self.nodes)
 
     @cached_property
-    def at_poses(self) -> tuple[Float[np.ndarray, " gauss"], Float[np.ndarray, " gauss"]]:
-        """Nodes of the pose, and their weights, mm.
-
-        Between pieces there is one more node, of weight 0: rotations are integrated from node to
-        node, and strains may jump there.
-        """
+    def at_poses(self) -> tuple[Float[Array, " gauss"], Float[Array, " gauss"]]:
+        """Nodes of the pose, and their weights, mm."""
+        # Between pieces there is one more node, of weight 0: rotations are integrated from node to
+        # node, and strains may jump there.
         pieces = [
             gauss_nodes(ends, count)
             for *ends, count in zip(self.ends[:-1], self.ends[1:], self.poses, strict=True)
@@ -368,18 +331,18 @@ class RodQuadrature:
         return positions, lengths
 
     @cached_property
-    def between(self) -> tuple[Float[np.ndarray, " fine"], Float[np.ndarray, " fine"]]:
+    def between(self) -> tuple[Float[Array, " fine"], Float[Array, " fine"]]:
         """Points between the neighbours of start, nodes of the pose and end, and their lengths."""
         ends = xp.asarray(self.ends)
         return gauss_nodes(xp.concatenate([ends[:1], self.at_poses[0], ends[-1:]]), _BETWEEN)
 
     @cached_property
-    def before(self) -> tuple[Float[np.ndarray, " more"], Float[np.ndarray, " more"]]:
+    def before(self) -> tuple[Float[Array, " more"], Float[Array, " more"]]:
         """Points between the start, the nodes of the strains and the ends, and their lengths."""
         return gauss_nodes(self._stops, _BETWEEN)
 
     @cached_property
-    def _stops(self) -> Float[np.ndarray, " stops"]:
+    def _stops(self) -> Float[Array, " stops"]:
         """The start, the nodes of the strains, and the ends between pieces, rising."""
         nodes = xp.split(self.at_nodes[0], np.cumsum(self.nodes)[:-1])
         starts = xp.asarray(self.ends)[:-1, None]
@@ -391,13 +354,13 @@ class RodQuadrature:
         return rod_quadrature(tuple(map(float, range(len(self.ends)))), self.nodes, self.poses)
 
     @cached_property
-    def every(self) -> Float[np.ndarray, " every"]:
+    def every(self) -> Float[Array, " every"]:
         """All points, in the order of the properties above."""
         parts = (self.at_nodes, self.at_poses, self.between, self.before)
         return xp.concatenate([positions for positions, _ in parts])
 
     @property
-    def weight(self) -> Float[np.ndarray, " every"]:
+    def weight(self) -> Float[Array, " every"]:
         """Weights of all points in an integral over the nodes of the strains."""
         own = self.at_nodes[1]
         return xp.pad(own, (0, len(self.every) - len(own)))
@@ -405,16 +368,10 @@ class RodQuadrature:
     def fields(
         self,
         curve: Motion | None,
-        basis: Float[np.ndarray, "every 6 modes"],
-        reference: Float[np.ndarray, "every 6"] | None = None,
+        basis: Float[Array, "every 6 modes"],
+        reference: Float[Array, "every 6"] | None = None,
     ) -> dict[str, Any]:
-        """Return the fields of a rod for its strains and its pose.
-
-        Args:
-            curve: Pose of the reference curve at every point, as leading axis; None for a point.
-            basis: Strain at every point per unit of mode.
-            reference: Strain of the free rod beyond that of the curve; none where not given.
-        """
+        """Return the fields of a rod for its strains and its pose."""
         free = xp.zeros(basis.shape[:2]) if reference is None else reference
         hat = xp.concatenate([free[..., None], basis], axis=-1)
         if curve is None:
@@ -443,29 +400,27 @@ class RodQuadrature:
         }
 
     @cached_property
-    def _reach(self) -> Float[np.ndarray, "nodes gauss"]:
+    def _reach(self) -> Float[Array, "nodes gauss"]:
         """Compute the fraction of each pose node's step before each node of the strains."""
         nodes = self.at_nodes[0]
         columns = []
         for low, high, count in zip(self.ends[:-1], self.ends[1:], self.poses, strict=True):
             part = xp.clip((nodes - low) / (high - low), 0.0, 1.0)
-            columns += [up_to(count, part) / (0.5 * _rule(count)[1]), xp.zeros((len(nodes), 1))]
+            columns += [up_to(count, part) / (0.5 * leggauss(count)[1]), xp.zeros((len(nodes), 1))]
         return xp.concatenate(columns[:-1], axis=1)
 
 
-def _grouped(values: Float[np.ndarray, "fine ..."], lengths: Float[np.ndarray, " fine"]) -> Any:
+def _grouped(values: Float[Array, "fine ..."], lengths: Float[Array, " fine"]) -> Any:
     """Integrate over every run of points."""
     weighted = lengths.reshape(-1, *(1,) * (values.ndim - 1)) * values
     return weighted.reshape(-1, _BETWEEN, *values.shape[1:]).sum(axis=1)
 
 
 def _pairs(
-    turning: Float[np.ndarray, "fine 3 hat"], lengths: Float[np.ndarray, " fine"]
-) -> Float[np.ndarray, "places 3 hat hat"]:
-    """Compute the second term of the Magnus series on every run of points, for pairs of modes.
-
-    It is half the integral of a(t) x a(s) over t < s, for a motion in the moving frame.
-    """
+    turning: Float[Array, "fine 3 hat"], lengths: Float[Array, " fine"]
+) -> Float[Array, "places 3 hat hat"]:
+    """Compute the second term of the Magnus series on every run of points, for pairs of modes."""
+    # It is half the integral of a(t) x a(s) over t < s, for a motion in the moving frame.
     modes = turning.shape[-1]
     rates, weights = turning.reshape(-1, _BETWEEN, 3 * modes), lengths.reshape(-1, _BETWEEN, 1)
     so_far = weights.sum(axis=1, keepdims=True) * (_BEFORE @ rates)
@@ -482,12 +437,10 @@ def _pairs(
 def geometric_stiffness(
     rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration, wrench: Float[Array, " w"]
 ) -> Float[Array, "modes modes"]:
-    """Compute the change of the generalised forces of a wrench with the modes.
-
-    It is the derivative of twist_slope^T wrench for a wrench that moves with the body; rows are the
-    modes that it acts on. With F the force and M the moment about the end, along the axes of the
-    start, the generalised force is M . turn + F . (sum of the moved steps).
-    """
+    """Compute the change of the generalised forces of a wrench with the modes."""
+    # It is the derivative of twist_slope^T wrench for a wrench that moves with the body; rows are
+    # the modes that it acts on. With F the force and M the moment about the end, along the axes of
+    # the start, the generalised force is M . turn + F . (sum of the moved steps).
     axes = own.turn.shape[1]
     at_end = tail_pose(rod).wrench(wrench)
     end = own.rotation[-1]
@@ -527,11 +480,9 @@ def _moments(points: Array, force: Array) -> Float[Array, "places a modes"]:
 def _noncommuting_terms(
     rod: Rod, own: RodConfiguration, at_end: Float[Array, " 6"]
 ) -> Float[Array, "modes modes"]:
-    """Compute the terms of `geometric_stiffness` in space, where rotations do not commute.
-
-    The slopes of the rotations change with the modes: with the rotations before, with the slope of
-    the exponential, and with the pairs of the Magnus series.
-    """
+    """Compute the terms of `geometric_stiffness` in space, where rotations do not commute."""
+    # The slopes of the rotations change with the modes: with the rotations before, with the slope
+    # of the exponential, and with the pairs of the Magnus series.
     assert rod.turn_pair is not None
     assert own.from_place is not None
     turns, slope, turning = own.from_place

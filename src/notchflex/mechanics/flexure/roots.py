@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 from numpy.typing import ArrayLike
 
 from notchflex._arrays import plain_number, xp
@@ -26,8 +26,11 @@ from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
 from notchflex.mechanics.material import FibreSection, NotchEnds
 from notchflex.mechanics.motion import Motion, rotation_about
-from notchflex.mechanics.section import clamped_torsion_constant, two_walls
-from notchflex.mechanics.section.section import rectangle_torsion_constant
+from notchflex.mechanics.section import (
+    clamped_torsion_constant,
+    rectangle_torsion_constant,
+    two_walls,
+)
 from notchflex.robot import StripNotch, Tube, ULink
 
 # The strip between two slots with the walls that it turns into: compliances and sections.
@@ -66,19 +69,12 @@ from notchflex.robot import StripNotch, Tube, ULink
 
 
 class Sideways(NamedTuple):
-    """Constants of the rule, for sharp or for round ends of slots.
+    """Constants of the rule, for sharp or for round ends of slots."""
 
-    Attributes:
-        against: γ, of the walls moved against each other along the tube.
-        twist: α, of their torsion.
-        across: β₀ and β₁, of the walls moved against each other along the strip.
-        coupling: η.
-    """
-
-    against: float
-    twist: float
-    across: tuple[float, float]
-    coupling: float
+    against: float  # γ, of the walls moved against each other along the tube
+    twist: float  # α, of their torsion
+    across: tuple[float, float]  # β₀ and β₁, of the walls moved against each other along the strip
+    coupling: float  # η
 
 
 ROUND = Sideways(0.9841, 0.6533, (0.9868, 1.4764), 0.7012)
@@ -90,39 +86,23 @@ _MAX_COUPLING = 0.49
 
 
 class Walls(NamedTuple):
-    """The two walls of a strip.
+    """The two walls of a strip."""
 
-    Attributes:
-        outer: Outer radius of the tube, mm.
-        inner: Inner radius, mm.
-        width: Width of each wall, mm.
-        thickness: Thickness of the strip, mm.
-        length: Length over which they are twisted, mm.
-    """
-
-    outer: float
-    inner: float
-    width: float
-    thickness: float
-    length: float
+    outer: float  # Outer radius of the tube, mm
+    inner: float  # Inner radius, mm
+    width: float  # Width of each wall, mm
+    thickness: float  # Thickness of the strip, mm
+    length: float  # Length over which they are twisted, mm
 
 
 def plane_compliance(
     poses: Motion,
-    length: Float[np.ndarray, " nodes"],
+    length: Float[Array, " nodes"],
     section: FibreSection,
-    middle: Float[np.ndarray, " 3"],
+    middle: Float[Array, " 3"],
     poisson_ratio: float,
-) -> Float[np.ndarray, "2 2"]:
-    """Compute E times the compliance to forces across and along the tube at the middle.
-
-    Args:
-        poses: Pose of the free rod at every node.
-        length: Length that each node stands for, mm.
-        section: Its section at every node.
-        middle: Middle of the strip, mm.
-        poisson_ratio: For the ratio of the moduli.
-    """
+) -> Float[Array, "2 2"]:
+    """Compute E times the compliance to forces across and along the tube at the middle."""
     ratio, ends = 2.0 * (1.0 + poisson_ratio), section.ends
     assert ends is not None
     bending = (1.0 + xp.asarray(ends.weak)) / xp.asarray(section.second_moment_weak)
@@ -138,16 +118,9 @@ def plane_compliance(
 
 
 def turned_compliance(
-    walls: Walls, plane: Float[np.ndarray, "2 2"], rule: Sideways, poisson_ratio: float
+    walls: Walls, plane: Float[Array, "2 2"], rule: Sideways, poisson_ratio: float
 ) -> tuple[float, float, float]:
-    """Compute E times the compliance to moments about the strip and the tube, and of both.
-
-    Args:
-        walls: The walls.
-        plane: E times their compliance in the plane, see `plane_compliance`.
-        rule: The constants.
-        poisson_ratio: For the ratio of the moduli.
-    """
+    """Compute E times the compliance to moments about the strip and the tube, and of both."""
     arm = 0.25 * (walls.outer + walls.inner) ** 2
     torsion = 2.0 * plain_number(rectangle_torsion_constant(walls.width, walls.thickness))
     twisted = rule.twist * torsion / (2.0 * (1.0 + poisson_ratio)) / walls.length
@@ -159,20 +132,12 @@ def turned_compliance(
 
 def with_sideways(
     section: FibreSection,
-    length: Float[np.ndarray, " nodes"],
-    on_wall: Float[np.ndarray, " nodes"],
+    length: Float[Array, " nodes"],
+    on_wall: Float[Array, " nodes"],
     turned: tuple[float, float, float],
     poisson_ratio: float,
 ) -> FibreSection:
-    """Put the compliance to moments out of the plane into the sections of a rod.
-
-    Args:
-        section: Sections at the nodes, those on the walls along the tube.
-        length: Length that each node stands for, mm.
-        on_wall: Whether each lies on a wall.
-        turned: E times the compliance, as `turned_compliance` finds it.
-        poisson_ratio: For the ratio of the moduli.
-    """
+    """Put the compliance to moments out of the plane into the sections of a rod."""
     strip, tube, both = turned
     assert section.ends is not None
     wall = xp.where(on_wall, length, 0.0).sum()
@@ -207,31 +172,18 @@ _WEDGE = 4.893
 
 
 class RootedStrip(NamedTuple):
-    """A strip between two slots of a tube.
+    """A strip between two slots of a tube."""
 
-    Attributes:
-        thickness: Thickness t along the tube, mm.
-        free_length: Length between the tips of the slots, mm.
-        beyond: Length beyond the tips, mm.
-        along: Length along the wall, mm.
-        bending: Second moment of the root over that of the strip at the tip.
-        sheared: Length of a tube that shears like the wall there, mm.
-        middle: Height of its middle above the proximal face, mm.
-        hand: 1 where the proximal wall is on the bend's side, -1 on the opposite one.
-        sideways: Constants of the answer to loads out of the plane.
-        width_factor: Width of the walls over that of the tube's walls there.
-    """
-
-    thickness: float
-    free_length: float
-    beyond: float
-    along: float
-    bending: float
-    sheared: float
-    middle: float
-    hand: float
-    sideways: Sideways
-    width_factor: float = 1.0
+    thickness: float  # Thickness t along the tube, mm
+    free_length: float  # Length between the tips of the slots, mm
+    beyond: float  # Length beyond the tips, mm
+    along: float  # Length along the wall, mm
+    bending: float  # Second moment of the root over that of the strip at the tip
+    sheared: float  # Length of a tube that shears like the wall there, mm
+    middle: float  # Height of its middle above the proximal face, mm
+    hand: float  # 1 where the proximal wall is on the bend's side, -1 on the opposite one
+    sideways: Sideways  # Constants of the answer to loads out of the plane
+    width_factor: float = 1.0  # Width of the walls over that of the tube's walls there
 
 
 def sharp_strip(notch: StripNotch, tube: Tube) -> RootedStrip:
@@ -286,8 +238,8 @@ _RIGID = 1e6  # area of a root that does not shear, over that of the strip
 def strip_sections(
     strip: RootedStrip,
     tube: Tube,
-    along: np.ndarray,
-    above: np.ndarray,
+    along: Array,
+    above: Array,
     length: float,
     poisson_ratio: float,
 ) -> FibreSection:
@@ -343,7 +295,7 @@ def _arch(thickness: float, wall: float, radius: float, tip: float) -> float:
     return plain_number(radius**3 * 2.0 * angle * spread / (2.0 * thickness * wall**3 / 12.0))
 
 
-def _frame(strip: RootedStrip, wall: float, width: np.ndarray) -> np.ndarray:
+def _frame(strip: RootedStrip, wall: float, width: Array) -> Array:
     """Compute the sway of two walls as posts of a frame, times E over force and length, 1/mm²."""
     length = strip.free_length + 2.0 * _CLAMP_SIDEWAYS * xp.sqrt(strip.thickness * wall)
     return length**3 / (12.0 * 2.0 * strip.thickness * width**3 / 12.0) / strip.free_length
@@ -373,20 +325,7 @@ def rooted_strip_rod(
     linear_kinematics: bool = False,
     poisson_ratio: float,
 ) -> Rod:
-    """Build the rod of a strip with its roots.
-
-    Args:
-        strip: The strip.
-        tube: The tube that it is cut into.
-        distal: Height of the distal body's frame above the proximal face, mm.
-        refinement: How many more modes and nodes than for usual loads.
-        direction_deg: Side toward which a positive angle bends it, deg.
-        linear_kinematics: Whether displacements are proportional to the strains.
-        poisson_ratio: Poisson's ratio of the tube.
-
-    Returns:
-        The rod, from the proximal wall to the distal one.
-    """
+    """Build the rod of a strip with its roots."""
     pieces = [0.0, strip.along, strip.beyond, strip.free_length, strip.beyond, strip.along]
     ends = tuple(xp.cumsum(xp.stack(pieces)))
     more = refinement
@@ -434,9 +373,7 @@ def rooted_strip_rod(
     )
 
 
-def _course(
-    position: Float[np.ndarray, " k"], ends: tuple[float, ...]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _course(position: Float[Array, " k"], ends: tuple[float, ...]) -> tuple[Array, Array, Array]:
     """Return positions along the strip and above its middle, mm, and a mask of the walls."""
     half = 0.5 * ends[-1]
     along = xp.clip(position - half, ends[1] - half, half - ends[1])
@@ -460,30 +397,17 @@ _THIN = ": bending was found up to 5 % off, shear across the strip up to 18 %"
 
 
 class CheckedRange(NamedTuple):
-    """A dimension of a notch, with its range checked against finite elements.
+    """A dimension of a notch, with its range checked against finite elements."""
 
-    Attributes:
-        dimension: Name of the dimension.
-        value: Its value.
-        low: Smallest value that was checked.
-        high: Largest value that was checked.
-        beyond: Note on values outside, the end of a sentence.
-    """
-
-    dimension: str
-    value: float
-    low: float
-    high: float
-    beyond: str = _UNCHECKED
+    dimension: str  # Name of the dimension
+    value: float  # Its value
+    low: float  # Smallest value that was checked
+    high: float  # Largest value that was checked
+    beyond: str = _UNCHECKED  # Note on values outside, the end of a sentence
 
 
 def left_ranges(ranges: Iterable[CheckedRange]) -> list[str]:
-    """Return a sentence for each range that is left: the number, its bound and what is known.
-
-    Example:
-        >>> left_ranges([CheckedRange("width / height", 1.36, 0.35, 1.0, ": not checked")])
-        ['width / height is 1.36, above 1: not checked']
-    """
+    """Return a sentence for each range that is left: the number, its bound and what is known."""
     sentences: list[str] = []
     for dimension, value, low, high, beyond in ranges:
         if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):

@@ -25,45 +25,35 @@ from notchflex.mechanics.motion import PLANE, Motion, angular, rotation_about
 
 
 class FlexureState(Pytree):
-    """One flexure under given modes (mm, N, rad), in the frame of its proximal body.
+    """One flexure under given modes (mm, N, rad), in the frame of its proximal body."""
 
-    Attributes:
-        configuration: Rotations and steps of the rod; None without pose.
-        pose: From the proximal body to the distal one; None where it is not computed.
-        twist: Twist (angular, linear) of the distal body, in its own frame, per unit of mode;
-            None without pose.
-        resultants: Internal moments and forces of each interval, in the rod's frame.
-        strain: Strain of each interval beyond that of the free tube.
-        memory: Memory of the material at every node, after these strains.
-        slope: Change of the moment about y with the curvature at every node, where the law
-            provides it (`SectionResponse.slope`).
-        internal: Generalised internal force of each mode, N mm per unit of mode.
-        bend: Bending of the whole rod about x and y of its frame, of a plane about y, rad.
-        chord_turn: Rotation, in the proximal body's frame, by which the chord from the rod's
-            start to its end has turned in the plane of bending; None where it is not computed.
-        chord_angle: Its angle, rad; None likewise.
-    """
-
-    configuration: RodConfiguration | None
-    pose: Motion | None
+    configuration: RodConfiguration | None  # Rotations and steps of the rod; None without pose
+    pose: Motion | None  # From the proximal body to the distal one; None where it is not computed
+    # Twist (angular, linear) of the distal body, in its own frame, per unit of mode; None without
+    # pose
     twist: Float[Array, "w modes"] | None
+    # Internal moments and forces of each interval, in the rod's frame
     resultants: Float[Array, "intervals w"]
-    strain: Float[Array, "intervals w"]
-    memory: Any
+    strain: Float[Array, "intervals w"]  # Strain of each interval beyond that of the free tube
+    memory: Any  # Memory of the material at every node, after these strains
+    # Change of the moment about y with the curvature at every node, where the law provides it
+    # (`SectionResponse.slope`)
     slope: Float[Array, " nodes"] | None
+    # Generalised internal force of each mode, N mm per unit of mode
     internal: Float[Array, " modes"]
+    # Bending of the whole rod about x and y of its frame, of a plane about y, rad
     bend: Float[Array, " axes"]
+    # Rotation, in the proximal body's frame, by which the chord from the rod's start to its end has
+    # turned in the plane of bending; None where it is not computed
     chord_turn: Float[Array, "d d"] | None
-    chord_angle: Float[Array, ""] | None
+    chord_angle: Float[Array, ""] | None  # Its angle, rad; None likewise
 
 
 def fibre_stretch(across: Float[Array, "*shape 2"]) -> Float[Array, "*shape 6"]:
-    """Return the weights of the strains that give the length of a fibre per length of the rod.
-
-    The length of a fibre at (x, y) from the neutral axis is the rod's stretch plus its curvatures
-    times their lever arms, v_z + u_x y - u_y x. This holds for the concentric wall arc of Pacheco's
-    tendon (its l = h - theta (r_i + ybar)) and for the edge of a notch.
-    """
+    """Return the weights of the strains that give the length of a fibre per length of the rod."""
+    # The length of a fibre at (x, y) from the neutral axis is the rod's stretch plus its curvatures
+    # times their lever arms, v_z + u_x y - u_y x. This holds for the concentric wall arc of
+    # Pacheco's tendon (its l = h - theta (r_i + ybar)) and for the edge of a notch.
     weights = across @ _ACROSS
     return weights + xp.broadcast_to(_ALONG, weights.shape)
 
@@ -96,20 +86,7 @@ def flexure_state(
     *,
     with_pose: bool,
 ) -> FlexureState:
-    """Compute the state of a flexure from its modes.
-
-    Args:
-        rod: The flexure.
-        law: Its material.
-        memory: Memory of the material at every node.
-        modes: Amplitude of each strain mode.
-        response: Response of the law at every node, where it is known.
-        with_pose: Whether to compute pose and twist; without forces on bodies they do not enter the
-            equilibrium.
-
-    Returns:
-        Its state.
-    """
+    """Compute the state of a flexure from its modes."""
     own, pose, twist = None, None, None
     if with_pose:
         own = integrate_rod(rod, modes)
@@ -143,14 +120,7 @@ def flexure_state(
 def material_tangent(
     rod: Rod, law: SectionLaw, memory: Any, state: FlexureState
 ) -> Float[Array, "modes modes"]:
-    """Differentiate the internal forces of the modes (`internal`) by the modes.
-
-    Args:
-        rod: The flexure.
-        law: Its material.
-        memory: Memory of the material at every node.
-        state: Its state there.
-    """
+    """Differentiate the internal forces of the modes (`internal`) by the modes."""
 
     def resultant_slope(
         strain: Array, section: Any, at_node: Any, slope: Array | None, columns: Array
@@ -174,11 +144,9 @@ def material_tangent(
 
 
 def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "d d"], Float[Array, ""]]:
-    """Compute the rotation of the chord of a rod in its plane of bending (Liu 2022, eq. 19).
-
-    The chord is the straight line from the rod's start to its end; for a strip this is the angle
-    that the paper calls bending angle, about two thirds of the slope at the end.
-    """
+    """Compute the rotation of the chord of a rod in its plane of bending (Liu 2022, eq. 19)."""
+    # The chord is the straight line from the rod's start to its end; for a strip this is the angle
+    # that the paper calls bending angle, about two thirds of the slope at the end.
     end, free = rod_end(rod, modes).translation, rod.curve_offset
     about_y = xp.eye(3)[1] if len(end) == 3 else xp.ones(1)
     angle = jnp.atan2(end[0] * free[-1] - end[-1] * free[0], end[0] * free[0] + end[-1] * free[-1])

@@ -36,9 +36,10 @@ from notchflex.mechanics.flexure.roots import (
     wall_ranges,
 )
 from notchflex.mechanics.motion import Motion
-from notchflex.mechanics.section import clamped_torsion_constant, two_walls
-from notchflex.mechanics.section.section import (
+from notchflex.mechanics.section import (
     FibresAt,
+    clamped_torsion_constant,
+    two_walls,
     two_walls_fibres,
 )
 from notchflex.robot import StripNotch, Tube
@@ -71,22 +72,7 @@ def strip_rod(
     nodes: int = 10,
     more_sideways: int = 0,
 ) -> Rod:
-    """Build the rod of a strip.
-
-    Args:
-        notch: The notch.
-        tube: The tube that it is cut into.
-        bending_modes: Legendre polynomials of the curvature in the plane of bending.
-        nodes: Gauss's nodes along the strip.
-        more_sideways: Polynomials of sideways bending and of twist beyond the usual ones.
-
-    Returns:
-        The rod, from the clamp to the free end.
-
-    Example:
-        >>> strip_rod(StripNotch(height=3.5, strip_thickness=1.5, depth=6.9), Tube(10, 6)).levels
-        (5, 5, 10)
-    """
+    """Build the rod of a strip."""
     length = notch.strip_length_in(tube)
     points = RodQuadrature((0.0, length), (nodes,), (nodes,))
     modes = legendre_modes(points, bending_modes, _SIDEWAYS + more_sideways, _TWIST + more_sideways)

@@ -21,6 +21,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Array
 
 from notchflex._arrays import plain_number, xp
 from notchflex._jax import constant
@@ -51,9 +52,10 @@ from notchflex.mechanics.flexure.roots import (
 )
 from notchflex.mechanics.material import FibreSection
 from notchflex.mechanics.motion import Motion, rotation_about
-from notchflex.mechanics.section import clamped_torsion_constant, two_walls
-from notchflex.mechanics.section.section import (
+from notchflex.mechanics.section import (
     FibresAt,
+    clamped_torsion_constant,
+    two_walls,
     two_walls_fibres,
 )
 from notchflex.robot import Tube, ULink
@@ -66,28 +68,16 @@ _NEWTON = 4  # the speed varies by a few tenths: the fourth step is below 1e-16
 
 @dataclass(frozen=True)
 class CurvedEnd:
-    """Segment S1 of a link J.
-
-    Args:
-        slot_radius: Radius r_c of the slot's round end, half the slot's width, mm.
-        strip_thickness: Thickness l_s of the strip between two slots, mm.
-
-    Example:
-        >>> end = CurvedEnd(slot_radius=0.275, strip_thickness=0.70)
-        >>> print(f"{end.outer_length:.6f} mm, {end.angle:.6f} rad, {end.length():.6f} mm")
-        0.525882 mm, 1.076154 rad, 0.561031 mm
-    """
+    """Segment S1 of a link J."""
 
     slot_radius: float
     strip_thickness: float
 
     @property
     def outer_length(self) -> float:
-        """Length d_e by which the edge N outreaches the slot's end, mm.
-
-        It makes the middle line begin square to the cut from M to N: the root of
-        d_e² + r_c d_e = (π/2) r_c (r_c + l_s).
-        """
+        """Length d_e by which the edge N outreaches the slot's end, mm."""
+        # It makes the middle line begin square to the cut from M to N: the root of d_e² + r_c d_e =
+        # (π/2) r_c (r_c + l_s).
         radius = self.slot_radius
         beyond = 2.0 * np.pi * radius * (radius + self.strip_thickness)
         return 0.5 * beyond / (radius + plain_number(xp.sqrt(radius**2 + beyond)))
@@ -97,60 +87,58 @@ class CurvedEnd:
         """Angle alpha between the strip and the cut where S1 begins, rad (Gao 2017, eq. 10)."""
         return plain_number(xp.arctan2(self.slot_radius + self.strip_thickness, self.outer_length))
 
-    def inner_edge(self, t: Any) -> np.ndarray:
+    def inner_edge(self, t: Any) -> Array:
         """Compute the points M on the slot's round end: (..., 2), (y, z) in mm."""
         turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
         return self.slot_radius * xp.stack([-xp.cos(turn), xp.sin(turn)], axis=-1)
 
-    def outer_edge(self, t: Any) -> np.ndarray:
+    def outer_edge(self, t: Any) -> Array:
         """Compute the points N on the other edge of the material, that of the next slot."""
         t = xp.asarray(t, dtype=float)
         along = -(self.outer_length + self.slot_radius) * (1.0 - t)
         return xp.stack([along, xp.full_like(t, self.slot_radius + self.strip_thickness)], axis=-1)
 
-    def middle(self, t: Any) -> np.ndarray:
+    def middle(self, t: Any) -> Array:
         """Compute the points C of the middle line."""
         return 0.5 * (self.inner_edge(t) + self.outer_edge(t))
 
-    def thickness(self, t: Any) -> np.ndarray:
+    def thickness(self, t: Any) -> Array:
         """Compute the thickness |N - M| of the material, mm."""
         return xp.linalg.norm(self.outer_edge(t) - self.inner_edge(t), axis=-1)
 
-    def _first_derivative(self, t: Any) -> np.ndarray:
+    def _first_derivative(self, t: Any) -> Array:
         turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
         inner = 0.5 * np.pi * self.slot_radius * xp.stack([xp.sin(turn), xp.cos(turn)], axis=-1)
         return 0.5 * (inner + xp.array([self.outer_length + self.slot_radius, 0.0]))
 
-    def _second_derivative(self, t: Any) -> np.ndarray:
+    def _second_derivative(self, t: Any) -> Array:
         turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
         inward = xp.stack([xp.cos(turn), -xp.sin(turn)], axis=-1)
         return 0.5 * (0.5 * np.pi) ** 2 * self.slot_radius * inward
 
-    def heading(self, t: Any) -> np.ndarray:
+    def heading(self, t: Any) -> Array:
         """Compute the direction of the middle line: from pi/2 - alpha at 0 to 0 at 1."""
         first = self._first_derivative(t)
         return xp.arctan2(first[..., 1], first[..., 0])
 
-    def curvature(self, t: Any) -> np.ndarray:
-        """Compute the signed curvature, negative, 1/mm.
-
-        |C' x C''| / |C'|³: Gao's eq. 8 leaves out the denominator, but C has not unit speed.
-        """
+    def curvature(self, t: Any) -> Array:
+        """Compute the signed curvature, negative, 1/mm."""
+        # |C' x C''| / |C'|³: Gao's eq. 8 leaves out the denominator, but C has not unit speed.
         first, second = self._first_derivative(t), self._second_derivative(t)
         cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
         return cross / xp.linalg.norm(first, axis=-1) ** 3
 
-    def length(self, t: Any = 1.0) -> np.ndarray:
+    def length(self, t: Any = 1.0) -> Array:
         """Compute the length of the middle line from 0 to t, mm (Gao 2017, eq. 9 for t = 1)."""
         t = xp.asarray(t, dtype=float)
         return 0.5 * t * (self._speed(0.5 * t[..., None] * (1.0 + _NODES)) @ _WEIGHTS)
 
-    def _speed(self, t: np.ndarray) -> np.ndarray:
+    def _speed(self, t: Array) -> Array:
         """Compute |C'|, written out: it is evaluated at some thousand points per link."""
         inner, outer = 0.5 * np.pi * self.slot_radius, self.outer_length + self.slot_radius
         return 0.5 * xp.sqrt(inner**2 + outer**2 + 2.0 * inner * outer * xp.sin(0.5 * np.pi * t))
 
-    def at_length(self, length: Any) -> np.ndarray:
+    def at_length(self, length: Any) -> Array:
         """Find the parameter t where the middle line has a given length from its beginning."""
         target = xp.asarray(length, dtype=float)
         t = target / self.length()
@@ -160,41 +148,22 @@ class CurvedEnd:
 
 
 class Course(NamedTuple):
-    """The middle line at some positions.
+    """The middle line at some positions."""
 
-    Attributes:
-        along: Its points, along the strip from the middle of the straight part, mm.
-        above: The same across the strip, along the tube, mm.
-        heading: Its direction, the same at both ends, rad.
-        curvature: Signed curvature, first negative, then positive, 1/mm (Gao 2017, eq. 11).
-        thickness: Thickness of the material, mm.
-    """
-
-    along: np.ndarray
-    above: np.ndarray
-    heading: np.ndarray
-    curvature: np.ndarray
-    thickness: np.ndarray
+    along: Array  # Its points, along the strip from the middle of the straight part, mm
+    above: Array  # The same across the strip, along the tube, mm
+    heading: Array  # Its direction, the same at both ends, rad
+    # Signed curvature, first negative, then positive, 1/mm (Gao 2017, eq. 11)
+    curvature: Array
+    thickness: Array  # Thickness of the material, mm
 
 
 @dataclass(frozen=True)
 class Link:
-    """The whole link: S1, the straight part S2, and S3, which is S1 turned by half a turn.
+    """The whole link: S1, the straight part S2, and S3, which is S1 turned by half a turn."""
 
-    Positions are lengths along the middle line from its start; points (along, above) are relative
-    to the middle of the straight part.
-
-    Args:
-        slot_radius: Radius of the slots' round ends, mm.
-        strip_thickness: Thickness of the strip, mm.
-        strip_length: Length of its straight part, mm.
-
-    Example:
-        >>> link = Link(slot_radius=0.275, strip_thickness=0.70, strip_length=2.0)
-        >>> start = link.course(0.0)
-        >>> print(f"{link.length:.6f} mm long, begins at {start.along:.6f}, {start.above:.4f} mm")
-        3.122062 mm long, begins at -1.537941, -0.1375 mm
-    """
+    # Positions are lengths along the middle line from its start; points (along, above) are relative
+    # to the middle of the straight part.
 
     slot_radius: float
     strip_thickness: float
@@ -259,23 +228,7 @@ def u_link_rod(
     nodes: tuple[int, int] = (6, 6),
     poisson_ratio: float = POISSON_RATIO,
 ) -> Rod:
-    """Build the rod of a link.
-
-    Args:
-        notch: The link.
-        tube: The tube that it is cut into.
-        moment_modes: Modes of the moment in the plane, 3 or more, see `wrench_modes`.
-        force_modes: Pairs of modes of the force in the plane, 1 or more.
-        nodes: Gauss's nodes in each curved end, and in the straight part.
-        poisson_ratio: Poisson's ratio for the shape of the modes.
-
-    Returns:
-        The rod, from the proximal wall piece to the distal one.
-
-    Example:
-        >>> u_link_rod(ULink(0.275, 0.70, 2.0, "away"), Tube(5.99, 4.0)).levels
-        (5, 5, 9)
-    """
+    """Build the rod of a link."""
     link = Link(notch.slot_radius, notch.strip_thickness, notch.strip_length)
     curved = link.length - link.strip_length
     ends = (0.0, 0.5 * curved, link.length - 0.5 * curved, link.length)
@@ -312,7 +265,7 @@ def u_link_rod(
     return build_rod(axis, section, modes, direction_deg=notch.direction_deg)
 
 
-def _poses(course: Course, middle: np.ndarray, hand: float) -> Motion:
+def _poses(course: Course, middle: Array, hand: float) -> Motion:
     """Compute the poses of the free middle line: z along it, y out of the plane."""
     position = xp.stack([-hand * course.along, 0.0 * course.along, course.above], axis=-1)
     about_y = hand * (course.heading - 0.5 * np.pi)

@@ -10,18 +10,14 @@ from notchflex.robot import Capstan
 
 
 class CapstanLaw(FrictionLaw):
-    """Capstan law with the turning of a gap placed at one edge or at both.
+    """Capstan law with the turning of a gap placed at one edge or at both."""
 
-    Attributes:
-        coefficient: Coefficient of friction.
-        moved_to_exit: Part of the entry edge's turning that counts at the exit edge: 0 where
-            each edge keeps its own, 1 where the whole turning of a notch lies ahead of it
-            (Pacheco 2021, eq. 10, whose product includes the notch itself).
-        loss: Tension that sliding over an edge costs whatever the turning, N; None for none.
-    """
-
-    coefficient: Float[Array, ""]
+    coefficient: Float[Array, ""]  # Coefficient of friction
+    # Part of the entry edge's turning that counts at the exit edge: 0 where each edge keeps its
+    # own, 1 where the whole turning of a notch lies ahead of it (Pacheco 2021, eq. 10, whose
+    # product includes the notch itself)
     moved_to_exit: Float[Array, ""]
+    # Tension that sliding over an edge costs whatever the turning, N; None for none
     loss: Float[Array, ""] | None
 
     def bounds(

@@ -17,21 +17,15 @@ MAX_SLOPE = 1.0 - 1e-9
 
 
 class CornerLaw(FrictionLaw):
-    """Law of a string over a corner, each edge with its own turning (Gao 2017, eq. 23).
+    """Law of a string over a corner, each edge with its own turning (Gao 2017, eq. 23)."""
 
-    Attributes:
-        coefficient: Coefficient of friction.
-    """
-
-    coefficient: Float[Array, ""]
+    coefficient: Float[Array, ""]  # Coefficient of friction
 
     def bounds(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
-        """Return 2 artanh(coefficient * tan(turning / 2)) at each edge.
-
-        It is ln((cos b + mu sin b) / (cos b - mu sin b)) with b = half the turning.
-        """
+        """Return 2 artanh(coefficient * tan(turning / 2)) at each edge."""
+        # It is ln((cos b + mu sin b) / (cos b - mu sin b)) with b = half the turning.
         return self._bound(exit_turning), self._bound(entry_turning)
 
     def valid(

@@ -1,8 +1,4 @@
-"""Friction laws and their registry: limits of the tension ratio over a contact.
-
-Each law is a file in this folder that registers itself for its description; the package imports
-every file of the folder.
-"""
+"""Friction laws and their registry: limits of the tension ratio over a contact."""
 
 from __future__ import annotations
 
@@ -14,6 +10,7 @@ from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import Pytree, jnp
 from notchflex._packages import unregistered
+from notchflex.robot import Frictionless
 
 # N; keeps the formulas finite where the loss is zero.
 _MIN_LOSS = 1e-100
@@ -61,11 +58,9 @@ class FrictionLaw(Pytree, ABC):
         del exit_turning, entry_turning
 
     def offset(self) -> Float[Array, ""] | float:
-        """Return what is added to tensions in their ratios, N: the loss at a turning of 1 rad.
-
-        With a constant loss the tension beyond a contact may be 0 N, and is not 0 N beyond a
-        released one. Ratios of tensions that are raised by a loss are finite.
-        """
+        """Return what is added to tensions in their ratios, N: the loss at a turning of 1 rad."""
+        # With a constant loss the tension beyond a contact may be 0 N, and is not 0 N beyond a
+        # released one. Ratios of tensions that are raised by a loss are finite.
         losses = self.constant_loss(jnp.ones(()), jnp.ones(()))
         return 0.0 if losses is None else jnp.maximum(jnp.maximum(*losses), _MIN_LOSS)
 
@@ -76,21 +71,10 @@ class FrictionLaw(Pytree, ABC):
         tension: tuple[Float[Array, "*t"], Float[Array, "*t"]],
         log_ratio: Float[Array, "*t 2"],
     ) -> Float[Array, "*t 2"]:
-        """Compute the largest |ln(tension ratio)| at both edges, constant losses included.
-
-        With the tension T on the base side, T' on the tip side and the offset a, the ratio is
-        (T + a) / (T' + a). At the limit of loading T = e^b T' + F, or T' = 0 where T is below the
-        loss F; at that of unloading T' = e^b T + F.
-
-        Args:
-            exit_turning: As for `bounds`.
-            entry_turning: As for `bounds`.
-            tension: Tension on the base side of the exit edge and of the entry edge, N.
-            log_ratio: Logarithm of the ratio; its sign is the direction of sliding.
-
-        Returns:
-            The limits, as last axis the edges.
-        """
+        """Compute the largest |ln(tension ratio)| at both edges, constant losses included."""
+        # With the tension T on the base side, T' on the tip side and the offset a, the ratio is (T
+        # + a) / (T' + a). At the limit of loading T = e^b T' + F, or T' = 0 where T is below the
+        # loss F; at that of unloading T' = e^b T + F.
         ratio = jnp.stack(self.bounds(exit_turning, entry_turning), axis=-1)
         losses = self.constant_loss(exit_turning, entry_turning)
         if losses is None:
@@ -129,3 +113,21 @@ def friction_law(friction: Any) -> FrictionLaw:
         TypeError: There is no law for this kind of description.
     """
     raise unregistered("friction law", friction, "friction", "friction_law")
+
+
+class FrictionlessLaw(FrictionLaw):
+    """Contacts without friction."""
+
+    remembers = False
+
+    def bounds(
+        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
+    ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
+        """Return zero at both edges."""
+        return jnp.zeros_like(exit_turning), jnp.zeros_like(entry_turning)
+
+
+@friction_law.register
+def _(friction: Frictionless) -> FrictionlessLaw:
+    del friction
+    return FrictionlessLaw()

@@ -1,20 +1,12 @@
-"""Law of fibres: the stress of each depends on its strain and its history.
-
-A fibre carries sigma = E (eps - e), with the transformed strain e between two curves over its
-strain: a lower bound while the strain grows, and an upper bound while it shrinks. Between them e is
-constant and the fibre is elastic: a rate-independent play operator with return-point memory. One
-number per fibre is its memory, since unloading ends before the stress is zero. Without hysteresis
-the two curves coincide.
-
-The curvature k of the section and the strain of its neutral axis solve two equations: the axial
-force vanishes, and section and ends (`law.py`) bend by s in total.
-"""
+"""Laws of fibres: the stress of each depends on its strain and its history."""
 
 from __future__ import annotations
 
 import dataclasses
+from functools import lru_cache
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._arrays import xp
@@ -29,7 +21,9 @@ from notchflex.mechanics.material.law import (
     FibreSection,
     SectionLaw,
     SectionResponse,
+    section_law,
 )
+from notchflex.robot import Nitinol, StressStrain
 
 # Balance of the fibres of a section: strain of the neutral axis, and curvature between its ends.
 #
@@ -43,21 +37,13 @@ _LONGEST, _TINY = 0.2, 1e-300
 
 
 class FibreSums(NamedTuple):
-    """Sums over the fibres: force (N) and moment (N mm), and how they change.
+    """Sums over the fibres: force (N) and moment (N mm), and how they change."""
 
-    Attributes:
-        force: Axial force.
-        moment: Moment.
-        stretch: Change of the force with the strain of the neutral axis.
-        mixed: Change of the force with the curvature, and of the moment with that strain.
-        bending: Change of the moment with the curvature.
-    """
-
-    force: Array
-    moment: Array
-    stretch: Array
-    mixed: Array
-    bending: Array
+    force: Array  # Axial force
+    moment: Array  # Moment
+    stretch: Array  # Change of the force with the strain of the neutral axis
+    mixed: Array  # Change of the force with the curvature, and of the moment with that strain
+    bending: Array  # Change of the moment with the curvature
 
 
 class SectionEnds(NamedTuple):
@@ -104,10 +90,8 @@ def _settle(
     scale: tuple[Array, Array],
     start: Array,
 ) -> tuple[Array, Array, FibreSums]:
-    """Find strain of the neutral axis, curvature and sums of all sections, from a curvature.
-
-    One condition stops the iteration of all sections; they may have leading axes.
-    """
+    """Find strain of the neutral axis, curvature and sums of all sections, from a curvature."""
+    # One condition stops the iteration of all sections; they may have leading axes.
     bending_strain = scale[0] * jnp.abs(joint.reduced)
 
     def proceed(search: tuple[Array, ...]) -> Array:
@@ -154,10 +138,8 @@ def _(size: int, batched: Any, law: SumsFibres, *sections: Any) -> tuple[Any, An
 
 @jax.custom_jvp
 def same_sums(sums: FibreSums, *of: Any) -> FibreSums:
-    """Return known sums over fibres, with the derivatives of the summation.
-
-    Without differentiation nothing is summed or traced.
-    """
+    """Return known sums over fibres, with the derivatives of the summation."""
+    # Without differentiation nothing is summed or traced.
     del of
     return sums
 
@@ -231,21 +213,16 @@ class _Curve(NamedTuple):
 
 
 class FibreLaw(SectionLaw):
-    """Fibres that transform; everything but bending about the weak axis is elastic.
+    """Fibres that transform; everything but bending about the weak axis is elastic."""
 
-    The transformed strain on a curve is a sum over its kinks: change * (strain - the strain clipped
-    between low and high).
+    # The transformed strain on a curve is a sum over its kinks: change * (strain - the strain
+    # clipped between low and high).
 
-    Attributes:
-        low: Strain in compression where each kink of the lower and of the upper curve lies; one
-            curve without hysteresis.
-        high: The same in tension.
-        change: Change of transformed strain per strain at each kink.
-    """
-
+    # Strain in compression where each kink of the lower and of the upper curve lies; one curve
+    # without hysteresis
     low: Float[Array, "curves kinks"]
-    high: Float[Array, "curves kinks"]
-    change: Float[Array, " kinks"]
+    high: Float[Array, "curves kinks"]  # The same in tension
+    change: Float[Array, " kinks"]  # Change of transformed strain per strain at each kink
 
     @property
     def remembers(self) -> bool:
@@ -395,3 +372,84 @@ def _in_parts(array: Array) -> Array:
 def _along(strain: Array, curvature: Array, arm: Array) -> Array:
     """Compute the strain of fibres from that of the neutral axis and the curvature."""
     return strain[..., None] + curvature[..., None] * arm
+
+
+@section_law.register
+def _(material: Nitinol) -> FibreLaw:
+    modulus = material.elastic_modulus
+    loading, ratio = material.plateau_stress / modulus, material.compression_ratio
+    # A fibre does not fall below loading in tension, nor below unloading in compression.
+    tension, compression = [loading], [-ratio * loading]
+    if material.unloading_stress is not None:
+        unloading = material.unloading_stress / modulus
+        tension, compression = [loading, unloading], [-ratio * unloading, -ratio * loading]
+    low, high = xp.array(compression)[:, None], xp.array(tension)[:, None]
+    change = xp.array([1.0 - xp.maximum(material.plateau_modulus / modulus, FLATTEST)])
+    if material.transformation_strain is not None:
+        length = material.transformation_strain - loading
+        low, high = xp.hstack([low, low - length]), xp.hstack([high, high + length])
+        change = xp.append(change, -change)
+    return FibreLaw(
+        elastic_modulus=constant(modulus),
+        shear_modulus=constant(modulus / (2.0 * (1.0 + material.poisson_ratio))),
+        low=constant(low),
+        high=constant(high),
+        change=constant(change),
+    )
+
+
+# A strain that no fibre reaches.
+_NEVER = 1e6
+# How far a curve through fewer points may lie off, of its largest stress.
+_OFF = 1e-6
+
+
+@section_law.register
+def _(material: StressStrain) -> FibreLaw:
+    modulus = material.elastic_modulus
+    high, change = _kinks(*material.in_tension, modulus)
+    low = -high
+    if material.in_compression is not None:
+        at, by = _kinks(*material.in_compression, modulus)
+        low = xp.append(xp.full(len(high), -_NEVER), -at)
+        high = xp.append(high, xp.full(len(at), _NEVER))
+        change = xp.append(change, by)
+    # Numbers of kinks are powers of two, so that curves share programs.
+    spare = (0, (1 << (len(change) - 1).bit_length()) - len(change))
+    return FibreLaw(
+        elastic_modulus=constant(modulus),
+        shear_modulus=constant(modulus / (2.0 * (1.0 + material.poisson_ratio))),
+        low=constant(xp.pad(low, spare, constant_values=-_NEVER)[None]),
+        high=constant(xp.pad(high, spare, constant_values=_NEVER)[None]),
+        change=constant(xp.pad(change, spare)),
+    )
+
+
+@lru_cache(maxsize=64)
+def _kinks(
+    strain: tuple[float, ...], stress: tuple[float, ...], modulus: float
+) -> tuple[Array, Array]:
+    """List the kinks of a curve, and the fall of slope there over Young's modulus."""
+    at, value = _few_points(xp.append(0.0, strain), xp.append(0.0, stress))
+    slope = xp.maximum(xp.diff(value) / xp.diff(at) / modulus, FLATTEST)
+    change = -xp.diff(slope, prepend=1.0)
+    turns = xp.abs(change) > 1e-12  # at zero only where compression begins with another slope
+    return (at[:-1][turns], change[turns]) if turns.any() else (at[:1], change[:1])
+
+
+def _few_points(strain: Array, stress: Array) -> tuple[Array, Array]:
+    """Keep the first point, the last and few between them; chords pass the others closely."""
+    off = _OFF * stress[-1]
+    kept, last = [0], len(strain) - 1
+    while kept[-1] < last:
+        begin = kept[-1]
+        least, most, reached = -np.inf, np.inf, begin + 1
+        for point in range(begin + 1, last + 1):
+            run, rise = strain[point] - strain[begin], stress[point] - stress[begin]
+            if least <= rise / run <= most:
+                reached = point
+            least, most = max(least, (rise - off) / run), min(most, (rise + off) / run)
+            if least > most:
+                break
+        kept.append(reached)
+    return strain[kept], stress[kept]

@@ -42,17 +42,7 @@ _ITERATIONS = 20
 def bracketed_root(
     function: Callable[[Array], tuple[Array, Array]], start: Array, low: Array, high: Array
 ) -> Array:
-    """Find the root by Newton's method with bisection in a bracket; not differentiable.
-
-    Args:
-        function: Value and slope of a function that does not decrease.
-        start: Initial guess.
-        low: Lower bound of the root.
-        high: Upper bound of the root; without a root the nearer bound is approached.
-
-    Returns:
-        The root.
-    """
+    """Find the root by Newton's method with bisection in a bracket; not differentiable."""
 
     def improve(_: int, search: tuple[Array, ...]) -> tuple[Array, ...]:
         root, low, high, last_step = search
@@ -164,7 +154,7 @@ class FibreSection(Pytree):
     outer_radius: Float[Array, "*shape"] | float = 0.0
     half_angle: Float[Array, "*shape"] | float = 0.0
 
-    def stiffened(self, factor: Float[np.ndarray, "*shape"]) -> FibreSection:
+    def stiffened(self, factor: Float[Array, "*shape"]) -> FibreSection:
         """Multiply the stiffness in all directions; for plain arrays. Strains stay as they are."""
         names = ("area", "second_moment_weak", "second_moment_strong", "torsion_constant")
         moments = {name: constant(factor * getattr(self, name)) for name in names}
@@ -221,19 +211,12 @@ class SectionBending(Protocol):
 
 
 class Flattening(NamedTuple):
-    """Flattening of a section, per length.
+    """Flattening of a section, per length."""
 
-    Attributes:
-        path: X.
-        transformed: K e, N mm.
-        by_transformation: H, N mm/mm.
-        energy: psi, N mm/mm.
-    """
-
-    path: Array
-    transformed: Array
-    by_transformation: Array
-    energy: Array
+    path: Array  # X
+    transformed: Array  # K e, N mm
+    by_transformation: Array  # H, N mm/mm
+    energy: Array  # psi, N mm/mm
 
     @classmethod
     def none(cls, like: Array) -> Flattening:
@@ -244,17 +227,7 @@ class Flattening(NamedTuple):
 def flattening(
     law: SectionBending, curvature: Array, section: FibreSection, memory: Any
 ) -> Flattening:
-    """Compute the flattening of a section at a curvature.
-
-    Args:
-        law: Its material.
-        curvature: Curvature kappa of the notch, 1/mm.
-        section: The section; its notch has ends.
-        memory: Memory of the material; () for laws without memory.
-
-    Returns:
-        Path, transformation and energy of the flattening.
-    """
+    """Compute the flattening of a section at a curvature."""
     ends = section.ends
     assert ends is not None
     stiffness = law.elastic_modulus * section.second_moment_weak / (1.0 + ends.weak)
@@ -295,10 +268,8 @@ def _along(ends: NotchEnds, curvature: Array, node: Array) -> tuple[Array, Array
 def _middle(
     law: SectionBending, section: FibreSection, start: Array, own: Array, stiffness: Array
 ) -> Array:
-    """Find the curvature where loading by halfway stresses has transformed a section as much.
-
-    Only the last Newton step is differentiated.
-    """
+    """Find the curvature where loading by halfway stresses has transformed a section as much."""
+    # Only the last Newton step is differentiated.
     ends = section.ends
     assert ends is not None
 
@@ -329,36 +300,25 @@ def _middle(
 
 
 class SectionResponse(NamedTuple):
-    """Response of a section law.
+    """Response of a section law."""
 
-    Attributes:
-        resultants: Moments about x, y, z (N mm) and forces along x, y, z (N).
-        memory: The memory after these strains.
-        slope: Change of the moment about y with the curvature about y, where the law provides it
-            and all else is elastic; None to differentiate.
-    """
-
-    resultants: Float[Array, " 6"]
-    memory: Any
+    resultants: Float[Array, " 6"]  # Moments about x, y, z (N mm) and forces along x, y, z (N)
+    memory: Any  # The memory after these strains
+    # Change of the moment about y with the curvature about y, where the law provides it and all
+    # else is elastic; None to differentiate
     slope: Float[Array, ""] | None = None
 
 
 class Bending(NamedTuple):
-    """A section between its ends, bent about the weak axis.
+    """A section between its ends, bent about the weak axis."""
 
-    Attributes:
-        curvature: Curvature of the section itself, beyond that of the free tube, 1/mm.
-        moment: Its moment, N mm.
-        memory: The memory after it.
-        slope: Change of the moment with s, where the law provides it; None to differentiate.
-        strain: Strain of the neutral axis, for laws of fibres.
-    """
-
+    # Curvature of the section itself, beyond that of the free tube, 1/mm
     curvature: Float[Array, ""]
-    moment: Float[Array, ""]
-    memory: Any
+    moment: Float[Array, ""]  # Its moment, N mm
+    memory: Any  # The memory after it
+    # Change of the moment with s, where the law provides it; None to differentiate
     slope: Array | None = None
-    strain: Array | float = 0.0
+    strain: Array | float = 0.0  # Strain of the neutral axis, for laws of fibres
 
 
 # Mask of weak-axis bending among strains and resultants.
@@ -425,10 +385,8 @@ class SectionLaw(Pytree, ABC):
     def respond(
         self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
     ) -> SectionResponse:
-        """Compute the resultants of a cross-section from its strains beyond those of the free tube.
-
-        Laws that bend many sections at once accept many.
-        """
+        """Compute resultants from strains beyond those of the free tube, N and N mm."""
+        # Laws that bend many sections at once accept many.
         elastic = self.elastic(jnp.moveaxis(strain, -1, 0), section)
         ends, curvature = section.ends, strain[..., 1]
         if ends is None:
@@ -447,12 +405,10 @@ class SectionLaw(Pytree, ABC):
     def energy(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Return the energy stored per length under given strains, N mm/mm.
-
-        It is the area under the moment over the curvature, and the elastic energy of the other
-        strains. With hysteresis it is the energy of fibres, ends and flattening; the rest of the
-        area is dissipated.
-        """
+        """Return the energy stored per length under given strains, N mm/mm."""
+        # It is the area under the moment over the curvature, and the elastic energy of the other
+        # strains. With hysteresis it is the energy of fibres, ends and flattening; the rest of the
+        # area is dissipated.
         return self.stored_energy_density(strain, section, memory)[0]
 
     def stored_energy_density(
@@ -499,10 +455,8 @@ def _imbalance(law: SectionLaw, section: FibreSection, reduced: Array, curvature
 
 
 def _between_ends(law: SectionLaw, section: FibreSection, reduced: Array) -> Float[Array, ""]:
-    """Find the curvature of a section between its ends.
-
-    Only the last Newton step is differentiated, from a constant point.
-    """
+    """Find the curvature of a section between its ends."""
+    # Only the last Newton step is differentiated, from a constant point.
     fixed = jax.tree.map(jax.lax.stop_gradient, (law, section, reduced))
     ends, aim = fixed[1].ends, fixed[2]
 
@@ -522,22 +476,11 @@ def elastic_resultants(
     section: FibreSection,
     strain: Float[Array, " 6"],
 ) -> Float[Array, "*shape 6"]:
-    """Compute the resultants of a linear elastic section about its neutral axis, with its ends.
-
-    The axes through the centroid are principal, so bending and stretch do not couple. Shear
-    along y acts at the shear centre, `shear_centre` on the spine's side, where the section's
-    shear is v_y - shear_centre * twist: that couples it with torsion. The shear areas are the
-    whole area (Gao 2017 takes the same factor of 1).
-
-    Args:
-        elastic_modulus: Young's modulus, MPa.
-        shear_modulus: Shear modulus, MPa.
-        section: The section, or many.
-        strain: Its strains.
-
-    Returns:
-        Resultants, in the order of the strains.
-    """
+    """Compute the resultants of a linear elastic section about its neutral axis, with its ends."""
+    # The axes through the centroid are principal, so bending and stretch do not couple. Shear along
+    # y acts at the shear centre, `shear_centre` on the spine's side, where the section's shear is
+    # v_y - shear_centre * twist: that couples it with torsion. The shear areas are the whole area
+    # (Gao 2017 takes the same factor of 1).
     about_x, about_y, twist, along_x, along_y, stretch = (
         strain[component] for component in range(6)
     )
@@ -599,17 +542,12 @@ def section_law(material: Any) -> SectionLaw:
 
 
 class SectionStrain(NamedTuple):
-    """Strains of a section itself, without those of its ends.
+    """Strains of a section itself, without those of its ends."""
 
-    Attributes:
-        stretch: Strain of the neutral axis.
-        curvature: Curvature about the weak axis, 1/mm; positive closes and stretches the spine.
-        sideways: Magnitude of the curvature about the strong axis, 1/mm.
-    """
-
-    stretch: Array
+    stretch: Array  # Strain of the neutral axis
+    # Curvature about the weak axis, 1/mm; positive closes and stretches the spine
     curvature: Array
-    sideways: Array
+    sideways: Array  # Magnitude of the curvature about the strong axis, 1/mm
 
 
 def section_strain(

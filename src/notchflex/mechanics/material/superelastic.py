@@ -27,11 +27,11 @@ from notchflex.robot import Superelastic
 
 
 class SuperelasticLaw(SectionLaw):
-    """Linear, then the flat superelastic branch, then plastic stiffening. Stresses in MPa.
+    """Linear, then the flat superelastic branch, then plastic stiffening."""
 
-    Weak-axis bending follows the curve; everything else (sideways bending, torsion, shear,
-    stretch) stays on the linear branch, of which the paper says nothing.
-    """
+    # Stresses in MPa.
+    # Weak-axis bending follows the curve; everything else (sideways bending, torsion, shear,
+    # stretch) stays on the linear branch, of which the paper says nothing.
 
     superelastic_modulus: Float[Array, ""]
     transition_strain: Float[Array, ""]

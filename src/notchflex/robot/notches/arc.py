@@ -178,7 +178,7 @@ class ArcNotch(Notch):
 
         Pacheco 2021: h / (r_o + centroid).
         """
-        from notchflex.mechanics.section import SECTION_OF_CUT  # it loads JAX
+        from notchflex.mechanics.cuts import SECTION_OF_CUT  # it loads JAX
 
         depth = self.section_depth(tube)
         left = SECTION_OF_CUT[self.cut](tube.outer_radius, tube.inner_radius, depth)

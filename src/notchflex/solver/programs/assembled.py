@@ -23,8 +23,8 @@ from notchflex._jax import (
     jnp,
 )
 from notchflex.mechanics.chain import Chain, assemble, body_lengths, flexure, sites_of
-from notchflex.mechanics.ends import Side
 from notchflex.mechanics.flexure import Site
+from notchflex.mechanics.ring import Side
 from notchflex.robot import Robot, Tube
 from notchflex.robot.kinds import Notch
 from notchflex.robot.numbers import (

@@ -107,7 +107,7 @@ class StaticStructure:
     """Which numbers of a chain are constants, and the layout of the others in a vector.
 
     Constants are zeros that a chain has at every flexure because of how it is made
-    (`structural` in `mechanics/chain/arrays.py`), and whole numbers and flags that are the same at
+    (`structural` in `mechanics/chain.py`), and whole numbers and flags that are the same at
     every flexure. The others are laid out flexure after flexure, as programs read them.
 
     The structure depends on the chain alone, so a chain has the same program whatever was solved

@@ -7,8 +7,7 @@ from notchflex.mechanics.flexure.rod import (
     section_fibres,
 )
 from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
-from notchflex.mechanics.section import two_walls
-from notchflex.mechanics.section.section import two_walls_fibres
+from notchflex.mechanics.section import two_walls, two_walls_fibres
 from notchflex.robot import Tube
 from notchflex.robot.notches.flat import FlatNotch
 

@@ -9,11 +9,11 @@ from math import factorial
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
-from notchflex._arrays import cached, decide, is_traced, xp
+from notchflex._arrays import cached, is_traced, xp
 from notchflex._jax import (
     constant,
     jax,
@@ -35,23 +35,8 @@ Term = tuple[Fraction | int, int, str, int]
 """(c, n, "sin" or "cos", m) stands for c αⁿ sin(mα) or c αⁿ cos(mα)."""
 
 
-def cancelling_sum(terms: Sequence[Term]) -> Callable[[jax.Array], jax.Array]:
-    """Make a function of an angle that adds up `terms` without loss at small angles.
-
-    Args:
-        terms: Terms (c, n, "sin" or "cos", m) of the sum, c αⁿ sin(mα) or c αⁿ cos(mα), with
-            exact (rational) c. All of them must be odd in α, or all of them even.
-
-    Returns:
-        The sum as a function of the angle in rad (any shape), relative error about 1e-14 for
-        angles from 0 to π.
-
-    Example:
-        >>> import numpy as np
-        >>> excess = cancelling_sum([(1, 1, "cos", 0), (-1, 0, "sin", 1)])  # α − sin α
-        >>> print(f"{float(excess(xp.asarray(1e-5))) * 6e15:.10f}")  # α³/6
-        1.0000000000
-    """
+def cancelling_sum(terms: Sequence[Term]) -> Callable[[Array], Array]:
+    """Make a function of an angle that adds up `terms` without loss at small angles."""
     series: dict[int, Fraction] = {}
     for factor, power, kind, multiple in terms:
         start = 1 if kind == "sin" else 0
@@ -62,7 +47,7 @@ def cancelling_sum(terms: Sequence[Term]) -> Callable[[jax.Array], jax.Array]:
     first = min(order for order, value in series.items() if value)
     coefficients = [float(series[first + 2 * k]) for k in range(_TERMS)]
 
-    def evaluate(angle: jax.Array) -> jax.Array:
+    def evaluate(angle: Array) -> Array:
         if isinstance(angle, np.ndarray) and angle.ndim == 0:  # of one notch: no arrays needed
             plain: Any = float(angle)
             return xp.asarray(near(plain) if plain < _SERIES_BELOW else far(plain))  # pyright: ignore[reportReturnType]
@@ -84,19 +69,8 @@ def cancelling_sum(terms: Sequence[Term]) -> Callable[[jax.Array], jax.Array]:
     return evaluate
 
 
-def half_angle(radius: jax.Array, above: jax.Array, below: jax.Array) -> jax.Array:
-    """Compute half of the angle of a circle beyond a chord, arccos(d / r), clipped.
-
-    Args:
-        radius: Radius r of the circle, mm.
-        above: r − d, from the chord to the top of the circle, mm; given by itself because
-            the difference would lose digits for small angles.
-        below: r + d, from the bottom of the circle to the chord, mm.
-
-    Returns:
-        The angle in rad: 0 where the chord passes above the circle (`above` ≤ 0), π where it
-        passes below, 2 atan(√(above / below)) between. Its derivative is finite everywhere.
-    """
+def half_angle(radius: Array, above: Array, below: Array) -> Array:
+    """Compute half of the angle of a circle beyond a chord, arccos(d / r), clipped."""
     cut = (above > 0.0) & (below > 0.0)
     above_safe = xp.where(cut, above, radius)
     below_safe = xp.where(cut, below, radius)
@@ -107,17 +81,8 @@ def half_angle(radius: jax.Array, above: jax.Array, below: jax.Array) -> jax.Arr
 # Series over arrays of any shape, with the terms as leading axis.
 
 
-def broadcast_terms(constants: np.ndarray, like: jax.Array) -> jax.Array:
-    """Shape one constant for each term so that it combines with `like[None]`.
-
-    Args:
-        constants: Constants, shape (terms,).
-        like: Array that the terms are functions of, any shape.
-
-    Returns:
-        The constants, shape (terms, 1, …, 1) with as many ones as `like` has axes; explicit
-        because silent broadcasting across ranks is an error in the tests.
-    """
+def broadcast_terms(constants: Array, like: Array) -> Array:
+    """Shape one constant for each term so that it combines with `like[None]`."""
     return xp.asarray(constants).reshape((-1, *([1] * like.ndim)))
 
 
@@ -151,30 +116,23 @@ class Section(NamedTuple):
         half_angle: Half angle of that arc, rad.
     """
 
-    area: jax.Array
-    centroid: jax.Array
-    second_moment_weak: jax.Array
-    second_moment_strong: jax.Array
-    torsion_constant: jax.Array
-    shear_centre: jax.Array
-    edge_near: jax.Array
-    edge_spine: jax.Array
-    edge_across: jax.Array
-    outer_radius: jax.Array
-    half_angle: jax.Array
+    area: Array
+    centroid: Array
+    second_moment_weak: Array
+    second_moment_strong: Array
+    torsion_constant: Array
+    shear_centre: Array
+    edge_near: Array
+    edge_spine: Array
+    edge_across: Array
+    outer_radius: Array
+    half_angle: Array
 
 
 def of_any_shape(
-    properties: Callable[[jax.Array, jax.Array, jax.Array], Section],
+    properties: Callable[[Array, Array, Array], Section],
 ) -> Callable[[ArrayLike, ArrayLike, ArrayLike], Section]:
-    """Let a formula for arrays of one shape take radii and depth in any form.
-
-    Args:
-        properties: Section of outer radius, inner radius and depth.
-
-    Returns:
-        The same for numbers and arrays that broadcast; read-only, as it is kept for plain numbers.
-    """
+    """Let a formula for arrays of one shape take radii and depth in any form."""
 
     @cached(1024)  # notches of a tube, and their sites, share sections
     def section(outer: ArrayLike, inner: ArrayLike, depth: ArrayLike) -> Section:
@@ -234,27 +192,12 @@ def two_walls(width: ArrayLike, thickness: ArrayLike, middle: ArrayLike) -> Sect
     )
 
 
-def rectangle_torsion_constant(width: ArrayLike, thickness: ArrayLike) -> np.ndarray:
-    r"""Compute Saint-Venant's torsion constant of a rectangle, to rounding.
-
-    With the longer side b and the shorter h (Timoshenko and Goodier, Theory of Elasticity, §109):
-
-    $$J = \frac{bh^3}{3}\Big[1 - \frac{192}{\pi^5}\frac hb
-    \sum_{n=1,3,\dots}\frac{\tanh(n\pi b/2h)}{n^5}\Big]$$
-
-    The sum of $n^{-5}$ is known, and what the tanh takes off falls with $e^{-n\pi}$ or faster.
-
-    Args:
-        width: One side, mm; any shape.
-        thickness: The other side, mm.
-
-    Returns:
-        Torsion constant, mm⁴.
-
-    Example:
-        >>> print(f"{rectangle_torsion_constant(1.0, 1.0):.10f}")
-        0.1405770150
-    """
+def rectangle_torsion_constant(width: ArrayLike, thickness: ArrayLike) -> Array:
+    """Compute Saint-Venant's torsion constant of a rectangle, to rounding."""
+    # With the longer side b and the shorter h (Timoshenko and Goodier, Theory of Elasticity, §109):
+    # $$J = \frac{bh^3}{3}\Big[1 - \frac{192}{\pi^5}\frac hb
+    # \sum_{n=1,3,\dots}\frac{\tanh(n\pi b/2h)}{n^5}\Big]$$
+    # The sum of $n^{-5}$ is known, and what the tanh takes off falls with $e^{-n\pi}$ or faster.
     one, other = xp.asarray(width, dtype=float), xp.asarray(thickness, dtype=float)
     b, h = xp.maximum(one, other), xp.minimum(one, other)
     decay = xp.exp(-np.pi * _ODD * (b / h)[..., None])
@@ -264,40 +207,21 @@ def rectangle_torsion_constant(width: ArrayLike, thickness: ArrayLike) -> np.nda
 
 def clamped_torsion_constant(
     section: Section, middle: ArrayLike, length: float, poisson_ratio: float = 0.33
-) -> np.ndarray:
-    r"""Compute the equivalent torsion constant of two walls clamped at both ends.
-
-    Where the strip turns about its own axis, its walls are bent one up, one down. With the
-    warping constant $I_\omega = 2\,(bh^3/12)\,c^2$ the torque that turns the whole length L by
-    an angle is that of free warping with
-
-    $$J_\text{clamped} = \frac{J}{1 - \tanh u/u},\qquad
-    u = \frac L2\sqrt{\frac{GJ}{EI_\omega}},$$
-
-    (Vlasov 1961, Thin-Walled Elastic Beams): for short strips $12EI_\omega/GL^2$, two beams.
-
-    Args:
-        section: Section by `two_walls`.
-        middle: Distance c of the middle of each wall from the plane of symmetry, mm.
-        length: Length between the clamps, mm.
-        poisson_ratio: For the ratio of the moduli; the result changes by less than its relative
-            change times 1 / (1 + ratio).
-
-    Returns:
-        Torsion constant, mm⁴.
-
-    Example:
-        >>> strip = two_walls(2.0, 1.5, 4.0)
-        >>> print(f"{clamped_torsion_constant(strip, 4.0, 8.0):.3f} mm⁴")
-        11.890 mm⁴
-    """
+) -> Array:
+    """Compute the equivalent torsion constant of two walls clamped at both ends."""
+    # Where the strip turns about its own axis, its walls are bent one up, one down. With the
+    # warping constant $I_\omega = 2\,(bh^3/12)\,c^2$ the torque that turns the whole length L by
+    # an angle is that of free warping with
+    # $$J_\text{clamped} = \frac{J}{1 - \tanh u/u},\qquad
+    # u = \frac L2\sqrt{\frac{GJ}{EI_\omega}},$$
+    # (Vlasov 1961, Thin-Walled Elastic Beams): for short strips $12EI_\omega/GL^2$, two beams.
     free = xp.asarray(section.torsion_constant)
     warping = xp.asarray(section.second_moment_weak) * xp.asarray(middle, dtype=float) ** 2
     u = 0.5 * length * xp.sqrt(free / (2.0 * (1.0 + poisson_ratio) * warping))
     return free / _beyond_tanh(u)
 
 
-def _beyond_tanh(u: np.ndarray) -> np.ndarray:
+def _beyond_tanh(u: Array) -> Array:
     """Compute 1 - tanh(u)/u, which is u²/3 for small u, without cancellation."""
     small = u < 0.1
     square = xp.where(small, u, 0.0) ** 2
@@ -320,12 +244,11 @@ def _beyond_tanh(u: np.ndarray) -> np.ndarray:
 leggauss = lru_cache(maxsize=16)(legendre.leggauss)
 
 FIBRES = 20
-_RADII, _ANGLES, _STRIPS = 10, 2, 8  # the latter for each fibre; with fewer the recurrence fails
 # A node is searched in eighths of an angle; five times, and the error is below 1e-4 rad.
 _PARTS, _WIDTHS = np.arange(1, 8)[:, None], np.pi / 8.0 ** np.arange(1, 6)
 
-Strips = Float[np.ndarray, " strips"]
-Points = tuple[Float[np.ndarray, "*nodes fibres"], Float[np.ndarray, "*nodes fibres"]]
+Strips = Float[Array, " strips"]
+Points = tuple[Float[Array, "*nodes fibres"], Float[Array, "*nodes fibres"]]
 """Arms (mm) and areas (mm^2)."""
 
 FibresAt = Callable[[Any, Any, int], Points]
@@ -338,57 +261,6 @@ def two_walls_fibres(near: Any, spine: Any, count: int) -> Points:
     points, weights = leggauss(count)
     beside_spine, beside_near = xp.outer(spine, 1.0 + points), xp.outer(near, 1.0 - points)
     return 0.5 * (beside_spine - beside_near), weights
-
-
-@cached(1024)  # the same for all sites and heights
-def cut_fibres(cut: str, outer: float, inner: float, depth: float, count: int) -> Points:
-    """Few fibres of what a cut leaves of a tube."""
-    return gauss_rule(*_FIBRES_OF_CUT[cut](outer, inner, depth, count), count)
-
-
-def sector_fibres(outer: float, inner: float, depth: float, count: int = FIBRES) -> Points:
-    """Divide an annular sector (`annular_sector`); each piece stands for both halves."""
-    numbers = outer, 2.0 * outer - depth, depth
-    half = half_angle(*map(constant, numbers))
-    angles, of_angles = _between(0.0, half, _ANGLES * count)
-    radii, of_radii = _between(inner, outer, _RADII)
-    area = 2.0 * xp.outer(of_radii * radii, of_angles)
-    return xp.outer(radii, xp.cos(angles)).ravel(), area.ravel()
-
-
-def segment_fibres(outer: float, inner: float, depth: float, count: int = FIBRES) -> Points:
-    """Divide an annular segment (`annular_segment`) into strips across, outside and at the bore.
-
-    The heights of strips are cosines, so that the chords of both circles are smooth over them.
-    """
-    plane = depth - outer
-    top, bottom, rim = (
-        half_angle(*map(constant, (radius, radius - height, radius + height)))
-        for radius, height in ((outer, plane), (inner, plane), (outer, inner))
-    )
-    beyond = xp.minimum(rim, top)
-    ends = [(0.0, beyond)] + ([(np.pi - beyond, top)] if decide(plane < -inner) else [])
-    at_bore = _STRIPS * count // 2 if decide(bottom > 0.0) else 0
-    angles, of_angles = zip(
-        *(_between(*pair, (_STRIPS * count - at_bore) // len(ends)) for pair in ends), strict=True
-    )
-    solid, of_solid = xp.concatenate(angles), xp.concatenate(of_angles)
-    bore, of_bore = _between(0.0, bottom, at_bore) if at_bore else (xp.zeros(0), xp.zeros(0))
-    height = inner * xp.cos(bore)
-    wall = xp.sqrt(outer**2 - height**2) - inner * xp.sin(bore)
-    area = (
-        2.0 * (outer * xp.sin(solid)) ** 2 * of_solid,
-        2.0 * wall * inner * xp.sin(bore) * of_bore,
-    )
-    return xp.append(outer * xp.cos(solid), height), xp.concatenate(area)
-
-
-_FIBRES_OF_CUT = {"on-axis": sector_fibres, "off-axis": segment_fibres}
-
-
-def _between(first: float, last: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
-    points, weights = leggauss(count)
-    return 0.5 * (first + last) + 0.5 * (last - first) * points, 0.5 * (last - first) * weights
 
 
 def fitted(points: Points, area: Any, second_moment: Any) -> Points:
@@ -404,12 +276,10 @@ def fitted(points: Points, area: Any, second_moment: Any) -> Points:
 
 
 def gauss_rule(points: Strips, weights: Strips, count: int) -> Points:
-    """Compute the Gauss rule of a discrete measure, exact up to degree 2 count - 1.
-
-    The nodes are the roots of the last of the polynomials orthogonal over the points. Signs of the
-    others tell how many lie above a place; they are searched along the angle of its cosine, where
-    they are evenly spaced.
-    """
+    """Compute the Gauss rule of a discrete measure, exact up to degree 2 count - 1."""
+    # The nodes are the roots of the last of the polynomials orthogonal over the points. Signs of
+    # the others tell how many lie above a place; they are searched along the angle of its cosine,
+    # where they are evenly spaced.
     total = xp.sum(weights)
     shares = weights / total
 

@@ -1,18 +1,25 @@
-"""Which section each cut of an asymmetric notch leaves."""
+"""What each cut of an asymmetric notch leaves of a tube: its section, and the fibres of it."""
 
 from fractions import Fraction
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
+from jaxtyping import Array
+from numpy.typing import ArrayLike
 
-from notchflex._arrays import xp
-from notchflex._jax import jax
-from notchflex.mechanics.section.section import (
+from notchflex._arrays import cached, decide, xp
+from notchflex._jax import constant
+from notchflex.mechanics.section import (
+    FIBRES,
+    Points,
     Section,
     broadcast_terms,
     cancelling_sum,
+    gauss_rule,
     half_angle,
+    leggauss,
     of_any_shape,
 )
 
@@ -45,14 +52,12 @@ _SUMMED = 24  # terms added one by one; even, so that odd and even terms pair up
 _TAIL_NODES = 12
 
 
-def _series_nodes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return index, parity and weight of the terms; the tail is integrated, not summed.
-
-    Terms of one parity are smooth in n, and their sum beyond N is half of the integral from N
-    (odd) or N + 1 (even) by the midpoint rule; the substitution n = N / u makes it a Gauss
-    rule. With it slivers (a much less than the wall over the radius) keep their accuracy,
-    where terms decay only as n⁻² up to n = L / a.
-    """
+def _series_nodes() -> tuple[Array, Array, Array]:
+    """Return index, parity and weight of the terms; the tail is integrated, not summed."""
+    # Terms of one parity are smooth in n, and their sum beyond N is half of the integral from N
+    # (odd) or N + 1 (even) by the midpoint rule; the substitution n = N / u makes it a Gauss rule.
+    # With it slivers (a much less than the wall over the radius) keep their accuracy, where terms
+    # decay only as n⁻² up to n = L / a.
     n = xp.arange(1, _SUMMED + 1)
     x, weight = np.polynomial.legendre.leggauss(_TAIL_NODES)
     u, weight = 0.5 * (1.0 + x), 0.5 * weight
@@ -67,17 +72,8 @@ def _series_nodes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 _INDEX, _PARITY, _WEIGHT = _series_nodes()
 
 
-def sector_torsion_constant(outer: jax.Array, inner: jax.Array, angle: jax.Array) -> jax.Array:
-    """Compute the Saint-Venant torsion constant of an annular sector.
-
-    Args:
-        outer: Outer radius, mm.
-        inner: Inner radius, mm, greater than 0; of the same shape.
-        angle: Half-angle a, rad, 0 < a ≤ π; of the same shape.
-
-    Returns:
-        Torsion constant, mm⁴. At a = π that of the slit tube.
-    """
+def sector_torsion_constant(outer: Array, inner: Array, angle: Array) -> Array:
+    """Compute the Saint-Venant torsion constant of an annular sector."""
     n, parity, weight = (broadcast_terms(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
     outer, inner, angle = outer[None], inner[None], angle[None]
     length = xp.log(outer / inner)
@@ -88,21 +84,9 @@ def sector_torsion_constant(outer: jax.Array, inner: jax.Array, angle: jax.Array
 
 
 def sector_shear_centre(
-    outer: jax.Array, inner: jax.Array, angle: jax.Array, bow: jax.Array, strong: jax.Array
-) -> jax.Array:
-    """Compute the distance from the tube axis to the shear centre of an annular sector.
-
-    Args:
-        outer: Outer radius, mm.
-        inner: Inner radius, mm, greater than 0; of the same shape.
-        angle: Half-angle a, rad, 0 < a ≤ π; of the same shape.
-        bow: sin a − a cos a, without cancellation.
-        strong: Second moment for bending sideways, mm⁴.
-
-    Returns:
-        Distance of the shear centre from the tube axis, toward the spine, mm. It lies outside
-        the material, up to two mean radii from the axis.
-    """
+    outer: Array, inner: Array, angle: Array, bow: Array, strong: Array
+) -> Array:
+    """Compute the distance from the tube axis to the shear centre of an annular sector."""
     n, parity, weight = (broadcast_terms(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
     outer_, inner_, angle_ = outer[None], inner[None], angle[None]
     length = xp.log(outer_ / inner_)
@@ -133,9 +117,9 @@ _sag = cancelling_sum([(1, 1, "cos", 0), (-1, 0, "sin", 1)])
 
 
 def annular_sector(
-    outer_radius: jax.typing.ArrayLike,
-    inner_radius: jax.typing.ArrayLike,
-    depth: jax.typing.ArrayLike,
+    outer_radius: ArrayLike,
+    inner_radius: ArrayLike,
+    depth: ArrayLike,
 ) -> Section:
     r"""Compute the section that an on-axis cut leaves of a tube.
 
@@ -177,7 +161,7 @@ def annular_sector(
     return _sector(outer_radius, inner_radius, depth)
 
 
-def _sector_properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
+def _sector_properties(outer: Array, inner: Array, depth: Array) -> Section:
     """Compute all properties of arrays of one shape."""
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     a = half_angle(outer, left, depth)
@@ -242,24 +226,12 @@ _sector = of_any_shape(_sector_properties)
 # at r_i: a closed tube with a flat, an open arc with bevelled ends, a solid segment of the wall.
 
 
-def closed_estimate(
-    outer: jax.Array, inner: jax.Array, depth: jax.Array
-) -> tuple[jax.Array, jax.Array]:
-    r"""Estimate the closed tube with a flat after Bredt.
-
-    $J \approx 4A_m^2/C + \int t^3 ds/3$ with $C = \oint ds/t$. Under the flat, within an angle
-    b of the middle of the cut, the wall is $|d|/\cos\varphi - r_i$ thick, which integrates in
-    closed form. The part f of C that the flat adds moves the shear centre from the tube axis
-    to $2mf$; with f = 1 this is that of a slit tube.
-
-    Args:
-        outer: Outer radius, mm.
-        inner: Inner radius, mm.
-        depth: Depth of the cut, mm, greater than 0 and less than the wall.
-
-    Returns:
-        Torsion constant, mm⁴, and shear centre, mm.
-    """
+def closed_estimate(outer: Array, inner: Array, depth: Array) -> tuple[Array, Array]:
+    """Estimate the closed tube with a flat after Bredt."""
+    # $J \approx 4A_m^2/C + \int t^3 ds/3$ with $C = \oint ds/t$. Under the flat, within an angle
+    # b of the middle of the cut, the wall is $|d|/\cos\varphi - r_i$ thick, which integrates in
+    # closed form. The part f of C that the flat adds moves the shear centre from the tube axis
+    # to $2mf$; with f = 1 this is that of a slit tube.
     mean, wall = 0.5 * (outer + inner), outer - inner
     height = outer - depth  # |d|, from the tube axis to the flat
     tangent = xp.sqrt(depth / (2.0 * outer - depth))  # tan(b / 2)
@@ -275,20 +247,8 @@ def closed_estimate(
     return torsion, 2.0 * mean * added
 
 
-def open_estimate(
-    outer: jax.Array, inner: jax.Array, depth: jax.Array, area: jax.Array
-) -> tuple[jax.Array, jax.Array]:
-    """Estimate the open arc: J = A t²/3 and the shear centre of the thin arc.
-
-    Args:
-        outer: Outer radius, mm.
-        inner: Inner radius, mm.
-        depth: Depth of the cut, mm, such that the plane passes through the bore.
-        area: Area of the section, mm².
-
-    Returns:
-        Torsion constant, mm⁴, and shear centre, mm.
-    """
+def open_estimate(outer: Array, inner: Array, depth: Array, area: Array) -> tuple[Array, Array]:
+    """Estimate the open arc: J = A t²/3 and the shear centre of the thin arc."""
     mean, wall = 0.5 * (outer + inner), outer - inner
     a = half_angle(mean, mean + outer - depth, mean - outer + depth)
     sine, cosine = xp.sin(a), xp.cos(a)
@@ -307,9 +267,9 @@ CHORD_RANGE = {  # of the angle in rad, see `chord_angle`
 
 
 @cache
-def _read_table() -> dict[tuple[str, str], np.ndarray]:
+def _read_table() -> dict[tuple[str, str], Array]:
     """Read the coefficients, by shape and quantity, shape (ratio orders, angle orders)."""
-    text = (files("notchflex.mechanics.section") / "segment_table.csv").read_text(encoding="utf-8")
+    text = (files("notchflex.mechanics") / "segment_table.csv").read_text(encoding="utf-8")
     table: dict[tuple[str, str], list[list[float]]] = {}
     for line in text.splitlines():
         if not line.startswith("#"):
@@ -318,7 +278,7 @@ def _read_table() -> dict[tuple[str, str], np.ndarray]:
     return {key: xp.array(rows) for key, rows in table.items()}
 
 
-def _chebyshev(count: int, value: jax.Array, low: float, high: float) -> jax.Array:
+def _chebyshev(count: int, value: Array, low: float, high: float) -> Array:
     """Evaluate the first Chebyshev polynomials (count, …), constant outside low … high."""
     # The ends are moved in by 1e-12, because the arccosine has no derivative there.
     x = (2.0 * value - low - high) / (high - low)
@@ -326,20 +286,8 @@ def _chebyshev(count: int, value: jax.Array, low: float, high: float) -> jax.Arr
     return xp.cos(broadcast_terms(xp.arange(count, dtype=float), x) * xp.arccos(x)[None])
 
 
-def chord_angle(shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array) -> jax.Array:
-    """Return the table's coordinate along the depth, an angle in rad.
-
-    Args:
-        shape: "closed", "open" or "solid".
-        outer: Outer radius, mm.
-        inner: Inner radius, mm.
-        depth: Depth of the cut, mm.
-
-    Returns:
-        For the solid segment the half-angle of the outer circle beyond the cut plane, for the
-        open arc that of the inner circle, for the closed tube 2 arccos √(g / wall): all of them
-        make the square roots at the ends of their range smooth.
-    """
+def chord_angle(shape: str, outer: Array, inner: Array, depth: Array) -> Array:
+    """Return the table's coordinate along the depth, an angle in rad."""
     if shape == "closed":
         return half_angle(outer, outer - inner - depth, depth)
     if shape == "open":
@@ -347,9 +295,7 @@ def chord_angle(shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array
     return half_angle(outer, 2.0 * outer - depth, depth)
 
 
-def _factors(
-    shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array
-) -> tuple[jax.Array, jax.Array]:
+def _factors(shape: str, outer: Array, inner: Array, depth: Array) -> tuple[Array, Array]:
     """Interpolate the factors on the torsion constant and on the shear centre."""
     low, high = (float(xp.sqrt(1.0 - ratio)) for ratio in reversed(RATIO_RANGE))
     table = _read_table()
@@ -363,21 +309,8 @@ def _factors(
     return torsion, shear
 
 
-def segment_torsion(
-    outer: jax.Array, inner: jax.Array, depth: jax.Array, area: jax.Array
-) -> tuple[jax.Array, jax.Array]:
-    """Compute torsion constant and shear centre of an annular segment.
-
-    Args:
-        outer: Outer radius, mm.
-        inner: Inner radius, mm, greater than 0; of the same shape.
-        depth: Depth of the cut, mm; of the same shape.
-        area: Area of the section, mm²; of the same shape.
-
-    Returns:
-        Torsion constant, mm⁴, and distance of the (Trefftz) shear centre from the tube axis,
-        toward the spine, mm.
-    """
+def segment_torsion(outer: Array, inner: Array, depth: Array, area: Array) -> tuple[Array, Array]:
+    """Compute torsion constant and shear centre of an annular segment."""
     wall, plane = outer - inner, depth - outer
     closed = (plane < -inner) & (depth < wall)  # both: they may differ by rounding
     solid = plane >= inner
@@ -400,7 +333,7 @@ def segment_torsion(
         on_torsion, on_shear = _factors(shape, outer, inner, at)
         torsion[shape], shear[shape] = first * on_torsion, second * on_shear
 
-    def choose(of: dict[str, jax.Array]) -> jax.Array:
+    def choose(of: dict[str, Array]) -> Array:
         return xp.where(closed, of["closed"], xp.where(solid, of["solid"], of["open"]))
 
     return choose(torsion), choose(shear)
@@ -427,9 +360,9 @@ _sideways = cancelling_sum(
 
 
 def annular_segment(
-    outer_radius: jax.typing.ArrayLike,
-    inner_radius: jax.typing.ArrayLike,
-    depth: jax.typing.ArrayLike,
+    outer_radius: ArrayLike,
+    inner_radius: ArrayLike,
+    depth: ArrayLike,
 ) -> Section:
     r"""Compute the section that an off-axis cut leaves of a tube.
 
@@ -475,7 +408,7 @@ def annular_segment(
     return _segment(outer_radius, inner_radius, depth)
 
 
-def _segment_properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
+def _segment_properties(outer: Array, inner: Array, depth: Array) -> Section:
     """Compute all properties of arrays of one shape."""
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     plane = depth - outer  # d
@@ -527,6 +460,56 @@ def _segment_properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) ->
 
 
 _segment = of_any_shape(_segment_properties)
+
+
+@cached(1024)  # the same for all sites and heights
+def cut_fibres(cut: str, outer: float, inner: float, depth: float, count: int) -> Points:
+    """Few fibres of what a cut leaves of a tube."""
+    return gauss_rule(*_FIBRES_OF_CUT[cut](outer, inner, depth, count), count)
+
+
+def sector_fibres(outer: float, inner: float, depth: float, count: int = FIBRES) -> Points:
+    """Divide an annular sector (`annular_sector`); each piece stands for both halves."""
+    numbers = outer, 2.0 * outer - depth, depth
+    half = half_angle(*map(constant, numbers))
+    angles, of_angles = _between(0.0, half, 2 * count)
+    radii, of_radii = _between(inner, outer, 10)
+    area = 2.0 * xp.outer(of_radii * radii, of_angles)
+    return xp.outer(radii, xp.cos(angles)).ravel(), area.ravel()
+
+
+def segment_fibres(outer: float, inner: float, depth: float, count: int = FIBRES) -> Points:
+    """Divide an annular segment (`annular_segment`) into strips across, outside and at the bore."""
+    # The heights of strips are cosines, so that the chords of both circles are smooth over them. With
+    # fewer than 8 strips for each fibre the recurrence of `gauss_rule` fails.
+    plane = depth - outer
+    top, bottom, rim = (
+        half_angle(*map(constant, (radius, radius - height, radius + height)))
+        for radius, height in ((outer, plane), (inner, plane), (outer, inner))
+    )
+    beyond = xp.minimum(rim, top)
+    ends = [(0.0, beyond)] + ([(np.pi - beyond, top)] if decide(plane < -inner) else [])
+    at_bore = 4 * count if decide(bottom > 0.0) else 0
+    angles, of_angles = zip(
+        *(_between(*pair, (8 * count - at_bore) // len(ends)) for pair in ends), strict=True
+    )
+    solid, of_solid = xp.concatenate(angles), xp.concatenate(of_angles)
+    bore, of_bore = _between(0.0, bottom, at_bore) if at_bore else (xp.zeros(0), xp.zeros(0))
+    height = inner * xp.cos(bore)
+    wall = xp.sqrt(outer**2 - height**2) - inner * xp.sin(bore)
+    area = (
+        2.0 * (outer * xp.sin(solid)) ** 2 * of_solid,
+        2.0 * wall * inner * xp.sin(bore) * of_bore,
+    )
+    return xp.append(outer * xp.cos(solid), height), xp.concatenate(area)
+
+
+_FIBRES_OF_CUT = {"on-axis": sector_fibres, "off-axis": segment_fibres}
+
+
+def _between(first: float, last: Any, count: int) -> tuple[Array, Array]:
+    points, weights = leggauss(count)
+    return 0.5 * (first + last) + 0.5 * (last - first) * points, 0.5 * (last - first) * weights
 
 
 SECTION_OF_CUT = {"on-axis": annular_sector, "off-axis": annular_segment}

@@ -26,10 +26,12 @@ from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
+from jaxtyping import Array
 
 from notchflex._arrays import cached, decide, is_traced, plain_number, xp
 from notchflex._values import read_only
-from notchflex.mechanics.section import Section, annular_sector
+from notchflex.mechanics.cuts import annular_sector
+from notchflex.mechanics.section import Section
 
 # Uncut ring beside a notch, with the boundary condition at its far edge.
 
@@ -71,7 +73,7 @@ def _halves() -> list[list[tuple[int, int]]]:
     return [[term for term in half if term[1] <= _DEGREE] for half in halves]
 
 
-def _polynomial(displacement: int, degree: int) -> np.ndarray:
+def _polynomial(displacement: int, degree: int) -> Array:
     """Compute value and two derivatives by z / length at the far edge, the loaded one, the rule."""
     legendre = np.polynomial.legendre
     unit = np.eye(_DEGREE + 1)
@@ -105,13 +107,8 @@ _STRAINS = (
 
 # Robots with rigid ends do without; this takes 40 ms.
 @cache
-def _energies() -> np.ndarray:
-    """Integrate the products of strains in the energy, for r = 1, the highest degrees first.
-
-    Returns:
-        Array (parts, powers of ν, of radius / length, of n, rows, _BAND, halves); parts are the
-        membrane and bending. Empty rows follow, those that a band reaches.
-    """
+def _energies() -> Array:
+    """Integrate the products of strains in the energy, for r = 1, the highest degrees first."""
     strains = np.zeros((2, 3, 3, 6, _DEGREE + 1, len(_EMPTY) + _BAND))
     for half, terms in enumerate(_halves()):
         for number, (displacement, degree) in enumerate(terms):
@@ -132,11 +129,9 @@ def _energies() -> np.ndarray:
 
 
 @cache
-def _edges() -> np.ndarray:
-    """Return the first polynomials of both halves by what moves, shape (halves, _EDGE, 2 _EDGE).
-
-    The order is u, v, w and slope at the far edge, then v, w, u and slope at the loaded one.
-    """
+def _edges() -> Array:
+    """Return the first polynomials of both halves by what moves, shape (halves, _EDGE, 2 _EDGE)."""
+    # The order is u, v, w and slope at the far edge, then v, w, u and slope at the loaded one.
     moved = np.zeros((2 * _EDGE, 2 * _EDGE))
     for number, term in enumerate(_halves()[0][:_EDGE] + _halves()[1][:_EDGE]):
         value, slope = _polynomial(*term)[:2, :2]
@@ -147,7 +142,7 @@ def _edges() -> np.ndarray:
     return np.linalg.inv(moved).reshape(2, _EDGE, 2 * _EDGE)
 
 
-def _held(boundary: str) -> np.ndarray:
+def _held(boundary: str) -> Array:
     """Return what is held at the edges, in the order of `_edges`, (2 _EDGE, harmonics)."""
     held = np.zeros((2 * _EDGE, HARMONICS))
     held[[1, 4], 0] = 1.0  # no torsion
@@ -169,14 +164,8 @@ _SYMMETRIC = np.array([[0, 1], [1, 2]])
 _DIAGONAL = np.eye(2 * _EDGE)[..., None]
 
 
-def _flexibility(by_power: np.ndarray, powers: np.ndarray, held: np.ndarray) -> np.ndarray:
-    """Solve for u by tension, u by moment and slope by moment at the loaded edge, (3, harmonics).
-
-    Args:
-        by_power: Energies summed up for a ring, (powers of n, rows, _BAND, halves).
-        powers: Powers of n, (5, harmonics).
-        held: What is held, (2 _EDGE, harmonics).
-    """
+def _flexibility(by_power: Array, powers: Array, held: Array) -> Array:
+    """Solve for u by tension, u by moment and slope by moment, (3, harmonics)."""
     rows = xp.tensordot(by_power, powers, ((0,), (0,))) + _EMPTY
     window = rows[:_BAND]
     for following in range(_BAND, len(rows)):  # the first row of the window goes
@@ -200,21 +189,8 @@ def _flexibility(by_power: np.ndarray, powers: np.ndarray, held: np.ndarray) -> 
 @cached(256)  # rings of one length are equal, however deep the notches beside them
 def edge_compliance(
     radius: float, wall: float, length: float, poisson_ratio: float, boundary: str
-) -> np.ndarray:
-    """Compute the compliance of an edge to its loads, for each harmonic.
-
-    Args:
-        radius: Mean radius r, mm.
-        wall: Wall t, mm.
-        length: From the loaded edge to the plane of symmetry, clamp or free end, mm.
-        poisson_ratio: Poisson's ratio ν.
-        boundary: "between" (the plane of symmetry between two notches), "clamped" or "free"
-            (the motions of a rigid ring held at the far edge).
-
-    Returns:
-        Displacement away from the ring and slope of the outward displacement along z, per unit of
-        tension and of moment in N/mm and N with a Young's modulus of 1, shape (harmonics, 2, 2).
-    """
+) -> Array:
+    """Compute the compliance of an edge to its loads, for each harmonic."""
     length = xp.maximum(length, _SHORTEST * radius)
     ratio = radius / length
     # Strains of the membrane come per 1/r, those of bending per 1/r².
@@ -253,32 +229,16 @@ RELAXATION = 0.833
 
 
 class WallSector(NamedTuple):
-    """The arc of wall that a cut leaves, as an annular sector with edges at right angles.
+    """The arc of wall that a cut leaves, as an annular sector with edges at right angles."""
 
-    Attributes:
-        radius: Mean radius r, mm.
-        wall: Wall t, mm.
-        half_angle: a, rad, such that the sector has the area of the section, A = 2 a r t.
-        section: The sector of that half angle, whatever the cut.
-    """
-
-    radius: float
-    wall: float
-    half_angle: float
-    section: Section
+    radius: float  # Mean radius r, mm
+    wall: float  # Wall t, mm
+    half_angle: float  # a, rad, such that the sector has the area of the section, A = 2 a r t
+    section: Section  # The sector of that half angle, whatever the cut
 
 
 def arc_of(outer: float, inner: float, section: Section) -> WallSector:
-    """Replace what the cut leaves by a sector of the same area.
-
-    Args:
-        outer: Outer radius, mm.
-        inner: Inner radius, mm.
-        section: The section that the cut leaves.
-
-    Returns:
-        The arc.
-    """
+    """Replace what the cut leaves by a sector of the same area."""
     radius, wall = 0.5 * (outer + inner), outer - inner
     angle = plain_number(section.area) / (2.0 * radius * wall)
     return WallSector(
@@ -287,31 +247,16 @@ def arc_of(outer: float, inner: float, section: Section) -> WallSector:
 
 
 class EndCompliance(NamedTuple):
-    """Compliance that one ring adds to a notch.
+    """Compliance that one ring adds to a notch."""
 
-    Attributes:
-        weak: Length δ added to that of the bending of the notch, mm.
-        strong: Length added to that of the bending sideways, mm.
-        axial: Length added to that of the stretch of the centroid, mm.
-        coupling: b_c, mm²: I E times the stretch of the centroid per bending moment.
-    """
-
-    weak: float
-    strong: float
-    axial: float
-    coupling: float
+    weak: float  # Length δ added to that of the bending of the notch, mm
+    strong: float  # Length added to that of the bending sideways, mm
+    axial: float  # Length added to that of the stretch of the centroid, mm
+    coupling: float  # b_c, mm²: I E times the stretch of the centroid per bending moment
 
 
-def arc_harmonics(arc: WallSector) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Expand the edge loads of the arc's stress in harmonics.
-
-    Args:
-        arc: The arc of the notch.
-
-    Returns:
-        Coefficients of (N, −M), shape (harmonics, 2), for a unit moment, a unit moment sideways
-        and a unit tension: in cos nφ, sin nφ, cos nφ.
-    """
+def arc_harmonics(arc: WallSector) -> tuple[Array, Array, Array]:
+    """Expand the edge loads of the arc's stress in harmonics."""
     r, t, a = arc.radius, arc.wall, arc.half_angle
     n = xp.arange(HARMONICS, dtype=float)
     # Integrals over |φ| < a of cos nφ, cos φ cos nφ, sin φ sin nφ.
@@ -320,7 +265,7 @@ def arc_harmonics(arc: WallSector) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     cosine, sine = below + above, below - above
     third = t**3 / 12.0
 
-    def loads(constant: np.ndarray, varying: np.ndarray) -> np.ndarray:
+    def loads(constant: Array, varying: Array) -> Array:
         """Compute loads of the stress `constant` + (1 + ζ/r) `varying`, in harmonics of φ."""
         force = t * (constant + varying) + third / r**2 * varying
         moment = third / r * (constant + 2.0 * varying)
@@ -342,21 +287,9 @@ def end_compliance(
     arc: WallSector,
     side: Side,
     poisson_ratio: float,
-    relaxation: np.ndarray = _RELAXED,
+    relaxation: Array = _RELAXED,
 ) -> EndCompliance:
-    """Compute the compliance of a ring beyond that of a tube as stiff as a beam of its length.
-
-    Args:
-        outer: Outer radius, mm.
-        inner: Inner radius, mm.
-        arc: The arc of the notch.
-        side: The ring; up to the plane of symmetry where it lies between two notches.
-        poisson_ratio: Poisson's ratio ν.
-        relaxation: Factor on each harmonic.
-
-    Returns:
-        The added lengths; none where there is no ring.
-    """
+    """Compute the compliance of a ring beyond that of a tube as stiff as a beam of its length."""
     ring_length = 0.5 * side.length if side.boundary == "between" else side.length
     if decide(ring_length == 0.0):
         return EndCompliance(0.0, 0.0, 0.0, 0.0)
@@ -364,7 +297,7 @@ def end_compliance(
     flexibility = edge_compliance(arc.radius, arc.wall, ring_length, poisson_ratio, side.boundary)
     weights = _NORM * relaxation
 
-    def energy(one: np.ndarray, other: np.ndarray) -> float:
+    def energy(one: Array, other: Array) -> float:
         return arc.radius * xp.einsum("n,ni,nij,nj->", weights, one, flexibility, other)
 
     # As a beam, the ring has the compliances c/(E I_tube) in bending and c/(E A_tube) in tension.

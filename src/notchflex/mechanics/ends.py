@@ -8,13 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from notchflex._arrays import cached, plain_number, xp
-from notchflex.mechanics.ends.ring import (
-    Side,
-    WallSector,
-    arc_of,
-    end_compliance,
-)
-from notchflex.mechanics.section import SECTION_OF_CUT, Section
+from notchflex.mechanics.cuts import SECTION_OF_CUT
+from notchflex.mechanics.ring import Side, WallSector, arc_of, end_compliance
+from notchflex.mechanics.section import Section
 
 # Torsion of a notch whose ends restrain warping of its section, and its shear.
 #
@@ -29,14 +25,7 @@ from notchflex.mechanics.section import SECTION_OF_CUT, Section
 
 
 def warping_constant(arc: WallSector) -> float:
-    """Compute the warping constant C_w of the arc about its shear centre.
-
-    Args:
-        arc: The arc of wall that the cut leaves.
-
-    Returns:
-        C_w of the middle line and of the wall, mm⁶.
-    """
+    """Compute the warping constant C_w of the arc about its shear centre."""
     r, t, a = arc.radius, arc.wall, arc.half_angle
     sine, cosine = xp.sin(a), xp.cos(a)
     line = a**3 - 6.0 * (sine - a * cosine) ** 2 / (a - sine * cosine)
@@ -50,18 +39,7 @@ def torsion_length(
     poisson_ratio: float,
     section: Section,
 ) -> float:
-    """Compute the effective length ℓ in free torsion of the notch with its ends.
-
-    Args:
-        arc: The arc of wall that the cut leaves.
-        outer: Outer radius, mm.
-        height: Height h of the notch, mm.
-        poisson_ratio: Poisson's ratio ν.
-        section: The section that the cut leaves; its torsion constant is J.
-
-    Returns:
-        The length, mm: twist = T ℓ/(G J).
-    """
+    """Compute the effective length ℓ in free torsion of the notch with its ends."""
     t, a, diameter = arc.wall, arc.half_angle, 2.0 * outer
     shear_over_young = 0.5 / (1.0 + poisson_ratio)
     rate = xp.sqrt(shear_over_young * section.torsion_constant / warping_constant(arc))
@@ -72,16 +50,7 @@ def torsion_length(
 
 
 def shear_centre(arc: WallSector, height: float, section: Section) -> float:
-    """Compute the distance of the centre of twist from the tube axis, toward the spine.
-
-    Args:
-        arc: The arc of wall that the cut leaves.
-        height: Height h of the notch, mm.
-        section: The section that the cut leaves.
-
-    Returns:
-        The distance, mm: that of the section, moved out by the ends of short notches.
-    """
+    """Compute the distance of the centre of twist from the tube axis, toward the spine."""
     width = 2.0 * arc.half_angle * arc.radius
     return plain_number(section.shear_centre) * (1.0 + 0.027 * width / (height + 0.72 * width))
 
@@ -111,15 +80,7 @@ _EDGE_OF_SPECIMEN, _BRAZIER_OF_SPECIMEN = (0.465, 1.51), 0.74
 
 
 def edge_and_brazier(radius: float, sides: Sequence[Side]) -> tuple[float, float]:
-    """Compute the mean k of the two sides, and the factor c_b on Brazier's flattening.
-
-    Args:
-        radius: Mean radius r, mm.
-        sides: The two rings.
-
-    Returns:
-        k and c_b.
-    """
+    """Compute the mean k of the two sides, and the factor c_b on Brazier's flattening."""
     specimen = all(side.boundary == "clamped" for side in sides)
     factor, decay = _EDGE_OF_SPECIMEN if specimen else _EDGE
     # The flattening k that a ring of some length imposes at the edge of the notch.
@@ -135,19 +96,7 @@ def flattening_numbers(
     poisson_ratio: float,
     section: Section,
 ) -> tuple[float, float, float]:
-    """Compute the parameters of flattening from the shape of the arc.
-
-    Args:
-        outer: Outer radius, mm.
-        inner: Inner radius, mm.
-        cut: "on-axis" or "off-axis".
-        depth: Depth of the cut, mm.
-        poisson_ratio: Poisson's ratio ν.
-        section: The section that the cut leaves.
-
-    Returns:
-        Half angle a_o of the arc on the outer surface, rad; φ, without unit; B, mm².
-    """
+    """Compute the parameters of flattening from the shape of the arc."""
     radius, wall = 0.5 * (outer + inner), outer - inner
     outer_angle = xp.arccos((depth - outer) / outer)
     # An off-axis cut beyond the mean radius leaves no arc at mid-wall; `validity` says so.
@@ -203,19 +152,7 @@ def shear_compliances(
     second_moments: tuple[float, float],
     sides: Sequence[Side],
 ) -> tuple[float, float]:
-    """Compute the compliance of the two directions across the tube.
-
-    Args:
-        arc: The arc of wall that the cut leaves.
-        outer: Outer radius, mm.
-        lengths: Lengths ℓ of weak and of strong bending, mm.
-        second_moments: Second moments of these, mm⁴.
-        sides: The rings beside the notch.
-
-    Returns:
-        Displacement per force times Young's modulus, 1/mm: in the plane in which the notch bends,
-        and sideways.
-    """
+    """Compute the compliance of the two directions across the tube."""
     diameter = 2.0 * outer
     wall, width = arc.wall / diameter, 2.0 * arc.half_angle * arc.radius / diameter
 
@@ -240,51 +177,36 @@ _REACH = 3.33
 
 
 class NotchStiffness(NamedTuple):
-    r"""Effective lengths of a notch with its ends, and how it softens with its angle.
+    """Effective lengths of a notch with its ends, and how it softens with its angle."""
 
-    The section is the true one of the cut (`annular_sector`, `annular_segment`): its area A,
-    second moments I (weak) and I_y (strong), torsion constant J, centroid ȳ. All fields are
-    plain numbers.
+    # The section is the true one of the cut (`annular_sector`, `annular_segment`): its area A,
+    # second moments I (weak) and I_y (strong), torsion constant J, centroid ȳ. All fields are plain
+    # numbers.
 
-    Attributes:
-        weak: ℓ = h + δ, mm: θ = M ℓ/(E I) at small angles.
-        strong: h + δ of the bending sideways, mm: θ = M ℓ/(E I_y).
-        axial: h + δ of the stretch of the centroid by an axial force there, mm: u = N ℓ/(E A).
-        coupling: b_c, mm²: a tension N at the centroid closes the notch by N b_c/(E I), and a
-            closing moment M stretches the centroid by M b_c/(E I). The neutral axis of the
-            bending lies at ȳ − b_c/ℓ.
-        torsion: Effective length, mm: twist = T ℓ/(G J) with the J of the section; the ends hold
-            the section against warping.
-        shear_centre: Distance of the centre of twist from the tube axis, toward the spine, mm.
-        shear: Compliance in shear times E, 1/mm: how far the rings shift in the plane of bending
-            under a force across the tube through the middle of the notch.
-        sway: The same sideways, under a force through the centre of twist.
-        alpha: α, 1/rad: the stiffness K₀ = E I/ℓ falls to K₀/q², q = 1 + αθ/2 + βθ²/2, θ > 0
-            closing.
-        beta: β, 1/rad².
-        closing_factor: Angle between the rings at which the edges touch, over h/(r_o + ȳ).
-        closed_ratio: Stiffness of the closed notch, its edges in contact, over K₀.
-    """
-
-    weak: float
-    strong: float
-    axial: float
+    weak: float  # ℓ = h + δ, mm: θ = M ℓ/(E I) at small angles
+    strong: float  # h + δ of the bending sideways, mm: θ = M ℓ/(E I_y)
+    axial: float  # h + δ of the stretch of the centroid by an axial force there, mm: u = N ℓ/(E A)
+    # b_c, mm²: a tension N at the centroid closes the notch by N b_c/(E I), and a closing moment M
+    # stretches the centroid by M b_c/(E I). The neutral axis of the bending lies at ȳ − b_c/ℓ
     coupling: float
+    # Effective length, mm: twist = T ℓ/(G J) with the J of the section; the ends hold the section
+    # against warping
     torsion: float
-    shear_centre: float
+    shear_centre: float  # Distance of the centre of twist from the tube axis, toward the spine, mm
+    # Compliance in shear times E, 1/mm: how far the rings shift in the plane of bending under a
+    # force across the tube through the middle of the notch
     shear: float
-    sway: float
+    sway: float  # The same sideways, under a force through the centre of twist
+    # α, 1/rad: the stiffness K₀ = E I/ℓ falls to K₀/q², q = 1 + αθ/2 + βθ²/2, θ > 0 closing
     alpha: float
-    beta: float
-    closing_factor: float
-    closed_ratio: float
+    beta: float  # β, 1/rad²
+    closing_factor: float  # Angle between the rings at which the edges touch, over h/(r_o + ȳ)
+    closed_ratio: float  # Stiffness of the closed notch, its edges in contact, over K₀
 
 
 def reach_of(arc: WallSector) -> float:
-    """Return how far along a ring the effects of its edge reach, mm.
-
-    The ovalising load reaches farthest; it decays over a length that grows with r √(r/t).
-    """
+    """Return how far along a ring the effects of its edge reach, mm."""
+    # The ovalising load reaches farthest; it decays over a length that grows with r √(r/t).
     return plain_number(_REACH * arc.radius * xp.sqrt(arc.radius / arc.wall))
 
 
@@ -299,26 +221,7 @@ def notch_stiffness(
     proximal: Side,
     distal: Side,
 ) -> NotchStiffness:
-    """Compute the stiffness of a notch from the drawing.
-
-    Args:
-        outer_radius: Outer radius of the tube, mm.
-        inner_radius: Inner radius, mm.
-        cut: "on-axis" or "off-axis".
-        depth: Depth g of the cut, mm.
-        height: Height h of the notch along the tube, mm.
-        poisson_ratio: Poisson's ratio ν.
-        proximal: The ring toward the base.
-        distal: The ring toward the tip.
-
-    Returns:
-        The numbers, smooth in every argument; cached.
-
-    Example:
-        >>> ring = Side("between", 1.2)
-        >>> round(notch_stiffness(0.81, 0.70, "on-axis", 1.4, 0.8, 0.33, ring, ring).weak, 3)
-        1.291
-    """
+    """Compute the stiffness of a notch from the drawing."""
     section = SECTION_OF_CUT[cut](outer_radius, inner_radius, depth)
     arc = arc_of(outer_radius, inner_radius, section)
     sides: list[Side] = []
@@ -373,29 +276,7 @@ def validity(
     proximal: Side,
     distal: Side,
 ) -> list[str]:
-    """List the checked ranges (against finite elements) that a notch leaves.
-
-    Args:
-        outer_radius: Outer radius of the tube, mm.
-        inner_radius: Inner radius, mm.
-        cut: "on-axis" or "off-axis".
-        depth: Depth g of the cut, mm.
-        height: Height h of the notch along the tube, mm.
-        proximal: The ring toward the base.
-        distal: The ring toward the tip.
-
-    Returns:
-        A sentence for each range that is left, with the number, the range and the error found
-        beyond it; empty inside.
-
-    Example:
-        >>> ring = Side("between", 1.2)
-        >>> validity(0.81, 0.70, "on-axis", 1.4, 0.8, ring, ring)
-        []
-        >>> for sentence in validity(0.81, 0.70, "on-axis", 1.2, 3.2, ring, Side("free", 3.0)):
-        ...     print(sentence)
-        depth / outer diameter is 0.741, below 0.75: moments near closing were found up to 3 % off
-    """
+    """List the checked ranges (against finite elements) that a notch leaves."""
     radius = 0.5 * (outer_radius + inner_radius)
     wall = (outer_radius - inner_radius) / radius
     diameter = 2.0 * outer_radius

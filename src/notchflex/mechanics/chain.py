@@ -1,9 +1,15 @@
-"""From the description of a robot to the arrays of its chain."""
+"""The chain: the solver's model of a robot as one pytree of arrays, and how a robot becomes one.
+
+Units mm, N, rad. Strains and rotations that are zero whatever the numbers of the robot file are
+structural: programs omit the products with them (a mode that stretches a rod never rotates it).
+The zeros of a rod that happens to be straight are not structural.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple, cast
 
@@ -12,21 +18,25 @@ from jaxtyping import Array, Float, Int
 
 from notchflex._arrays import cached, plain_number, xp
 from notchflex._jax import (
+    Pytree,
     constant,
     jax,
+    jnp,
+    static,
 )
-from notchflex.mechanics.chain.arrays import Chain
 from notchflex.mechanics.contact import (
     ContactGroup,
     build_contacts,
 )
-from notchflex.mechanics.ends import Side
 from notchflex.mechanics.flexure import (
+    FlexureState,
     Rod,
     Site,
     fibre_stretch,
     flattened,
+    flexure_state,
     free_pose,
+    in_space,
     rod_at,
     section_fibres,
     stack,
@@ -34,13 +44,11 @@ from notchflex.mechanics.flexure import (
     with_level,
 )
 from notchflex.mechanics.flexure.rod import planar_points
-from notchflex.mechanics.friction import friction_law
+from notchflex.mechanics.friction import FrictionLaw, friction_law
 from notchflex.mechanics.material import Fibres, SectionLaw, section_law
 from notchflex.mechanics.motion import Motion, rotation_about
-from notchflex.mechanics.section.section import (
-    FIBRES,
-    fitted,
-)
+from notchflex.mechanics.ring import Side
+from notchflex.mechanics.section import FIBRES, fitted
 from notchflex.mechanics.tendon import (
     RoutedTendons,
     RoutingContext,
@@ -55,13 +63,226 @@ from notchflex.robot.kinds import (
 )
 from notchflex.robot.part import unchecked
 
+# Axial stiffness of a tendon in the friction law, over the force that would close a notch by its
+# own stiffness (1e6 N for wrist A). It distinguishes the slip over two sticking contacts of one
+# rigid piece, between which an inextensible tendon would leave the tension undetermined.
+MEMORY_STIFFNESS = 4e5
+
+
+class Chain(Pytree):
+    """Bodies 0 (the base) to n joined by n flexures, with t tendons."""
+
+    # Units mm, N, rad.
+
+    # The flexures, each from the frame of body j - 1 to that of body j. A body's frame lies on the
+    # tube axis at its proximal face
+    rods: Rod
+    law: SectionLaw  # The material
+    friction: FrictionLaw  # The friction between tendons and tube
+    groups: tuple[TendonGroup, ...]  # The tendons, by the way they run
+    contact_pairs: tuple[ContactGroup, ...]  # The contacts that close notches, by kind
+    # Axial stiffness of each tendon, infinite where inextensible, N
+    axial_stiffness: Float[Array, " t"]
+    # Length of each tendon before its first contact, from its actuator on and through the base, mm
+    free_length: Float[Array, " t"]
+    body_length: Float[Array, " bodies"]  # Length of each body on the tube axis, mm
+    body_mass: Float[Array, " bodies"]  # Mass of each body, g; 0 where the material has no density
+    body_centre: Float[Array, "bodies 3"]  # Its centre, in its frame, mm
+    # Stiffness of each mode in the free robot, N mm; the scale of residuals
+    stiffness: Float[Array, "n modes"]
+    # Stiffness of the modes of each flexure against each other, N mm, where the material is linear;
+    # None where the law of the material gives it
+    elastic: Float[Array, "n modes modes"] | None
+    # Stiffness of each notch at its contact in the free robot, N/mm
+    contact_stiffness: Float[Array, " n"]
+    # Flexibility of the contact of each closed notch, mm/N; None where all are rigid
+    contact_flexibility: Float[Array, " n"] | None
+    # Force that would close a notch by that stiffness, mean of all, N
+    closing_force: Float[Array, ""]
+    stroke_stiffness: Float[Array, ""]  # Approximate tension per stroke of a tendon, N/mm
+    # Rotation from the frame of flexures, tendons and contacts to that of the base: x and z span
+    # the plane of bending of a flat chain. None in space
+    frame: Float[Array, "3 3"] | None
+    # Rotation from the frame of every notch, turned by its direction, to the tube
+    notch_frame: Float[Array, "n 3 3"]
+    tendon_entry: Float[Array, "t 3"]  # Point where each tendon enters the base, mm
+    # For every tendon, the edges of gaps that it touches: indices into (flexure, edge) flattened,
+    # -1 as padding
+    contacts: Int[Array, "t edges"]
+    level: str = static()  # Loads for which the flexures have enough modes
+    loaded: bool = static()  # Whether loads other than the tendons' act
+    follows: bool = static()  # Whether any of them may turn with a body
+    refinement: int = static()  # Number of refinements of the modes beyond those for usual loads
+    window: int = static()  # Largest number of flexures that a span or an opening reaches over
+
+    @property
+    def flexures(self) -> int:
+        """Number of flexures."""
+        return self.stiffness.shape[0]
+
+    @property
+    def tendons(self) -> int:
+        """Number of tendons."""
+        return self.axial_stiffness.shape[0]
+
+    @property
+    def tendon_order(self) -> Int[Array, " t"]:
+        """Numbers of the tendons, group by group."""
+        return xp.array([number for group in self.groups for number in group.numbers], int)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether a solved state depends on the one before, by friction or by the material."""
+        return self.friction.remembers or self.law.remembers
+
+    @property
+    def forces_on_bodies(self) -> bool:
+        """Whether any force acts on a body, so that poses enter the balance."""
+        parts = (*self.groups, *self.contact_pairs)
+        return self.loaded or any(part.acts_on_bodies for part in parts)
+
+    @property
+    def memory_stiffness(self) -> Float[Array, " t"]:
+        """Axial stiffness that the memory of the contacts uses, always finite, N."""
+        return jnp.minimum(self.axial_stiffness, MEMORY_STIFFNESS * self.closing_force)
+
+
+def flexure_states(
+    chain: Chain, modes: Float[Array, "n modes"], memory: Any, *, with_pose: bool
+) -> FlexureState:
+    """Return the state of all flexures at once, after a memory of the material at every node."""
+    rods, law = chain.rods, chain.law
+    strain = in_space(jnp.einsum("nicm,nm->nic", rods.basis, modes))
+    response = law.respond_all(strain, rods.section, memory)
+    state = partial(flexure_state, with_pose=with_pose)
+    return jax.vmap(state, in_axes=(0, None, 0, 0, 0))(rods, law, memory, modes, response)
+
+
+def structural(chain: Chain) -> Chain:
+    """Mark the numbers of a chain that may be constants of a program."""
+    # They are the strains, rotations and displacements of a rod by its modes, the stiffness between
+    # modes, counts and flags. The mask of padding flexures is not: chains of other lengths share
+    # the program.
+
+    def counts(leaf: Any) -> Any:
+        return xp.full(xp.shape(leaf), xp.asarray(leaf).dtype.kind != "f")
+
+    plain: Chain = jax.tree.map(counts, chain)
+    rods = chain.rods
+    pairs = None
+    if rods.turn_pair is not None:
+        pairs = _of_modes(rods.turn_pair) & xp.swapaxes(_of_modes(rods.turn_pair), -1, -2)
+    return replace(
+        plain,
+        rods=replace(
+            plain.rods,
+            basis=_all(rods.basis),
+            node_reach=_all(rods.node_reach),
+            turn=_of_modes(rods.turn),
+            turn_pair=pairs,
+            step=_of_modes(rods.step),
+            node_turn=_of_modes(rods.node_turn),
+        ),
+        elastic=None if chain.elastic is None else _all(chain.elastic),
+    )
+
+
+def _all(leaf: Array) -> Any:
+    return xp.full(xp.shape(leaf), True)
+
+
+def _of_modes(leaf: Array) -> Any:
+    """Mark the entries over the modes of an array over (1, modes)."""
+    return xp.broadcast_to(xp.arange(xp.shape(leaf)[-1]) > 0, xp.shape(leaf))
+
+
+_ROTATIONS = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")
+_NOTHING = (
+    "start_offset",
+    "curve_offset",
+    "end_offset",
+    "node_offset",
+    "reference_strain",
+    "basis",
+    "turn",
+    "turn_pair",
+    "step",
+    "node_turn",
+    "has_closure",
+    "chord",
+)
+
+
+def padded(chain: Chain, flexures: int, edges: int) -> Chain:
+    """Pad a chain with flexures beyond its tip, and with entries for contact edges."""
+    # The added flexures are stiff, straight, of zero length and without tendons: the last body's
+    # frame is then the tip, and no other number of the robot changes.
+    more = flexures - chain.flexures
+    contacts = xp.pad(
+        chain.contacts, ((0, 0), (0, edges - chain.contacts.shape[1])), constant_values=-1
+    )
+    if more == 0:
+        return dataclasses.replace(chain, contacts=contacts)
+
+    index = np.minimum(np.arange(flexures), chain.flexures - 1)
+
+    def longer(leaf: Any) -> Array:
+        return leaf[index]
+
+    def changed(part: Any, **values: Any) -> Any:
+        """Return a part whose added entries have other values."""
+        wider = jax.tree.map(longer, part)
+        for name, value in values.items():
+            getattr(wider, name)[-more:] = value
+        return wider
+
+    def with_nothing(values: Any) -> Array:
+        return constant(xp.pad(values, [(0, more)] + [(0, 0)] * (xp.ndim(values) - 1)))
+
+    return dataclasses.replace(
+        chain,
+        rods=_rods(chain, changed),
+        groups=tuple(
+            changed(group, present=0.0, visits=0.0, ends=0.0, back=1, body_length=0.0)
+            for group in chain.groups
+        ),
+        contact_pairs=tuple(
+            changed(group, has_contact=0.0, back=1) for group in chain.contact_pairs
+        ),
+        body_length=with_nothing(chain.body_length),
+        body_mass=with_nothing(chain.body_mass),
+        body_centre=with_nothing(chain.body_centre),
+        stiffness=xp.concatenate([chain.stiffness, xp.ones((more, chain.stiffness.shape[1]))]),
+        elastic=None if chain.elastic is None else _elastic(chain.elastic, more),
+        contact_stiffness=longer(chain.contact_stiffness),
+        contact_flexibility=jax.tree.map(longer, chain.contact_flexibility),
+        notch_frame=longer(chain.notch_frame),
+        contacts=contacts,
+    )
+
+
+def _rods(chain: Chain, changed: Any) -> Rod:
+    rods = chain.rods
+    values = {name: 0.0 for name in _NOTHING if getattr(rods, name) is not None}
+    values |= {name: xp.eye(getattr(rods, name).shape[-1]) for name in _ROTATIONS}
+    wider: Rod = changed(rods, padding_mask=1.0, **values)
+    # The first added flexure begins at the tip, at the end of the last body.
+    wider.start_offset[chain.flexures, -1] = chain.body_length[-1]  # pyright: ignore
+    return wider
+
+
+def _elastic(elastic: Any, more: int) -> Array:
+    idle = xp.broadcast_to(xp.eye(elastic.shape[-1]), (more, *elastic.shape[1:]))
+    return xp.concatenate([elastic, idle])  # pyright: ignore
+
+
 # Masses of the pieces of a robot: uncut tube, and the sections that the notches leave.
 
 # From kg/m3 to g/mm3.
 _GRAMS = 1e-6
 
 
-def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[np.ndarray, " bodies"]:
+def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[Array, " bodies"]:
     """Return the length of each rigid piece on the tube axis, base first, mm."""
     following = (*notches[1:], None)
     spacings = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
@@ -70,22 +291,12 @@ def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[np.ndarray, " bo
 
 def body_masses(
     robot: Robot, rods: Rod
-) -> tuple[Float[np.ndarray, " bodies"], Float[np.ndarray, "bodies 3"]]:
-    """Compute mass and centre of mass of each body, with its share of the notches.
-
-    A body is a piece of uncut tube: the area of the tube's wall times the body's axial length,
-    its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure (area
-    of its sections times the length of the neutral axis) is lumped: half at the start of the
-    neutral axis on the body before it, half at its end on the body after it.
-
-    Args:
-        robot: The robot, n notches.
-        rods: Its flexures, each starting from the proximal body, without factors on stiffness.
-
-    Returns:
-        Masses (g, (n + 1,)), base first, and centres (mm, (n + 1, 3)) in the frames of the
-        bodies; zero masses where the material's density is not known.
-    """
+) -> tuple[Float[Array, " bodies"], Float[Array, "bodies 3"]]:
+    """Compute mass and centre of mass of each body, with its share of the notches."""
+    # A body is a piece of uncut tube: the area of the tube's wall times the body's axial length,
+    # its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure
+    # (area of its sections times the length of the neutral axis) is lumped: half at the start of
+    # the neutral axis on the body before it, half at its end on the body after it.
     bodies = len(robot.notches) + 1
     density = robot.material.density
     if density is None:
@@ -112,7 +323,7 @@ _ROUNDING = 1e-12
 
 
 @cached(64)
-def bending_normal(robot: Robot) -> Float[np.ndarray, " 3"] | None:
+def bending_normal(robot: Robot) -> Float[Array, " 3"] | None:
     """Return the normal of the plane in which all notches bend, in the base frame, or None."""
     direction = xp.radians([notch.direction_deg for notch in robot.notches])
     if (xp.abs(xp.sin(direction - direction[0])) > _ROUNDING).any():
@@ -139,18 +350,10 @@ _SAME_DIRECTION = 1e-6
 
 
 def sites_of(robot: Robot) -> tuple[Site | None, ...]:
-    """Return the rings beside every notch; None for notches that do not depend on them.
-
-    A rigid plate holds the base at its length before the first notch. The ring after the last notch
-    is free. Where neighbours differ, each models the ring between them as if both were of its own
-    kind and opened to its own side.
-
-    Args:
-        robot: The robot, n notches.
-
-    Returns:
-        n sites, base to tip.
-    """
+    """Return the rings beside every notch; None for notches that do not depend on them."""
+    # A rigid plate holds the base at its length before the first notch. The ring after the last
+    # notch is free. Where neighbours differ, each models the ring between them as if both were of
+    # its own kind and opened to its own side.
     notches = robot.notches
     if not any(notch.has_elastic_ends for notch in notches):
         return (None,) * len(notches)
@@ -181,15 +384,7 @@ def _is_turned(notch: Notch, other: Notch) -> bool:
 
 
 def unchecked_dimensions(robot: Robot) -> list[str]:
-    """Say where dimensions of notches with elastic ends leave the range that was checked.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        One sentence with each dimension, the notches that it belongs to, and what to do; none where
-        all lie inside, or the ends are rigid.
-    """
+    """Say where dimensions of notches with elastic ends leave the range that was checked."""
     notches_of: dict[str, list[str]] = {}
     sites = sites_of(robot)
     for number, (notch, site) in enumerate(zip(robot.notches, sites, strict=True), 1):
@@ -232,16 +427,7 @@ FlexureOf = Callable[..., tuple[Rod, Motion]]
 def flexure(
     notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int, by_fibres: bool
 ) -> tuple[Rod, Motion]:
-    """Make a flexure without its factor on stiffness, and its pose in the free robot; cached.
-
-    Args:
-        notch: The notch.
-        site: Its surroundings, where its ends are elastic.
-        tube: The tube that it is cut into.
-        level: For which loads, as for `assemble`.
-        refinement: As for `assemble`.
-        by_fibres: Whether the material needs the fibres of sections.
-    """
+    """Make a flexure without its factor on stiffness, and its pose in the free robot; cached."""
     rod = with_level(rod_at(site, notch, tube, refinement), level)
     rod = with_fibres(rod, notch, tube, refinement) if by_fibres else rod
     return rod, free_pose(rod)
@@ -316,12 +502,7 @@ def assemble(
 
 
 def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
-    """Return the fields of a chain that follow from its material, or from its friction.
-
-    Args:
-        part: The material or the friction.
-        template: Template of the robot's chain.
-    """
+    """Return the fields of a chain that follow from its material, or from its friction."""
     if isinstance(part, Friction):
         return {"friction": friction_law(part)}
     law = section_law(part)
@@ -343,31 +524,20 @@ def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
 
 
 class ChainTemplate(NamedTuple):
-    """The part of a chain that depends only on the shape of the robot.
+    """The part of a chain that depends only on the shape of the robot."""
 
-    Attributes:
-        distinct_rods: The flexures, without repetitions.
-        rod_index: Index of every notch's flexure among them.
-        rods: All flexures.
-        routed_tendons: The tendons.
-        contact_pairs: The contacts.
-        body_length: Length of each body on the tube axis, mm.
-        notch_frame: Rotation from the frame of every notch to the tube.
-        height: Length of the neutral axis of every flexure, mm.
-        contact_motion: Square of the motion of each notch's contact by every mode, mm^2.
-        stiffness_factor: Factor on the stiffness of each notch, which the rods are without.
-    """
-
-    distinct_rods: Rod
-    rod_index: Int[np.ndarray, " n"]
-    rods: Rod
-    routed_tendons: RoutedTendons
-    contact_pairs: tuple[ContactGroup, ...]
-    body_length: Array
-    notch_frame: Array
-    height: Float[np.ndarray, " n"]
-    contact_motion: Float[np.ndarray, "n modes"]
-    stiffness_factor: Float[np.ndarray, " n"]
+    distinct_rods: Rod  # The flexures, without repetitions
+    rod_index: Int[Array, " n"]  # Index of every notch's flexure among them
+    rods: Rod  # All flexures
+    routed_tendons: RoutedTendons  # The tendons
+    contact_pairs: tuple[ContactGroup, ...]  # The contacts
+    body_length: Array  # Length of each body on the tube axis, mm
+    notch_frame: Array  # Rotation from the frame of every notch to the tube
+    height: Float[Array, " n"]  # Length of the neutral axis of every flexure, mm
+    # Square of the motion of each notch's contact by every mode, mm^2
+    contact_motion: Float[Array, "n modes"]
+    # Factor on the stiffness of each notch, which the rods are without
+    stiffness_factor: Float[Array, " n"]
 
 
 def chain_template(
@@ -433,7 +603,7 @@ def _build_template(
 _cached_template = cached(64)(_build_template)
 
 
-def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
+def _flat(chain: Chain, frame: Float[Array, "3 3"]) -> Chain:
     """Reduce a spatial chain that stays in the x-z plane of a frame to that plane."""
 
     def planar(part: Any) -> Any:
@@ -450,7 +620,7 @@ def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
     )
 
 
-def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:
+def _elastic(rods: Rod, law: SectionLaw) -> Float[Array, "n modes modes"]:
     """Compute the stiffness of every flexure in the free robot; 1 for padding modes."""
     basis = rods.basis
     stiffness_product = rods.length[..., None, None] * (law.stiffness(rods.section) @ basis)
@@ -458,12 +628,11 @@ def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:
     return own + rods.padding_mask[:, None] * xp.eye(rods.modes)
 
 
-def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[np.ndarray, "n modes"]:
-    """Compute the squared motion of a notch's contact by its modes; over stiffness a flexibility.
-
-    A contact opposite a spine moves with its fibre; an edge contact by its distance from the tube
-    axis times the rotation of the distal body.
-    """
+def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[Array, "n modes"]:
+    """Compute the squared motion of a notch's contact by its modes, mm²."""
+    # Over the stiffness it is a flexibility.
+    # A contact opposite a spine moves with its fibre; an edge contact by its distance from the tube
+    # axis times the rotation of the distal body.
     fibre = xp.einsum("nc,nicm,ni->nm", fibre_stretch(rods.closure), rods.basis, rods.length)
     turn = outer_radius * (rods.start_rotation @ rods.turn[:, -1, :, 1:])[:, :2]
     squared = xp.where(rods.has_closure[:, None] > 0.0, fibre**2, xp.sum(turn**2, axis=1))
@@ -472,7 +641,7 @@ def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[np.ndarray,
 
 def _contacts(groups: tuple[TendonGroup, ...], tendons: int) -> Int[Array, "t edges"]:
     """List the edges that every tendon touches, base to tip: two per body that it visits."""
-    contact_edges: list[np.ndarray] = [xp.zeros(0, int)] * tendons
+    contact_edges: list[Array] = [xp.zeros(0, int)] * tendons
     for group in groups:
         for column, number in enumerate(group.numbers):
             flexures = xp.flatnonzero(xp.asarray(group.visits)[:, column])
