@@ -29,7 +29,13 @@ PLAIN = FibreSection(
 """A section of wrist A as plain numbers, without ends and fibres."""
 
 respond = jax.jit(lambda law, strain, section, memory: law.respond(strain, section, memory))
-energy = jax.jit(lambda law, strain, section, memory: law.energy(strain, section, memory))
+energy = jax.jit(lambda law, *state: law.stored_energy_density(*state)[0])
+
+
+def tangent(law: SectionLaw, strain: np.ndarray, section: FibreSection) -> np.ndarray:
+    """The change of the resultants with the strains."""
+    slope = jax.jacfwd(lambda varied: law.respond(varied, section, ()).resultants)
+    return np.asarray(slope(np.asarray(strain, float)))
 
 
 def section(cut: str = "on-axis", ends: NotchEnds | None = None) -> FibreSection:

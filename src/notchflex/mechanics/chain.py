@@ -7,11 +7,10 @@ The zeros of a rod that happens to be straight are not structural.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -63,16 +62,9 @@ from notchflex.robot.kinds import (
 )
 from notchflex.robot.part import unchecked
 
-# Axial stiffness of a tendon in the friction law, over the force that would close a notch by its
-# own stiffness (1e6 N for wrist A). It distinguishes the slip over two sticking contacts of one
-# rigid piece, between which an inextensible tendon would leave the tension undetermined.
-MEMORY_STIFFNESS = 4e5
-
 
 class Chain(Pytree):
     """Bodies 0 (the base) to n joined by n flexures, with t tendons."""
-
-    # Units mm, N, rad.
 
     # The flexures, each from the frame of body j - 1 to that of body j. A body's frame lies on the
     # tube axis at its proximal face
@@ -144,7 +136,9 @@ class Chain(Pytree):
     @property
     def memory_stiffness(self) -> Float[Array, " t"]:
         """Axial stiffness that the memory of the contacts uses, always finite, N."""
-        return jnp.minimum(self.axial_stiffness, MEMORY_STIFFNESS * self.closing_force)
+        # For wrist A 1e6 N. It distinguishes the slip over two sticking contacts of one rigid
+        # piece, between which an inextensible tendon would leave the tension undetermined.
+        return jnp.minimum(self.axial_stiffness, 4e5 * self.closing_force)
 
 
 def flexure_states(
@@ -165,121 +159,89 @@ def structural(chain: Chain) -> Chain:
     # the program.
 
     def counts(leaf: Any) -> Any:
-        return xp.full(xp.shape(leaf), xp.asarray(leaf).dtype.kind != "f")
+        return np.full(np.shape(leaf), xp.asarray(leaf).dtype.kind != "f")
 
+    def all_of_it(leaf: Array) -> Any:
+        return np.full(leaf.shape, True)
+
+    def of_modes(leaf: Array) -> Any:
+        return np.broadcast_to(np.arange(leaf.shape[-1]) > 0, leaf.shape)
+
+    def of_pairs(leaf: Array) -> Any:
+        return of_modes(leaf) & of_modes(leaf).swapaxes(-1, -2)
+
+    marks = {"basis": all_of_it, "node_reach": all_of_it, "turn_pair": of_pairs}
+    marks |= dict.fromkeys(("turn", "step", "node_turn"), of_modes)
+    marked = {name: jax.tree.map(mark, getattr(chain.rods, name)) for name, mark in marks.items()}
     plain: Chain = jax.tree.map(counts, chain)
-    rods = chain.rods
-    pairs = None
-    if rods.turn_pair is not None:
-        pairs = _of_modes(rods.turn_pair) & xp.swapaxes(_of_modes(rods.turn_pair), -1, -2)
-    return replace(
-        plain,
-        rods=replace(
-            plain.rods,
-            basis=_all(rods.basis),
-            node_reach=_all(rods.node_reach),
-            turn=_of_modes(rods.turn),
-            turn_pair=pairs,
-            step=_of_modes(rods.step),
-            node_turn=_of_modes(rods.node_turn),
-        ),
-        elastic=None if chain.elastic is None else _all(chain.elastic),
-    )
-
-
-def _all(leaf: Array) -> Any:
-    return xp.full(xp.shape(leaf), True)
-
-
-def _of_modes(leaf: Array) -> Any:
-    """Mark the entries over the modes of an array over (1, modes)."""
-    return xp.broadcast_to(xp.arange(xp.shape(leaf)[-1]) > 0, xp.shape(leaf))
-
-
-_ROTATIONS = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")
-_NOTHING = (
-    "start_offset",
-    "curve_offset",
-    "end_offset",
-    "node_offset",
-    "reference_strain",
-    "basis",
-    "turn",
-    "turn_pair",
-    "step",
-    "node_turn",
-    "has_closure",
-    "chord",
-)
+    elastic = jax.tree.map(all_of_it, chain.elastic)
+    return replace(plain, rods=replace(plain.rods, **marked), elastic=elastic)
 
 
 def padded(chain: Chain, flexures: int, edges: int) -> Chain:
     """Pad a chain with flexures beyond its tip, and with entries for contact edges."""
     # The added flexures are stiff, straight, of zero length and without tendons: the last body's
     # frame is then the tip, and no other number of the robot changes.
-    more = flexures - chain.flexures
-    contacts = xp.pad(
-        chain.contacts, ((0, 0), (0, edges - chain.contacts.shape[1])), constant_values=-1
+    more, spare = flexures - chain.flexures, edges - chain.contacts.shape[1]
+    chain = replace(
+        chain, contacts=xp.pad(chain.contacts, ((0, 0), (0, spare)), constant_values=-1)
     )
     if more == 0:
-        return dataclasses.replace(chain, contacts=contacts)
-
+        return chain
     index = np.minimum(np.arange(flexures), chain.flexures - 1)
 
-    def longer(leaf: Any) -> Array:
-        return leaf[index]
-
-    def changed(part: Any, **values: Any) -> Any:
-        """Return a part whose added entries have other values."""
-        wider = jax.tree.map(longer, part)
-        for name, value in values.items():
-            getattr(wider, name)[-more:] = value
+    def longer(leaf: Any, *value: Any) -> Any:
+        """Repeat the last entry of an array, or add entries of a value."""
+        wider = leaf[index]
+        if value:
+            wider[-more:] = value[0]
         return wider
 
-    def with_nothing(values: Any) -> Array:
-        return constant(xp.pad(values, [(0, more)] + [(0, 0)] * (xp.ndim(values) - 1)))
+    def changed(part: Any, **values: Any) -> Any:
+        known = {name: getattr(part, name) for name in values}
+        rows = {k: longer(leaf, values[k]) for k, leaf in known.items() if leaf is not None}
+        return replace(jax.tree.map(longer, part), **rows)
 
-    return dataclasses.replace(
+    rods = chain.rods
+    nothing = dict.fromkeys(
+        [
+            "start_offset",
+            "curve_offset",
+            "end_offset",
+            "node_offset",
+            "reference_strain",
+            "basis",
+            "turn",
+            "turn_pair",
+            "step",
+            "node_turn",
+            "has_closure",
+            "chord",
+        ],
+        0.0,
+    )
+    rotations = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")
+    unturned = dict.fromkeys(rotations, xp.eye(rods.start_rotation.shape[-1]))
+    rods = changed(rods, padding_mask=1.0, **nothing, **unturned)
+    # The first added flexure begins at the tip, at the end of the last body.
+    rods.start_offset[chain.flexures, -1] = chain.body_length[-1]
+    idle = {"present": 0.0, "visits": 0.0, "ends": 0.0, "back": 1, "body_length": 0.0}
+    bodies = {name: getattr(chain, name) for name in ("body_length", "body_mass", "body_centre")}
+    return replace(
         chain,
-        rods=_rods(chain, changed),
-        groups=tuple(
-            changed(group, present=0.0, visits=0.0, ends=0.0, back=1, body_length=0.0)
-            for group in chain.groups
-        ),
-        contact_pairs=tuple(
-            changed(group, has_contact=0.0, back=1) for group in chain.contact_pairs
-        ),
-        body_length=with_nothing(chain.body_length),
-        body_mass=with_nothing(chain.body_mass),
-        body_centre=with_nothing(chain.body_centre),
-        stiffness=xp.concatenate([chain.stiffness, xp.ones((more, chain.stiffness.shape[1]))]),
-        elastic=None if chain.elastic is None else _elastic(chain.elastic, more),
+        rods=rods,
+        groups=tuple(changed(group, **idle) for group in chain.groups),
+        contact_pairs=tuple(changed(pair, has_contact=0.0, back=1) for pair in chain.contact_pairs),
+        stiffness=longer(chain.stiffness, 1.0),
+        elastic=jax.tree.map(lambda leaf: longer(leaf, np.eye(leaf.shape[-1])), chain.elastic),
         contact_stiffness=longer(chain.contact_stiffness),
         contact_flexibility=jax.tree.map(longer, chain.contact_flexibility),
         notch_frame=longer(chain.notch_frame),
-        contacts=contacts,
+        **{k: np.pad(v, [(0, more)] + [(0, 0)] * (v.ndim - 1)) for k, v in bodies.items()},
     )
 
 
-def _rods(chain: Chain, changed: Any) -> Rod:
-    rods = chain.rods
-    values = {name: 0.0 for name in _NOTHING if getattr(rods, name) is not None}
-    values |= {name: xp.eye(getattr(rods, name).shape[-1]) for name in _ROTATIONS}
-    wider: Rod = changed(rods, padding_mask=1.0, **values)
-    # The first added flexure begins at the tip, at the end of the last body.
-    wider.start_offset[chain.flexures, -1] = chain.body_length[-1]  # pyright: ignore
-    return wider
-
-
-def _elastic(elastic: Any, more: int) -> Array:
-    idle = xp.broadcast_to(xp.eye(elastic.shape[-1]), (more, *elastic.shape[1:]))
-    return xp.concatenate([elastic, idle])  # pyright: ignore
-
-
 # Masses of the pieces of a robot: uncut tube, and the sections that the notches leave.
-
-# From kg/m3 to g/mm3.
-_GRAMS = 1e-6
 
 
 def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[Array, " bodies"]:
@@ -300,33 +262,28 @@ def body_masses(
     bodies = len(robot.notches) + 1
     density = robot.material.density
     if density is None:
-        return np.zeros(bodies), np.zeros((bodies, 3))
+        return xp.zeros(bodies), xp.zeros((bodies, 3))
     length = body_lengths(robot.tube, robot.notches)
-    wall = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2)
-    piece = wall * length
+    piece = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2) * length
     half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1)
     end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
-    nothing = np.zeros(1)
-    before, behind = xp.concatenate([half, nothing]), xp.concatenate([nothing, half])
+    before, behind = xp.append(half, 0.0), xp.append(0.0, half)
     # Every body has a volume: where no tube is left between two notches, half of each flexure.
     volume = piece + before + behind
     on_axis = (0.5 * length * piece)[:, None] * np.eye(3)[2]
     at_starts = before[:, None] * xp.pad(rods.start_offset, ((0, 1), (0, 0)))
     at_ends = behind[:, None] * xp.pad(end, ((1, 0), (0, 0)))
-    return _GRAMS * density * volume, (on_axis + at_starts + at_ends) / volume[:, None]
+    return 1e-6 * density * volume, (on_axis + at_starts + at_ends) / volume[:, None]
 
 
 # Whether a robot stays in one plane under its tendons alone.
-
-# Tolerance of a direction's component out of the plane.
-_ROUNDING = 1e-12
 
 
 @cached(64)
 def bending_normal(robot: Robot) -> Float[Array, " 3"] | None:
     """Return the normal of the plane in which all notches bend, in the base frame, or None."""
     direction = xp.radians([notch.direction_deg for notch in robot.notches])
-    if (xp.abs(xp.sin(direction - direction[0])) > _ROUNDING).any():
+    if (xp.abs(xp.sin(direction - direction[0])) > 1e-12).any():
         return None
     return xp.array([-xp.sin(direction[0]), xp.cos(direction[0]), 0.0])
 
@@ -345,9 +302,6 @@ def tendons_in_plane(robot: Robot) -> bool:
 
 # The rings beside every notch, as notches with elastic ends need them.
 
-_SAME_DIRECTION = 1e-6
-"""Notches open to one side if their directions differ by less, deg: rounding of sums of angles."""
-
 
 def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     """Return the rings beside every notch; None for notches that do not depend on them."""
@@ -363,24 +317,22 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
 
     sites: dict[tuple[int | None, ...], Site] = {}  # shared where all around is of the same parts
 
-    def site(index: int) -> Site:
-        before, after = lengths[index], lengths[index + 1]
-        neighbours = notches[max(index - 1, 0)], notches[min(index + 1, last)]
-        turned = [_is_turned(notches[index], one) for one in neighbours]
-        proximal = Side("clamped" if index == 0 else "between", before, turned[0])
-        distal = Side("free" if index == last else "between", after, turned[1])
-        parts = (neighbours[0], notches[index], neighbours[1])
-        key = (*map(id, parts), index == 0, index == last)
+    def side(boundary: Any, notch: Notch, length: float, other: Notch) -> Side:
+        apart = (notch.direction_deg - other.direction_deg + 180.0) % 360.0 - 180.0
+        return Side(boundary, length, abs(apart) > 1e-6)  # deg: rounding of sums of angles
+
+    def site(index: int, notch: Notch) -> Site:
+        before, after = notches[max(index - 1, 0)], notches[min(index + 1, last)]
+        is_first, is_last = index == 0, index == last
+        proximal = side("clamped" if is_first else "between", notch, lengths[index], before)
+        distal = side("free" if is_last else "between", notch, lengths[index + 1], after)
+        key = (*map(id, (before, notch, after)), is_first, is_last)
         return sites.setdefault(key, Site(proximal, distal, ratio))
 
     return tuple(
-        site(index) if notch.has_elastic_ends else None for index, notch in enumerate(notches)
+        site(index, notch) if notch.has_elastic_ends else None
+        for index, notch in enumerate(notches)
     )
-
-
-def _is_turned(notch: Notch, other: Notch) -> bool:
-    apart = (notch.direction_deg - other.direction_deg + 180.0) % 360.0 - 180.0
-    return abs(apart) > _SAME_DIRECTION
 
 
 def unchecked_dimensions(robot: Robot) -> list[str]:
@@ -389,21 +341,21 @@ def unchecked_dimensions(robot: Robot) -> list[str]:
     sites = sites_of(robot)
     for number, (notch, site) in enumerate(zip(robot.notches, sites, strict=True), 1):
         if site is not None:
-            for found in validity_warnings(notch, robot.tube, site):
-                notches_of.setdefault(found, []).append(str(number))
+            for warning in validity_warnings(notch, robot.tube, site):
+                notches_of.setdefault(warning, []).append(str(number))
     if not notches_of:
         return []
-    every = [f"{found} ({_numbered(numbers, len(sites))})" for found, numbers in notches_of.items()]
+
+    def numbered(numbers: list[str]) -> str:
+        if len(numbers) == len(sites) > 1:
+            return "all notches"
+        return f"notch{'es' if len(numbers) > 1 else ''} {', '.join(numbers)}"
+
+    warnings = [f"{warning} ({numbered(numbers)})" for warning, numbers in notches_of.items()]
     return [
-        f"finite elements did not check all dimensions of this robot: {'; '.join(every)}. Widen "
+        f"finite elements did not check all dimensions of this robot: {'; '.join(warnings)}. Widen "
         "the band by a tolerance of `notch.stiffness_factor`, or check a notch by `export`."
     ]
-
-
-def _numbered(numbers: list[str], count: int) -> str:
-    if len(numbers) == count > 1:
-        return "all notches"
-    return f"notch{'es' if len(numbers) > 1 else ''} {', '.join(numbers)}"
 
 
 # One flexure of a chain: the rod of a notch with the modes that the loads need, and its fibres.
@@ -416,11 +368,7 @@ def with_fibres(rod: Rod, notch: Any, tube: Tube, refinement: int = 0) -> Rod:
     points = section_fibres(notch, tube)(section.edge_near, section.edge_spine, count)
     points = fitted(points, section.area, section.second_moment_weak)
     fibres = Fibres(*map(constant, points))
-    return dataclasses.replace(rod, section=dataclasses.replace(section, fibres=fibres))
-
-
-FlexureOf = Callable[..., tuple[Rod, Motion]]
-"""Makes a flexure, and its pose in the free robot; for the arguments see `flexure`."""
+    return replace(rod, section=replace(section, fibres=fibres))
 
 
 @cached(512)
@@ -444,7 +392,7 @@ def assemble(
     follows: bool = True,
     refinement: int = 0,
     flat: bool = True,
-    flexures: FlexureOf | None = None,
+    flexures: Callable[..., Any] | None = None,
 ) -> Chain:
     """Turn the description of a robot into the arrays of its chain.
 
@@ -472,7 +420,7 @@ def assemble(
     section = rods.section.stiffened(template.stiffness_factor[:, None])
     tendons = robot.tendon
     chain = Chain(
-        rods=dataclasses.replace(rods, section=section),
+        rods=replace(rods, section=section),
         groups=routed.groups,
         contact_pairs=template.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
@@ -541,7 +489,7 @@ class ChainTemplate(NamedTuple):
 
 
 def chain_template(
-    robot: Robot, level: str, refinement: int, flexures: FlexureOf | None = None
+    robot: Robot, level: str, refinement: int, flexures: Callable[..., Any] | None = None
 ) -> ChainTemplate:
     """Build the template of a robot's chain; for the arguments see `assemble`."""
     chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
@@ -559,7 +507,7 @@ def _build_template(
     refinement: int,
     turns_with_chord: bool,
     by_fibres: bool,
-    flexures: FlexureOf = flexure,
+    flexures: Callable[..., Any] = flexure,
 ) -> ChainTemplate:
     # Notches that are equal but for their factor are built once.
     factor = xp.array([notch.stiffness_factor for notch in notches])
@@ -568,23 +516,22 @@ def _build_template(
     # By identity, as numbers that are traced are neither equal nor different.
     pairs = list(zip(notches, sites, strict=True))
     sited = {(id(notch), id(site)): (notch, site) for notch, site in pairs}
-    built = [flexures(*each, tube, level, refinement, by_fibres) for each in sited.values()]
-    own_rods, free_poses = zip(*built, strict=True)
-    distinct_rods = stack(own_rods)
+    built = [flexures(*pair, tube, level, refinement, by_fibres) for pair in sited.values()]
+    different, free_poses = zip(*built, strict=True)
+    distinct_rods = stack(different)
     order = {key: index for index, key in enumerate(sited)}
-    rod_index = np.array([order[id(notch), id(site)] for notch, site in pairs])
+    rod_index = xp.array([order[id(notch), id(site)] for notch, site in pairs])
     rods = jax.tree.map(lambda leaf: leaf[rod_index], distinct_rods)
     body_length = constant(body_lengths(tube, notches))
     lead = body_length[:-1, None] * _UP
-    rods = dataclasses.replace(rods, start_offset=rods.start_offset + lead)
+    rods = replace(rods, start_offset=rods.start_offset + lead)
     free = jax.tree.map(lambda *leaves: xp.stack(leaves)[rod_index], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
     context = RoutingContext(
         notches, tube.outer_radius, rods, free, body_length, turns_with_chord=turns_with_chord
     )
-    directions = {notch.direction_deg: xp.empty(0) for notch in notches}
-    for side in directions:
-        directions[side] = xp.asarray(rotation_about(constant(_UP * xp.radians(side))))
+    sides = dict.fromkeys(notch.direction_deg for notch in notches)
+    turns = {side: rotation_about(constant(_UP * xp.radians(side))) for side in sides}
     return ChainTemplate(
         distinct_rods,
         rod_index,
@@ -592,7 +539,7 @@ def _build_template(
         route(tendons, context),
         build_contacts(notches, tube, rods, body_length),
         body_length,
-        constant(xp.stack([directions[notch.direction_deg] for notch in notches])),
+        constant(xp.stack([turns[notch.direction_deg] for notch in notches])),
         xp.sum(rods.length, axis=-1),
         _squared_contact_motion(rods, tube.outer_radius),
         factor,
@@ -608,24 +555,24 @@ def _flat(chain: Chain, frame: Float[Array, "3 3"]) -> Chain:
 
     def planar(part: Any) -> Any:
         points = [name for name in ("leaves", "enters", "along", "normal") if hasattr(part, name)]
-        turned = {name: planar_points(getattr(part, name) @ frame) for name in points}
-        return dataclasses.replace(part, **turned)
+        return replace(
+            part, **{name: planar_points(getattr(part, name) @ frame) for name in points}
+        )
 
-    return dataclasses.replace(
+    return replace(
         chain,
         rods=flattened(chain.rods, frame),
-        groups=tuple(planar(group) for group in chain.groups),
-        contact_pairs=tuple(planar(group) for group in chain.contact_pairs),
+        groups=tuple(map(planar, chain.groups)),
+        contact_pairs=tuple(map(planar, chain.contact_pairs)),
         frame=constant(frame),
     )
 
 
 def _elastic(rods: Rod, law: SectionLaw) -> Float[Array, "n modes modes"]:
-    """Compute the stiffness of every flexure in the free robot; 1 for padding modes."""
-    basis = rods.basis
-    stiffness_product = rods.length[..., None, None] * (law.stiffness(rods.section) @ basis)
-    own = xp.einsum("niam,niak->nmk", basis, stiffness_product)
-    return own + rods.padding_mask[:, None] * xp.eye(rods.modes)
+    """Compute the stiffness of every flexure in the free robot, N mm; 1 for padding modes."""
+    weighted = rods.length[..., None, None] * (law.stiffness(rods.section) @ rods.basis)
+    stiffness = xp.einsum("niam,niak->nmk", rods.basis, weighted)
+    return stiffness + rods.padding_mask[:, None] * xp.eye(rods.modes)
 
 
 def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[Array, "n modes"]:
@@ -641,13 +588,10 @@ def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[Array, "n m
 
 def _contacts(groups: tuple[TendonGroup, ...], tendons: int) -> Int[Array, "t edges"]:
     """List the edges that every tendon touches, base to tip: two per body that it visits."""
-    contact_edges: list[Array] = [xp.zeros(0, int)] * tendons
+    contact_edges: list[Any] = [[]] * tendons
     for group in groups:
         for column, number in enumerate(group.numbers):
-            flexures = xp.flatnonzero(xp.asarray(group.visits)[:, column])
-            contact_edges[number] = (2 * flexures[:, None] + xp.arange(2)).ravel()
-    max_edges = max(len(edges) for edges in contact_edges)
-    filled = [
-        xp.pad(edges, (0, max_edges - len(edges)), constant_values=-1) for edges in contact_edges
-    ]
-    return cast("Array", xp.stack(filled))
+            flexures = np.flatnonzero(np.asarray(group.visits)[:, column])
+            contact_edges[number] = (2 * flexures[:, None] + np.arange(2)).ravel().tolist()
+    most = max(map(len, contact_edges))
+    return xp.array([edges + [-1] * (most - len(edges)) for edges in contact_edges], int)

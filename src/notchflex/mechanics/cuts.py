@@ -480,8 +480,8 @@ def sector_fibres(outer: float, inner: float, depth: float, count: int = FIBRES)
 
 def segment_fibres(outer: float, inner: float, depth: float, count: int = FIBRES) -> Points:
     """Divide an annular segment (`annular_segment`) into strips across, outside and at the bore."""
-    # The heights of strips are cosines, so that the chords of both circles are smooth over them. With
-    # fewer than 8 strips for each fibre the recurrence of `gauss_rule` fails.
+    # The heights of strips are cosines, so that the chords of both circles are smooth over them.
+    # With fewer than 8 strips for each fibre the recurrence of `gauss_rule` fails.
     plane = depth - outer
     top, bottom, rim = (
         half_angle(*map(constant, (radius, radius - height, radius + height)))

@@ -260,11 +260,22 @@ def notch_stiffness(
     )
 
 
-# Checked ranges of the law of a notch with its ends, and where a notch lies outside.
+# Checked ranges (against finite elements) of the law of a notch with its ends.
 
-_SHORT_RING = 0.37  # in outer diameters; shorter ones were not checked
-_LEAST_EFFECT = 0.01  # of the stiffness; below, nothing is said
-_LONG_RING = 1.5  # in outer diameters; with 1.9 the chain agrees with finite elements to 2 %
+Dimension = tuple[str, float, list[tuple[float, float, str]]]
+"""A dimension, its value, and checked ranges, widest first: least, most, what is known beyond."""
+
+
+def left_ranges(dimensions: list[Dimension]) -> list[str]:
+    """Return a sentence for each dimension outside a range: number, bound and what is known."""
+    sentences: list[str] = []
+    for dimension, value, ranges in dimensions:
+        for low, high, beyond in ranges:
+            if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
+                side, bound = ("below", low) if value < low else ("above", high)
+                sentences.append(f"{dimension} is {value:.3g}, {side} {bound:g}: {beyond}")
+                break
+    return sentences
 
 
 def validity(
@@ -276,58 +287,54 @@ def validity(
     proximal: Side,
     distal: Side,
 ) -> list[str]:
-    """List the checked ranges (against finite elements) that a notch leaves."""
-    radius = 0.5 * (outer_radius + inner_radius)
-    wall = (outer_radius - inner_radius) / radius
-    diameter = 2.0 * outer_radius
+    """List the checked ranges that a notch leaves, each with the error found beyond it."""
+    radius, diameter = 0.5 * (outer_radius + inner_radius), 2.0 * outer_radius
     sentences: list[str] = []
-
-    def check(what: str, value: float, low: float, high: float, why: str) -> bool:
-        inside = low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9)
-        if not inside:
-            side, bound = ("below", low) if value < low else ("above", high)
-            sentences.append(f"{what} is {value:.3g}, {side} {bound:g}: {why}")
-        return inside
-
-    untested = "the stiffness may be off by more than the 3 % found inside"
     if cut == "off-axis" and depth >= outer_radius + inner_radius:
         sentences.append(
             f"depth is {depth:.4g} mm, beyond the far side of the bore at "
             f"{outer_radius + inner_radius:.4g} mm, where a solid strip is left: the stiffness was "
             "found wrong by up to 23 %"
         )
-    if check("wall / mean radius", wall, 0.0769, 0.47, untested):
-        off = "moments near closing were found up to 13 % off"
-        check("wall / mean radius", wall, 0.14, 0.47, off)
-    # Of higher notches the rings are a small part.
-    check("height / mean radius", height / radius, 0.39, np.inf, untested)
-    what, ratio = "depth / outer diameter", depth / diameter
-    between = proximal.boundary == distal.boundary == "between"
-    if check(what, ratio, 0.60, 0.90, untested) and (
-        not between or check(what, ratio, 0.68, 1.0, "between notches found up to 3 % off")
-    ):
-        check(what, ratio, 0.75, 1.0, "moments near closing were found up to 3 % off")
+    untested = "the stiffness may be off by more than the 3 % found inside"
+    off = "moments near closing were found up to 13 % off"
+    depths = [(0.60, 0.90, untested), (0.75, 1.0, "moments near closing were found up to 3 % off")]
+    if proximal.boundary == distal.boundary == "between":
+        depths.insert(1, (0.68, 1.0, "between notches found up to 3 % off"))
+    walls = [(0.0769, 0.47, untested), (0.14, 0.47, off)]
+    sentences += left_ranges(
+        [
+            ("wall / mean radius", (outer_radius - inner_radius) / radius, walls),
+            # Of higher notches the rings are a small part.
+            ("height / mean radius", height / radius, [(0.39, np.inf, untested)]),
+            ("depth / outer diameter", depth / diameter, depths),
+        ]
+    )
     shape = outer_radius, inner_radius, cut, depth, height, 0.33
     sentences += _short_rings(shape, (proximal, distal), diameter)
     turned = {side.length for side in (proximal, distal) if side.turned}
+    # With a ring of 1.9 outer diameters the chain agrees with finite elements to 2 %.
     return sentences + [
         f"a neighbour opens to another side of the tube, and the ring between them is {length:.3g} "
-        f"mm long, below {_LONG_RING:g} outer diameters: both were found too stiff, 1.4 times with "
-        "0.6 outer diameters and up to 2 times with 0.4"
+        "mm long, below 1.5 outer diameters: both were found too stiff, 1.4 times with 0.6 outer "
+        "diameters and up to 2 times with 0.4"
         for length in sorted(turned)
-        if length < _LONG_RING * 2.0 * outer_radius
+        if length < 1.5 * diameter
     ]
 
 
 def _short_rings(shape: tuple[Any, ...], sides: tuple[Side, Side], diameter: float) -> list[str]:
     """Tell of short rings by what they change against the shortest ones that were checked."""
-    least = _SHORT_RING * diameter
-    longer = [one._replace(length=max(one.length, least)) if one.length else one for one in sides]
+    checked = 0.37  # outer diameters
+    longer = [
+        side._replace(length=max(side.length, checked * diameter)) if side.length else side
+        for side in sides
+    ]
     change = abs(notch_stiffness(*shape, *longer).weak / notch_stiffness(*shape, *sides).weak - 1.0)
-    if change <= _LEAST_EFFECT:
+    if change <= 0.01:
         return []
     shortest = min(side.length for side in sides if side.length)
     return [
-        f"ring / outer diameter is {shortest / diameter:.3g}, below {_SHORT_RING:g}: "
+        f"ring / outer diameter is {shortest / diameter:.3g}, below {checked:g}: "
         f"{100.0 * change:.0f} % of the stiffness follow from longer rings"
     ]

@@ -10,7 +10,7 @@ from notchflex.mechanics.flexure import Site, rod
 from notchflex.mechanics.flexure.roots import (
     ROUND,
     SHARP,
-    Walls,
+    RootedStrip,
     turned_compliance,
     with_sideways,
 )
@@ -23,7 +23,7 @@ ON_WALL = np.array([True, False, False, True])
 
 def bar() -> FibreSection:
     size = np.ones(4)
-    ends = NotchEnds.rigid(size)
+    ends = NotchEnds()
     plain = (2.0 * size, 0.3 * size, 5.0 * size, 0.7 * size, 0.0 * size, size, size)
     return FibreSection(*plain, ends=ends)
 
@@ -47,12 +47,12 @@ def test_the_sections_add_up_to_the_compliance_asked_for() -> None:
 
 @pytest.mark.parametrize("rule", [ROUND, SHARP])
 def test_the_coupling_never_makes_the_stiffness_indefinite(rule) -> None:
-    walls = Walls(3.0, 2.0, 1.0, 0.7, 2.5)
+    strip = RootedStrip(0.7, 2.5, 0.0, 0.4, 2.1, 0.0, 1.5, 1.0, rule, wall=1.0)
+    tube = nf.Tube(6.0, 4.0)
     for cross in (-1e3, -7.0, 0.0, 7.0, 1e3):
-        strip, tube, both = turned_compliance(
-            walls, np.array([[6.4, cross], [cross, 57.0]]), rule, 0.3
-        )
-        assert 0.25 * strip * tube > both**2
+        plane = np.array([[6.4, cross], [cross, 57.0]])
+        about_strip, about_tube, both = turned_compliance(strip, tube, plane, 0.3)
+        assert 0.25 * about_strip * about_tube > both**2
         assert both * cross <= 0.0
 
 

@@ -8,6 +8,7 @@ from scipy.integrate import quad
 
 import notchflex as nf
 from fibre_sections import PLAIN as SECTION
+from fibre_sections import energy, tangent
 from notchflex.mechanics.material import SectionLaw, section_law
 
 LAWS = {
@@ -56,7 +57,7 @@ def test_superelastic_moment_is_that_of_the_outer_fibre(law: SectionLaw) -> None
 @pytest.mark.parametrize("curvature", [0.05, 0.4, -0.9, 1.1])
 def test_tangent_is_the_finite_difference(law: SectionLaw, curvature: float) -> None:
     strain = np.array([0.01, curvature, -0.02, 0.001, 0.002, -0.001])
-    tangent = np.asarray(law.tangent(strain, SECTION, ()))
+    slope = tangent(law, strain, SECTION)
     step = 1e-6
     for column in range(6):
         change = np.zeros(6)
@@ -64,7 +65,7 @@ def test_tangent_is_the_finite_difference(law: SectionLaw, curvature: float) -> 
         ahead = law.respond(strain + change, SECTION, ()).resultants
         behind = law.respond(strain - change, SECTION, ()).resultants
         np.testing.assert_allclose(
-            (ahead - behind) / (2 * step), tangent[:, column], rtol=1e-6, atol=1e-6
+            (ahead - behind) / (2 * step), slope[:, column], rtol=1e-6, atol=1e-6
         )
 
 
@@ -77,13 +78,13 @@ def test_energy_is_the_work_of_the_moment(law: SectionLaw, curvature: float) -> 
     kinks = [sign * e / SECTION.edge_spine for e in (0.028, 0.1) for sign in (1, -1)]
     inside = [kink for kink in kinks if min(0, curvature) < kink < max(0, curvature)]
     work = quad(moment, 0.0, curvature, points=inside or None, epsabs=1e-13, epsrel=1e-12)[0]
-    energy = law.energy(np.array([0.0, curvature, 0.0, 0.0, 0.0, 0.0]), SECTION, ())
-    assert float(energy) == pytest.approx(work, rel=1e-9)
+    stored = energy(law, np.array([0.0, curvature, 0.0, 0.0, 0.0, 0.0]), SECTION, ())
+    assert float(stored) == pytest.approx(work, rel=1e-9)
 
 
 def test_stiffness_is_the_tangent_at_rest_and_symmetric(law: SectionLaw) -> None:
     stiffness = np.asarray(law.stiffness(SECTION))
-    np.testing.assert_allclose(stiffness, law.tangent(np.zeros(6), SECTION, ()), rtol=1e-12)
+    np.testing.assert_allclose(stiffness, tangent(law, np.zeros(6), SECTION), rtol=1e-12)
     np.testing.assert_allclose(stiffness, stiffness.T)
     assert (np.linalg.eigvalsh(stiffness) > 0.0).all()
 

@@ -41,9 +41,6 @@ from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.section import FibresAt, Section
 from notchflex.robot import ArcNotch, Tube
 
-# Part of the end compliance that follows the material beyond its elastic limit (finite elements).
-MATERIAL_SHARE = 0.25
-
 
 @rod.register
 def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
@@ -97,30 +94,29 @@ def _ends(
     seconds = (plain_number(cut.second_moment_weak), plain_number(cut.second_moment_strong))
     # Beyond what the linear part of the bending gives: h^2 l/(12 I).
     shear = [
-        all_of_it - height**2 * length / (12.0 * second)
-        for all_of_it, length, second in zip(
+        total - height**2 * length / (12.0 * second)
+        for total, length, second in zip(
             (stiffness.shear, stiffness.sway), bending, seconds, strict=True
         )
     ]
-    push, sway = (
-        one * plain_number(cut.area) / (2.0 * (1.0 + poisson_ratio) * height) - 1.0 for one in shear
-    )
+    area, ratio = plain_number(cut.area), 2.0 * (1.0 + poisson_ratio)
+    push, sway = (compliance * area / (ratio * height) - 1.0 for compliance in shear)
     ends = NotchEnds(
-        weak=constant(stiffness.weak / height - 1.0),
-        strong=constant(stiffness.strong / height - 1.0),
-        axial=constant(stiffness.axial / height - 1.0),
-        torsion=constant(stiffness.torsion / height - 1.0),
-        odd=constant(0.5 * stiffness.alpha * height),
-        even=constant(0.5 * stiffness.beta * height**2),
-        material_share=constant(MATERIAL_SHARE),
-        sway=constant(sway),
-        push=constant(push),
-        oblique=constant(0.0),
+        weak=stiffness.weak / height - 1.0,
+        strong=stiffness.strong / height - 1.0,
+        axial=stiffness.axial / height - 1.0,
+        torsion=stiffness.torsion / height - 1.0,
+        odd=0.5 * stiffness.alpha * height,
+        even=0.5 * stiffness.beta * height**2,
+        material_share=0.25,  # of finite elements beyond the elastic limit
+        sway=sway,
+        push=push,
     )
-    # M = E I kappa h/l changes by the force: 2 E I/(h l) where kappa = P_1/h.
+    # M = E I kappa h/l changes by the force: 2 E I/(h l) where kappa = P_1/h. It shifts the rings
+    # in the plane and sideways, mm.
     in_plane, sideways = (
-        2.0 * second / (height * length) * one
-        for one, length, second in zip(shear, bending, seconds, strict=True)
+        2.0 * second / (height * length) * compliance
+        for compliance, length, second in zip(shear, bending, seconds, strict=True)
     )
     return ends, (in_plane, sideways)
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import ArrayLike
 
-from notchflex._arrays import decide, xp
+from notchflex._arrays import xp
 from notchflex._jax import (
     constant,
     jax,
@@ -26,7 +26,7 @@ from notchflex.mechanics.flexure.rod_kinematics import (
     legendre,
 )
 from notchflex.mechanics.material import FibreSection
-from notchflex.mechanics.motion import Motion
+from notchflex.mechanics.motion import Motion, rotation_about
 from notchflex.mechanics.section import Section
 
 STRAIGHT = xp.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -122,19 +122,11 @@ def legendre_modes(
 
 def about_neutral_axis(section: Section, torsion_constant: ArrayLike | None = None) -> FibreSection:
     """Refer a section to its neutral axis; another torsion constant may replace its own, mm^4."""
-    torsion = section.torsion_constant if torsion_constant is None else torsion_constant
-    return FibreSection(
-        area=section.area,
-        second_moment_weak=section.second_moment_weak,
-        second_moment_strong=section.second_moment_strong,
-        torsion_constant=constant(torsion),
-        shear_centre=section.shear_centre - section.centroid,
-        edge_spine=section.edge_spine,
-        edge_near=section.edge_near,
-        edge_across=section.edge_across,
-        outer_radius=section.outer_radius,
-        half_angle=section.half_angle,
-    )
+    values = section._asdict()
+    values["shear_centre"] = section.shear_centre - values.pop("centroid")
+    if torsion_constant is not None:
+        values["torsion_constant"] = constant(torsion_constant)
+    return FibreSection(**values)
 
 
 def build_rod(
@@ -173,13 +165,13 @@ def build_rod(
     turned = xp.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     curve, curve_end, reference = None, shifted(), strain
     if axis.curve is not None:
-        curve, curve_end = (Motion(*(part[at] for part in axis.curve)) for at in (slice(-1), -1))
+        curve, curve_end = (Motion(*(part[k] for part in axis.curve)) for k in (slice(-1), -1))
         reference = None
 
-    def at_nodes(values: Array, own_axes: int = 0) -> Array:
-        each = xp.asarray(values)
-        is_uniform = each.ndim == own_axes
-        return constant(xp.broadcast_to(each, (nodes, *each.shape)) if is_uniform else each[:nodes])
+    def at_nodes(values: Array, axes: int = 0) -> Array:
+        values = constant(values)
+        is_uniform = values.ndim == axes
+        return xp.broadcast_to(values, (nodes, *values.shape)) if is_uniform else values[:nodes]
 
     return Rod(
         start_rotation=constant(turned @ axis.start.rotation),
@@ -192,7 +184,7 @@ def build_rod(
         reference_strain=constant(strain[:nodes]),
         section=dataclasses.replace(
             jax.tree.map(at_nodes, dataclasses.replace(section, fibres=None)),
-            fibres=jax.tree.map(partial(at_nodes, own_axes=1), section.fibres),
+            fibres=jax.tree.map(partial(at_nodes, axes=1), section.fibres),
         ),
         closure=constant([0.0 if closure is None else closure, 0.0]),
         has_closure=constant(float(closure is not None)),
@@ -215,10 +207,41 @@ def build_rod(
 _X, _Y, _Z = xp.eye(3)
 
 
-def wrench_modes(
+def course_poses(
+    along: Array, above: Array, heading: Array, middle: Float[Array, " 3"], hand: float
+) -> Motion:
+    """Compute poses along a free rod in the x-z plane: z along it, y out of the plane."""
+    # Along the strip and along the tube from its middle, mm; the mirror image for `hand` -1.
+    position = xp.stack([-hand * along, 0.0 * along, above], axis=-1)
+    turns = rotation_about(constant((hand * (heading - 0.5 * np.pi))[:, None] * _Y))
+    return Motion(turns, constant(middle + position))
+
+
+def course_rod(
+    points: RodQuadrature,
     poses: Motion,
-    part: Float[Array, " nodes"],
-    length: Float[Array, " nodes"],
+    section: FibreSection,
+    middle: Float[Array, " 3"],
+    mode_counts: tuple[int, int],
+    distal: float,
+    poisson_ratio: float,
+    free: Array | None = None,
+    **options: Any,
+) -> Rod:
+    """Build the rod of a strip from wall to wall; the distal frame is `distal` mm up the tube."""
+    # The poses are those at all points, at the start and at the end.
+    along, start, end = (Motion(*(part[k] for part in poses)) for k in (slice(-2), -2, -1))
+    basis = wrench_modes(points, along, section, middle, *mode_counts, poisson_ratio)
+    to_end = Motion(*(xp.concatenate([part[:-2], part[-1:]]) for part in poses))
+    curve, body = between(start, to_end), between(end, shifted(z=distal))
+    in_plane = mode_counts[0] + 2 * mode_counts[1]
+    modes = StrainModes(basis, (in_plane, in_plane, basis.shape[-1]))
+    return build_rod(NeutralAxis(points, start, body, curve, free), section, modes, **options)
+
+
+def wrench_modes(
+    points: RodQuadrature,
+    poses: Motion,
     section: FibreSection,
     middle: Float[Array, " 3"],
     moment_modes: int,
@@ -230,18 +253,21 @@ def wrench_modes(
     # fourth mode on with the Legendre polynomials P_2, P_3 ... of arc length (P_1 is nearly a
     # lever); then come forces along x and along z, times P_0, P_1 ... in pairs. Out of the plane
     # come a constant moment about x, one about z and the moment of a sideways force at the middle,
-    # then moments about x and z times P_2, P_3 ... as far as in the plane, and that force.
-    whole = length.sum()
+    # then moments about x and z times P_2, P_3 ... as far as in the plane, and that force. A unit
+    # is about 1 rad of the end for a moment, and a mean strain of 1 for a force.
+    length = points.weight
+    part = 2.0 * points.every / points.ends[-1] - 1.0
     rotation, lever = poses.rotation, poses.translation - middle
     reach = xp.abs(lever).max(axis=0)
     polynomials = legendre(part, max(moment_modes - 1, force_modes))
 
     moment = [xp.ones_like(length), lever[:, 0] / reach[0], lever[:, 2] / reach[2]]
     moment += [polynomials[:, degree] for degree in range(2, moment_modes - 1)]
-    force = [(polynomials[:, k], along) for k in range(force_modes) for along in (_X, _Z)]
     none = xp.zeros_like(lever)
     wrenches = [(size[:, None] * _Y, none) for size in moment]
-    wrenches += [(none, size[:, None] * along) for size, along in force]
+    wrenches += [
+        (none, polynomials[:, k, None] * along) for k in range(force_modes) for along in (_X, _Z)
+    ]
     sideways = xp.cross(lever, _Y) / reach[0]
     out_of_plane = [about + none for about in (_X, _Z, sideways)]
     out_of_plane += [
@@ -253,34 +279,19 @@ def wrench_modes(
     of_force = xp.arange(len(wrenches)) >= moment_modes
     of_force[-len(out_of_plane) - 1 : -1] = False
 
-    parts = xp.stack([part for wrench in wrenches for part in wrench])
+    parts = xp.stack([each for wrench in wrenches for each in wrench])
     in_frame = xp.einsum("kji,mpkj->kmpi", rotation, parts.reshape(len(wrenches), 2, -1, 3))
     in_frame = in_frame.reshape(len(length), len(wrenches), 6)
     strain = _strains(section, poisson_ratio, in_frame)
     work = xp.einsum("k,kmc,kmc->m", length, in_frame, strain)
-    return xp.moveaxis(strain * (xp.where(of_force, whole, 1.0) / work)[:, None], 1, 2)
+    return xp.moveaxis(strain * (xp.where(of_force, length.sum(), 1.0) / work)[:, None], 1, 2)
 
 
 def _strains(
     section: FibreSection, poisson_ratio: float, resultants: Float[Array, "nodes modes 6"]
 ) -> Float[Array, "nodes modes 6"]:
     """Compute strains by resultants, times Young's modulus."""
-    compliance = _compliance(section, poisson_ratio)[:, None]
-    strain = compliance * resultants
-    if section.ends is None or not decide(xp.any(section.ends.oblique)):
-        return strain
-    oblique = xp.asarray(section.ends.oblique)[:, None]
-    # The inverse of the stiffness of sideways bending and torsion together.
-    part = 1.0 - oblique**2 * compliance[..., 0] * compliance[..., 2]
-    crossed = oblique * compliance[..., 0] * compliance[..., 2]
-    about_x = (strain[..., 0] - crossed * resultants[..., 2]) / part
-    twist = (strain[..., 2] - crossed * resultants[..., 0]) / part
-    return xp.stack([about_x, strain[..., 1], twist, *xp.moveaxis(strain[..., 3:], -1, 0)], axis=-1)
-
-
-def _compliance(section: FibreSection, poisson_ratio: float) -> Float[Array, "nodes 6"]:
-    """Compute strains per resultant, times Young's modulus."""
-    ratio = 2.0 * (1.0 + poisson_ratio)  # E / G
+    ratio, ends = 2.0 * (1.0 + poisson_ratio), section.compliance  # E / G
     stiffness = [
         section.second_moment_strong,
         section.second_moment_weak,
@@ -289,9 +300,14 @@ def _compliance(section: FibreSection, poisson_ratio: float) -> Float[Array, "no
         section.area / ratio,
         section.area,
     ]
-    compliance = 1.0 / xp.stack([xp.asarray(one) for one in stiffness], axis=-1)
-    if (ends := section.ends) is None:
-        return compliance
     added = (ends.strong, ends.weak, ends.torsion, ends.push, ends.sway, ends.axial)
-    parts = xp.broadcast_arrays(*map(xp.asarray, added))
-    return compliance * (1.0 + xp.stack(parts, axis=-1))
+    softer = 1.0 + xp.stack(xp.broadcast_arrays(section.area, *added)[1:], axis=-1)
+    compliance = (1.0 / xp.stack(stiffness, axis=-1) * softer)[:, None]
+    strain = compliance * resultants
+    # The inverse of the stiffness of sideways bending and torsion together.
+    oblique = (ends.oblique + xp.zeros(len(compliance)))[:, None]
+    part = 1.0 - oblique**2 * compliance[..., 0] * compliance[..., 2]
+    crossed = oblique * compliance[..., 0] * compliance[..., 2]
+    about_x = (strain[..., 0] - crossed * resultants[..., 2]) / part
+    twist = (strain[..., 2] - crossed * resultants[..., 0]) / part
+    return xp.stack([about_x, strain[..., 1], twist, *xp.moveaxis(strain[..., 3:], -1, 0)], axis=-1)

@@ -188,9 +188,10 @@ def stack(rods: Sequence[Rod]) -> Rod:
 
 def _with_ends(rod: Rod) -> Rod:
     """Return the rod with ends, rigid ones where it has none."""
-    if rod.section.ends is not None:
-        return rod
-    ends = NotchEnds.rigid(rod.section.area)
+    rigid = xp.zeros(xp.shape(rod.section.area))
+    ends = (
+        jax.tree.map(lambda _: rigid, NotchEnds()) if rod.section.ends is None else rod.section.ends
+    )
     return dataclasses.replace(rod, section=dataclasses.replace(rod.section, ends=ends))
 
 

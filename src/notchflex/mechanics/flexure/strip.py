@@ -14,23 +14,17 @@ from __future__ import annotations
 
 from notchflex._arrays import xp
 from notchflex._jax import constant
+from notchflex.mechanics.ends import Dimension, left_ranges
 from notchflex.mechanics.flexure.notch_rod import (
     NeutralAxis,
     about_neutral_axis,
     build_rod,
     legendre_modes,
 )
-from notchflex.mechanics.flexure.rod import (
-    Rod,
-    Site,
-    rod,
-    section_fibres,
-    validity_warnings,
-)
+from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres, validity_warnings
 from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
 from notchflex.mechanics.flexure.roots import (
-    CheckedRange,
-    left_ranges,
+    STRIP_UNCHECKED,
     rooted_strip_rod,
     sharp_strip,
     wall_ranges,
@@ -44,8 +38,6 @@ from notchflex.mechanics.section import (
 )
 from notchflex.robot import StripNotch, Tube
 
-# Polynomials of the sideways curvature and of the twist.
-_SIDEWAYS, _TWIST = 3, 2
 # Rod frame in the notch's frame: z along the strip toward the bend, x toward the base, same y.
 _LYING = xp.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
@@ -58,9 +50,9 @@ def _(notch: StripNotch, tube: Tube, refinement: int = 0, site: Site | None = No
             tube,
             notch.height + notch.rise,
             refinement,
+            site.poisson_ratio,
             direction_deg=notch.direction_deg,
             linear_kinematics=notch.deflection == "small",
-            poisson_ratio=site.poisson_ratio,
         )
     return strip_rod(notch, tube, 5 + refinement, 10 + 3 * refinement, refinement)
 
@@ -75,15 +67,14 @@ def strip_rod(
     """Build the rod of a strip."""
     length = notch.strip_length_in(tube)
     points = RodQuadrature((0.0, length), (nodes,), (nodes,))
-    modes = legendre_modes(points, bending_modes, _SIDEWAYS + more_sideways, _TWIST + more_sideways)
+    modes = legendre_modes(points, bending_modes, 3 + more_sideways, 2 + more_sideways)
     along = xp.append(points.every, length)
     axis = NeutralAxis(
         points,
         start=Motion(constant(_LYING), constant([-0.5 * length, 0.0, notch.height])),
         end=Motion(constant(_LYING.T), constant([0.0, 0.0, -0.5 * length])),
         curve=Motion(
-            constant(xp.tile(xp.eye(3), (len(along), 1, 1))),
-            constant(along[:, None] * xp.array([0.0, 0.0, 1.0])),
+            xp.tile(xp.eye(3), (len(along), 1, 1)), along[:, None] * xp.array([0.0, 0.0, 1.0])
         ),
     )
     # Both walls, their middles where the wall of the tube has its own.
@@ -113,15 +104,14 @@ def _(notch: StripNotch, tube: Tube, site: Site) -> list[str]:
     thickness, outer = notch.strip_thickness, tube.outer_diameter
     overlap = 2.0 * notch.depth - outer
     slanting = (
-        ": the body between two pairs is a slanting bar, which bends too; pairs that adjoin were "
+        "the body between two pairs is a slanting bar, which bends too; pairs that adjoin were "
         "found 2.1 times as flexible"
     )
-    ranges = [
-        CheckedRange("overlap of the cuts / strip thickness", overlap / thickness, 1.6, 5.4),
-        CheckedRange("overlap of the cuts / outer diameter", overlap / outer, 0.24, 0.54),
-        CheckedRange("height / outer diameter", notch.height / outer, 0.2, 0.5),
-        CheckedRange(
-            "uncut length / height", notch.uncut_length / notch.height, 0.7, float("inf"), slanting
-        ),
+    ratio, what = notch.uncut_length / notch.height, STRIP_UNCHECKED
+    ranges: list[Dimension] = [
+        ("overlap of the cuts / strip thickness", overlap / thickness, [(1.6, 5.4, what)]),
+        ("overlap of the cuts / outer diameter", overlap / outer, [(0.24, 0.54, what)]),
+        ("height / outer diameter", notch.height / outer, [(0.2, 0.5, what)]),
+        ("uncut length / height", ratio, [(0.7, float("inf"), slanting)]),
     ]
-    return left_ranges([*wall_ranges(thickness, tube), *ranges])
+    return left_ranges(wall_ranges(thickness, tube) + ranges)

@@ -24,34 +24,21 @@ import numpy as np
 from jaxtyping import Array
 
 from notchflex._arrays import plain_number, xp
-from notchflex._jax import constant
+from notchflex.mechanics.ends import Dimension, left_ranges
 from notchflex.mechanics.flexure.notch_rod import (
     STRAIGHT,
-    NeutralAxis,
-    StrainModes,
     about_neutral_axis,
-    between,
-    build_rod,
-    shifted,
-    wrench_modes,
+    course_poses,
+    course_rod,
 )
-from notchflex.mechanics.flexure.rod import (
-    Rod,
-    Site,
-    rod,
-    section_fibres,
-    validity_warnings,
-)
+from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres, validity_warnings
 from notchflex.mechanics.flexure.rod_kinematics import rod_quadrature
 from notchflex.mechanics.flexure.roots import (
-    CheckedRange,
-    left_ranges,
+    STRIP_UNCHECKED,
     rooted_strip_rod,
     round_strip,
     wall_ranges,
 )
-from notchflex.mechanics.material import FibreSection
-from notchflex.mechanics.motion import Motion, rotation_about
 from notchflex.mechanics.section import (
     FibresAt,
     clamped_torsion_constant,
@@ -62,8 +49,6 @@ from notchflex.robot import Tube, ULink
 
 # The arc length is a smooth integral over t, a third of a turn at most: ten nodes are exact.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
-
-_NEWTON = 4  # the speed varies by a few tenths: the fourth step is below 1e-16
 
 
 @dataclass(frozen=True)
@@ -76,8 +61,8 @@ class CurvedEnd:
     @property
     def outer_length(self) -> float:
         """Length d_e by which the edge N outreaches the slot's end, mm."""
-        # It makes the middle line begin square to the cut from M to N: the root of d_e² + r_c d_e =
-        # (π/2) r_c (r_c + l_s).
+        # It makes the middle line begin square to the cut from M to N: the root of
+        # d_e² + r_c d_e = (π/2) r_c (r_c + l_s).
         radius = self.slot_radius
         beyond = 2.0 * np.pi * radius * (radius + self.strip_thickness)
         return 0.5 * beyond / (radius + plain_number(xp.sqrt(radius**2 + beyond)))
@@ -89,17 +74,17 @@ class CurvedEnd:
 
     def inner_edge(self, t: Any) -> Array:
         """Compute the points M on the slot's round end: (..., 2), (y, z) in mm."""
-        turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
+        turn = 0.5 * np.pi * xp.asarray(t)
         return self.slot_radius * xp.stack([-xp.cos(turn), xp.sin(turn)], axis=-1)
 
     def outer_edge(self, t: Any) -> Array:
         """Compute the points N on the other edge of the material, that of the next slot."""
-        t = xp.asarray(t, dtype=float)
-        along = -(self.outer_length + self.slot_radius) * (1.0 - t)
-        return xp.stack([along, xp.full_like(t, self.slot_radius + self.strip_thickness)], axis=-1)
+        along = -(self.outer_length + self.slot_radius) * (1.0 - xp.asarray(t))
+        above = xp.full_like(along, self.slot_radius + self.strip_thickness)
+        return xp.stack([along, above], axis=-1)
 
     def middle(self, t: Any) -> Array:
-        """Compute the points C of the middle line."""
+        """Compute the points C of the middle line, mm."""
         return 0.5 * (self.inner_edge(t) + self.outer_edge(t))
 
     def thickness(self, t: Any) -> Array:
@@ -107,14 +92,9 @@ class CurvedEnd:
         return xp.linalg.norm(self.outer_edge(t) - self.inner_edge(t), axis=-1)
 
     def _first_derivative(self, t: Any) -> Array:
-        turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
+        turn = 0.5 * np.pi * xp.asarray(t)
         inner = 0.5 * np.pi * self.slot_radius * xp.stack([xp.sin(turn), xp.cos(turn)], axis=-1)
         return 0.5 * (inner + xp.array([self.outer_length + self.slot_radius, 0.0]))
-
-    def _second_derivative(self, t: Any) -> Array:
-        turn = 0.5 * np.pi * xp.asarray(t, dtype=float)
-        inward = xp.stack([xp.cos(turn), -xp.sin(turn)], axis=-1)
-        return 0.5 * (0.5 * np.pi) ** 2 * self.slot_radius * inward
 
     def heading(self, t: Any) -> Array:
         """Compute the direction of the middle line: from pi/2 - alpha at 0 to 0 at 1."""
@@ -124,13 +104,15 @@ class CurvedEnd:
     def curvature(self, t: Any) -> Array:
         """Compute the signed curvature, negative, 1/mm."""
         # |C' x C''| / |C'|³: Gao's eq. 8 leaves out the denominator, but C has not unit speed.
-        first, second = self._first_derivative(t), self._second_derivative(t)
+        turn, first = 0.5 * np.pi * xp.asarray(t), self._first_derivative(t)
+        second = 0.5 * (0.5 * np.pi) ** 2 * self.slot_radius
+        second = second * xp.stack([xp.cos(turn), -xp.sin(turn)], axis=-1)
         cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
         return cross / xp.linalg.norm(first, axis=-1) ** 3
 
     def length(self, t: Any = 1.0) -> Array:
         """Compute the length of the middle line from 0 to t, mm (Gao 2017, eq. 9 for t = 1)."""
-        t = xp.asarray(t, dtype=float)
+        t = xp.asarray(t)
         return 0.5 * t * (self._speed(0.5 * t[..., None] * (1.0 + _NODES)) @ _WEIGHTS)
 
     def _speed(self, t: Array) -> Array:
@@ -140,10 +122,9 @@ class CurvedEnd:
 
     def at_length(self, length: Any) -> Array:
         """Find the parameter t where the middle line has a given length from its beginning."""
-        target = xp.asarray(length, dtype=float)
-        t = target / self.length()
-        for _ in range(_NEWTON):
-            t = t - (self.length(t) - target) / self._speed(t)
+        t = length / self.length()
+        for _ in range(4):  # the speed varies by a few tenths: the fourth step is below 1e-16
+            t = t - (self.length(t) - length) / self._speed(t)
         return t
 
 
@@ -200,11 +181,6 @@ class Link:
         )
 
 
-# Poisson's ratio of a robot file without one. It only affects the shape of the modes and the
-# restraint of warping; the stiffness is that of the material.
-POISSON_RATIO = 0.33
-
-
 @rod.register
 def _(notch: ULink, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
     if site is not None:
@@ -213,11 +189,11 @@ def _(notch: ULink, tube: Tube, refinement: int = 0, site: Site | None = None) -
             tube,
             notch.height,
             refinement,
+            site.poisson_ratio,
             direction_deg=notch.direction_deg,
-            poisson_ratio=site.poisson_ratio,
         )
-    more = (3 + 3 * refinement, 1 + 2 * refinement, (6 + 3 * refinement, 6 + 3 * refinement))
-    return u_link_rod(notch, tube, *more)
+    nodes = 6 + 3 * refinement
+    return u_link_rod(notch, tube, 3 + 3 * refinement, 1 + 2 * refinement, (nodes, nodes))
 
 
 def u_link_rod(
@@ -226,61 +202,36 @@ def u_link_rod(
     moment_modes: int = 3,
     force_modes: int = 1,
     nodes: tuple[int, int] = (6, 6),
-    poisson_ratio: float = POISSON_RATIO,
+    poisson_ratio: float = 0.33,
 ) -> Rod:
-    """Build the rod of a link."""
+    """Build the rod of a link, from the proximal wall piece to the distal one."""
+    # `nodes` are Gauss's in each curved end and in the straight part. Poisson's ratio only affects
+    # the shape of the modes and the restraint of warping; the stiffness is that of the material.
     link = Link(notch.slot_radius, notch.strip_thickness, notch.strip_length)
     curved = link.length - link.strip_length
     ends = (0.0, 0.5 * curved, link.length - 0.5 * curved, link.length)
     counts = (nodes[0], nodes[1], nodes[0])
     # One node less moves the tip of 27 links by 4e-8 mm, modes left out by 1e-5 mm.
-    quadrature = rod_quadrature(ends, counts, tuple(count - 1 for count in counts))
-    position = quadrature.every
-    course = link.course(np.append(quadrature.unit.every, [0.0, 3.0]))
-    section = _section(link, tube, Course(*(values[:-2] for values in course)), poisson_ratio)
+    points = rod_quadrature(ends, counts, tuple(count - 1 for count in counts))
+    course = link.course(np.append(points.unit.every, [0.0, 3.0]))
+    # Two walls as wide as the tube's wall there, joined beyond the lumen.
+    along = course.along[:-2]
+    outer = xp.sqrt(tube.outer_radius**2 - along**2)
+    inner = xp.sqrt(xp.maximum(tube.inner_radius**2 - along**2, 0.0))
+    walls = two_walls(outer - inner, course.thickness[:-2], 0.5 * (outer + inner))
+    torsion = clamped_torsion_constant(walls, 0.5 * (outer + inner), link.length, poisson_ratio)
+    section = about_neutral_axis(walls, torsion)
     # A slot cut from the side away from the bend leaves the wall on the bend's side, where the
     # link then begins; over the slot that follows stands its mirror image.
     hand = 1.0 if notch.proximal_slot == "away" else -1.0
     # The strip lies above its proximal slot, whose lower edge is the proximal face.
     middle = xp.array([0.0, 0.0, 2.0 * notch.slot_radius + 0.5 * notch.strip_thickness])
-    every = _poses(course, middle, hand)
-    poses, start, end = (Motion(*(part[at] for part in every)) for at in (slice(-2), -2, -1))
     free = STRAIGHT + (hand * course.curvature[:-2])[:, None] * np.eye(6)[1]
-    basis = wrench_modes(
-        poses,
-        2.0 * position / link.length - 1.0,
-        quadrature.weight,
-        section,
-        middle,
-        moment_modes,
-        force_modes,
-        poisson_ratio,
-    )
-    poses_to_end = Motion(*(xp.concatenate([part[:-2], part[-1:]]) for part in every))
     # The distal body's frame: level with the strip's lower edge, on the tube axis.
-    distal = between(end, shifted(z=2.0 * notch.slot_radius))
-    axis = NeutralAxis(quadrature, start, distal, between(start, poses_to_end), free)
-    in_plane = moment_modes + 2 * force_modes
-    modes = StrainModes(basis, (in_plane, in_plane, basis.shape[-1]))
-    return build_rod(axis, section, modes, direction_deg=notch.direction_deg)
-
-
-def _poses(course: Course, middle: Array, hand: float) -> Motion:
-    """Compute the poses of the free middle line: z along it, y out of the plane."""
-    position = xp.stack([-hand * course.along, 0.0 * course.along, course.above], axis=-1)
-    about_y = hand * (course.heading - 0.5 * np.pi)
-    turns = rotation_about(constant(about_y[:, None] * xp.array([0.0, 1.0, 0.0])))
-    return Motion(turns, constant(middle + position))
-
-
-def _section(link: Link, tube: Tube, course: Course, poisson_ratio: float) -> FibreSection:
-    """Compute the sections: two walls as wide as the tube's wall there, joined beyond the lumen."""
-    outer = xp.sqrt(tube.outer_radius**2 - course.along**2)
-    inner = xp.sqrt(xp.maximum(tube.inner_radius**2 - course.along**2, 0.0))
-    middle = 0.5 * (outer + inner)
-    walls = two_walls(outer - inner, course.thickness, middle)
-    torsion = clamped_torsion_constant(walls, middle, link.length, poisson_ratio)
-    return about_neutral_axis(walls, torsion)
+    distal, modes = 2.0 * notch.slot_radius, (moment_modes, force_modes)
+    poses = course_poses(course.along, course.above, course.heading, middle, hand)
+    options = {"free": free, "direction_deg": notch.direction_deg}
+    return course_rod(points, poses, section, middle, modes, distal, poisson_ratio, **options)
 
 
 @section_fibres.register
@@ -295,9 +246,10 @@ def _(notch: ULink, tube: Tube, site: Site) -> list[str]:
     if not notch.has_elastic_ends:  # a model of a paper
         return []
     thickness, length = notch.strip_thickness, notch.strip_length
-    ranges = [
-        CheckedRange("strip length / strip thickness", length / thickness, 1.7, 5.8),
-        CheckedRange("strip length / outer diameter", length / tube.outer_diameter, 0.2, 0.5),
-        CheckedRange("slot radius / strip thickness", notch.slot_radius / thickness, 0.2, 0.8),
+    outer, radius = tube.outer_diameter, notch.slot_radius
+    ranges: list[Dimension] = [
+        ("strip length / strip thickness", length / thickness, [(1.7, 5.8, STRIP_UNCHECKED)]),
+        ("strip length / outer diameter", length / outer, [(0.2, 0.5, STRIP_UNCHECKED)]),
+        ("slot radius / strip thickness", radius / thickness, [(0.2, 0.8, STRIP_UNCHECKED)]),
     ]
-    return left_ranges([*wall_ranges(thickness, tube), *ranges])
+    return left_ranges(wall_ranges(thickness, tube) + ranges)

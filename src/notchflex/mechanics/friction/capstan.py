@@ -5,7 +5,7 @@ from __future__ import annotations
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant
-from notchflex.mechanics.friction.registry import FrictionLaw, friction_law
+from notchflex.mechanics.friction.registry import Edges, FrictionLaw, Turning, friction_law
 from notchflex.robot import Capstan
 
 
@@ -20,9 +20,7 @@ class CapstanLaw(FrictionLaw):
     # Tension that sliding over an edge costs whatever the turning, N; None for none
     loss: Float[Array, ""] | None
 
-    def bounds(
-        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
-    ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
+    def bounds(self, exit_turning: Turning, entry_turning: Turning) -> Edges:
         """Return coefficient times turning at each edge."""
         moved = self.moved_to_exit * entry_turning
         return (
@@ -30,9 +28,7 @@ class CapstanLaw(FrictionLaw):
             self.coefficient * (entry_turning - moved),
         )
 
-    def constant_loss(
-        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
-    ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]] | None:
+    def constant_loss(self, exit_turning: Turning, entry_turning: Turning) -> Edges | None:
         """Return the same loss at every edge."""
         if self.loss is None:
             return None

@@ -8,12 +8,12 @@ from notchflex._jax import (
     constant,
     jnp,
 )
-from notchflex.mechanics.friction.registry import FrictionLaw, friction_law
+from notchflex.mechanics.friction.registry import Edges, FrictionLaw, Turning, friction_law
 from notchflex.robot import Corner
 
 # At mu tan(beta/2) = 1 a corner holds any tension. Just below, the logarithm of the ratio is
 # bounded by 21 (a ratio of 1e9), and its derivative is finite.
-MAX_SLOPE = 1.0 - 1e-9
+_STEEPEST = 1.0 - 1e-9
 
 
 class CornerLaw(FrictionLaw):
@@ -21,24 +21,20 @@ class CornerLaw(FrictionLaw):
 
     coefficient: Float[Array, ""]  # Coefficient of friction
 
-    def bounds(
-        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
-    ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
+    def bounds(self, exit_turning: Turning, entry_turning: Turning) -> Edges:
         """Return 2 artanh(coefficient * tan(turning / 2)) at each edge."""
         # It is ln((cos b + mu sin b) / (cos b - mu sin b)) with b = half the turning.
         return self._bound(exit_turning), self._bound(entry_turning)
 
-    def valid(
-        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
-    ) -> Bool[Array, "*t"]:
+    def valid(self, exit_turning: Turning, entry_turning: Turning) -> Bool[Array, "*t"]:
         """Return where coefficient times tangent of half the turning is below 1 at both edges."""
-        return (self._slope(exit_turning) < MAX_SLOPE) & (self._slope(entry_turning) < MAX_SLOPE)
+        return (self._slope(exit_turning) < _STEEPEST) & (self._slope(entry_turning) < _STEEPEST)
 
-    def _slope(self, turning: Float[Array, "*t"]) -> Float[Array, "*t"]:
+    def _slope(self, turning: Turning) -> Turning:
         return self.coefficient * jnp.tan(0.5 * turning)
 
-    def _bound(self, turning: Float[Array, "*t"]) -> Float[Array, "*t"]:
-        return 2.0 * jnp.arctanh(jnp.minimum(self._slope(turning), MAX_SLOPE))
+    def _bound(self, turning: Turning) -> Turning:
+        return 2.0 * jnp.arctanh(jnp.minimum(self._slope(turning), _STEEPEST))
 
 
 @friction_law.register

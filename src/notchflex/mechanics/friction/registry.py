@@ -12,8 +12,10 @@ from notchflex._jax import Pytree, jnp
 from notchflex._packages import unregistered
 from notchflex.robot import Frictionless
 
-# N; keeps the formulas finite where the loss is zero.
-_MIN_LOSS = 1e-100
+Turning = Float[Array, "*t"]
+"""Turning angle of every tendon at an edge, rad."""
+Edges = tuple[Turning, Turning]
+"""A value of every tendon at the exit edge of a gap, and at the entry edge."""
 
 
 class FrictionLaw(Pytree, ABC):
@@ -30,9 +32,7 @@ class FrictionLaw(Pytree, ABC):
     remembers: ClassVar[bool] = True
 
     @abstractmethod
-    def bounds(
-        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
-    ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
+    def bounds(self, exit_turning: Turning, entry_turning: Turning) -> Edges:
         """Return the largest |ln(base-side tension / tip-side tension)| at both edges.
 
         Args:
@@ -43,9 +43,7 @@ class FrictionLaw(Pytree, ABC):
             The bound at the exit edge and at the entry edge, each >= 0.
         """
 
-    def constant_loss(
-        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
-    ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]] | None:
+    def constant_loss(self, exit_turning: Turning, entry_turning: Turning) -> Edges | None:
         """State the tension that sliding costs beside the ratio of `bounds`, N.
 
         Args:
@@ -62,13 +60,14 @@ class FrictionLaw(Pytree, ABC):
         # With a constant loss the tension beyond a contact may be 0 N, and is not 0 N beyond a
         # released one. Ratios of tensions that are raised by a loss are finite.
         losses = self.constant_loss(jnp.ones(()), jnp.ones(()))
-        return 0.0 if losses is None else jnp.maximum(jnp.maximum(*losses), _MIN_LOSS)
+        # Above 0 the formulas are finite where the loss is zero.
+        return 0.0 if losses is None else jnp.maximum(jnp.maximum(*losses), 1e-100)
 
     def limits(
         self,
-        exit_turning: Float[Array, "*t"],
-        entry_turning: Float[Array, "*t"],
-        tension: tuple[Float[Array, "*t"], Float[Array, "*t"]],
+        exit_turning: Turning,
+        entry_turning: Turning,
+        tension: Edges,
         log_ratio: Float[Array, "*t 2"],
     ) -> Float[Array, "*t 2"]:
         """Compute the largest |ln(tension ratio)| at both edges, constant losses included."""
@@ -87,9 +86,7 @@ class FrictionLaw(Pytree, ABC):
         unloading = jnp.log((highest + offset) / (before + offset))
         return jnp.where(log_ratio >= 0.0, loading, unloading)
 
-    def valid(
-        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
-    ) -> Bool[Array, "*t"]:
+    def valid(self, exit_turning: Turning, entry_turning: Turning) -> Bool[Array, "*t"]:
         """Return where the law is valid; elsewhere `bounds` is finite but meaningless.
 
         Args:
@@ -120,9 +117,7 @@ class FrictionlessLaw(FrictionLaw):
 
     remembers = False
 
-    def bounds(
-        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
-    ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
+    def bounds(self, exit_turning: Turning, entry_turning: Turning) -> Edges:
         """Return zero at both edges."""
         return jnp.zeros_like(exit_turning), jnp.zeros_like(entry_turning)
 

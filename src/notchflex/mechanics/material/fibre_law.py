@@ -1,10 +1,20 @@
-"""Laws of fibres: the stress of each depends on its strain and its history."""
+"""Laws of fibres: the stress of each depends on its strain and its history.
+
+A fibre carries sigma = E (eps - e), with the transformed strain e between two curves over its
+strain: a lower bound while the strain grows, and an upper bound while it shrinks. Between them e is
+constant and the fibre is elastic: a rate-independent play operator with return-point memory. One
+number per fibre is its memory, since unloading ends before the stress is zero. Without hysteresis
+the two curves coincide.
+
+The curvature k of the section and the strain of its neutral axis solve two equations: the axial
+force vanishes, and section and ends (`law.py`) bend by s in total.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -25,16 +35,6 @@ from notchflex.mechanics.material.law import (
 )
 from notchflex.robot import Nitinol, StressStrain
 
-# Balance of the fibres of a section: strain of the neutral axis, and curvature between its ends.
-#
-# Both are unknowns of two equations: the axial force vanishes, and section and ends (`law.py`) bend
-# by s in total.
-
-# Newton's method stops at this imbalance relative to the bending strain, or at this iteration.
-_BALANCED, _MAX_ITERATIONS = 1e-13, 60
-# Longest step relative to the bending strain: with all fibres on a plateau it would be endless.
-_LONGEST, _TINY = 0.2, 1e-300
-
 
 class FibreSums(NamedTuple):
     """Sums over the fibres: force (N) and moment (N mm), and how they change."""
@@ -47,43 +47,37 @@ class FibreSums(NamedTuple):
 
 
 class SectionEnds(NamedTuple):
-    """The section between its ends: own * k + soft * moment = s."""
+    """The section between its ends: direct * k + soft * moment = s."""
 
-    own: Array | float
-    soft: Array | float
+    direct: Array
+    soft: Array
     reduced: Array
+
+    def beyond(self, curvature: Array, sums: FibreSums) -> Array:
+        """Return by how much section and ends bend beyond s."""
+        return self.direct * curvature + self.soft * sums.moment - self.reduced
 
     def step(self, curvature: Array, sums: FibreSums, slopes: FibreSums) -> tuple[Array, Array]:
         """Return Newton's step of the strain of the neutral axis and of the curvature."""
-        beyond = self.own * curvature + self.soft * sums.moment - self.reduced
-        by_strain, by_curvature = self.soft * slopes.mixed, self.own + self.soft * slopes.bending
+        beyond = self.beyond(curvature, sums)
+        by_strain, by_curvature = self.soft * slopes.mixed, self.direct + self.soft * slopes.bending
         determinant = slopes.stretch * by_curvature - slopes.mixed * by_strain
         strain = slopes.mixed * beyond - by_curvature * sums.force
-        return strain / determinant, (
-            by_strain * sums.force - slopes.stretch * beyond
-        ) / determinant
+        turn = by_strain * sums.force - slopes.stretch * beyond
+        return strain / determinant, turn / determinant
 
     def size(self, curvature: Array, sums: FibreSums, scale: tuple[Array, Array]) -> Array:
         """Return the imbalance of forces and of bending, as strains."""
-        beyond = self.own * curvature + self.soft * sums.moment - self.reduced
-        return jnp.abs(sums.force) / scale[1] + scale[0] * jnp.abs(beyond)
+        return jnp.abs(sums.force) / scale[1] + scale[0] * jnp.abs(self.beyond(curvature, sums))
 
     def slope(self, slopes: FibreSums) -> Array:
         """Return the change of the moment with s."""
         free = slopes.bending - slopes.mixed**2 / slopes.stretch
-        return free / (self.own + self.soft * free)
-
-
-class SumsFibres(Protocol):
-    """A law that sums up the stress of fibres."""
-
-    def sum_fibres(self, fibres: Fibres, memory: Any, strain: Array, curvature: Array) -> FibreSums:
-        """Sum over the fibres of a section, or of many."""
-        ...
+        return free / (self.direct + self.soft * free)
 
 
 def _settle(
-    law: SumsFibres,
+    law: FibreLaw,
     fibres: Fibres,
     memory: Any,
     joint: SectionEnds,
@@ -96,7 +90,7 @@ def _settle(
 
     def proceed(search: tuple[Array, ...]) -> Array:
         *_, imbalance, iterations = search
-        return jnp.any(imbalance > _BALANCED * bending_strain) & (iterations < _MAX_ITERATIONS)
+        return jnp.any(imbalance > 1e-13 * bending_strain) & (iterations < 60)
 
     def improve(search: tuple[Any, ...]) -> tuple[Any, ...]:
         """Try a step: take it where the imbalance falls, halve it elsewhere."""
@@ -106,15 +100,15 @@ def _settle(
         size = joint.size(trial[1], trial_sums, scale)
         falls = size < imbalance
         step = joint.step(trial[1], trial_sums, trial_sums)
-        longest = _LONGEST * bending_strain / jnp.maximum(jnp.abs(step[0]), _TINY)
+        # With all fibres on a plateau a step would be endless.
+        longest = 0.2 * bending_strain / jnp.maximum(jnp.abs(step[0]), 1e-300)
         by = [jnp.minimum(longest, 1.0) * part for part in step]
         new = *trial, *by, trial_sums, size
         old = strain, curvature, 0.5 * by_strain, 0.5 * by_curvature, sums, imbalance
         return *jax.tree.map(lambda *pair: jnp.where(falls, *pair), new, old), iterations + 1
 
     none, far = jnp.zeros_like(start), jnp.full_like(start, jnp.inf)
-    sums = FibreSums(*(none for _ in FibreSums._fields))
-    begin = none, start, none, none, sums, far, jnp.zeros((), int)
+    begin = none, start, none, none, FibreSums(*[none] * 5), far, jnp.zeros((), int)
     strain, curvature, _, _, sums, *_ = jax.lax.while_loop(proceed, improve, begin)
     return strain, curvature, sums
 
@@ -123,17 +117,17 @@ settle_fibres = jax.custom_batching.custom_vmap(_settle)
 
 
 @settle_fibres.def_vmap
-def _(size: int, batched: Any, law: SumsFibres, *sections: Any) -> tuple[Any, Any]:
-    all_batched = True, True, FibreSums._make([True] * len(FibreSums._fields))
+def _(size: int, batched: Any, law: FibreLaw, *sections: Any) -> tuple[Any, Any]:
+    all_batched = True, True, FibreSums(*[True] * 5)
     if any(jax.tree.leaves(batched[0])):  # rows of a batch that is not one of sections
-        axes = jax.tree.map(lambda one: 0 if one else None, list(batched))
-        return jax.vmap(_settle, in_axes=tuple(axes))(law, *sections), all_batched
-    every = jax.tree.map(
-        lambda one, leaf: leaf if one else jnp.broadcast_to(leaf, (size, *jnp.shape(leaf))),
+        axes = jax.tree.map(lambda varies: 0 if varies else None, tuple(batched))
+        return jax.vmap(_settle, in_axes=axes)(law, *sections), all_batched
+    rows = jax.tree.map(
+        lambda varies, leaf: leaf if varies else jnp.broadcast_to(leaf, (size, *jnp.shape(leaf))),
         list(batched[1:]),
         list(sections),
     )
-    return settle_fibres(law, *every), all_batched
+    return settle_fibres(law, *rows), all_batched
 
 
 @jax.custom_jvp
@@ -148,42 +142,36 @@ def _change_of_sums(
     primals: tuple[Any, ...], tangents: tuple[Any, ...]
 ) -> tuple[FibreSums, FibreSums]:
     """Differentiate with respect to the varying arguments only."""
+
+    def is_still(tangent: Any) -> bool:
+        return isinstance(tangent, jax.custom_derivatives.SymbolicZero)
+
     (sums, *of), (_, *moved) = primals, tangents
     leaves, tree = jax.tree.flatten(of)
-    by = jax.tree.leaves(moved, is_leaf=_is_still)
-    varies = [index for index, one in enumerate(by) if not _is_still(one)]
+    slopes = jax.tree.leaves(moved, is_leaf=is_still)
+    varies = [index for index, slope in enumerate(slopes) if not is_still(slope)]
 
     def again(*varied: Array) -> FibreSums:
-        every = list(leaves)
-        for index, one in zip(varies, varied, strict=True):
-            every[index] = one
-        law, *rest = jax.tree.unflatten(tree, every)
+        changed = list(leaves)
+        for index, value in zip(varies, varied, strict=True):
+            changed[index] = value
+        law, *rest = jax.tree.unflatten(tree, changed)
         return law.sum_fibres(*rest)
 
-    at, along = [leaves[index] for index in varies], [by[index] for index in varies]
-    return sums, jax.jvp(again, at, along)[1]
-
-
-def _is_still(tangent: Any) -> bool:
-    return isinstance(tangent, jax.custom_derivatives.SymbolicZero)
+    values, along = [leaves[index] for index in varies], [slopes[index] for index in varies]
+    return sums, jax.jvp(again, values, along)[1]
 
 
 same_sums.defjvp(_change_of_sums, symbolic_zeros=True)
 
 
-# Fibres and kinks per loop iteration: more lengthen programs, fewer slow them down.
-_AT_ONCE, _KINKS = 5, 8
-# A transformed strain this close to a curve follows it.
-_ON_CURVE = 1e-12
+_KINKS = 8  # kinks per loop iteration: more lengthen programs, fewer slow them down
 
 FLATTEST = 1e-9
 """Least slope of a plateau over Young's modulus: it keeps the balance of fibres solvable.
 
 Over a strain of 0.1 it adds 1e-10 of Young's modulus to the stress, 1e-8 of a usual plateau.
 """
-
-
-_Sums = tuple[Array, Array, Array]
 
 
 class _Curve(NamedTuple):
@@ -193,11 +181,11 @@ class _Curve(NamedTuple):
     high: Array
     change: Array
 
-    def at(self, strain: Array) -> _Sums:
+    def under(self, strain: Array) -> tuple[Array, Array, Array]:
         """Evaluate the transformed strain, its slope and twice its area."""
         none = jnp.zeros_like(strain)
 
-        def add(total: _Sums, kinks: _Curve) -> tuple[_Sums, None]:
+        def add(total: Any, kinks: _Curve) -> tuple[Any, None]:
             transformed, slope, square = total
             for low, high, change in zip(*kinks, strict=True):
                 beyond = strain - jnp.clip(strain, low, high)
@@ -246,10 +234,10 @@ class FibreLaw(SectionLaw):
 
     def bent(self, reduced: Float[Array, "*shape"], section: FibreSection, memory: Any) -> Bending:
         """Bend sections between their ends; only the last Newton step is differentiated."""
-        fibres, ends = section.fibres, section.ends
+        fibres, ends = section.fibres, section.compliance
         assert fibres is not None
         none = jnp.zeros_like(reduced)
-        weak, share = (none, none) if ends is None else (ends.weak, ends.material_share)
+        weak, share = none + ends.weak, none + ends.material_share
         rigidity = self.elastic_modulus * section.second_moment_weak
         joint = SectionEnds(1.0 + share * weak, (1.0 - share) * weak / rigidity, reduced)
         start = reduced / (1.0 + weak)
@@ -277,17 +265,17 @@ class FibreLaw(SectionLaw):
 
         def add(total: FibreSums, some: tuple[Array, Array, Any]) -> tuple[FibreSums, None]:
             arm, area, past = some
-            own = _along(strain, curvature, arm)
-            transformed, slope = self._transformed(own, past, curves)
-            force, tangent = area * (own - transformed), area * (1.0 - slope)
+            stretch = _along(strain, curvature, arm)
+            transformed, slope = self._transformed(stretch, past, curves)
+            force, tangent = area * (stretch - transformed), area * (1.0 - slope)
             turning = tangent * arm
             parts = force, force * arm, tangent, turning, turning * arm
             added = FibreSums(*(jnp.sum(part, axis=-1) for part in parts))
             return jax.tree.map(jnp.add, total, added), None
 
-        none = FibreSums(*[jnp.zeros_like(strain)] * len(FibreSums._fields))
-        every = fibres.arm, fibres.area, memory
-        sums = jax.lax.scan(add, none, jax.tree.map(_in_parts, every))[0]
+        none = FibreSums(*[jnp.zeros_like(strain)] * 5)
+        parts = jax.tree.map(_in_parts, (fibres.arm, fibres.area, memory))
+        sums = jax.lax.scan(add, none, parts)[0]
         return jax.tree.map(lambda total: self.elastic_modulus * total, sums)
 
     def _remember(
@@ -303,18 +291,18 @@ class FibreLaw(SectionLaw):
             moved = _along(by_strain, by_curvature, still)
             return none, transformed + jax.lax.stop_gradient(slope) * moved
 
-        every = jax.tree.map(_in_parts, (fibres.arm, fixed_arm, memory))
-        transformed = jnp.moveaxis(jax.lax.scan(some, None, every)[1], 0, -2)
+        parts = jax.tree.map(_in_parts, (fibres.arm, fixed_arm, memory))
+        transformed = jnp.moveaxis(jax.lax.scan(some, None, parts)[1], 0, -2)
         return jnp.reshape(transformed, memory.shape)
 
     def _transformed(self, strain: Array, past: Any, curves: list[_Curve]) -> tuple[Array, Array]:
         """Compute the transformed strain of fibres after a strain, and its slope."""
         if isinstance(past, tuple):
-            return curves[0].at(strain)[:2]
-        (lower, by_lower), (upper, by_upper) = (curve.at(strain)[:2] for curve in curves)
+            return curves[0].under(strain)[:2]
+        (lower, by_lower), (upper, by_upper) = (curve.under(strain)[:2] for curve in curves)
         # One condition for value and slope: the derivative of a fibre on a curve, as where friction
         # holds its notch, must be consistent with its slope.
-        on_upper, on_lower = past >= upper - _ON_CURVE, past <= lower + _ON_CURVE
+        on_upper, on_lower = past >= upper - 1e-12, past <= lower + 1e-12
         transformed = jnp.where(on_lower, lower, jnp.where(on_upper, upper, past))
         return transformed, jnp.where(on_lower, by_lower, jnp.where(on_upper, by_upper, 0.0))
 
@@ -348,7 +336,7 @@ class FibreLaw(SectionLaw):
 
     def _area_under(self, strain: Array) -> Array:
         """Integrate the stress of the mean curve up to a strain, N mm/mm^3."""
-        return 0.5 * self.elastic_modulus * (strain**2 - self._halfway().at(strain)[2])
+        return 0.5 * self.elastic_modulus * (strain**2 - self._halfway().under(strain)[2])
 
     def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
         """Return the energy per length lost between two memories, N mm/mm; for plain arrays."""
@@ -358,20 +346,22 @@ class FibreLaw(SectionLaw):
         for side, kinks in (xp.minimum, self.low), (xp.maximum, self.high):
             change = xp.abs(side(after, 0.0) - side(before, 0.0))
             loss = loss + 0.5 * self.elastic_modulus * xp.abs(kinks[1, 0] - kinks[0, 0]) * change
-        ends = section.ends
-        follows = 1.0 if ends is None else 1.0 + ends.material_share * ends.weak
+        follows = 1.0 + section.compliance.material_share * section.compliance.weak
         return follows * xp.sum(loss * section.fibres.area, axis=-1)
 
 
 def _in_parts(array: Array) -> Array:
-    """Split the values of fibres into parts, as leading axis."""
-    parts = jnp.reshape(array, (*array.shape[:-1], -1, _AT_ONCE))
+    """Split the values of fibres into parts of five, as leading axis."""
+    parts = jnp.reshape(array, (*array.shape[:-1], -1, 5))
     return jnp.moveaxis(parts, -2, 0)
 
 
 def _along(strain: Array, curvature: Array, arm: Array) -> Array:
     """Compute the strain of fibres from that of the neutral axis and the curvature."""
     return strain[..., None] + curvature[..., None] * arm
+
+
+# Nitinol: elastic, a plateau with hardening, unloading on a plateau of its own.
 
 
 @section_law.register
@@ -389,19 +379,18 @@ def _(material: Nitinol) -> FibreLaw:
         length = material.transformation_strain - loading
         low, high = xp.hstack([low, low - length]), xp.hstack([high, high + length])
         change = xp.append(change, -change)
-    return FibreLaw(
-        elastic_modulus=constant(modulus),
-        shear_modulus=constant(modulus / (2.0 * (1.0 + material.poisson_ratio))),
-        low=constant(low),
-        high=constant(high),
-        change=constant(change),
-    )
+    return _law(material, low, high, change)
 
 
-# A strain that no fibre reaches.
-_NEVER = 1e6
-# How far a curve through fewer points may lie off, of its largest stress.
-_OFF = 1e-6
+def _law(material: Nitinol | StressStrain, low: Array, high: Array, change: Array) -> FibreLaw:
+    modulus = material.elastic_modulus
+    shear = modulus / (2.0 * (1.0 + material.poisson_ratio))
+    return FibreLaw(*map(constant, (modulus, shear, low, high, change)))
+
+
+# A curve of stress over strain: each of its points is a kink.
+
+_NEVER = 1e6  # a strain that no fibre reaches
 
 
 @section_law.register
@@ -410,19 +399,17 @@ def _(material: StressStrain) -> FibreLaw:
     high, change = _kinks(*material.in_tension, modulus)
     low = -high
     if material.in_compression is not None:
-        at, by = _kinks(*material.in_compression, modulus)
-        low = xp.append(xp.full(len(high), -_NEVER), -at)
-        high = xp.append(high, xp.full(len(at), _NEVER))
+        strain, by = _kinks(*material.in_compression, modulus)
+        low = xp.append(xp.full(len(high), -_NEVER), -strain)
+        high = xp.append(high, xp.full(len(strain), _NEVER))
         change = xp.append(change, by)
     # Numbers of kinks are powers of two, so that curves share programs.
     spare = (0, (1 << (len(change) - 1).bit_length()) - len(change))
-    return FibreLaw(
-        elastic_modulus=constant(modulus),
-        shear_modulus=constant(modulus / (2.0 * (1.0 + material.poisson_ratio))),
-        low=constant(xp.pad(low, spare, constant_values=-_NEVER)[None]),
-        high=constant(xp.pad(high, spare, constant_values=_NEVER)[None]),
-        change=constant(xp.pad(change, spare)),
+    low, high = (
+        xp.pad(kinks, spare, constant_values=far)[None]
+        for kinks, far in ((low, -_NEVER), (high, _NEVER))
     )
+    return _law(material, low, high, xp.pad(change, spare))
 
 
 @lru_cache(maxsize=64)
@@ -430,19 +417,21 @@ def _kinks(
     strain: tuple[float, ...], stress: tuple[float, ...], modulus: float
 ) -> tuple[Array, Array]:
     """List the kinks of a curve, and the fall of slope there over Young's modulus."""
-    at, value = _few_points(xp.append(0.0, strain), xp.append(0.0, stress))
-    slope = xp.maximum(xp.diff(value) / xp.diff(at) / modulus, FLATTEST)
+    corners, value = _few_points(xp.append(0.0, strain), xp.append(0.0, stress))
+    slope = xp.maximum(xp.diff(value) / xp.diff(corners) / modulus, FLATTEST)
     change = -xp.diff(slope, prepend=1.0)
     turns = xp.abs(change) > 1e-12  # at zero only where compression begins with another slope
-    return (at[:-1][turns], change[turns]) if turns.any() else (at[:1], change[:1])
+    if not turns.any():
+        turns[0] = True
+    return corners[:-1][turns], change[turns]
 
 
 def _few_points(strain: Array, stress: Array) -> tuple[Array, Array]:
     """Keep the first point, the last and few between them; chords pass the others closely."""
-    off = _OFF * stress[-1]
-    kept, last = [0], len(strain) - 1
-    while kept[-1] < last:
-        begin = kept[-1]
+    off = 1e-6 * stress[-1]
+    chosen, last = [0], len(strain) - 1
+    while chosen[-1] < last:
+        begin = chosen[-1]
         least, most, reached = -np.inf, np.inf, begin + 1
         for point in range(begin + 1, last + 1):
             run, rise = strain[point] - strain[begin], stress[point] - stress[begin]
@@ -451,5 +440,6 @@ def _few_points(strain: Array, stress: Array) -> tuple[Array, Array]:
             least, most = max(least, (rise - off) / run), min(most, (rise + off) / run)
             if least > most:
                 break
-        kept.append(reached)
-    return strain[kept], stress[kept]
+        chosen.append(reached)
+    index = np.array(chosen)
+    return strain[index], stress[index]

@@ -19,7 +19,7 @@ import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial, singledispatch
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -33,16 +33,17 @@ from notchflex._jax import (
 )
 from notchflex._packages import unregistered
 
-# Bracketed root of an increasing function.
-
-# A bilinear law takes three iterations, one with a plastic branch more.
-_ITERATIONS = 20
+Scalar = Float[Array, ""]
+Each = Float[Array, "*shape"]
+Strain = Float[Array, "*shape 6"]
+"""Curvatures about x, y, z (1/mm), shear along x, y, stretch along z; or resultants of these."""
 
 
 def bracketed_root(
     function: Callable[[Array], tuple[Array, Array]], start: Array, low: Array, high: Array
 ) -> Array:
-    """Find the root by Newton's method with bisection in a bracket; not differentiable."""
+    """Find the root of a rising function by Newton's method with bisection; not differentiable."""
+    # A bilinear law takes three iterations of the 20, one with a plastic branch more.
 
     def improve(_: int, search: tuple[Array, ...]) -> tuple[Array, ...]:
         root, low, high, last_step = search
@@ -56,10 +57,7 @@ def bracketed_root(
         return new, low, high, jnp.abs(new - root)
 
     search = start, low, high, 2.0 * (high - low)
-    return jax.lax.fori_loop(0, _ITERATIONS, improve, search)[0]
-
-
-# Properties of a cross-section of a flexure that material laws need.
+    return jax.lax.fori_loop(0, 20, improve, search)[0]
 
 
 class NotchEnds(Pytree):
@@ -84,27 +82,22 @@ class NotchEnds(Pytree):
             Young's modulus, mm^4; its square is below the product of both stiffnesses.
     """
 
-    weak: Float[Array, "*shape"]
-    strong: Float[Array, "*shape"]
-    axial: Float[Array, "*shape"]
-    torsion: Float[Array, "*shape"]
-    odd: Float[Array, "*shape"]
-    even: Float[Array, "*shape"]
-    material_share: Float[Array, "*shape"]
-    sway: Float[Array, "*shape"] | float = 0.0
-    push: Float[Array, "*shape"] | float = 0.0
-    oblique: Float[Array, "*shape"] | float = 0.0
+    weak: Each | float = 0.0
+    strong: Each | float = 0.0
+    axial: Each | float = 0.0
+    torsion: Each | float = 0.0
+    odd: Each | float = 0.0
+    even: Each | float = 0.0
+    material_share: Each | float = 0.0
+    sway: Each | float = 0.0
+    push: Each | float = 0.0
+    oblique: Each | float = 0.0
 
-    @classmethod
-    def rigid(cls, like: Float[Array, "*shape"]) -> NotchEnds:
-        """Return rigid ends, in the shape of an array."""
-        return cls(*(xp.zeros(xp.shape(like)) for _ in range(10)))  # pyright: ignore
-
-    def flattening(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
+    def flattening(self, curvature: Scalar) -> Scalar:
         """Compute the factor q by which the distances of the fibres shrink at a curvature."""
         return 1.0 + curvature * (self.odd + curvature * self.even)
 
-    def slope_factor(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
+    def slope_factor(self, curvature: Scalar) -> Scalar:
         """Compute the relative tangent stiffness of an elastic notch, times q^3."""
         return 1.0 - curvature * (self.odd + 3.0 * curvature * self.even)
 
@@ -141,35 +134,39 @@ class FibreSection(Pytree):
         half_angle: Half angle of that arc, rad.
     """
 
-    area: Float[Array, "*shape"]
-    second_moment_weak: Float[Array, "*shape"]
-    second_moment_strong: Float[Array, "*shape"]
-    torsion_constant: Float[Array, "*shape"]
-    shear_centre: Float[Array, "*shape"]
-    edge_spine: Float[Array, "*shape"]
-    edge_near: Float[Array, "*shape"]
+    area: Each
+    second_moment_weak: Each
+    second_moment_strong: Each
+    torsion_constant: Each
+    shear_centre: Each
+    edge_spine: Each
+    edge_near: Each
     ends: NotchEnds | None = None
     fibres: Fibres | None = None
-    edge_across: Float[Array, "*shape"] | float = 0.0
-    outer_radius: Float[Array, "*shape"] | float = 0.0
-    half_angle: Float[Array, "*shape"] | float = 0.0
+    edge_across: Each | float = 0.0
+    outer_radius: Each | float = 0.0
+    half_angle: Each | float = 0.0
 
-    def stiffened(self, factor: Float[Array, "*shape"]) -> FibreSection:
-        """Multiply the stiffness in all directions; for plain arrays. Strains stay as they are."""
+    def stiffened(self, factor: Each) -> FibreSection:
+        """Multiply the stiffness in all directions. Strains stay as they are."""
         names = ("area", "second_moment_weak", "second_moment_strong", "torsion_constant")
-        moments = {name: constant(factor * getattr(self, name)) for name in names}
-        ends, fibres = self.ends, self.fibres
-        if ends is not None:
-            ends = dataclasses.replace(ends, oblique=constant(factor * ends.oblique))
-        if fibres is not None:
-            fibres = dataclasses.replace(fibres, area=constant(factor[..., None] * fibres.area))
-        return dataclasses.replace(self, **moments, ends=ends, fibres=fibres)
+        scaled: dict[str, Any] = {name: factor * getattr(self, name) for name in names}
+        if (ends := self.ends) is not None:
+            scaled["ends"] = dataclasses.replace(ends, oblique=factor * ends.oblique)
+        if (fibres := self.fibres) is not None:
+            area = constant(factor[..., None] * fibres.area)
+            scaled["fibres"] = dataclasses.replace(fibres, area=area)
+        return dataclasses.replace(self, **scaled)
+
+    @property
+    def compliance(self) -> NotchEnds:
+        """Compliance of its ends, rigid ones where it has none."""
+        return self.ends or NotchEnds()
 
     @property
     def softens(self) -> bool:
         """Whether any section flattens as it bends; for plain arrays."""
-        ends = self.ends
-        return ends is not None and decide(xp.any(ends.odd) | xp.any(ends.even))
+        return decide(xp.any(self.compliance.odd) | xp.any(self.compliance.even))
 
 
 # Energy of the flattening of a notch at constant transformation.
@@ -191,23 +188,6 @@ class FibreSection(Pytree):
 _POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
 NODES, WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
 """Gauss's rule on 0 ... 1."""
-_RULE = xp.stack([NODES, WEIGHTS], axis=-1)
-# Lower bound of `even`, 1/mm^2, for sections that do not flatten: negligible, but above 0.
-_MIN_EVEN = 1e-12
-# With a smaller change of the transformation with s a section counts as elastic.
-_MIN_SLOPE = 1e-9
-
-
-class SectionBending(Protocol):
-    """Bending of a section between its ends, see `SectionLaw.bent`."""
-
-    @property
-    def elastic_modulus(self) -> Array:
-        """Young's modulus, MPa."""
-        ...
-
-    def bent(self, reduced: Array, section: FibreSection, memory: Any) -> Any:
-        """Bend a section by s."""
 
 
 class Flattening(NamedTuple):
@@ -224,22 +204,18 @@ class Flattening(NamedTuple):
         return cls(*(jnp.zeros_like(like) for _ in cls._fields))
 
 
-def flattening(
-    law: SectionBending, curvature: Array, section: FibreSection, memory: Any
-) -> Flattening:
+def flattening(law: SectionLaw, curvature: Array, section: FibreSection, memory: Any) -> Flattening:
     """Compute the flattening of a section at a curvature."""
-    ends = section.ends
-    assert ends is not None
+    ends = section.compliance
     stiffness = law.elastic_modulus * section.second_moment_weak / (1.0 + ends.weak)
 
     def transformed(reduced: Array, past: Any) -> Array:
         return reduced - law.bent(reduced, section, past).moment / stiffness
 
     reduced = curvature / ends.flattening(curvature)
-    own = transformed(reduced, memory)
-    middle = curvature
+    present, middle = transformed(reduced, memory), curvature
     if not isinstance(memory, tuple):
-        middle = _middle(law, section, reduced, own, stiffness)
+        middle = _middle(law, section, reduced, present, stiffness)
 
     def add(total: tuple[Array, ...], node: Array) -> tuple[tuple[Array, ...], None]:
         path, elastic, transformation = total
@@ -248,51 +224,54 @@ def flattening(
         return (
             path + change,
             elastic + reduced * change,
-            transformation + (own - transformed(until, ())) * by,
+            transformation + (present - transformed(until, ())) * by,
         ), None
 
     none = jnp.zeros_like(curvature)
-    path, elastic, transformation = jax.lax.scan(add, (none, none, none), constant(_RULE))[0]
+    path, elastic, transformation = jax.lax.scan(
+        add, (none, none, none), constant(xp.stack([NODES, WEIGHTS], axis=-1))
+    )[0]
     by_transformation = stiffness * transformation
-    energy = stiffness * (elastic - own * path) + by_transformation
-    return Flattening(path, stiffness * own, by_transformation, energy)
+    energy = stiffness * (elastic - present * path) + by_transformation
+    return Flattening(path, stiffness * present, by_transformation, energy)
 
 
 def _along(ends: NotchEnds, curvature: Array, node: Array) -> tuple[Array, Array]:
     """Return s at a node of the rule on 0 ... curvature, and its weight of dX."""
-    at = node[0] * curvature
-    q, slope = ends.flattening(at), ends.odd + 2.0 * ends.even * at
-    return at / q, node[1] * curvature * at * slope / q**2
+    part = node[0] * curvature
+    q, slope = ends.flattening(part), ends.odd + 2.0 * ends.even * part
+    return part / q, node[1] * curvature * part * slope / q**2
 
 
 def _middle(
-    law: SectionBending, section: FibreSection, start: Array, own: Array, stiffness: Array
+    law: SectionLaw, section: FibreSection, start: Array, present: Array, stiffness: Array
 ) -> Array:
     """Find the curvature where loading by halfway stresses has transformed a section as much."""
-    # Only the last Newton step is differentiated.
-    ends = section.ends
-    assert ends is not None
+    ends = section.compliance
 
     def beyond(
-        law: SectionBending, section: FibreSection, own: Array, stiffness: Array, reduced: Array
+        law: SectionLaw, section: FibreSection, present: Array, stiffness: Array, reduced: Array
     ) -> tuple[Array, Array]:
         bent = law.bent(reduced, section, ())
-        return reduced - bent.moment / stiffness - own, 1.0 - bent.slope / stiffness
+        return reduced - bent.moment / stiffness - present, 1.0 - bent.slope / stiffness
 
-    # s is largest at kappa^2 = 1 / even; the transformation is a fraction of it.
-    root = jnp.sqrt(jnp.maximum(ends.even, _MIN_EVEN))
-    side = jnp.where(own < 0.0, -1.0, 1.0)
+    # s is largest at kappa^2 = 1 / even; the transformation is a fraction of it. Where a section
+    # does not flatten, `even` is negligible, but above 0.
+    root = jnp.sqrt(jnp.maximum(ends.even, 1e-12))
+    side = jnp.where(present < 0.0, -1.0, 1.0)
     extreme = side / (2.0 * root + side * ends.odd)
-    low, high = jnp.minimum(own, extreme), jnp.maximum(own, extreme)
-    varied = law, section, own, stiffness
-    bounds = jnp.clip(start, low, high), low, high
-    fixed, fixed_bounds = jax.tree.map(jax.lax.stop_gradient, (varied, bounds))
-    reduced = bracketed_root(partial(beyond, *fixed), *fixed_bounds)
+    low, high = jnp.minimum(present, extreme), jnp.maximum(present, extreme)
+    varied = law, section, present, stiffness
+    fixed, bounds = jax.tree.map(
+        jax.lax.stop_gradient, (varied, (jnp.clip(start, low, high), low, high))
+    )
+    reduced = bracketed_root(partial(beyond, *fixed), *bounds)
+    # Only the last Newton step is differentiated; a section that hardly transforms is elastic.
     missing, slope = beyond(*varied, reduced)
     slope = jax.lax.stop_gradient(slope)
-    transforms = slope > _MIN_SLOPE
+    transforms = slope > 1e-9
     step = jnp.where(transforms, missing / jnp.where(transforms, slope, 1.0), 0.0)
-    reduced = jnp.clip(reduced - step, *fixed_bounds[1:])
+    reduced = jnp.clip(reduced - step, *bounds[1:])
     # The solution of s = kappa / q before that largest one.
     linear = 1.0 - ends.odd * reduced
     square = jnp.maximum(linear**2 - 4.0 * ends.even * reduced**2, 0.0)
@@ -302,19 +281,19 @@ def _middle(
 class SectionResponse(NamedTuple):
     """Response of a section law."""
 
-    resultants: Float[Array, " 6"]  # Moments about x, y, z (N mm) and forces along x, y, z (N)
+    resultants: Strain  # Moments about x, y, z (N mm) and forces along x, y, z (N)
     memory: Any  # The memory after these strains
     # Change of the moment about y with the curvature about y, where the law provides it and all
     # else is elastic; None to differentiate
-    slope: Float[Array, ""] | None = None
+    slope: Scalar | None = None
 
 
 class Bending(NamedTuple):
     """A section between its ends, bent about the weak axis."""
 
     # Curvature of the section itself, beyond that of the free tube, 1/mm
-    curvature: Float[Array, ""]
-    moment: Float[Array, ""]  # Its moment, N mm
+    curvature: Scalar
+    moment: Scalar  # Its moment, N mm
     memory: Any  # The memory after it
     # Change of the moment with s, where the law provides it; None to differentiate
     slope: Array | None = None
@@ -335,8 +314,8 @@ class SectionLaw(Pytree, ABC):
     """
 
     is_linear: ClassVar[bool] = False
-    elastic_modulus: Float[Array, ""]
-    shear_modulus: Float[Array, ""]
+    elastic_modulus: Scalar
+    shear_modulus: Scalar
 
     @property
     def remembers(self) -> bool:
@@ -354,169 +333,110 @@ class SectionLaw(Pytree, ABC):
         return xp.zeros(xp.shape(section.area))
 
     @abstractmethod
-    def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
+    def moment(self, curvature: Scalar, section: FibreSection) -> Scalar:
         """Return the moment of a section without ends at a curvature about its weak axis, N mm."""
 
     @abstractmethod
-    def bending_energy(
-        self, curvature: Float[Array, ""], section: FibreSection, memory: Any
-    ) -> Float[Array, ""]:
+    def bending_energy(self, curvature: Scalar, section: FibreSection, memory: Any) -> Scalar:
         """Return the energy per length of a section without ends at a curvature, N mm/mm."""
 
-    def bent(self, reduced: Float[Array, ""], section: FibreSection, memory: Any) -> Bending:
+    def bent(self, reduced: Scalar, section: FibreSection, memory: Any) -> Bending:
         """Bend a section between its ends by s = kappa / q; for laws without memory."""
-        if section.ends is None:
-            curvature = reduced
-        elif self.is_linear:
-            curvature = reduced / (1.0 + section.ends.weak)
+        if self.is_linear or section.ends is None:
+            curvature = reduced / (1.0 + section.compliance.weak)
         else:
             curvature = _between_ends(self, section, reduced)
         return Bending(curvature, self.moment(curvature, section), memory)
 
-    def respond_all(
-        self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
-    ) -> SectionResponse:
+    def respond_all(self, strain: Strain, section: FibreSection, memory: Any) -> SectionResponse:
         """Compute the resultants of many cross-sections."""
         respond = self.respond
         for _ in strain.shape[:-1]:
             respond = jax.vmap(respond)
         return respond(strain, section, memory)
 
-    def respond(
-        self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
-    ) -> SectionResponse:
+    def respond(self, strain: Strain, section: FibreSection, memory: Any) -> SectionResponse:
         """Compute resultants from strains beyond those of the free tube, N and N mm."""
         # Laws that bend many sections at once accept many.
         elastic = self.elastic(jnp.moveaxis(strain, -1, 0), section)
-        ends, curvature = section.ends, strain[..., 1]
-        if ends is None:
-            bending = self.bent(curvature, section, memory)
-            moment, slope = bending.moment, bending.slope
-        else:
-            q = ends.flattening(curvature)
-            bending = self.bent(curvature / q, section, memory)
-            moment, slope = bending.moment / q, bending.slope
-            if slope is not None:
-                by_q = (ends.odd + 2.0 * ends.even * curvature) / q
-                slope = (slope * (1.0 - curvature * by_q) / q - bending.moment * by_q) / q
-        resultants = jnp.where(_WEAK, moment[..., None], elastic)
+        ends, curvature = section.compliance, strain[..., 1]
+        q = ends.flattening(curvature)
+        bending = self.bent(curvature / q, section, memory)
+        if (slope := bending.slope) is not None:
+            by_q = (ends.odd + 2.0 * ends.even * curvature) / q
+            slope = (slope * (1.0 - curvature * by_q) / q - bending.moment * by_q) / q
+        resultants = jnp.where(_WEAK, (bending.moment / q)[..., None], elastic)
         return SectionResponse(resultants, bending.memory, slope)
 
-    def energy(
-        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
-    ) -> Float[Array, ""]:
-        """Return the energy stored per length under given strains, N mm/mm."""
+    def stored_energy_density(
+        self, strain: Strain, section: FibreSection, memory: Any
+    ) -> tuple[Scalar, Flattening]:
+        """Compute the stored energy per length, N mm/mm, and the flattening of the section."""
         # It is the area under the moment over the curvature, and the elastic energy of the other
         # strains. With hysteresis it is the energy of fibres, ends and flattening; the rest of the
         # area is dissipated.
-        return self.stored_energy_density(strain, section, memory)[0]
-
-    def stored_energy_density(
-        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
-    ) -> tuple[Float[Array, ""], Flattening]:
-        """Compute the stored energy per length, and the flattening, which depends on the memory."""
         others = 0.5 * jnp.where(_WEAK, 0.0, self.elastic(strain, section)) @ strain
-        ends, curvature = section.ends, strain[1]
-        if ends is None:
-            own = self.bending_energy(curvature, section, memory)
-            return others + own, Flattening.none(curvature)
+        ends, curvature = section.compliance, strain[1]
         bending = self.bent(curvature / ends.flattening(curvature), section, memory)
         stored = (1.0 + ends.material_share * ends.weak) * self.bending_energy(
             bending.curvature, section, memory
         )
+        if section.ends is None:
+            return others + stored, Flattening.none(curvature)
         rigidity = self.elastic_modulus * section.second_moment_weak
         stored += 0.5 * (1.0 - ends.material_share) * ends.weak * bending.moment**2 / rigidity
         flat = flattening(self, curvature, section, memory)
         return others + stored + flat.energy, flat
 
-    def elastic(self, strain: Float[Array, " 6"], section: FibreSection) -> Float[Array, " 6"]:
-        """Compute the resultants with the moduli of the free robot."""
-        plain = dataclasses.replace(section, fibres=None)
-        return elastic_resultants(self.elastic_modulus, self.shear_modulus, plain, strain)
+    def elastic(self, strain: Strain, section: FibreSection) -> Strain:
+        """Compute the resultants with the moduli of the free robot, of components first."""
+        # The axes through the centroid are principal, so bending and stretch do not couple. Shear
+        # along y acts at the shear centre, `shear_centre` on the spine's side, where the section's
+        # shear is v_y - shear_centre * twist: that couples it with torsion. The shear areas are
+        # the area of the section (Gao 2017 takes the same factor of 1).
+        ends, young, shear = section.compliance, self.elastic_modulus, self.shear_modulus
+        about_x, about_y, twist, along_x, along_y, stretch = (strain[k] for k in range(6))
+        across = shear * section.area * (along_y - section.shear_centre * twist) / (1.0 + ends.sway)
+        torsion = shear * section.torsion_constant * (twist / (1.0 + ends.torsion))
+        torsion = torsion + young * ends.oblique * about_x
+        sideways = young * section.second_moment_strong * (about_x / (1.0 + ends.strong))
+        resultants = [
+            sideways + young * ends.oblique * twist,
+            young * section.second_moment_weak * (about_y / (1.0 + ends.weak)),
+            torsion - section.shear_centre * across,
+            shear * section.area * (along_x / (1.0 + ends.push)),
+            across,
+            young * section.area * (stretch / (1.0 + ends.axial)),
+        ]
+        return xp.stack(resultants, axis=-1)
 
     def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
         """Compute the stiffness in the free robot, of a section or of many."""
-        return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
-
-    def tangent(
-        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
-    ) -> Float[Array, "6 6"]:
-        """Return the change of the resultants with the strains."""
-        return jax.jacfwd(lambda varied: self.respond(varied, section, memory).resultants)(strain)
+        plain = dataclasses.replace(section, fibres=None)
+        columns = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], plain)
+        return self.elastic(constant(xp.eye(6)), columns).swapaxes(-1, -2)
 
 
-def _imbalance(law: SectionLaw, section: FibreSection, reduced: Array, curvature: Array) -> Array:
-    """Compute the bending of a section with its ends at a curvature, beyond s."""
-    ends = section.ends
-    assert ends is not None
-    elastic = law.moment(curvature, section) / (law.elastic_modulus * section.second_moment_weak)
-    share = ends.material_share
-    return (1.0 + share * ends.weak) * curvature + (1.0 - share) * ends.weak * elastic - reduced
+def _between_ends(law: SectionLaw, section: FibreSection, reduced: Array) -> Scalar:
+    """Find the curvature of a section between its ends; the last Newton step is differentiated."""
 
+    def beyond(law: SectionLaw, section: FibreSection, reduced: Array, curvature: Array) -> Array:
+        ends, rigidity = section.compliance, law.elastic_modulus * section.second_moment_weak
+        elastic, share = law.moment(curvature, section) / rigidity, ends.material_share
+        follows = (1.0 + share * ends.weak) * curvature
+        return follows + (1.0 - share) * ends.weak * elastic - reduced
 
-def _between_ends(law: SectionLaw, section: FibreSection, reduced: Array) -> Float[Array, ""]:
-    """Find the curvature of a section between its ends."""
-    # Only the last Newton step is differentiated, from a constant point.
     fixed = jax.tree.map(jax.lax.stop_gradient, (law, section, reduced))
     ends, aim = fixed[1].ends, fixed[2]
 
-    def at(curvature: Array) -> tuple[Array, Array]:
-        return jax.jvp(partial(_imbalance, *fixed), (curvature,), (jnp.ones_like(curvature),))
+    def with_slope(curvature: Array) -> tuple[Array, Array]:
+        return jax.jvp(partial(beyond, *fixed), (curvature,), (jnp.ones_like(curvature),))
 
     # Bound: a section without resistance, where only the compliance that follows it limits it.
     soft_limit = aim / (1.0 + ends.material_share * ends.weak)
     low, high = jnp.minimum(soft_limit, 0.0), jnp.maximum(soft_limit, 0.0)
-    root = bracketed_root(at, aim / (1.0 + ends.weak), low, high)
-    return root - _imbalance(law, section, reduced, root) / at(root)[1]
-
-
-def elastic_resultants(
-    elastic_modulus: float | Array,
-    shear_modulus: float | Array,
-    section: FibreSection,
-    strain: Float[Array, " 6"],
-) -> Float[Array, "*shape 6"]:
-    """Compute the resultants of a linear elastic section about its neutral axis, with its ends."""
-    # The axes through the centroid are principal, so bending and stretch do not couple. Shear along
-    # y acts at the shear centre, `shear_centre` on the spine's side, where the section's shear is
-    # v_y - shear_centre * twist: that couples it with torsion. The shear areas are the whole area
-    # (Gao 2017 takes the same factor of 1).
-    about_x, about_y, twist, along_x, along_y, stretch = (
-        strain[component] for component in range(6)
-    )
-    if (ends := section.ends) is not None:
-        about_x, about_y = about_x / (1.0 + ends.strong), about_y / (1.0 + ends.weak)
-        stretch = stretch / (1.0 + ends.axial)
-    free_twist = twist if ends is None else twist / (1.0 + ends.torsion)
-    shear = shear_modulus * section.area
-    across = shear * (along_y - section.shear_centre * twist)
-    if ends is not None:
-        across = across / (1.0 + ends.sway)
-        along_x = along_x / (1.0 + ends.push)
-    sideways = elastic_modulus * section.second_moment_strong * about_x
-    torsion = shear_modulus * section.torsion_constant * free_twist
-    if ends is not None:
-        sideways = sideways + elastic_modulus * ends.oblique * twist
-        torsion = torsion + elastic_modulus * ends.oblique * strain[0]
-    resultants = [
-        sideways,
-        elastic_modulus * section.second_moment_weak * about_y,
-        torsion - section.shear_centre * across,
-        shear * along_x,
-        across,
-        elastic_modulus * section.area * stretch,
-    ]
-    return xp.stack(resultants, axis=-1)
-
-
-def elastic_stiffness(
-    elastic_modulus: float | Array, shear_modulus: float | Array, section: FibreSection
-) -> Float[Array, "*shape 6 6"]:
-    """Compute the stiffness of a linear elastic section, or of many; see `elastic_resultants`."""
-    plain = dataclasses.replace(section, fibres=None)
-    every = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], plain)
-    by_strain = elastic_resultants(elastic_modulus, shear_modulus, every, constant(xp.eye(6)))
-    return by_strain.swapaxes(-1, -2)
+    root = bracketed_root(with_slope, aim / (1.0 + ends.weak), low, high)
+    return root - beyond(law, section, reduced, root) / with_slope(root)[1]
 
 
 @singledispatch
@@ -551,19 +471,16 @@ class SectionStrain(NamedTuple):
 
 
 def section_strain(
-    law: SectionLaw, strain: Float[Array, " 6"], section: FibreSection, memory: object
+    law: SectionLaw, strain: Strain, section: FibreSection, memory: object
 ) -> SectionStrain:
     """Compute the strains of a section from those of its flexure, which holds its ends too."""
-    ends, about_weak = section.ends, strain[1]
-    stretch, sideways = strain[5], jnp.abs(strain[0])
-    if ends is not None:
-        about_weak = about_weak / ends.flattening(about_weak)
-        stretch, sideways = stretch / (1.0 + ends.axial), sideways / (1.0 + ends.strong)
-    bending = law.bent(about_weak, section, memory)
-    return SectionStrain(stretch + bending.strain, bending.curvature, sideways)
+    ends, curvature = section.compliance, strain[1]
+    bending = law.bent(curvature / ends.flattening(curvature), section, memory)
+    stretch = strain[5] / (1.0 + ends.axial) + bending.strain
+    return SectionStrain(stretch, bending.curvature, jnp.abs(strain[0]) / (1.0 + ends.strong))
 
 
-def peak_strain(strain: SectionStrain, section: FibreSection) -> Float[Array, "*shape"]:
+def peak_strain(strain: SectionStrain, section: FibreSection) -> Each:
     """Compute the largest magnitude of the strain of any fibre, without the shear of torsion."""
     stretch, curvature, sideways = strain
     radius, angle = section.outer_radius, section.half_angle
