@@ -40,7 +40,7 @@ from notchflex.results.quantities import DEGREES, QUANTITIES
 from notchflex.robot import Robot, Tube
 from notchflex.robot.kinds import Notch
 from notchflex.robot.numbers import VariedRobots
-from notchflex.robot.part import fields_of
+from notchflex.robot.part import fields_of, unit_of
 from notchflex.solver.newton import (
     DEFAULT,
     Settings,
@@ -534,7 +534,7 @@ def named_values(notch: Notch) -> dict[str, Any]:
     """
     values: dict[str, Any] = {}
     for name, field in fields_of(type(notch)).items():
-        unit = (field.json_schema_extra or {}).get("unit", "")
+        unit = unit_of(field)
         with_unit = f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name
         values[with_unit] = getattr(notch, name)
     del values["repeat"]

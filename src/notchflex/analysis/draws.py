@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from notchflex.errors import InputError
 from notchflex.robot import Nitinol, Robot
-from notchflex.robot.part import fields_of
+from notchflex.robot.part import fields_of, unit_of
 from notchflex.robot.problems import (
     Tolerance,
     amount,
@@ -258,7 +258,7 @@ def _assumed(robot: Robot) -> Iterator[Tolerance]:
         name
         for notch in robot.notch
         for name, field in fields_of(type(notch)).items()
-        if (field.json_schema_extra or {}).get("unit") == "mm" and name != "uncut_length"
+        if unit_of(field) == "mm" and name != "uncut_length"
     ]
     for name in dict.fromkeys(cuts):
         if _is_number(robot, f"notch.{name}"):
@@ -268,7 +268,7 @@ def _assumed(robot: Robot) -> Iterator[Tolerance]:
     material = robot.material
     nitinol = isinstance(material, Nitinol)
     for name, field in fields_of(type(material)).items():
-        is_modulus = (field.json_schema_extra or {}).get("unit") == "MPa"
+        is_modulus = unit_of(field) == "MPa"
         if is_modulus and name not in _LEFT_OUT and _is_number(robot, f"material.{name}"):
             limits = _NITINOL.get(name, _MODULUS) if nitinol else _MODULUS
             yield _between(f"material.{name}", *limits)

@@ -31,17 +31,15 @@ from notchflex.robot.reading import (
     robot_from_text,
 )
 from notchflex.robot.robot import (
+    Changed,
     Drawing,
     Robot,
     from_table,
     json_schema,
+    set_values,
     to_table,
 )
-from notchflex.robot.value_names import (
-    Changed,
-    parse_assignment,
-    set_values,
-)
+from notchflex.robot.value_names import parse_assignment
 
 if TYPE_CHECKING:
     from notchflex.robot.writing import (

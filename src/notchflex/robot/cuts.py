@@ -10,6 +10,11 @@ from notchflex.errors import InputError
 Point = tuple[float, float]
 
 
+def cosine_of(angle_deg: float) -> float:
+    """Return the cosine of an angle [deg]."""
+    return math.cos(math.radians(angle_deg))
+
+
 class NotchCut(NamedTuple):
     """One cut, from the outer surface into the tube and back out.
 
@@ -58,16 +63,7 @@ def slot(
     radius: float = 0.0,
     radial: bool = False,
 ) -> NotchCut:
-    """Return a cut with a flat bottom: a window or a slot.
-
-    Args:
-        side_deg: Side from which it is cut [deg].
-        ends: Its proximal and its distal face along the tube [mm].
-        bottom: Height of its bottom above the tube axis [mm].
-        surface: Outer radius of the tube [mm].
-        radius: Radius of the two corners at the bottom [mm].
-        radial: Whether its walls point to the tube axis.
-    """
+    """Return a slot: its ends along the tube, bottom above the axis, radius of its corners [mm]."""
     start, end = ends
     corners = ((start, surface), (start, bottom), (end, bottom), (end, surface))
     return NotchCut(side_deg, corners, (0.0, radius, radius, 0.0), radial)
@@ -105,27 +101,18 @@ class Opening(NamedTuple):
 
     def admits(self, direction_deg: float) -> bool:
         """Return whether a tendon on this side of the tube [deg] passes through."""
-        if self.side_deg is None:
-            return True
-        return math.cos(math.radians(direction_deg - self.side_deg)) > 0.0
+        return self._cosine(direction_deg) > 0.0
 
     def inside(self, direction_deg: float, outer_radius: float, radius: float) -> float:
-        """Return the depth of a line below the outer surface, across the tube [mm].
-
-        Args:
-            direction_deg: Side of the tube on which the line runs [deg].
-            outer_radius: Outer radius of the tube [mm].
-            radius: Distance of the line from the tube axis [mm].
-        """
-        if self.side_deg is None:
-            return outer_radius - radius
-        return outer_radius - radius * math.cos(math.radians(direction_deg - self.side_deg))
+        """Return the depth of a line at a radius, on a side [deg], below the outer surface [mm]."""
+        return outer_radius - radius * self._cosine(direction_deg)
 
     def faces(self, direction_deg: float) -> bool:
         """Return whether this side of the tube [deg] is the middle of the opening."""
-        if self.side_deg is None:
-            return False
-        return math.cos(math.radians(direction_deg - self.side_deg)) > 1.0 - 1e-9
+        return self.side_deg is not None and self._cosine(direction_deg) > 1.0 - 1e-9
+
+    def _cosine(self, direction_deg: float) -> float:
+        return 1.0 if self.side_deg is None else cosine_of(direction_deg - self.side_deg)
 
 
 # Lines and arcs of a cut's profile: corners joined by lines, each rounded by its radius.
@@ -134,9 +121,9 @@ class Opening(NamedTuple):
 # distance of an ellipse's tangent from its centre, so that the ellipse rolls on the profile.
 
 _ROUNDING = 1e-9
-"""Lengths that differ by less than this are equal [mm]: far below any laser, above rounding."""
+"""Lengths that differ by less are equal [mm]: far below any laser, above rounding."""
 _STRAIGHT = 1e-12
-"""Sine of the angle between two lines that are one."""
+"""Sine of the angle between two lines that are the same line."""
 
 
 class Line(NamedTuple):
@@ -145,7 +132,7 @@ class Line(NamedTuple):
     start: Point
     end: Point
 
-    def at(self, part: float) -> Point:
+    def point(self, part: float) -> Point:
         """Return the point at a part of its length, 0 to 1."""
         (x, y), (u, v) = self
         return (1.0 - part) * x + part * u, (1.0 - part) * y + part * v
@@ -163,7 +150,7 @@ class Arc(NamedTuple):
     sweep: float
     inside: Point
 
-    def at(self, part: float) -> Point:
+    def point(self, part: float) -> Point:
         """Return the point at a part of its length, 0 to 1."""
         angle = self.start_angle + part * self.sweep
         cosine, sine = math.cos(angle), math.sin(angle)
@@ -180,16 +167,7 @@ class Arc(NamedTuple):
 def pieces(
     corners: Sequence[Point], radii: Sequence[float], inside: Point = (0.0, 0.0)
 ) -> list[Line | Arc]:
-    """Return the lines and arcs of an open line of corners.
-
-    Args:
-        corners: Corners from first to last [mm]; both at one height.
-        radii: Radius of each corner [mm]; those of the first and the last have no effect.
-        inside: How far pieces along y and pieces along x move to their left [mm].
-
-    Raises:
-        InputError: A radius is too large for the lines beside it, or `inside` for the profile.
-    """
+    """Return lines and arcs through corners [mm], moved `inside` to the left along x and y."""
     outline: list[Line | Arc] = []
     moved = shrunk(corners, inside, corners[0][1])
     used = 0.0  # length of the line before a corner that the corner before it takes
@@ -204,7 +182,7 @@ def pieces(
                 f"a corner radius of {radius:.6g} mm does not fit the cut: its arc takes "
                 f"{tangent:.6g} mm of a line of {available:.6g} mm; give a smaller radius."
             )
-        start, end = (sharp, sharp) if arc is None else (arc.at(0.0), arc.at(1.0))
+        start, end = (sharp, sharp) if arc is None else (arc.point(0.0), arc.point(1.0))
         outline += [Line(last, start)] if math.dist(last, start) > _ROUNDING else []
         outline += [] if arc is None else [arc]
         last, used = end, tangent
@@ -213,16 +191,7 @@ def pieces(
 
 
 def shrunk(corners: Sequence[Point], inside: Point, top: float) -> list[Point]:
-    """Return the corners of a profile whose lines have moved into the waste, to their left.
-
-    Args:
-        corners: Corners [mm].
-        inside: How far lines along y and lines along x move [mm].
-        top: Height at which the profile is then open, where its first and its last line end.
-
-    Raises:
-        InputError: The cut is too narrow.
-    """
+    """Return the corners [mm] of a profile, open at `top`, that moved `inside` to the left."""
     lines: list[tuple[Point, float]] = []  # their normals, and how far they move
     for (x, y), (u, v) in pairwise(corners):
         length = math.dist((x, y), (u, v))
@@ -230,15 +199,14 @@ def shrunk(corners: Sequence[Point], inside: Point, top: float) -> list[Point]:
         lines.append((normal, math.hypot(inside[0] * normal[0], inside[1] * normal[1])))
     first, last = (((0.0, 1.0), top - y) for _, y in (corners[0], corners[-1]))
     points: list[Point] = []
-    for (x, y), (one, far), (two, away) in zip(
+    for (x, y), ((a, b), far), ((c, d), away) in zip(
         corners, [first, *lines], [*lines, last], strict=True
     ):
-        turn = one[0] * two[1] - one[1] * two[0]
+        turn = a * d - b * c
         if abs(turn) < _STRAIGHT:
-            points.append((x + far * one[0], y + far * one[1]))
+            points.append((x + far * a, y + far * b))
         else:
-            across = far * two[1] - away * one[1], away * one[0] - far * two[0]
-            points.append((x + across[0] / turn, y + across[1] / turn))
+            points.append((x + (far * d - away * b) / turn, y + (away * a - far * c) / turn))
     for ((x, y), (u, v)), ((a, b), (c, d)) in zip(pairwise(points), pairwise(corners), strict=True):
         if (u - x) * (c - a) + (v - y) * (d - b) <= 0.0:
             raise InputError.OUT_OF_RANGE(
@@ -268,17 +236,12 @@ def _fillet(
 
 
 def outline(cut: NotchCut, chord: float) -> list[Point]:
-    """Return the profile of a cut as points.
-
-    Args:
-        cut: The cut.
-        chord: Largest distance of an arc from its chords [mm].
-    """
+    """Return the profile of a cut as points; arcs are at most `chord` [mm] from their chords."""
     points = [cut.corners[0]]
     for piece in pieces(cut.corners, cut.radii):
         count = 1
         if isinstance(piece, Arc):
             step = 2.0 * math.acos(max(1.0 - chord / piece.radius, 0.0))
             count = max(1, math.ceil(abs(piece.sweep) / step - 1e-9))
-        points += [piece.at(number / count) for number in range(1, count + 1)]
+        points += [piece.point(number / count) for number in range(1, count + 1)]
     return points

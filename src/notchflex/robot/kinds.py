@@ -5,13 +5,16 @@ The folders are scanned, so that a new file is all that a new kind needs: readin
 JSON Schema and `--set` pick it up.
 """
 
+import datetime
 import functools
 import math
+import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Union
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, Union
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic_core import PydanticCustomError
 
 from notchflex._packages import import_all
 from notchflex.robot.cuts import CutLayout, Opening
@@ -20,7 +23,7 @@ from notchflex.robot.part import (
     Float,
     FloatOrInf,
     Int,
-    ProblemError,
+    Problems,
     kind_of,
     part,
     quantity,
@@ -57,19 +60,14 @@ class Tube:
         Float, quantity("mm", "uncut length before the first notch", at_least=0)
     ] = 0.0
 
-    @model_validator(mode="after")
-    def _has_a_wall(self) -> "Tube":
+    def conflicts(self) -> Problems:
+        """Find a tube without a wall."""
         if self.inner_diameter >= self.outer_diameter:
-            raise ProblemError(
-                [
-                    (
-                        "inner_diameter",
-                        f"is {self.inner_diameter} mm; it must be less than the outer diameter, "
-                        f"{self.outer_diameter} mm.",
-                    )
-                ]
+            yield (
+                "inner_diameter",
+                f"is {self.inner_diameter} mm; it must be less than the outer diameter, "
+                f"{self.outer_diameter} mm.",
             )
-        return self
 
     @property
     def outer_radius(self) -> float:
@@ -206,95 +204,49 @@ class Notch:
         """
         return (0.047, 0.047) if self.has_elastic_ends else (0.0, 0.0)
 
-    def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
+    def problems(self, tube: Tube) -> Problems:
         """Find what does not fit the tube: pairs of a key and the rest of the sentence."""
-        del tube
-        yield from ()
+        return ()
 
-    def row_problems(self, before: "Notch") -> Iterator[tuple[str, str]]:
+    def row_problems(self, before: "Notch") -> Problems:
         """Find what does not fit the notch right before this one, toward the base."""
-        del before
-        yield from ()
+        return ()
 
-    def tendon_problems(self, tendon: Tendon) -> Iterator[tuple[str, str]]:
-        """Find why a tendon cannot run over this notch: keys of the tendon, rest of the sentence.
-
-        It is asked only about tendons that end behind the notch.
-        """
-        del tendon
-        yield from ()
+    def tendon_problems(self, tendon: Tendon) -> Problems:
+        """Find why a tendon that ends behind this notch cannot run over it: keys of the tendon."""
+        return ()
 
     @property
     def spine_cut(self) -> tuple[float, bool] | None:
-        """Depth [mm] of the one cut that leaves the spine, and whether its edges are radial.
-
-        None where the notch has no spine, or one of another shape; pictures then make do with the
-        sections of its rod.
-        """
+        """Depth [mm] of the cut that leaves the spine, if any; whether its edges are radial."""
         return None
 
     def expanded(self) -> tuple["Notch", ...]:
         """Return the notches that this one stands for: `repeat` of them, each with `repeat` 1."""
-        one = self if self.repeat == 1 else unchecked(self, repeat=1)
-        return (one,) * self.repeat
+        return (self if self.repeat == 1 else unchecked(self, repeat=1),) * self.repeat
 
     @classmethod
     def further_on(cls, table: Mapping[str, Any], count: int) -> dict[str, Any]:
-        """Return the table of a repeated row for what is left of it behind `count` notches.
-
-        Args:
-            table: The keys of the row as in a robot file, perhaps not checked yet.
-            count: How many notches stand before what is left; `repeat` is the caller's.
-        """
-        del count
+        """Return the table of what is left of a row behind `count` notches, `repeat` as it was."""
         return dict(table)
 
     def spacing(self, following: "Notch | None") -> float:
-        """Return the rigid length along the axis up to the next notch, or to the tip [mm].
-
-        Args:
-            following: The next notch toward the tip; None behind the last one.
-        """
-        del following
+        """Return the rigid length along the axis up to the next notch, or to the tip [mm]."""
         return self.uncut_length
 
     def cut_layout(
         self, tube: Tube, before: "Notch | None", after: "Notch | None"
     ) -> CutLayout | None:
-        """Return the cuts of this notch; None where its kind does not know them.
-
-        Drawings, cut patterns and solids follow from them.
-
-        Args:
-            tube: The tube.
-            before: The notch right before this one, toward the base; None for the first.
-            after: The next notch toward the tip; None for the last.
-        """
-        del tube, before, after
+        """Return the cuts between its neighbours (None at an end), if they are known."""
         return None
 
     def openings(self, before: "Notch | None", after: "Notch | None") -> tuple[Opening, ...]:
-        """Return the openings through which tendons enter the body behind this notch.
-
-        Args:
-            before: The notch right before this one, toward the base; None for the first.
-            after: The next notch toward the tip; None for the last.
-        """
-        del before, after
+        """Return the openings through which tendons enter the body behind this notch."""
         return (Opening(None, 0.0, 0.0),)
 
 
 def openings_along(notches: Sequence[Notch], direction_deg: float) -> Iterator[tuple[int, Opening]]:
-    """Follow one side of the tube: the bodies that a tendon there enters, base to tip.
-
-    Args:
-        notches: Every notch of a robot, base to tip, each with `repeat` 1.
-        direction_deg: Side of the tube on which the tendon runs [deg].
-
-    Returns:
-        The number of each body (1 behind the first notch) and the opening that leads into it; the
-        tendon comes to it from the body named before, at first from body 0, the base.
-    """
+    """Yield the bodies that a tendon on one side [deg] enters, from 1, and their openings."""
     neighbours = (None, *notches, None)
     for number, notch in enumerate(notches, start=1):
         for opening in notch.openings(neighbours[number - 1], neighbours[number + 1]):
@@ -311,9 +263,12 @@ class Material:
         poisson_ratio: Poisson's ratio, for shear and torsion.
         density: Density [kg/m3], for the weight of the robot; None where it is not needed.
         allowed_strain: Strain beyond which a simulation warns; None never warns.
+
+    Of a class `by_fibres` tells whether its law sums up the fibres of a section.
     """
 
     papers: ClassVar[tuple[str, ...]] = ()
+    by_fibres: ClassVar[bool] = False
     kind: str
     poisson_ratio: Annotated[
         Float,
@@ -326,11 +281,6 @@ class Material:
         Float | None,
         quantity("", "strain beyond which a simulation warns", above=0, at_most=MOST_STRAIN),
     ] = None
-
-    @property
-    def by_fibres(self) -> bool:
-        """Whether its law sums up the fibres of a section."""
-        return False
 
 
 @part(kw_only=True)
@@ -350,6 +300,59 @@ class Friction:
         return False
 
 
+# The title block of a drawing.
+
+
+def _as_text(value: object) -> object:
+    """Take a date or a number as its text: TOML needs no quotes round `2026-11-26` or `3`."""
+    plain = isinstance(value, datetime.date | int) and not isinstance(value, bool)
+    return str(value) if plain else value
+
+
+def _printable(value: str) -> str:
+    """Refuse control characters, which files and terminals take for something else."""
+    if any(unicodedata.category(letter) == "Cc" for letter in value):
+        raise PydanticCustomError("control_character", "control characters are not allowed")
+    return value
+
+
+PRINTABLE = AfterValidator(_printable)
+_Entry: TypeAlias = (
+    Annotated[str, Field(strict=True, max_length=60), BeforeValidator(_as_text), PRINTABLE] | None
+)
+"""An entry of a title block."""
+
+
+@part(kw_only=True)
+class Drawing:
+    """What the title block of a drawing says; entries that are None stay empty or have a default.
+
+    Args:
+        part: Name or number of the part; by default the name of the robot.
+        revision: Its revision.
+        material: The material, as a workshop orders it; by default the kind of the model.
+        finish: The finish of its surface.
+        drawn: Who has drawn it.
+        date: The date.
+
+    Raises:
+        InputError: A value is no text, or has more than 60 letters.
+
+    Example:
+        >>> Drawing(part="W-12", revision="B").revision
+        'B'
+    """
+
+    part: Annotated[_Entry, Field(description="name or number of the part")] = None
+    revision: Annotated[_Entry, Field(description="revision")] = None
+    material: Annotated[_Entry, Field(description="material, as it is ordered")] = None
+    finish: Annotated[_Entry, Field(description="finish of the surface")] = None
+    drawn: Annotated[_Entry, Field(description="who has drawn it")] = None
+    date: Annotated[_Entry, Field(description="date")] = None
+
+
+# How kinds are looked for.
+
 _FOLDERS = {Notch: "notches", Material: "materials", Friction: "friction"}
 
 
@@ -364,6 +367,6 @@ def kinds_of(base: type) -> dict[str, type]:
     return {kind_of(cls): cls for cls in sorted(base.__subclasses__(), key=kind_of)}
 
 
-def one_of(base: type) -> Any:
+def any_kind_of(base: type) -> Any:
     """Make the type of a field that takes any kind of `base`, selected by its key `kind`."""
     return Annotated[Union[tuple(kinds_of(base).values())], Field(discriminator="kind")]  # noqa: UP007

@@ -15,10 +15,15 @@ from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
 from notchflex.errors import InputError
-from notchflex.robot.kinds import Notch, Tendon
 from notchflex.robot.part import unchecked
 from notchflex.robot.robot import Robot
-from notchflex.robot.value_names import number_at, parse_path
+from notchflex.robot.value_names import (
+    SECTIONS,
+    NamedPart,
+    named_parts,
+    number_at,
+    parse_path,
+)
 
 Place = tuple[int, str]
 """Where a number stands: its part, counted from 0, and its key."""
@@ -40,12 +45,7 @@ class PartsForm:
 
     @classmethod
     def of(cls, parts: Sequence[Any], varied: Collection[Place] = ()) -> PartsForm:
-        """Return the form of parts.
-
-        Args:
-            parts: The parts.
-            varied: Places that have numbers even if these are 0.
-        """
+        """Return the form of parts; places that are varied have numbers even if these are 0."""
         content, places = list[Any](), list[Place]()
         for number, part in enumerate(parts):
             words = dict[str, Any]()
@@ -75,36 +75,29 @@ class PartsForm:
 
 def parts_of(robot: Robot) -> tuple[Any, ...]:
     """Return the parts of a robot that its arrays are made of."""
-    return (robot.tube, robot.material, robot.friction, *robot.notch, *robot.tendon)
+    return tuple(named.part for named in _parts_of_arrays(robot))
+
+
+def _parts_of_arrays(robot: Robot) -> list[NamedPart]:
+    return [named for named in named_parts(robot) if named.section != "drawing"]
 
 
 def robot_of(parts: Sequence[Any]) -> Robot:
     """Return a robot of parts, as `parts_of` returns them; nothing checks it."""
-    tube, material, friction, *others = parts
     robot = object.__new__(Robot)
-    vars(robot).update({field.name: None for field in dataclasses.fields(Robot)})
-    vars(robot).update(tube=tube, material=material, friction=friction)
-    for key, kind in (("notch", Notch), ("tendon", Tendon)):
-        vars(robot)[key] = tuple(part for part in others if isinstance(part, kind))
+    values: dict[str, Any] = dict.fromkeys(field.name for field in dataclasses.fields(Robot))
+    for section, base in SECTIONS.items():
+        same = tuple(part for part in parts if isinstance(part, base))
+        values[section] = same if section in ("notch", "tendon") else next(iter(same), None)
+    vars(robot).update(values)
     return robot
 
 
 def places_of(robot: Robot, name: str) -> list[Place]:
-    """Return where a value stands among the parts of a robot.
-
-    Args:
-        robot: The robot; a notch that is named alone is not repeated.
-        name: Such as `notch[2].depth`; see `Robot.with_value`. Several notches or tendons may have
-            the value, where the name means them all.
-    """
-    path = parse_path(name)
-    first = {"tube": 0, "material": 1, "friction": 2, "notch": 3, "tendon": 3 + len(robot.notch)}
-    parts = getattr(robot, path.section)
-    numbers = range(len(parts) if isinstance(parts, tuple) else 1)
-    if path.number is not None:
-        ends = np.cumsum([getattr(part, "repeat", 1) for part in parts])
-        numbers = [int(np.searchsorted(ends, path.number))]
-    return [(first[path.section] + number, path.key) for number in numbers]
+    """Return where the values of a name stand among the parts of a robot."""
+    target = parse_path(name)
+    parts = enumerate(_parts_of_arrays(robot))
+    return [(number, target.key) for number, named in parts if named.is_meant(target)]
 
 
 def differing(parts: Sequence[Any], others: Sequence[Any]) -> list[Place] | None:
@@ -113,19 +106,17 @@ def differing(parts: Sequence[Any], others: Sequence[Any]) -> list[Place] | None
     if list(map(type, parts)) != list(map(type, others)):
         return None
     for number, (part, other) in enumerate(zip(parts, others, strict=True)):
-        for key in (field.name for field in dataclasses.fields(part)):
-            if getattr(part, key) != getattr(other, key):
-                places.append((number, key))
+        keys = (field.name for field in dataclasses.fields(part))
+        places += [(number, key) for key in keys if getattr(part, key) != getattr(other, key)]
     return places if set(places) <= set(PartsForm.of(parts, places).places) else None
 
 
 def apart(robot: Robot, names: Iterable[str]) -> Robot:
     """Return the robot with notches of their own if any name is of one, as `notch[2].depth` is."""
-    if all(parse_path(name).number is None or not name.startswith("notch") for name in names):
-        return robot
-    if all(notch.repeat == 1 for notch in robot.notch):
-        return robot
-    return robot.replace(notch=robot.notches)
+    targets = map(parse_path, names)
+    single = any(target.section == "notch" and target.number for target in targets)
+    is_repeated = len(robot.notch) < robot.number_of_notches
+    return robot.replace(notch=robot.notches) if single and is_repeated else robot
 
 
 # Many robots that differ from one by a few numbers, held as arrays of these numbers.

@@ -1,5 +1,6 @@
 """What every part of a robot is: a frozen dataclass, checked by pydantic when it is made."""
 
+import contextlib
 import dataclasses
 import difflib
 import functools
@@ -13,6 +14,8 @@ from typing import (
     Annotated,
     Any,
     Literal,
+    LiteralString,
+    TypeAlias,
     TypeVar,
     Union,
     cast,
@@ -27,29 +30,41 @@ from pydantic_core import PydanticCustomError
 
 from notchflex.errors import InputError
 
-# Fields of the parts of a robot, as pydantic records them: kinds, lists and keys.
+T = TypeVar("T")
+Problems: TypeAlias = Iterable[tuple[str, str]]
+"""Pairs of a key and the rest of a sentence that begins with it."""
+
+# Fields of the parts of a robot, as pydantic records them: kinds, lists, words and units.
 
 
-def kinds_in(annotation: Any) -> list[type]:
-    """List the part classes that an annotation of a field allows."""
+def _members(annotation: Any) -> Iterator[Any]:
+    """Yield the types that an annotation allows, without their checks."""
     if typing.get_origin(annotation) is Annotated:
-        return kinds_in(typing.get_args(annotation)[0])
-    if typing.get_origin(annotation) in (Union, types.UnionType, tuple):
-        return [cls for item in typing.get_args(annotation) for cls in kinds_in(item)]
-    is_part = isinstance(annotation, type) and dataclasses.is_dataclass(annotation)
-    return [annotation] if is_part else []
+        yield from _members(typing.get_args(annotation)[0])
+    elif typing.get_origin(annotation) in (Union, types.UnionType):
+        for member in typing.get_args(annotation):
+            yield from _members(member)
+    else:
+        yield annotation
+
+
+def kinds_in(annotation: Any) -> Iterator[type]:
+    """Yield the part classes that an annotation of a field allows, alone or in a list."""
+    for member in _members(annotation):
+        if typing.get_origin(member) is tuple:
+            yield from kinds_in(typing.get_args(member)[0])
+        elif dataclasses.is_dataclass(member):
+            yield cast("type", member)
 
 
 def is_list(field: Any) -> bool:
-    """Return whether a field (pydantic's record of it; None takes nothing) takes a list."""
+    """Return whether a field (pydantic's record of it) takes a list."""
+    return any(typing.get_origin(member) is tuple for member in _members(field.annotation))
 
-    def takes(annotation: Any) -> bool:
-        origin = typing.get_origin(annotation)
-        if origin in (Annotated, Union, types.UnionType):
-            return any(map(takes, typing.get_args(annotation)))
-        return origin is tuple
 
-    return field is not None and takes(field.annotation)
+def unit_of(field: Any) -> str:
+    """Return the unit of a field, "" for none."""
+    return str((field.json_schema_extra or {}).get("unit", ""))
 
 
 def is_unsaid(name: str, value: object) -> bool:
@@ -66,10 +81,7 @@ def kind_of(cls: type) -> str:
 
 @functools.cache  # asked for each value that is set by its name
 def fields_of(cls: type) -> Mapping[str, Any]:
-    """Return pydantic's field records, in the order in which a file lists the keys.
-
-    That is `kind`, then what the class itself declares, then what all kinds share.
-    """
+    """Return pydantic's field records as a file lists keys: `kind`, its own, those shared."""
     pydantic_fields: dict[str, Any] = getattr(cls, "__pydantic_fields__", {})
     shared = {f.name for f in dataclasses.fields(cls) if f.kw_only}
     order = sorted(pydantic_fields.items(), key=lambda item: (item[0] != "kind", item[0] in shared))
@@ -78,36 +90,27 @@ def fields_of(cls: type) -> Mapping[str, Any]:
 
 # Clear sentences instead of pydantic's error records.
 
-_TOML_TYPES = (
-    (bool, "true or false"),
-    (str, "text"),
-    (int, "a whole number"),
-    (float, "a number"),
-    (Mapping, "a table"),
-    (Sequence, "a list"),
-)
 _LONGEST = 80
 """Letters of a text that are shown at most."""
 
 
 def sentences(error: ValidationError, cls: type, repeats: Sequence[int] = ()) -> list[str]:
-    """Say what is wrong, one sentence a problem.
+    """Say in a sentence each what pydantic refused in a part.
 
     Args:
-        error: What pydantic found.
+        error: What pydantic refused.
         cls: The part class that was validated.
         repeats: `repeat` of every `[[notch]]` table, so that notches are counted as in the robot.
     """
     records = cast("list[dict[str, Any]]", error.errors(include_url=False))
-    wrong = [record["loc"] for record in records]
-    # pydantic counts only the good items of a list as there; what is wrong with others is said
-    counted = (
-        one
-        for one in records
-        if one["type"] != "too_short"
-        or not any(one["loc"] == w[: len(one["loc"])] != w for w in wrong)
-    )
-    return list(dict.fromkeys(said for one in counted for said in _sentences_of(one, cls, repeats)))
+    places = [record["loc"] for record in records]
+    said: dict[str, None] = {}
+    for record in records:
+        # pydantic counts only the good items of a list as there; what is wrong with others is said
+        inside = (place[: len(record["loc"])] == record["loc"] != place for place in places)
+        if record["type"] != "too_short" or not any(inside):
+            said |= dict.fromkeys(_sentences_of(record, cls, repeats))
+    return list(said)
 
 
 def unknown_key(name: str, key: str, allowed: Iterable[str]) -> str:
@@ -119,70 +122,63 @@ def unknown_key(name: str, key: str, allowed: Iterable[str]) -> str:
 def nearest(word: str, allowed: Iterable[str], most: int = 1) -> str:
     """Ask "did you mean", or say nothing where no allowed word is near; `most` are named."""
     close = difflib.get_close_matches(word.lower(), list(allowed), n=most, cutoff=0.6)
-    return f" (did you mean {' or '.join(f'`{one}`' for one in close)}?)" if close else ""
+    return f" (did you mean {' or '.join(f'`{name}`' for name in close)}?)" if close else ""
 
 
 def _sentences_of(record: dict[str, Any], cls: type, repeats: Sequence[int]) -> list[str]:
-    """Say one record of pydantic; a check across keys may have found several problems."""
+    """Say one record of pydantic; a check across keys may have several problems."""
     place, kind = _Place(cls, record["loc"], repeats), record["type"]
     error = record.get("ctx", {}).get("error")
-    if hasattr(error, "found"):
-        return [f"`{place.name_of(key)}` {text}{place.note}" for key, text in error.found]
+    if isinstance(error, ProblemError):
+        return [f"`{place.name_of(key)}` {text}{place.note}" for key, text in error.problems]
     if kind in ("unexpected_keyword_argument", "unexpected_positional_argument"):
-        owner = _Place(cls, record["loc"][:-1], repeats)
-        allowed = [name for name in fields_of(owner.cls) if name] if owner.cls else []
+        owners = _Place(cls, record["loc"][:-1], repeats).classes
+        allowed = [name for owner in owners for name in fields_of(owner)]
         return [unknown_key(place.name, str(record["loc"][-1]), allowed)]
+    kinds = [kind_of(each) for each in place.classes]
     if kind == "missing":
         return [f"`{place.name}` is missing{place.note}; give {place.wanted}."]
-    allowed = [kind_of(one) for one in place.kinds]
     if kind == "union_tag_not_found":
-        wanted = f"give one of {_quoted(allowed)}"
+        wanted = f"give one of {_quoted(kinds)}"
         return [f"`{place.name_of('kind')}` is missing{place.note}; {wanted}."]
     if kind == "union_tag_invalid":
-        got = f'`{place.name_of("kind")}` is "{record["ctx"]["tag"]}"{place.note}'
-        near = nearest(str(record["ctx"]["tag"]), allowed)
-        return [f"{got}; allowed: {_quoted(allowed)}{near}."]
+        tag = str(record["ctx"]["tag"])
+        return [
+            f'`{place.name_of("kind")}` is "{tag}"{place.note}; allowed: '
+            f"{_quoted(kinds)}{nearest(tag, kinds)}."
+        ]
     got = _got(record["input"], place.unit)
     return [f"`{place.name}` is {got}{place.note}; {_rule(record, place)}."]
 
 
 class _Place:
-    """Where in the robot a record of pydantic points: its name, field and class."""
+    """Where a record of pydantic points: the name, its field, and the part classes there."""
 
     def __init__(self, cls: type, loc: Sequence[int | str], repeats: Sequence[int]):
-        self.cls: type | None = cls
-        self.kinds: list[type] = []
-        self.field: Any = None
-        self.name = ""
-        self.note = ""
+        self.classes, self.field = [cls], cast("Any", None)
+        self.name = self.note = ""
         for item in loc:
             self._enter(item, repeats)
-        self.unit = str((getattr(self.field, "json_schema_extra", None) or {}).get("unit", ""))
+        self.unit = unit_of(self.field) if self.field else ""
 
     def _enter(self, item: int | str, repeats: Sequence[int]) -> None:
-        if isinstance(item, int) and self.kinds:
-            self.name += f"[{item + 1}]"
-            if self.name.startswith("notch[") and sum(repeats[:item]) != item:
-                # notches are counted as in every output: each one of a repeated group
-                self.name = f"notch[{sum(repeats[:item]) + 1}]"
+        if isinstance(item, int) and self.field:
+            # notches are counted as in every output, those of a repeated group each
+            before = sum(repeats[:item]) + max(item - len(repeats), 0)
+            before = before if self.name == "notch" else item
+            self.name += f"[{before + 1}]"
+            if before != item:
                 self.note = f" (in the [[notch]] table number {item + 1})"
-            return
-        if isinstance(item, int) and is_list(self.field):
-            self.name += f"[{item + 1}]"
-            return
-        if isinstance(item, int):  # a positional argument of a part made in Python
-            names = [f.name for f in dataclasses.fields(cast("Any", self.cls)) if not f.kw_only]
-            item = names[item] if item < len(names) else f"argument {item + 1}"
-        by_kind = {kind_of(one): one for one in self.kinds}
-        if item in by_kind and item:
-            self.cls, self.kinds = by_kind[item], []
-            return
-        if len(self.kinds) == 1:
-            self.cls = self.kinds[0]
-        self.name = self.name_of(item)
-        self.field = fields_of(self.cls).get(item) if self.cls else None
-        self.kinds = kinds_in(self.field.annotation) if self.field else []
-        self.cls = self.kinds[0] if len(self.kinds) == 1 else None
+        elif len(self.classes) > 1:  # pydantic names the kind before its keys
+            self.classes = [each for each in self.classes if kind_of(each) == item]
+        else:
+            if isinstance(item, int):  # a positional argument of a part made in Python
+                (cls,) = cast("Any", self.classes)
+                names = [field.name for field in dataclasses.fields(cls) if not field.kw_only]
+                item = names[item] if item < len(names) else f"argument {item + 1}"
+            self.name = self.name_of(item)
+            self.field = fields_of(self.classes[0]).get(item) if self.classes else None
+            self.classes = [*kinds_in(self.field.annotation)] if self.field else []
 
     def name_of(self, key: str) -> str:
         """Return the full name of a key below this place."""
@@ -193,26 +189,29 @@ class _Place:
         """What to give, in the words of the field."""
         if self.field and typing.get_origin(self.field.annotation) is Literal:
             return str(self.field.description)
-        if self.kinds:
-            is_list = typing.get_origin(self.field.annotation) is tuple
-            return f"a {'[[' if is_list else '['}{self.name}{']]' if is_list else ']'} table"
+        if self.classes:
+            header = f"[{self.name}]"
+            return f"a {f'[{header}]' if is_list(self.field) else header} table"
         text = f"the {self.field.description}" if self.field else "a value"
         return f"{text} [{self.unit}]" if self.unit else text
 
 
 def _got(value: object, unit: str) -> str:
     """Show a value as it stands in a file."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, (int, float)):
-        return f"{value} {unit}".strip()
-    if isinstance(value, str):
-        shown = value if len(value) <= _LONGEST else f"{value[: _LONGEST - 3]}..."
-        return f'"{shown}" (text)'
-    for cls, word in _TOML_TYPES:
-        if isinstance(value, cls):
-            return word
-    return f"a {type(value).__name__}"
+    match value:
+        case bool():
+            return str(value).lower()
+        case int() | float():
+            return f"{value} {unit}".strip()
+        case str():
+            shown = value if len(value) <= _LONGEST else f"{value[: _LONGEST - 3]}..."
+            return f'"{shown}" (text)'
+        case Mapping():
+            return "a table"
+        case Sequence():
+            return "a list"
+        case _:
+            return f"a {type(value).__name__}"
 
 
 def _quoted(words: Iterable[str]) -> str:
@@ -223,39 +222,32 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
     """Say what is allowed instead."""
     kind, got, unit = record["type"], record["input"], f" {place.unit}" if place.unit else ""
     if kind in _BOUNDS:
-        limit = record["ctx"][_BOUNDS[kind][1]]
+        words, limit = _BOUNDS[kind][0], record["ctx"][_BOUNDS[kind][1]]
         if got != got:  # only NaN differs from itself
             return "it must be a number"
         if kind == "greater_than_equal" and got <= 0.0 < limit < 1.0:
             return f"it must be greater than 0{unit}"  # a negative length is not a small length
         percent = "; 0.04 is 4 %" if kind == "less_than_equal" and "strain" in place.name else ""
-        return f"it must be {_BOUNDS[kind][0]} {limit:g}{unit}{percent}"
+        return f"it must be {words} {limit:g}{unit}{percent}"
     if kind == "number_wanted":
         return f"it must be a number{' in' if unit else ''}{unit}, without quotes"
     if kind == "literal_error":
-        allowed = list(_words_in(place.field.annotation))
+        words = map(typing.get_args, _members(cast("Any", place.field).annotation))
+        allowed = [word for several in words for word in several]
         return f"allowed: {_quoted(allowed)}{nearest(str(got), allowed)}"
-    if is_list(place.field) and not place.kinds:
-        if kind in ("too_short", "too_long"):
-            count = record["ctx"]["min_length" if kind == "too_short" else "max_length"]
-            return f"give at {'least' if kind == 'too_short' else 'most'} {count:g} values"
-        if kind in ("tuple_type", "list_type"):
-            return "it must be a list of numbers in brackets, such as [0.01, 0.05]"
-    if kind == "too_short":
-        return f"give at least one {place.wanted.removeprefix('a ')}"
+    of_parts = bool(place.classes)
+    if kind in ("too_short", "too_long"):
+        if of_parts:
+            return f"give at least one {place.wanted.removeprefix('a ')}"
+        side, count = ("least", "min") if kind == "too_short" else ("most", "max")
+        return f"give at {side} {record['ctx'][f'{count}_length']:g} values"
     if kind in ("tuple_type", "list_type"):
-        return f"write it as a list, one [[{place.name}]] table for each"
+        listed = f"write it as a list, one [[{place.name}]] table for each"
+        return (
+            listed if of_parts else "it must be a list of numbers in brackets, such as [0.01, 0.05]"
+        )
     table = f"it must be a table: [{place.name.partition('[')[0]}] and its keys below"
     return _RULES.get(kind, table)
-
-
-def _words_in(annotation: Any) -> Iterator[str]:
-    """Yield the words that an annotation of a field allows, which may be left out or not."""
-    if typing.get_origin(annotation) is Literal:
-        yield from typing.get_args(annotation)
-    elif typing.get_origin(annotation) in (Annotated, Union, types.UnionType):
-        for one in typing.get_args(annotation):
-            yield from _words_in(one)
 
 
 _BOUNDS = {
@@ -276,18 +268,15 @@ _RULES = {
 }
 
 
-T = TypeVar("T")
-
-
 class ProblemError(ValueError):
-    """What a check across several keys found: pairs of a key (a path below the part) and a text.
+    """The problems of a check across several keys: pairs of a key (a path below the part) and text.
 
     The text goes on after the name of the key: "is 1.7 mm; it must be ...".
     """
 
-    def __init__(self, problems: Iterable[tuple[str, str]]):
-        self.found = list(problems)
-        super().__init__("\n".join(f"`{key}` {text}" for key, text in self.found))
+    def __init__(self, problems: Problems):
+        self.problems = list(problems)
+        super().__init__("\n".join(f"`{key}` {text}" for key, text in self.problems))
 
 
 @overload
@@ -305,8 +294,9 @@ def part(
 ) -> Any:
     """Make a class a frozen pydantic dataclass that says clearly what is wrong with its values.
 
-    Wrong values raise `InputError`; unknown keys are refused by name. What the attribute `warnings`
-    of an object holds is given as Python warnings when it is made by its class.
+    Wrong values raise `InputError`; unknown keys are refused by name. A method `conflicts` yields
+    what is wrong across keys, as for `ProblemError`. What the attribute `warnings` of an object
+    holds is given as Python warnings when it is made by its class.
 
     Args:
         cls: The class with its annotated fields.
@@ -314,15 +304,13 @@ def part(
         refuse: Makes the error of a message, with its code.
     """
     if cls is None:
-        return functools.partial(_part, kw_only=kw_only, refuse=refuse)
-    return _part(cls, kw_only=kw_only, refuse=refuse)
-
-
-def _part(cls: type[T], *, kw_only: bool, refuse: Callable[[str], InputError]) -> type[T]:
-    dataclass = pydantic.dataclasses.dataclass(
-        frozen=True, kw_only=kw_only, config=ConfigDict(extra="forbid")
+        return functools.partial(part, kw_only=kw_only, refuse=refuse)
+    decorated: Any = cls
+    if hasattr(cls, "conflicts"):
+        decorated.__post_init__ = _check_conflicts
+    decorated = pydantic.dataclasses.dataclass(
+        decorated, frozen=True, kw_only=kw_only, config=ConfigDict(extra="forbid")
     )
-    decorated: Any = dataclass(cls)
     checked_init = decorated.__init__
 
     @functools.wraps(checked_init)
@@ -331,59 +319,55 @@ def _part(cls: type[T], *, kw_only: bool, refuse: Callable[[str], InputError]) -
             checked_init(self, *args, **kwargs)
         except ValidationError as error:
             problems = sentences(error, decorated)
-            raise refuse("\n".join(f"{decorated.__name__}: {one}" for one in problems)) from None
+            text = "\n".join(f"{decorated.__name__}: {problem}" for problem in problems)
+            raise refuse(text) from None
         for warning in getattr(self, "warnings", ()):
             warnings.warn(warning, stacklevel=2)
 
     decorated.__init__ = checked
-    decorated.__signature__ = _plain_signature(decorated)
+    # for help, without the checks of the annotations
+    plain, signature = get_type_hints(decorated), inspect.signature(decorated)
+    decorated.__signature__ = signature.replace(
+        parameters=[
+            parameter.replace(annotation=plain[name])
+            for name, parameter in signature.parameters.items()
+        ]
+    )
     return decorated
 
 
-def _plain_signature(cls: Any) -> inspect.Signature:
-    """Return the signature of a class without the checks of its annotations, for help."""
-    signature = inspect.signature(cls)
-    names = {name: one.annotation for name, one in signature.parameters.items()}
-    namespace = {"__annotations__": names, "__module__": cls.__module__}
-    plain = get_type_hints(type(cls.__name__, (), namespace))
-    return signature.replace(
-        parameters=[one.replace(annotation=plain[n]) for n, one in signature.parameters.items()]
-    )
+def _check_conflicts(part: Any) -> None:
+    """Refuse values of a part that contradict each other."""
+    if problems := list(part.conflicts()):
+        raise ProblemError(problems)
 
 
 def unchecked(part: T, **values: Any) -> T:
     """Return a part with other values that nothing checks, such as numbers that are traced."""
     other = object.__new__(type(part))
-    names = {field.name for field in dataclasses.fields(cast("Any", part))}
-    vars(other).update({name: one for name, one in vars(part).items() if name in names} | values)
+    names = [field.name for field in dataclasses.fields(cast("Any", part))]
+    vars(other).update({name: getattr(part, name) for name in names} | values)
     return other
 
 
-def _as_float(value: object) -> float:
-    """Take any real number (of numpy too), but no truth value and no text."""
-    if isinstance(value, (bool, str, bytes)) or not hasattr(value, "__float__"):
-        raise PydanticCustomError("number_wanted", "a number is wanted")
-    try:
-        return float(value)  # pyright: ignore[reportArgumentType]
-    except (TypeError, ValueError, OverflowError):
-        raise PydanticCustomError("number_wanted", "a number is wanted") from None
+def _converted(to: Callable[[Any], float], method: str, refused: LiteralString) -> BeforeValidator:
+    """Return what takes any number with a method (of numpy too), but no truth value and no text."""
+
+    def convert(value: object) -> float:
+        if not isinstance(value, bool) and hasattr(value, method):
+            with contextlib.suppress(TypeError, ValueError, OverflowError):  # such as of an array
+                return to(value)
+        raise PydanticCustomError(refused, "another number is wanted")
+
+    return BeforeValidator(convert)
 
 
-def _as_int(value: object) -> int:
-    """Take any whole number type (of numpy too), but no truth value, no text and no float."""
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise PydanticCustomError("whole_number_wanted", "a whole number is wanted")
-    try:
-        return operator.index(value)  # pyright: ignore[reportArgumentType]
-    except TypeError:  # an array of several numbers, or of floats
-        raise PydanticCustomError("whole_number_wanted", "a whole number is wanted") from None
-
-
-Float = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(_as_float)]
+_AS_FLOAT = _converted(float, "__float__", "number_wanted")
+Float = Annotated[float, Field(allow_inf_nan=False), _AS_FLOAT]
 """A finite float64."""
-FloatOrInf = Annotated[float, BeforeValidator(_as_float)]
+FloatOrInf = Annotated[float, _AS_FLOAT]
 """A float64 that may be infinite; a bound of `quantity` keeps NaN out."""
-Int = Annotated[int, BeforeValidator(_as_int)]
+Int = Annotated[int, _converted(operator.index, "__index__", "whole_number_wanted")]
 """A whole number."""
 
 

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, cast
 
 from pydantic import BeforeValidator, WithJsonSchema
 
-from notchflex.errors import InputWarning
+from notchflex.errors import InputError, InputWarning
 from notchflex.robot.kinds import (
     Notch,
     Tendon,
-    Tube,
     openings_along,
 )
-from notchflex.robot.part import ProblemError, fields_of, unknown_key
+from notchflex.robot.part import ProblemError, Problems, fields_of, unknown_key
+from notchflex.robot.value_names import described_at, named_parts, numbers_at
 
 if TYPE_CHECKING:
     from notchflex.robot.robot import Robot
@@ -55,7 +55,7 @@ class Tolerance:
     def written(self) -> Any:
         """What stands in a robot file: the standard deviation alone, or a table."""
         keys = {name: getattr(self, name) for name in _KEYS}
-        table = {name: one for name, one in keys.items() if one is not None and one is not False}
+        table = {name: key for name, key in keys.items() if key is not None and key is not False}
         return self.sd if list(table) == ["sd"] else table
 
 
@@ -82,11 +82,11 @@ def with_limits(tolerances: Sequence[Tolerance], path: str, value: float) -> str
         '1.4 ±0.02'
     """
     text = f"{value:.6g}"
-    for one in tolerances:
-        if one.value == path:
+    for tolerance in tolerances:
+        if tolerance.value == path:
             plus, minus = (
-                2.0 * amount(one.sd, value) if far is None else amount(far, value)
-                for far in (one.plus, one.minus)
+                2.0 * amount(tolerance.sd, value) if far is None else amount(far, value)
+                for far in (tolerance.plus, tolerance.minus)
             )
             text += f" ±{plus:.3g}" if plus == minus else f" +{plus:.3g} −{minus:.3g}"
     return text
@@ -96,11 +96,11 @@ def read_tolerances(table: Any) -> Any:
     """Make tolerances of the table of a robot file, or leave those that are made."""
     if table is None:
         return ()
-    if isinstance(table, Sequence) and all(
-        isinstance(one, Tolerance) for one in cast("Sequence[Any]", table)
-    ):
-        return tuple(cast("Sequence[Tolerance]", table))
     if not isinstance(table, Mapping):
+        if isinstance(table, Sequence):
+            entries = tuple(cast("Sequence[Any]", table))
+            if all(isinstance(entry, Tolerance) for entry in entries):
+                return entries
         text = "is not a table; write [tolerance] and below it lines such as notch.depth = 0.01."
         raise ProblemError([("", text)])
     tolerances: dict[str, Tolerance] = {}
@@ -197,7 +197,7 @@ _ON_SURFACE = 0.03
 """Part of the outer diameter by which a tendon on the inner surface may seem to be in the wall."""
 
 
-def robot_problems(robot: "Robot") -> Iterator[tuple[str, str]]:
+def robot_problems(robot: "Robot") -> Problems:
     """Yield what is wrong with a robot: the name of a value, and a sentence about it."""
     number = robot.number_of_notches
     if number > MOST_NOTCHES:
@@ -206,113 +206,114 @@ def robot_problems(robot: "Robot") -> Iterator[tuple[str, str]]:
     of_notches = list(_notch_problems(robot))
     yield from of_notches
     for i, tendon in enumerate(robot.tendon, start=1):
-        if tendon.radius > robot.tube.outer_radius:
-            yield (
-                f"tendon[{i}].radius",
-                f"is {tendon.radius} mm, outside the wall; it must be at most the outer "
-                f"radius, {robot.tube.outer_radius} mm.",
-            )
-        yield from _diameter_problems(f"tendon[{i}].diameter", tendon, robot.tube)
-        if tendon.end_body is not None and tendon.end_body > number:
-            yield (
-                f"tendon[{i}].end_body",
-                f"is {tendon.end_body}; the robot has the bodies 1 to {number}, one after each "
-                "notch.",
-            )
-        elif not of_notches:
-            for key, text in _tendon_problems(robot, tendon):
-                yield (f"tendon[{i}].{key}", text)
-    if robot.tolerance and not of_notches:
-        from notchflex.robot.value_names import tolerance_problems  # it makes robots
-
-        yield from tolerance_problems(robot)
+        for key, text in _tendon_problems(robot, tendon, bool(of_notches)):
+            yield f"tendon[{i}].{key}", text
+    if not of_notches:
+        yield from _tolerance_problems(robot)
 
 
-def _diameter_problems(name: str, tendon: Tendon, tube: Tube) -> Iterator[tuple[str, str]]:
-    """Find a tendon, of known diameter, that is neither all in the lumen nor all in the wall."""
-    if tendon.diameter is None:
-        return
-    inside, outside = (tendon.radius + sign * tendon.diameter / 2 for sign in (-1, 1))
-    lumen, surface = tube.inner_radius * (1 + 1e-9), tube.outer_radius * (1 + 1e-9)
-    if outside > lumen and (outside > surface or inside < tube.inner_radius * (1 - 1e-9)):
-        yield (
-            name,
-            f"is {tendon.diameter} mm; at a radius of {tendon.radius} mm the tendon reaches from "
-            f"{inside:.6g} to {outside:.6g} mm, neither all in the lumen (to "
-            f"{tube.inner_radius:.6g} mm) nor all in the wall (to {tube.outer_radius:.6g} mm); "
-            f"in the lumen its radius is at most {tube.inner_radius - tendon.diameter / 2:.6g} mm.",
-        )
+def _tolerance_problems(robot: "Robot") -> Problems:
+    """Find tolerances of what the robot does not have, or in a wrong unit."""
+    for tolerance in robot.tolerance:
+        name = f"tolerance.{tolerance.value}"
+        try:
+            numbers = numbers_at(robot, tolerance.value)
+        except InputError as error:
+            yield name, f"is about no number of this robot: {error}"
+            continue
+        unit = described_at(robot, tolerance.value).unit
+        if tolerance.per_notch and not tolerance.value.startswith("notch."):
+            yield name, "has `per_notch`, which is for values of all notches."
+        smallest = min(map(abs, numbers.values()))
+        for key in ("sd", "plus", "minus") if unit in ("mm", "MPa") and smallest else ():
+            size = getattr(tolerance, key)
+            if size is not None and amount(size, smallest) >= smallest:
+                yield (
+                    name,
+                    f"has {key} = {size}, as much as the value itself, {smallest:g} {unit}; "
+                    f"give it in {unit}, or in percent as text.",
+                )
 
 
-def _notch_problems(robot: "Robot") -> Iterator[tuple[str, str]]:
+def _notch_problems(robot: "Robot") -> Problems:
     """Check notches in their tube, and beside their neighbours."""
-    first = 1
     last: Notch | None = None  # the notch right before the table
-    row: list[tuple[str, str]] = []  # what one notch lacks its neighbours often lack too
-    for notch in robot.notch:
+    row: list[tuple[str, str]] = []  # what a notch lacks its neighbours often lack too
+    for named in named_parts(robot):
+        if not isinstance(notch := named.part, Notch):
+            continue
         for key, text in notch.problems(robot.tube):
-            yield f"notch[{first}].{key}", text
+            yield f"{named.name}.{key}", text
         if last and not row:
-            row = [(f"notch[{first}].{key}", text) for key, text in notch.row_problems(last)]
-        first += notch.repeat
+            row = [(f"{named.name}.{key}", text) for key, text in notch.row_problems(last)]
         last = notch.expanded()[-1]
     yield from row
 
 
-def _tendon_problems(robot: "Robot", tendon: Tendon) -> Iterator[tuple[str, str]]:
-    """Check a tendon against the notches that it crosses, and the body that it ends in."""
-    end = tendon.end_body or robot.number_of_notches
-    problems: dict[tuple[str, str], None] = {}  # equal notches say the same
-    first = 1
-    for notch in robot.notch:
-        if first <= end:
-            problems |= dict.fromkeys(notch.tendon_problems(tendon))
-        first += notch.repeat
-    yield from problems
-    if problems or tendon.end_body is None:
-        return
-    bodies = [number for number, _ in openings_along(robot.notches, tendon.direction_deg)]
-    if end not in bodies:
-        near = [n for n in bodies if n < end][-1:] + [n for n in bodies if n > end][:1]
+def _tendon_problems(robot: "Robot", tendon: Tendon, on_notches: bool) -> Problems:
+    """Check a tendon in the tube, and unless notches are wrong over them and in its last body."""
+    tube, number = robot.tube, robot.number_of_notches
+    if tendon.radius > tube.outer_radius:
+        yield (
+            "radius",
+            f"is {tendon.radius} mm, outside the wall; it must be at most the outer "
+            f"radius, {tube.outer_radius} mm.",
+        )
+    if tendon.diameter is not None:
+        inside, outside = (tendon.radius + sign * tendon.diameter / 2 for sign in (-1, 1))
+        lumen, surface = tube.inner_radius * (1 + 1e-9), tube.outer_radius * (1 + 1e-9)
+        if outside > lumen and (outside > surface or inside < tube.inner_radius * (1 - 1e-9)):
+            yield (
+                "diameter",
+                f"is {tendon.diameter} mm; at a radius of {tendon.radius} mm the tendon reaches "
+                f"from {inside:.6g} to {outside:.6g} mm, neither all in the lumen (to "
+                f"{tube.inner_radius:.6g} mm) nor all in the wall (to {tube.outer_radius:.6g} mm); "
+                "in the lumen its radius is at most "
+                f"{tube.inner_radius - tendon.diameter / 2:.6g} mm.",
+            )
+    end = tendon.end_body or number
+    if end > number:
         yield (
             "end_body",
-            f"is {end}, which has no wall on the tendon's side of the tube; the tendon runs "
-            f"through the {'bodies' if len(near) > 1 else 'body'} "
-            f"{' and '.join(map(str, near))} there.",
+            f"is {end}; the robot has the bodies 1 to {number}, one after each notch.",
         )
+    elif not on_notches:
+        problems: dict[tuple[str, str], None] = {}  # equal notches say the same
+        for named in named_parts(robot):
+            if isinstance(named.part, Notch) and named.first <= end:
+                problems |= dict.fromkeys(named.part.tendon_problems(tendon))
+        yield from problems
+        if problems or tendon.end_body is None:
+            return
+        bodies = [body for body, _ in openings_along(robot.notches, tendon.direction_deg)]
+        if end not in bodies:
+            near = [n for n in bodies if n < end][-1:] + [n for n in bodies if n > end][:1]
+            yield (
+                "end_body",
+                f"is {end}, which has no wall on the tendon's side of the tube; the tendon runs "
+                f"through the {'bodies' if len(near) > 1 else 'body'} "
+                f"{' and '.join(map(str, near))} there.",
+            )
+
+
+_Unusual: TypeAlias = tuple[str, float, tuple[float, float], float | None]
+"""A value that is hardly meant: its name, its value, the usual limits, and what may be meant."""
 
 
 def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
     """Yield a warning for each value that was probably not meant; lengths in metres are one."""
-    by_unit: dict[tuple[str, str], list[tuple[str, float, tuple[float, float], float | None]]] = {}
-    for name, part in _parts(robot):
-        for key, usual, unit in _usual_values(type(part)):
-            value = getattr(part, key)
-            if value is None or usual[0] <= value <= usual[1]:
-                continue
-            other, meant = _meant(value, usual, unit)
-            entry = (f"{name}.{key}", value, usual, meant)
-            by_unit.setdefault((unit, other), []).append(entry)
-    for (unit, other), entries in by_unit.items():
-        yield _outside(entries, unit, other)
+    by_unit: dict[tuple[str, str], list[_Unusual]] = {}
+    for named in named_parts(robot):
+        for key, usual, unit in _usual_values(type(named.part)):
+            value = getattr(named.part, key)
+            if value is not None and not usual[0] <= value <= usual[1]:
+                other, meant = _meant(value, usual, unit)
+                unusual = (f"{named.name}.{key}", value, usual, meant)
+                by_unit.setdefault((unit, other), []).append(unusual)
+    for (unit, other), values in by_unit.items():
+        yield _outside(values, unit, other)
     if not by_unit:
-        for i, tendon in enumerate(robot.tendon, start=1):
-            # A wall that has no room for a channel is asked about, unless its diameter is given.
-            tube, radius = robot.tube, tendon.radius
-            room = 2.0 * min(radius - tube.inner_radius, tube.outer_radius - radius)
-            is_inside = radius - tube.inner_radius > _ON_SURFACE * tube.outer_diameter
-            if (
-                is_inside
-                and tendon.diameter is None
-                and room < _LEAST_CHANNEL * tube.outer_diameter
-            ):
-                name = f"tendon[{i}].radius"
-                text = (
-                    f"`{name}` is {_shown(radius, 'mm')}, inside the wall, where a channel has "
-                    f"{_shown(room, 'mm')}; did you mean a tendon in the lumen, at most "
-                    f"{_shown(tube.inner_radius, 'mm')}? One in the wall has a `diameter`."
-                )
-                yield InputWarning(text, name, radius, tube.inner_radius)
+        yield from _narrow_channels(robot)
         yield from _remaining_depths(robot)
 
 
@@ -330,12 +331,11 @@ def _meant(value: float, usual: tuple[float, float], unit: str) -> tuple[str, fl
     return "", None
 
 
-def _outside(
-    entries: list[tuple[str, float, tuple[float, float], float | None]], unit: str, other: str
-) -> InputWarning:
+def _outside(values: list[_Unusual], unit: str, other: str) -> InputWarning:
     """Word the values of one unit that may all have been typed in one other unit."""
-    (name, value, (low, high), meant), *more = entries
-    names = [f"`{entry[0]}`" for entry in more[:2]] + [f"{len(more) - 2} more"] * (len(more) > 2)
+    (name, value, (low, high), meant), *more = values
+    names = [f"`{unusual[0]}`" for unusual in more[:2]]
+    names += [f"{len(more) - 2} more"] * (len(more) > 2)
     also = f" (so {'is' if len(more) == 1 else 'are'} {' and '.join(names)})" if more else ""
     question = f"did you mean {_shown(meant, unit)} ({_shown(value, other)})?" if meant else ""
     text = (
@@ -345,45 +345,48 @@ def _outside(
     return InputWarning(text, name, value, meant)
 
 
+def _narrow_channels(robot: "Robot") -> Iterator[InputWarning]:
+    """Ask about tendons, of unknown diameter, where the wall has no room for a channel."""
+    inner, outer = robot.tube.inner_radius, robot.tube.outer_radius
+    for i, tendon in enumerate(robot.tendon, start=1):
+        depth = tendon.radius - inner
+        room = 2.0 * min(depth, outer - tendon.radius)
+        is_inside = depth > 2.0 * _ON_SURFACE * outer and room < 2.0 * _LEAST_CHANNEL * outer
+        if is_inside and tendon.diameter is None:
+            name = f"tendon[{i}].radius"
+            text = (
+                f"`{name}` is {_shown(tendon.radius, 'mm')}, inside the wall, where a channel has "
+                f"{_shown(room, 'mm')}; did you mean a tendon in the lumen, at most "
+                f"{_shown(inner, 'mm')}? One in the wall has a `diameter`."
+            )
+            yield InputWarning(text, name, tendon.radius, inner)
+
+
 def _remaining_depths(robot: "Robot") -> Iterator[InputWarning]:
-    """Ask whether the depth of a shallow notch is what remains of the tube."""
-    diameter, first = robot.tube.outer_diameter, 1
-    for notch in robot.notch:
-        cut = notch.spine_cut
+    """Ask whether the depth of the first shallow notch is what remains of the tube."""
+    diameter = robot.tube.outer_diameter
+    for named in named_parts(robot):
+        cut = named.part.spine_cut if isinstance(named.part, Notch) else None
         if cut is not None and cut[0] < _LEAST_DEPTH * diameter:
-            name, remains = f"notch[{first}].depth", diameter - cut[0]
+            name, remains = f"{named.name}.depth", diameter - cut[0]
             text = (
                 f"`{name}` is {_shown(cut[0], 'mm')}, a shallow cut of a tube of "
                 f"{_shown(diameter, 'mm')}; did you mean {_shown(remains, 'mm')}, if "
                 f"{_shown(cut[0], 'mm')} is what remains?"
             )
             yield InputWarning(text, name, cut[0], remains)
-            return  # the others are alike
-        first += notch.repeat
-
-
-def _parts(robot: "Robot") -> Iterator[tuple[str, Any]]:
-    """Yield the parts of a robot with their names, notches counted as in outputs."""
-    yield "tube", robot.tube
-    first = 1
-    for notch in robot.notch:
-        yield f"notch[{first}]", notch
-        first += notch.repeat
-    for i, tendon in enumerate(robot.tendon, start=1):
-        yield f"tendon[{i}]", tendon
-    yield "material", robot.material
-    yield "friction", robot.friction
+            return
 
 
 @functools.cache
-def _usual_values(cls: type) -> tuple[tuple[str, tuple[float, float], str], ...]:
+def _usual_values(cls: type) -> list[tuple[str, tuple[float, float], str]]:
     """Return the keys of a part that have usual values, with these and their unit."""
-    extras = {name: field.json_schema_extra or {} for name, field in fields_of(cls).items()}
-    return tuple(
+    usual = {name: field.json_schema_extra or {} for name, field in fields_of(cls).items()}
+    return [
         (name, tuple(extra["usual"]), extra.get("unit", ""))
-        for name, extra in extras.items()
+        for name, extra in usual.items()
         if "usual" in extra
-    )
+    ]
 
 
 def _shown(value: float, unit: str) -> str:

@@ -14,16 +14,14 @@ from typing import Any
 from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.part import nearest
 from notchflex.robot.robot import (
+    Changed,
     Robot,
     from_table,
     remember_source,
+    set_values,
     warn_unlikely,
 )
-from notchflex.robot.value_names import (
-    Changed,
-    change_table,
-    set_values,
-)
+from notchflex.robot.value_names import change_table
 
 # The robots that come with the program, by name; imports little, so that listing them is quick.
 

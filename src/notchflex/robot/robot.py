@@ -1,49 +1,42 @@
 """Description of a robot."""
 
 import dataclasses
-import datetime
 import functools
 import math
-import unicodedata
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import wrap
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias, cast, overload
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Field,
-    TypeAdapter,
-    ValidationError,
-    model_validator,
-)
-from pydantic_core import PydanticCustomError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from notchflex import __version__
 from notchflex._summary import Summary, short
 from notchflex.errors import InputError, InputWarning
 from notchflex.robot.kinds import (
+    PRINTABLE,
+    Drawing,
     Friction,
     Material,
     Notch,
     Tendon,
     Tube,
-    one_of,
+    any_kind_of,
 )
 from notchflex.robot.part import (
-    ProblemError,
+    Problems,
     fields_of,
-    is_list,
     is_unsaid,
     part,
     sentences,
+    unit_of,
 )
 from notchflex.robot.problems import (
     Tolerances,
     robot_problems,
     robot_warnings,
 )
+from notchflex.robot.value_names import change_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,55 +47,11 @@ if TYPE_CHECKING:
     AnyMaterial: TypeAlias = Material
     AnyFriction: TypeAlias = Friction
 else:
-    AnyNotch, AnyMaterial, AnyFriction = one_of(Notch), one_of(Material), one_of(Friction)
-
-
-def _as_text(value: object) -> object:
-    """Take a date or a number as its text: TOML needs no quotes round `2026-11-26` or `3`."""
-    plain = isinstance(value, datetime.date | int) and not isinstance(value, bool)
-    return str(value) if plain else value
-
-
-def _printable(value: str) -> str:
-    """Refuse control characters, which files and terminals take for something else."""
-    if any(unicodedata.category(letter) == "Cc" for letter in value):
-        raise PydanticCustomError("control_character", "control characters are not allowed")
-    return value
-
-
-_PRINTABLE = AfterValidator(_printable)
-_Entry: TypeAlias = (
-    Annotated[str, Field(strict=True, max_length=60), BeforeValidator(_as_text), _PRINTABLE] | None
-)
-"""An entry of a title block."""
-
-
-@part(kw_only=True)
-class Drawing:
-    """What the title block of a drawing says; entries that are None stay empty or have a default.
-
-    Args:
-        part: Name or number of the part; by default the name of the robot.
-        revision: Its revision.
-        material: The material, as a workshop orders it; by default the kind of the model.
-        finish: The finish of its surface.
-        drawn: Who has drawn it.
-        date: The date.
-
-    Raises:
-        InputError: A value is no text, or has more than 60 letters.
-
-    Example:
-        >>> Drawing(part="W-12", revision="B").revision
-        'B'
-    """
-
-    part: Annotated[_Entry, Field(description="name or number of the part")] = None
-    revision: Annotated[_Entry, Field(description="revision")] = None
-    material: Annotated[_Entry, Field(description="material, as it is ordered")] = None
-    finish: Annotated[_Entry, Field(description="finish of the surface")] = None
-    drawn: Annotated[_Entry, Field(description="who has drawn it")] = None
-    date: Annotated[_Entry, Field(description="date")] = None
+    AnyNotch, AnyMaterial, AnyFriction = (
+        any_kind_of(Notch),
+        any_kind_of(Material),
+        any_kind_of(Friction),
+    )
 
 
 @part
@@ -138,7 +87,7 @@ class Robot:
     """
 
     name: Annotated[
-        str, Field(strict=True, min_length=1, description="name of the robot"), _PRINTABLE
+        str, Field(strict=True, min_length=1, description="name of the robot"), PRINTABLE
     ]
     tube: Tube
     notch: Annotated[tuple[AnyNotch, ...], Field(min_length=1)]
@@ -152,16 +101,13 @@ class Robot:
         Drawing()
     )
 
-    @model_validator(mode="after")
-    def _parts_fit(self) -> "Robot":
-        problems = list(robot_problems(self))
-        if problems:
-            raise ProblemError(problems)
-        return self
+    def conflicts(self) -> Problems:
+        """Find parts that do not fit each other."""
+        return robot_problems(self)
 
     @functools.cached_property
     def _hash(self) -> int:
-        return hash(tuple(getattr(self, one.name) for one in dataclasses.fields(self)))
+        return hash(tuple(getattr(self, field.name) for field in dataclasses.fields(self)))
 
     def __hash__(self) -> int:
         """Return the hash of all values, cached: robots are keys at every solve."""
@@ -215,11 +161,11 @@ class Robot:
 
         Example:
             >>> from notchflex import load_robot
-            >>> [one.partition(":")[0] for one in load_robot("liu2022").citations()]
+            >>> [paper.partition(":")[0] for paper in load_robot("liu2022").citations()]
             ['notchflex 0.1.0', 'Liu et al.', 'Gao et al.']
         """
         parts = (*self.notch, self.material, self.friction)
-        papers = dict.fromkeys(paper for one in parts for paper in one.papers)
+        papers = dict.fromkeys(paper for part in parts for paper in part.papers)
         return (f"notchflex {__version__}: statics of tendon-driven notched-tube robots", *papers)
 
     @property
@@ -275,44 +221,64 @@ class Robot:
         Raises:
             InputError: There is no such value, or a new one is not allowed.
         """
-        from notchflex.robot.value_names import set_values
-
         return set_values(self, values).robot
+
+
+class Changed(NamedTuple):
+    """A robot with new values, and the keys that a change of kind dropped."""
+
+    robot: Robot
+    dropped: tuple[str, ...]
+
+
+def set_values(
+    robot: Robot, values: Mapping[str, object] | Iterable[tuple[str, object]]
+) -> Changed:
+    """Set values of a robot by their names (see `Robot.with_value`); all are set, then checked.
+
+    Kinds are changed first, then the values of all notches or tendons, then those of single ones,
+    so that the order of `values` does not matter.
+    """
+    table = to_table(robot)
+    dropped = change_table(table, values)
+    return Changed(remember_source(from_table(table), source_of(robot)), dropped)
 
 
 def to_table(robot: Robot) -> dict[str, Any]:
     """Convert a robot to the plain table of its file: dicts, lists, numbers and text."""
-    optional = {
-        "tolerance": {one.value: one.written for one in robot.tolerance},
-        "drawing": _part_table(robot.drawing),
-    }
-    return {
-        "name": robot.name,
-        "tube": _part_table(robot.tube),
-        "notch": [_part_table(notch) for notch in robot.notch],
-        "tendon": [_part_table(tendon) for tendon in robot.tendon],
-        "material": _part_table(robot.material),
-        "friction": _part_table(robot.friction),
-        **{name: table for name, table in optional.items() if table},
-    }
+    tables = {name: _plain(getattr(robot, name)) for name in fields_of(Robot)}
+    tables["tolerance"] = {tolerance.value: tolerance.written for tolerance in robot.tolerance}
+    return {name: table for name, table in tables.items() if table}
+
+
+def _plain(value: Any) -> Any:
+    """Convert a part, parts, or a name to what stands in a file: the values that are said."""
+    if isinstance(value, tuple):
+        return [_plain(part) for part in cast("tuple[Any, ...]", value)]
+    if isinstance(value, str):
+        return value
+    values = {name: getattr(value, name) for name in fields_of(type(value))}
+    return {name: said for name, said in values.items() if not is_unsaid(name, said)}
 
 
 def from_table(table: Mapping[str, Any]) -> Robot:
-    """Make a robot from the plain table that a file holds.
-
-    Args:
-        table: As returned by `to_table` or read from TOML.
-
-    Raises:
-        InputError: A key is missing, not known, or its value is not allowed.
-    """
+    """Make a robot from the plain table that a file holds, or from its parts."""
     validator: Any = getattr(Robot, "__pydantic_validator__")  # noqa: B009
     try:
         return validator.validate_python(dict(table))
     except ValidationError as error:
-        raise InputError.INVALID_ROBOT(
-            "\n".join(sentences(error, Robot, _repeats(table)))
-        ) from None
+        repeats = list(_repeats(table.get("notch")))
+        raise InputError.INVALID_ROBOT("\n".join(sentences(error, Robot, repeats))) from None
+
+
+def _repeats(notches: Any) -> Iterator[int]:
+    """Read how many notches each of `notch` stands for, which may be anything."""
+    for notch in notches if isinstance(notches, list | tuple) else ():
+        table = (
+            notch if isinstance(notch, Mapping) else vars(notch) if isinstance(notch, Notch) else {}
+        )
+        repeat = table.get("repeat", 1)
+        yield repeat if isinstance(repeat, int) and repeat > 0 else 1
 
 
 def warn_unlikely(robot: Robot) -> None:
@@ -327,28 +293,9 @@ def source_of(robot: Robot) -> str | None:
 
 
 def remember_source(robot: Robot, text: str | None) -> Robot:
-    """Store the text of a robot's file with it, so that its comments survive a rewrite.
-
-    It is not a field: two robots with the same values are equal whatever their files say.
-    """
-    object.__setattr__(robot, "_source", text)
+    """Store the text of a robot's file with it, so that its comments survive a rewrite."""
+    vars(robot)["_source"] = text
     return robot
-
-
-def _part_table(value: object) -> dict[str, Any]:
-    """List the values of a part that are said."""
-    values = {name: getattr(value, name) for name in fields_of(type(value))}
-    return {name: one for name, one in values.items() if not is_unsaid(name, one)}
-
-
-def _repeats(table: Mapping[str, Any]) -> list[int]:
-    """Read `repeat` of every notch of a table that may hold anything."""
-    notches = table.get("notch")
-    repeated = [
-        one.get("repeat", 1) if isinstance(one, Mapping) else 1
-        for one in (notches if isinstance(notches, list) else [])
-    ]
-    return [one if isinstance(one, int) and one > 0 else 1 for one in repeated]
 
 
 # The JSON Schema of robot files, for editors that check and complete them.
@@ -379,16 +326,10 @@ def json_schema() -> dict[str, Any]:
 
 
 def schema_of(cls: type, title: str, description: str) -> dict[str, Any]:
-    """Return the JSON Schema of a file that a part describes.
-
-    Args:
-        cls: The part.
-        title: What the file is called.
-        description: What it holds.
-    """
+    """Return the JSON Schema, with a title and a description, of a file that a part describes."""
     schema = TypeAdapter(cls).json_schema()
-    for one in [schema, *schema["$defs"].values()]:
-        _tidy(one)
+    for model in [schema, *schema["$defs"].values()]:
+        _tidy(model)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **schema,
@@ -407,7 +348,7 @@ def _tidy(model: dict[str, Any]) -> None:
         default = value.get("default")
         if default in (None, []) or (isinstance(default, float) and math.isinf(default)):
             value.pop("default", None)  # TOML has no null: such a key is left out
-        choices = [one for one in value.get("anyOf", ()) if one != {"type": "null"}]
+        choices = [choice for choice in value.get("anyOf", ()) if choice != {"type": "null"}]
         if len(choices) == 1:
             del value["anyOf"]
             value.update(choices[0])
@@ -422,7 +363,7 @@ def _tidy(model: dict[str, Any]) -> None:
 # The summary of a robot: what `repr` and a notebook show of it.
 
 MOST = 4
-"""Different values of one key that are listed; of more, their range."""
+"""Different values of a key that are listed; of more, their range."""
 
 # A longer row goes on below.
 _WIDTH = 145
@@ -432,15 +373,15 @@ _HINT = ".plot() draws it; .with_value(...) returns a changed copy"
 
 def robot_summary(robot: Robot) -> Summary:
     """Summarise a robot: its tube, notches, tendons, material and friction."""
-    kinds: dict[str, list[Any]] = {}
+    kinds: dict[str, list[Notch]] = {}
     for notch in robot.notches:
-        kinds.setdefault(getattr(notch, "kind"), []).append(notch)  # noqa: B009
+        kinds.setdefault(notch.kind, []).append(notch)
     rows = [("tube", _words([robot.tube]))]
     rows += [("notches", f"{len(same)} {kind}: {_words(same)}") for kind, same in kinds.items()]
     rows.append(("tendons", f"{len(robot.tendon)}: {_words(robot.tendon)}"))
     for name in ("material", "friction"):
         part = getattr(robot, name)
-        rows.append((name, ", ".join(one for one in (part.kind, _words([part])) if one)))
+        rows.append((name, ", ".join(filter(None, (part.kind, _words([part]))))))
     lines = [
         (name if number == 0 else "", line)
         for name, words in rows
@@ -456,20 +397,20 @@ def _words(parts: Sequence[Any]) -> str:
         values = list(dict.fromkeys(getattr(part, name) for part in parts))
         if name in ("kind", "repeat") or values in ([None], [field.default]):
             continue
-        extra = field.json_schema_extra
-        unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+        unit = unit_of(field)
         title = name.removesuffix(f"_{unit}").replace("_", " ")
-        shown = " and ".join(_curve(one) for one in values if one) if is_list(field) else ""
-        words.append(f"{title} {shown or _values(values)} {unit}".strip())
+        words.append(f"{title} {_values(values)} {unit}".strip())
     return ", ".join(words)
 
 
-def _curve(values: Sequence[float]) -> str:
-    return f"{short(values[0])} to {short(values[-1])} ({len(values)} values)"
-
-
 def _values(values: Sequence[Any]) -> str:
-    numbers = all(isinstance(one, (int, float)) for one in values)
+    if any(isinstance(value, tuple) for value in values):
+        return " and ".join(
+            f"{short(value[0])} to {short(value[-1])} ({len(value)} values)"
+            for value in values
+            if value
+        )
+    numbers = all(isinstance(value, (int, float)) for value in values)
     if numbers and len(values) > MOST:
         return f"{short(min(values))} to {short(max(values))}"
-    return "/".join(short(one) if isinstance(one, float) else str(one) for one in values)
+    return "/".join(short(value) if isinstance(value, float) else str(value) for value in values)

@@ -3,7 +3,7 @@
 import os
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
@@ -15,6 +15,7 @@ from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.part import (
     fields_of,
     is_unsaid,
+    unit_of,
 )
 from notchflex.robot.problems import read_tolerances
 from notchflex.robot.reading import (
@@ -26,10 +27,9 @@ from notchflex.robot.robot import (
     source_of,
     to_table,
 )
-from notchflex.robot.value_names import defaults_of
+from notchflex.robot.value_names import NamedPart, class_of, group_of, named_parts, parse_path
 
 _HEADER = re.compile(r"""\s*\[{1,2}\s*["']?(\w+)["']?\s*\]{1,2}\s*(#.*)?""")
-_NUMBERED = re.compile(r"(\w+)(?:\[(\*|\d+)\])?\.(\w+)")
 _OPTIONAL = "tolerance", "drawing"
 """Tables that a robot file may have."""
 
@@ -64,7 +64,7 @@ def save_robot(
         >>> softer = load_robot("pacheco2021-a").with_value("material.elastic_modulus", 9_500.0)
         >>> save_robot(softer, "softer.toml")  # doctest: +SKIP
     """
-    source: str | None = None
+    source = None
     if template is not None:
         source = read_text(template, "robot file", error_class=RobotFileError)
     try:
@@ -77,13 +77,7 @@ def save_robot(
 def robot_text(
     robot: Robot, template: str | None = None, fitted: Mapping[str, str] | None = None
 ) -> str:
-    """Return the text of a robot file.
-
-    Args:
-        robot: The robot to write.
-        template: Text of a robot file whose comments and order are kept; None takes that of the
-            robot's file, and "" a fresh layout.
-        fitted: As for `save_robot`.
+    """Return the text of a robot file; a template of "" gives a fresh layout (see `save_robot`).
 
     Example:
         >>> from notchflex.robot import load_robot
@@ -105,16 +99,10 @@ def robot_text(
     return _fresh(robot, notes)
 
 
-def _notes_of(notes: _Notes, section: str, first: int, count: int) -> dict[str, str]:
-    """Return the notes of the keys of a part; for notches or tendons from `first` (from 1) on."""
-    by_key: dict[str, str] = {}
-    for path, note in notes.items():
-        match = _NUMBERED.fullmatch(path.strip())
-        if match is None or match[1] != section:
-            continue
-        if match[2] in (None, "*") or first <= int(match[2]) < first + count:
-            by_key[match[3]] = note
-    return by_key
+def _notes_of(notes: _Notes, named: NamedPart) -> dict[str, str]:
+    """Return the notes of the keys of a part."""
+    targets = ((parse_path(path), note) for path, note in notes.items())
+    return {target.key: note for target, note in targets if named.is_meant(target)}
 
 
 def _fresh(robot: Robot, notes: _Notes) -> str:
@@ -122,33 +110,29 @@ def _fresh(robot: Robot, notes: _Notes) -> str:
     lines = [
         "# A notchflex robot file. Lengths in mm, forces in N, moduli in MPa, angles in deg.",
         "",
+        f"name = {tomlkit.item(robot.name).as_string()}",
     ]
-    for key, value in to_table(robot).items():
-        if key == "name":
-            lines += [f"name = {tomlkit.item(value).as_string()}"]
-            continue
-        if key == "tolerance":
-            lines += ["", f"[{key}]", *_tolerance_lines(value)]
-            continue
-        parts = getattr(robot, key)
-        first = 1
-        for one in parts if isinstance(parts, tuple) else (parts,):
-            header = f"[[{key}]]" if isinstance(parts, tuple) else f"[{key}]"
-            count = getattr(one, "repeat", 1)
-            lines += ["", header, *_fresh_part(one, _notes_of(notes, key, first, count))]
-            first += count
+    table = to_table(robot)
+    for named in named_parts(robot):
+        if named.section == "drawing" and "tolerance" in table:
+            lines += ["", "[tolerance]", *_tolerance_lines(table["tolerance"])]
+        if named.section in table:
+            header = f"[[{named.section}]]" if named.first else f"[{named.section}]"
+            lines += ["", header, *_fresh_part(named.part, _notes_of(notes, named))]
     return "\n".join(lines) + "\n"
 
 
 def _tolerance_lines(table: Mapping[str, Any]) -> list[str]:
-    """Write tolerances, a name a line; TOML wants quotes around one with brackets."""
+    """Write tolerances, a name a line; TOML wants quotes around those with brackets."""
     lines: list[str] = []
-    for name, one in table.items():
-        item: Any = tomlkit.inline_table() if isinstance(one, dict) else tomlkit.item(one)
-        if isinstance(one, dict):
-            item.update(one)
-        lines.append(f'"{name}"' if "[" in name else name)
-        lines[-1] += f" = {item.as_string()}"
+    for name, tolerance in table.items():
+        item: Any = tomlkit.item(tolerance)
+        if isinstance(tolerance, dict):
+            item = tomlkit.inline_table()
+            item.update(tolerance)
+        lines.append(
+            f'"{name}" = {item.as_string()}' if "[" in name else f"{name} = {item.as_string()}"
+        )
     return lines
 
 
@@ -156,14 +140,12 @@ def _fresh_part(part: Any, notes: _Notes) -> list[str]:
     lines: list[str] = []
     for key, record in fields_of(type(part)).items():
         value = getattr(part, key)
-        if is_unsaid(key, value):
-            continue
-        unit = (record.json_schema_extra or {}).get("unit", "")
-        comment = ", ".join(word for word in (unit, record.description or "") if word)
-        if key in notes:
-            comment = "; ".join(word for word in (comment, f"{FITTED_TO} {notes[key]}") if word)
-        line = f"{key} = {tomlkit.item(value).as_string()}"
-        lines.append(f"{line}  # {comment}" if comment else line)
+        if not is_unsaid(key, value):
+            comment = ", ".join(filter(None, (unit_of(record), record.description)))
+            fitted = f"{FITTED_TO} {notes[key]}" if key in notes else ""
+            comment = "; ".join(filter(None, (comment, fitted)))
+            line = f"{key} = {tomlkit.item(value).as_string()}"
+            lines.append(f"{line}  # {comment}" if comment else line)
     return lines
 
 
@@ -182,43 +164,28 @@ class _Block:
         if self.name == "tolerance":
             if read_tolerances(tomllib.loads(text)) != read_tolerances(values):
                 text = "\n".join([*_tolerance_lines(values), ""])
-            return "".join(self.lead) + self.header + text
-        body = tomlkit.parse(text)
-        _update(body, values, self.name, notes)
-        return "".join(self.lead) + self.header + tomlkit.dumps(body)
+        else:
+            body = tomlkit.parse(text)
+            _update(body, values, self.name, notes)
+            text = tomlkit.dumps(body)
+        return "".join(self.lead) + self.header + text
 
 
 def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
     """Put the values of a robot into the text of a file."""
-    old = to_table(robot_from_text(template))
-    new = to_table(robot)
-    blocks = _split(template)
-    rewritten: list[tuple[_Block, dict[str, Any]]] = []
-    done: set[str] = set()
-    for block in blocks:
-        if block.name in ("notch", "tendon"):
-            if block.name not in done:
-                done.add(block.name)
-                mine = [one for one in blocks if one.name == block.name]
-                rewritten += _matched(mine, old[block.name], new[block.name])
-        elif block.name in new:
-            rewritten.append((block, new[block.name]))
-        elif block.name:  # a robot without a table that its file has
-            continue
-        else:  # the head of the file: the name, and whatever is not under a header of its own
-            headed = {one.name for one in blocks}
-            rewritten.append(
-                (block, {k: v for k, v in new.items() if k not in (*headed, *_OPTIONAL)})
-            )
+    old, new = to_table(robot_from_text(template)), to_table(robot)
+    blocks: dict[str, list[_Block]] = {}
+    for block in _split(template):
+        blocks.setdefault(block.name, []).append(block)
     for name in _OPTIONAL:
-        if name in new and all(block.name != name for block in blocks):
-            rewritten.append((_Block(name, ["\n"], f"[{name}]\n"), new[name]))
+        blocks.setdefault(name, [_Block(name, ["\n"], f"[{name}]\n")])
+    # the head of the file: the name, and whatever is not under a header of its own
+    new[""] = {name: table for name, table in new.items() if name not in blocks}
     texts: list[str] = []
-    first = {"notch": 1, "tendon": 1}
-    for block, table in rewritten:
-        start, count = first.get(block.name, 1), table.get("repeat", 1)
-        first[block.name] = start + count
-        texts.append(block.text(table, _notes_of(notes, block.name, start, count)))
+    for name, pieces in blocks.items():
+        for block, first, table in _matched(pieces, old.get(name), new.get(name, [])):
+            named = NamedPart(name, first, table)
+            texts.append(block.text(table, _notes_of(notes, named)))
     return "".join(texts)
 
 
@@ -244,25 +211,29 @@ def _split(template: str) -> list[_Block]:
 
 
 def _matched(
-    blocks: list[_Block], old: list[dict[str, Any]], new: list[dict[str, Any]]
-) -> list[tuple[_Block, dict[str, Any]]]:
-    """Give every new notch or tendon the piece of the file that described it, or the last one."""
-    owner = [i for i, one in enumerate(old) for _ in range(one.get("repeat", 1))]
-    result: list[tuple[_Block, dict[str, Any]]] = []
-    first, used = 0, -1
-    for table in new:
-        position = owner[min(first, len(owner) - 1)]
-        block = blocks[position]
+    blocks: list[_Block], old: Any, new: Any
+) -> Iterator[tuple[_Block, int, dict[str, Any]]]:
+    """Yield every new part, with the number of its first, and the piece that described it."""
+    if not isinstance(new, list):
+        yield blocks[0], 0, new
+        return
+    first, used = 1, None
+    for table in cast("list[dict[str, Any]]", new):
+        repeats = [former.get("repeat", 1) for former in old]
+        block = blocks[group_of(min(first, sum(repeats)), repeats)[0]]
         # a group of equal notches that was split: its comment stands once
-        result.append((replace(block, lead=["\n"]) if position == used else block, table))
-        used = position
-        first += table.get("repeat", 1)
-    return result
+        yield (replace(block, lead=["\n"]) if block is used else block), first, table
+        first, used = first + table.get("repeat", 1), block
 
 
 def _update(table: Any, values: dict[str, Any], section: str, notes: _Notes) -> None:
-    """Update a tomlkit table to the given values, changing only what differs."""
-    defaults = defaults_of(section, values) if section else {}
+    """Update a tomlkit table to the values of a part, changing only what differs."""
+    fields = fields_of(class_of(section, values)) if section else {}
+    defaults = {
+        name: field.default
+        for name, field in fields.items()
+        if name != "kind" and not field.is_required()
+    }
     for key in [key for key in table if key not in values and table[key] != defaults.get(key)]:
         del table[key]
     for key, value in values.items():
@@ -272,12 +243,10 @@ def _update(table: Any, values: dict[str, Any], section: str, notes: _Notes) -> 
         elif isinstance(value, dict):
             _update(table[key], cast("dict[str, Any]", value), key, notes)
         elif isinstance(value, list):
-            for item, one in zip(table[key], cast("list[Any]", value), strict=False):
-                _update(item, one, key, notes)
-        elif table[key] != value:
-            set_value(table, key, value)
-        if key in notes and key in table:
-            add_note(table[key], notes[key])
+            for item, part in zip(table[key], cast("list[Any]", value), strict=False):
+                _update(item, part, key, notes)
+        if key in table and not isinstance(value, dict | list):
+            _set_value(table, key, value, notes.get(key))
 
 
 # Comments beside the values of a robot file: from what a value changed, to what it was fitted.
@@ -285,40 +254,29 @@ def _update(table: Any, values: dict[str, Any], section: str, notes: _Notes) -> 
 FITTED_TO = "fitted by notchflex to"
 """Begins what a fit says of a value, behind the comment that stood there before."""
 
-_CHANGED = re.compile(r"\s*\(changed from (.*)\)$")
-_FITTED = re.compile(rf"(?:;|#)\s*{FITTED_TO} .*$")
+_COMMENT = re.compile(
+    rf"(.*?)\s*(?:(?:;|#)\s*{FITTED_TO} .*?)?(?:\s*\(changed from (.*)\))?", re.DOTALL
+)
 
 
-def set_value(table: Any, key: str, value: object) -> None:
-    """Set a value, and note the old one in a comment."""
-    was, comment = table[key].as_string(), table[key].trivia.comment
-    table[key] = value
-    if not comment:
+def _set_value(table: Any, key: str, value: object, note: str | None) -> None:
+    """Set a value, and say beside it from what it changed and to what it was fitted."""
+    was = table[key]
+    comment, changed = cast("re.Match[str]", _COMMENT.fullmatch(was.trivia.comment)).groups()
+    if was != value:
+        table[key] = value
+        changed = changed or was.as_string()
+        # Where no comment was, nothing speaks of the old value.
+        if not was.trivia.comment or tomllib.loads(f"x = {changed}")["x"] == value:
+            changed = None
+    elif not note:
         return
-    changed = _CHANGED.search(comment)
+    if note:
+        comment = f"{comment}; " if comment.strip("# ") else "# "
+        comment += f"{FITTED_TO} {note}"
     if changed:
-        comment, was = comment[: changed.start()], changed[1]
-    # What a fit said of the value is not true of another.
-    comment = _FITTED.sub("", comment).rstrip()
-    same = tomllib.loads(f"x = {was}")["x"] == value
-    if not same:
-        comment = f"{comment or '#'} (changed from {was})"
-    _put(table[key], comment)
-
-
-def add_note(item: Any, note: str) -> None:
-    """Add to what a value was fitted, between its comment and what it was changed from."""
-    comment = item.trivia.comment
-    changed = _CHANGED.search(comment)
-    if changed:
-        comment = comment[: changed.start()]
-    comment = _FITTED.sub("", comment).rstrip()
-    comment = f"{comment}; {FITTED_TO} {note}" if comment.strip("# ") else f"# {FITTED_TO} {note}"
-    _put(item, comment + (changed[0] if changed else ""))
-
-
-def _put(item: Any, comment: str) -> None:
-    """Put a comment beside a value, two blanks behind it where there was none."""
-    if comment and not item.trivia.comment:
-        item.trivia.comment_ws = "  "
-    item.trivia.comment = comment
+        comment = f"{comment or '#'} (changed from {changed})"
+    trivia = table[key].trivia
+    if comment and not trivia.comment:
+        trivia.comment_ws = "  "
+    trivia.comment = comment

@@ -19,6 +19,7 @@ from notchflex.robot import Friction, Material, Robot, kinds_of, list_robots, lo
 from notchflex.robot.part import (
     fields_of,
     is_list,
+    unit_of,
 )
 from notchflex.viewer.controls import POINTING, STROKE, TENSION, ControlRanges, Controls
 
@@ -284,5 +285,5 @@ def numbers(robot: Robot, section: str) -> Iterator[PartNumber]:
     for key, info in fields.items():
         value = getattr(part, key)
         if isinstance(value, float):
-            unit = str((info.json_schema_extra or {}).get("unit", ""))
+            unit = unit_of(info)
             yield PartNumber(key, value, unit, str(info.description))

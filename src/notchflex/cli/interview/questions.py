@@ -30,6 +30,7 @@ from notchflex.robot.part import (
     fields_of,
     is_list,
     kind_of,
+    unit_of,
 )
 from notchflex.robot.problems import MOST_NOTCHES
 
@@ -418,7 +419,7 @@ def _ask(
     if not field.is_required():
         default = "none" if field.default is None else f"{field.default}".removesuffix(".0")
     if wording is None:
-        unit = (field.json_schema_extra or {}).get("unit")
+        unit = unit_of(field)
         text = f"{section}.{key}, {field.description}" + (f" [{unit}]" if unit else "")
         option = OPTIONS.get((section, key), f"--set {section}.{key}")
         return interview.ask(Question(option, text, read, default))

@@ -14,6 +14,7 @@ from notchflex.robot import Robot
 from notchflex.robot.part import (
     fields_of,
     is_unsaid,
+    unit_of,
 )
 from notchflex.robot.robot import to_table
 
@@ -182,7 +183,7 @@ def _summary(robot: Robot, part: str) -> str:
     table = to_table(robot)[part]
     words = [str(table.pop("kind"))]
     for key, value in table.items():
-        unit = (fields[key].json_schema_extra or {}).get("unit", "")
+        unit = unit_of(fields[key])
         words.append(f"{key.replace('_', ' ')} {_value(value)} {unit}".strip())
     return textwrap.fill(
         ", ".join(words),

@@ -83,7 +83,7 @@ def unrolled(cut: NotchCut, outer_radius: float, path: Path) -> list[Point]:
     curves = pieces(corners, radii, path.inside)
     for piece in curves:
         half += _flattened(_on_surface(piece, cut.radial, outer_radius), path.chord)
-    half.append(_surface_point(curves[-1].at(1.0), cut.radial, outer_radius))
+    half.append(_surface_point(curves[-1].point(1.0), cut.radial, outer_radius))
     # `half` has positive y and goes toward the tip, which is clockwise.
     return _without_straight([*reversed(half), *((x, -y) for x, y in half)])
 
@@ -97,7 +97,7 @@ def _surface_point(point: Point, radial: bool, outer_radius: float) -> Point:
 def _on_surface(piece: Line | Arc, radial: bool, outer_radius: float) -> Callable[[float], Point]:
     """Return a piece as a curve on the unrolled surface, from 0 to 1."""
     if radial or isinstance(piece, Arc):
-        return lambda part: _surface_point(piece.at(part), radial, outer_radius)
+        return lambda part: _surface_point(piece.point(part), radial, outer_radius)
     (x, low), (u, high) = piece
     first, last = (angle_at(height, outer_radius) for height in (low, high))
     if abs(high - low) < _STRAIGHT:

@@ -134,7 +134,7 @@ def _removed(cut: NotchCut, outer: float) -> Any:
         if isinstance(piece, Line):
             edges.append(cad.Edge.make_line(place(piece.start), place(piece.end)))
         else:
-            through = [place(piece.at(part)) for part in (0.0, 0.5, 1.0)]
+            through = [place(piece.point(part)) for part in (0.0, 0.5, 1.0)]
             edges.append(cad.Edge.make_three_point_arc(*through))
     # Beyond the surface the cut is as wide as at the surface.
     around = [last, (last[0], top), (first[0], top), first]

@@ -22,7 +22,7 @@ from notchflex.fit.measurements.measurements import OBSERVED
 from notchflex.fit.model.constants import Unknown, unknowns
 from notchflex.fit.model.drawing import numbers_set
 from notchflex.fit.model.residuals import SENSOR
-from notchflex.robot.part import fields_of
+from notchflex.robot.part import fields_of, unit_of
 
 # Probability below which noise does not make a pattern; of constants for all of them together.
 _UNLIKELY = 0.01
@@ -218,7 +218,7 @@ def _candidates(calibration: Calibration) -> list[Unknown]:
             parts = robot.notch if section == "notch" else [getattr(robot, section)]
             for part in parts:
                 for name, field in fields_of(type(part)).items():
-                    unit = (field.json_schema_extra or {}).get("unit", "")
+                    unit = unit_of(field)
                     if unit in units and name not in _LEFT_OUT:
                         names.append(f"{rule}{section}.{name}")
     taken = numbers_set(robots, fitted)

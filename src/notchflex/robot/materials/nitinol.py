@@ -1,16 +1,13 @@
 """Nitinol with a plateau, and an unloading plateau where it is known."""
 
-from collections.abc import Iterator
 from dataclasses import KW_ONLY
-from typing import Annotated, Literal
-
-from pydantic import model_validator
+from typing import Annotated, ClassVar, Literal
 
 from notchflex.robot.kinds import Material
 from notchflex.robot.part import (
     MOST_STRAIN,
     Float,
-    ProblemError,
+    Problems,
     part,
     quantity,
 )
@@ -66,19 +63,10 @@ class Nitinol(Material):
     ] = None
     _: KW_ONLY
     kind: Literal["nitinol"] = "nitinol"
+    by_fibres: ClassVar = True
 
-    @property
-    def by_fibres(self) -> bool:
-        """Its sections are summed up fibre by fibre."""
-        return True
-
-    @model_validator(mode="after")
-    def _in_order(self) -> "Nitinol":
-        if problems := list(self._out_of_order()):
-            raise ProblemError(problems)
-        return self
-
-    def _out_of_order(self) -> Iterator[tuple[str, str]]:
+    def conflicts(self) -> Problems:
+        """Find a plateau that is too steep, ends before it begins, or lies below unloading."""
         if self.plateau_modulus >= self.elastic_modulus:
             yield (
                 "plateau_modulus",

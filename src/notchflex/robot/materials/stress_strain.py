@@ -1,17 +1,16 @@
 """A material as a table of stress over strain."""
 
-from collections.abc import Iterator
 from dataclasses import KW_ONLY
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from notchflex.robot.kinds import Material
 from notchflex.robot.part import (
     MOST_STRAIN,
     Float,
-    ProblemError,
+    Problems,
     part,
     quantity,
 )
@@ -71,11 +70,7 @@ class StressStrain(Material):
     ] = None
     _: KW_ONLY
     kind: Literal["stress-strain"] = "stress-strain"
-
-    @property
-    def by_fibres(self) -> bool:
-        """Its sections are summed up fibre by fibre."""
-        return True
+    by_fibres: ClassVar = True
 
     @property
     def elastic_modulus(self) -> float:
@@ -94,23 +89,17 @@ class StressStrain(Material):
         strain, stress = self.compression_strain, self.compression_stress
         return None if strain is None or stress is None else _without_zero(strain, stress)
 
-    @model_validator(mode="after")
-    def _curves_rise(self) -> "StressStrain":
-        problems = list(_problems(self.strain, self.stress, ""))
+    def conflicts(self) -> Problems:
+        """Find a curve that falls, and lists of unlike lengths."""
+        yield from _curve_problems(self.strain, self.stress, "")
         strain, stress = self.compression_strain, self.compression_stress
         if strain is not None and stress is not None:
-            problems += _problems(strain, stress, "compression_")
+            yield from _curve_problems(strain, stress, "compression_")
         elif strain is not None or stress is not None:
-            missing = "stress" if stress is None else "strain"
-            problems.append(
-                (
-                    f"compression_{missing}",
-                    "is missing; give strains and stresses in compression, or neither.",
-                )
+            yield (
+                f"compression_{'stress' if stress is None else 'strain'}",
+                "is missing; give strains and stresses in compression, or neither.",
             )
-        if problems:
-            raise ProblemError(problems)
-        return self
 
 
 def _without_zero(strain: tuple[float, ...], stress: tuple[float, ...]) -> Points:
@@ -118,9 +107,7 @@ def _without_zero(strain: tuple[float, ...], stress: tuple[float, ...]) -> Point
     return strain[first:], stress[first:]
 
 
-def _problems(
-    strain: tuple[float, ...], stress: tuple[float, ...], of: str
-) -> Iterator[tuple[str, str]]:
+def _curve_problems(strain: tuple[float, ...], stress: tuple[float, ...], of: str) -> Problems:
     if len(strain) != len(stress):
         yield (
             f"{of}stress",
@@ -128,17 +115,16 @@ def _problems(
             "each strain.",
         )
         return
-    for number, (at, value) in enumerate(zip(strain, stress, strict=True), start=1):
-        if (at == 0.0) != (value == 0.0):
+    points = [*zip(strain, stress, strict=True)]
+    for number, (low, high) in enumerate(points, start=1):
+        if (low == 0.0) != (high == 0.0):
             yield (
                 f"{of}stress",
-                f"is {value:g} MPa at the strain {at:g} (number {number}); it is 0 at the strain 0 "
+                f"is {high:g} MPa at the strain {low:g} (number {number}); it is 0 at the strain 0 "
                 "and nowhere else.",
             )
             return
-    for number, ((first, low), (second, high)) in enumerate(
-        pairwise(zip(strain, stress, strict=True)), start=2
-    ):
+    for number, ((first, low), (second, high)) in enumerate(pairwise(points), start=2):
         if second <= first:
             yield (
                 f"{of}strain",

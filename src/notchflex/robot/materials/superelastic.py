@@ -3,8 +3,6 @@
 from dataclasses import KW_ONLY
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import model_validator
-
 from notchflex.robot.kinds import (
     PACHECO,
     Material,
@@ -12,7 +10,7 @@ from notchflex.robot.kinds import (
 from notchflex.robot.part import (
     MOST_STRAIN,
     Float,
-    ProblemError,
+    Problems,
     part,
     quantity,
 )
@@ -69,16 +67,11 @@ class Superelastic(Material):
     kind: Literal["superelastic"] = "superelastic"
     papers: ClassVar = (PACHECO,)
 
-    @model_validator(mode="after")
-    def _branches_in_order(self) -> "Superelastic":
+    def conflicts(self) -> Problems:
+        """Find a third branch that begins before the second."""
         if self.plastic_strain <= self.transition_strain:
-            raise ProblemError(
-                [
-                    (
-                        "plastic_strain",
-                        f"is {self.plastic_strain}; it must be greater than the transition strain, "
-                        f"{self.transition_strain}.",
-                    )
-                ]
+            yield (
+                "plastic_strain",
+                f"is {self.plastic_strain}; it must be greater than the transition strain, "
+                f"{self.transition_strain}.",
             )
-        return self

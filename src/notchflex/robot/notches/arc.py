@@ -1,7 +1,6 @@
 """The notch of Pacheco 2021 and York 2015: a cut that leaves an arc of the wall."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import KW_ONLY
 from typing import Annotated, Literal
 
@@ -19,6 +18,7 @@ from notchflex.robot.kinds import (
 )
 from notchflex.robot.part import (
     Float,
+    Problems,
     part,
     quantity,
 )
@@ -126,7 +126,6 @@ class ArcNotch(Notch):
 
     def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
         """Return the window that leaves the arc."""
-        del before, after
         bottom = tube.outer_radius - self.section_depth(tube)
         window = slot(
             self.direction_deg,
@@ -137,7 +136,7 @@ class ArcNotch(Notch):
         )
         return CutLayout((window,), self.height + self.uncut_length)
 
-    def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
+    def problems(self, tube: Tube) -> Problems:
         """Find a cut that goes through the tube, and a precurvature beyond any closing angle."""
         if self.depth >= tube.outer_diameter:
             yield (
@@ -156,28 +155,19 @@ class ArcNotch(Notch):
                 "not meet the tube. Read it at the outer surface, or use another depth.",
             )
             return
-        if not self._open(tube):
-            closing = math.degrees(self.closing_angle(tube))
-            yield (
-                "precurvature_deg",
-                f"is {self.precurvature_deg} deg; a notch {self.height} mm high in this tube "
-                f"closes at {closing:.4g} deg; it must be less than that.",
-            )
-
-    def _open(self, tube: Tube) -> bool:
-        """Return whether the notch is open without loads."""
         free = math.radians(self.precurvature_deg)
         # The neutral axis lies between the tube axis and the spine: this bound decides for most
         # notches without computing a section.
-        if free < 0.5 * self.height / tube.outer_radius:
-            return True
-        return free < self.closing_angle(tube)
+        if free >= 0.5 * self.height / tube.outer_radius and free >= self.closing_angle(tube):
+            yield (
+                "precurvature_deg",
+                f"is {self.precurvature_deg} deg; a notch {self.height} mm high in this tube "
+                f"closes at {math.degrees(self.closing_angle(tube)):.4g} deg; it must be less than "
+                "that.",
+            )
 
     def closing_angle(self, tube: Tube) -> float:
-        """Return the angle at which the edges touch, from the straight notch [rad].
-
-        Pacheco 2021: h / (r_o + centroid).
-        """
+        """Return the angle at which the edges touch, h / (r_o + centroid) (Pacheco 2021) [rad]."""
         from notchflex.mechanics.cuts import SECTION_OF_CUT  # it loads JAX
 
         depth = self.section_depth(tube)

@@ -1,7 +1,5 @@
 """The notch of Liu 2022: two triangular cuts from opposite sides and the strip between them."""
 
-import math
-from collections.abc import Iterator
 from dataclasses import KW_ONLY
 from typing import Annotated, Literal
 
@@ -11,6 +9,7 @@ from notchflex.robot.cuts import (
     CutLayout,
     NotchCut,
     Opening,
+    cosine_of,
 )
 from notchflex.robot.kinds import (
     LIU,
@@ -20,6 +19,7 @@ from notchflex.robot.kinds import (
 )
 from notchflex.robot.part import (
     Float,
+    Problems,
     part,
     quantity,
 )
@@ -118,7 +118,7 @@ class StripNotch(Notch):
         walls = tube.outer_diameter - tube.inner_diameter
         return walls if self.wall_width is None else self.wall_width
 
-    def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
+    def problems(self, tube: Tube) -> Problems:
         """Find cuts that leave no strip, and a strip that is bent when nothing pulls."""
         if not tube.outer_radius < self.depth < tube.outer_diameter:
             yield (
@@ -153,7 +153,7 @@ class StripNotch(Notch):
                 "nothing pulls.",
             )
 
-    def tendon_problems(self, tendon: Tendon) -> Iterator[tuple[str, str]]:
+    def tendon_problems(self, tendon: Tendon) -> Problems:
         """Find a tendon on an arc of the wall, of which little is left, or beside the strip."""
         if tendon.path == "wall-arc":
             yield (
@@ -161,7 +161,7 @@ class StripNotch(Notch):
                 'is "wall-arc"; a tendon runs straight over a strip: give "straight", '
                 '"straight-dead" or "straight-follower".',
             )
-        cosine = math.cos(math.radians(tendon.direction_deg - self.direction_deg))
+        cosine = cosine_of(tendon.direction_deg - self.direction_deg)
         if abs(cosine) <= LEAST_COSINE:
             yield (
                 "direction_deg",
@@ -176,7 +176,6 @@ class StripNotch(Notch):
         Consecutive notches adjoin at the strip's far face, so that a pair takes height + thickness
         of the tube.
         """
-        del following
         return self.strip_thickness - self.rise + self.uncut_length
 
     @property
@@ -189,7 +188,6 @@ class StripNotch(Notch):
 
     def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
         """Return the triangle below the strip and the one above it, from the opposite side."""
-        del before, after
         surface, bottom = tube.outer_radius, tube.outer_radius - self.depth
         low, high = self.height, self.height + self.strip_thickness
         below = ((0.0, surface), (low, bottom), (low, surface))
@@ -203,7 +201,6 @@ class StripNotch(Notch):
 
     def openings(self, before: Notch | None, after: Notch | None) -> tuple[Opening, ...]:
         """Return the notch below the strip and, on the other side, the one above it."""
-        del before, after
         up, rise = self.height, self.rise
         lean = self.height / self.depth if self.has_elastic_ends else 0.0
         return (

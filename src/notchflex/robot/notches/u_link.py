@@ -1,7 +1,7 @@
 """The U-link of Gao 2017: the strip between two slots that are cut from opposite sides."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import KW_ONLY
 from typing import Annotated, Any, Literal
 
@@ -10,6 +10,7 @@ from pydantic import Field
 from notchflex.robot.cuts import (
     CutLayout,
     Opening,
+    cosine_of,
     slot,
 )
 from notchflex.robot.kinds import (
@@ -20,6 +21,7 @@ from notchflex.robot.kinds import (
 )
 from notchflex.robot.part import (
     Float,
+    Problems,
     part,
     quantity,
     unchecked,
@@ -133,7 +135,7 @@ class ULink(Notch):
         """Width across the tube that the strip's centre line takes with its ends [mm]."""
         return self.strip_length + self.end_width + 2.0 * self.slot_radius
 
-    def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
+    def problems(self, tube: Tube) -> Problems:
         """Find a strip that is too long for the tube, and one bent when nothing pulls."""
         if self.span >= tube.outer_diameter:
             yield (
@@ -149,7 +151,7 @@ class ULink(Notch):
                 "straight when nothing pulls.",
             )
 
-    def row_problems(self, before: Notch) -> Iterator[tuple[str, str]]:
+    def row_problems(self, before: Notch) -> Problems:
         """Find a link that disagrees with the one before it about the slot between them."""
         if not isinstance(before, ULink):
             return
@@ -172,7 +174,7 @@ class ULink(Notch):
                 f'from the two sides in turn, so it must be "{OTHER[before.proximal_slot]}".',
             )
 
-    def tendon_problems(self, tendon: Tendon) -> Iterator[tuple[str, str]]:
+    def tendon_problems(self, tendon: Tendon) -> Problems:
         """Find a tendon on an arc of the wall, or one that would run through the strip."""
         if tendon.path == "wall-arc":
             yield (
@@ -180,7 +182,7 @@ class ULink(Notch):
                 'is "wall-arc"; a tendon runs straight over U-links: give "straight", '
                 '"straight-dead" or "straight-follower".',
             )
-        cosine = math.cos(math.radians(tendon.direction_deg - self.direction_deg))
+        cosine = cosine_of(tendon.direction_deg - self.direction_deg)
         reach = tendon.radius * abs(cosine)
         if reach <= 0.5 * self.strip_length:
             yield (
@@ -216,7 +218,6 @@ class ULink(Notch):
 
     def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
         """Return the slot before the strip and, of the last link of a row, the last slot."""
-        del before
         bottom = -0.5 * self.strip_length - self.slot_radius
         side = self.direction_deg + (180.0 if self.proximal_slot == "away" else 0.0)
         starts = [(side, 0.0)]
