@@ -155,7 +155,7 @@ def test_a_missed_stroke_is_an_imbalance_beside_any_tension() -> None:
     command = Command(np.array([0.05, 0.0]), np.array([True, True]), None)
     released = np.array([0.05 - 1e-6, -1e-6])
     for tension in (1.0, 1e8, 1e16):
-        base = BaseReaction(np.full(2, tension), released, np.zeros(2), external=None)
+        base = BaseReaction(np.full(2, tension), released, np.zeros(2))
         missed = command_residual(chain, command, base)
         np.testing.assert_allclose(missed, -1e-6, rtol=1e-9)
 

@@ -63,7 +63,7 @@ def by_the_oracle(path: nf.EquilibriumPath) -> tuple[np.ndarray, np.ndarray]:
 def held(path: nf.EquilibriumPath) -> np.ndarray:
     loads = make_commands(path.load, path.robot, path.chain)
     pieces = held_stiffness(path.prepared, loads, path.run.solved)
-    return np.concatenate([one.stiffness for one in pieces])
+    return np.concatenate([stiffness for stiffness, _ in pieces])
 
 
 @pytest.mark.nightly

@@ -41,7 +41,7 @@ from notchflex.solver.programs.static_structure import (
 )
 from notchflex.solver.quantities import unpad_quantity
 from notchflex.solver.residual import SolverState, slip_mask
-from notchflex.solver.sensitivity import SubstepHistory, attach_derivatives
+from notchflex.solver.sensitivity import attach_derivatives
 
 
 class StepLayouts(NamedTuple):
@@ -178,11 +178,11 @@ def step_function(
         state and the outputs.
     """
     solved, halfway = layouts.state.unpack(state), layouts.state.unpack(between)
-    history = SubstepHistory(halfway, how[0], how[1].astype(int), how[2] > 0.0)
+    history = halfway, how[0], how[1].astype(int), how[2] > 0.0
 
     def step(chain: Chain, load: Array, before: Array) -> tuple[Array, dict[str, Array]]:
         command, last = layouts.command.unpack(load), layouts.state.unpack(before)
-        result = attach_derivatives(chain, command, last, solved, history)
+        result = attach_derivatives(chain, command, last, solved, *history)
         return layouts.state.pack(result), report_quantities(chain, result, layouts.outputs)
 
     return step

@@ -151,13 +151,14 @@ def _from_json(file: str | FilePath) -> EquilibriumPath:
 def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
     """Whether the steps of a document are those of a path, but for steps that were not tried.
 
-    Version 0.1.0 wrote zeros for the shape of those, and no `reason_code`.
+    Version 0.1.0 wrote zeros for the shape of those. Reasons are worded anew.
     """
     expected = plain(path_document(path))["steps"]
     if not isinstance(steps, list) or len(steps) != len(expected):
         return False
     return all(
-        isinstance(other, dict) and one == {"reason_code": one["reason_code"], **other}
+        isinstance(other, dict)
+        and one == {**other, "reason": one["reason"], "reason_code": one["reason_code"]}
         for one, other, tried in zip(expected, steps, np.asarray(path.run.tried), strict=True)
         if tried
     )
@@ -184,7 +185,7 @@ IN_BASE = "_in_base"
 _STATE, _START = "state", "before."
 _RUN = ("residual", "iterations", "converged", "tried", "reached")
 _HELD = ("smallest_eigenvalue", "determinant_sign")
-_SNAPPED = "snapped"
+_ADDED = ("snapped", "overdrawn")
 
 
 @dataclass(frozen=True)
@@ -321,7 +322,8 @@ def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
         yield ("solver_converged" if name == "converged" else name), np.asarray(getattr(run, name))
     yield _HELD[0], path.smallest_eigenvalue
     yield _HELD[1], path.determinant_sign
-    yield _SNAPPED, run.snapped
+    for name in _ADDED:
+        yield name, getattr(run, name)
     for name in BEFORE:
         yield _START + name, run.before(name)
     if not isinstance(run.solved.memory.material, tuple):
@@ -386,19 +388,23 @@ def _recorded(
     }
     for name, values in reported.items():
         _of_shape(values, (steps, *values.shape[1:]), name)
+    # Older files have neither, nor do those of robots that cannot snap need the first.
+    missing = dict(zip(_ADDED, (np.zeros(notches), np.zeros(steps, int)), strict=True))
     run = {
         name: _of_shape(arrays["solver_converged" if name == "converged" else name], (steps,), name)
         for name in _RUN
     }
-    # Older files do not have it, nor do those of robots that cannot snap need it.
-    snapped = _of_shape(arrays.get(_SNAPPED, np.zeros(notches)), notches, _SNAPPED)
+    added = {
+        name: _of_shape(arrays.get(name, values), values.shape, name)
+        for name, values in missing.items()
+    }
     return Recorded(
         solved=tree_util.tree_unflatten(structure, state),
         reported=reported,
         first=_before_the_first(arrays, ready, reported[FLATTENING].shape[1:]),
         held=(arrays[_HELD[0]], arrays[_HELD[1]]),
-        snapped=snapped,
         **run,
+        **added,
     )
 
 

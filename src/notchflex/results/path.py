@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -14,10 +13,7 @@ from jaxtyping import Bool, Float, Int
 from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
-from notchflex._jax import (
-    constant,
-    jax,
-)
+from notchflex._jax import jax
 from notchflex._summary import Displayed, Summary
 from notchflex._values import ByValue, frozen, read_only
 from notchflex.errors import ConvergenceError, Failure, InputError
@@ -42,7 +38,7 @@ from notchflex.solver.newton import (
     Settings,
 )
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.run import SolverRun, run
+from notchflex.solver.programs.run import SolverRun
 from notchflex.solver.quantities import (
     Shape,
     reported,
@@ -86,6 +82,7 @@ class Recorded:
         converged: Whether the load was reached.
         tried: Whether it was tried at all.
         reached: Part of the way from the load before that was reached.
+        overdrawn: Sum of 2**k over the tendons k, from 0, whose strokes no shape allows.
         snapped: Notches that snapped shut (1) or open (-1).
     """
 
@@ -98,6 +95,7 @@ class Recorded:
     converged: Bool[np.ndarray, " s"]
     tried: Bool[np.ndarray, " s"]
     reached: Float[np.ndarray, " s"]
+    overdrawn: Int[np.ndarray, " s"]
     snapped: Float[np.ndarray, "s n"]
 
     def quantity(self, name: str) -> np.ndarray:
@@ -246,10 +244,6 @@ _CLOSED_TOLERANCE = 1e-3
 _EDGES_MEET = 5e-2
 # Tension of a slack tendon, relative to what friction takes: rounding.
 _SLACK = 1e-6
-# Axial stiffnesses, in closing forces of a notch, in ratios of ten. Where only stretch allows a
-# stroke, the second step changes the tension about ten times as much as the first; where the shape
-# determines the tension, a tenth as much.
-_STIFFNESSES, _GROWS = (1e2, 1e3, 1e4), 3.0
 
 
 def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
@@ -273,7 +267,8 @@ def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
         return _said(Failure.NOTCHES_CLOSED, last)
     if (slack := _slack_by_loss(path, step)) is not None:
         return _said(Failure.LOSS_LEAVES_SLACK, last, tendon=slack[0] + 1, loss=slack[1])
-    tendons = [str(tendon + 1) for tendon in _drawn_by_stretch_alone(path, step)]
+    overdrawn = int(path.run.overdrawn[step])
+    tendons = [str(tendon + 1) for tendon in range(path.chain.tendons) if overdrawn >> tendon & 1]
     if len(tendons) == 1:
         return _said(Failure.STROKE_OUT_OF_REACH, last, tendon=tendons[0])
     if tendons:
@@ -338,31 +333,6 @@ def _in_space(chain: Chain, points: ArrayLike) -> Float[np.ndarray, "n t 3"]:
     if chain.frame is None:
         return points
     return np.insert(points, 1, 0.0, axis=-1) @ np.asarray(chain.frame).T
-
-
-def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray, " some"]:
-    """Return the inextensible tendons, from 0, whose stroke no shape of the robot allows.
-
-    Solved again with extensible tendons, their tension grows with their stiffness.
-    """
-    chain = path.chain
-    inextensible = np.isinf(np.asarray(chain.axial_stiffness))
-    asked = inextensible & np.isfinite(path.load.stroke[step])
-    tensions: list[np.ndarray] = []
-    for forces in _STIFFNESSES if asked.any() else ():
-        stiffness = np.where(inextensible, forces * chain.closing_force, chain.axial_stiffness)
-        softer = PreparedChain(dataclasses.replace(chain, axial_stiffness=constant(stiffness)))
-        command = jax.tree.map(lambda leaf: np.asarray(leaf)[step : step + 1], path.commands)
-        start = jax.tree.map(lambda leaf: np.asarray(leaf)[step], path.run.solved)
-        came = run(softer, command, start, path.settings, each_from_start=True)
-        if not came.converged[0]:
-            return np.zeros(0, int)
-        tensions.append(came.quantity("tension")[0])
-    if not tensions:
-        return np.zeros(0, int)
-    threshold = 1e-3 * float(chain.closing_force)
-    first, second = np.diff(tensions, axis=0)
-    return np.flatnonzero(asked & (second > np.maximum(_GROWS * first, threshold)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

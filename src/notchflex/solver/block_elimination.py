@@ -10,13 +10,11 @@ All elements eliminate their own unknowns at once, which leaves
     dnext = y + Y1 dcarried + Y2 dbeyond,   dprevious = z + Z1 dcarried + Z2 dbeyond
 
 `_condense` eliminates dbeyond of one element after the other from the tip, until only the tensions
-at the base are unknown; `_back_substitute` then goes from the base to the tip. This is the
+at the base are unknown; substitution then goes from the base to the tip. This is the
 elimination of a block-tridiagonal matrix, in two loops: the program does not grow with the chain.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from jax.flatten_util import ravel_pytree
@@ -32,9 +30,9 @@ from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.contact import closing_angles
 from notchflex.mechanics.flexure import fibre_stretch, of_rod
 from notchflex.solver.linear_step import (
-    RowLayout,
+    UnitRows,
     linearise,
-    row_layout,
+    unit_rows,
 )
 from notchflex.solver.residual import (
     BaseReaction,
@@ -105,8 +103,7 @@ def command_slopes(
     """Differentiate `command_residual` by base tension, released length, tension times length."""
 
     def residual(tension: Array, released: Array, tension_length: Array) -> Array:
-        moved = BaseReaction(tension, released, tension_length, base.external)
-        return command_residual(chain, command, moved)
+        return command_residual(chain, command, BaseReaction(tension, released, tension_length))
 
     at = (base.base_tension, base.released_length, base.tension_length)
     return jax.jacfwd(residual, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, at))
@@ -133,18 +130,6 @@ def tension_is_bounded(chain: Chain, command: Command, point: Iterate) -> Bool[A
 _PIVOT_SHIFT, _ZERO_SLOPE = 1e-9, 1e-7
 
 
-class _Condensed(NamedTuple):
-    """Blocks of every element after condensation, as rows over (1, carried to it).
-
-    Attributes:
-        to_next: What it carries to the next element.
-        returned: What it receives from the next element.
-    """
-
-    to_next: Float[Array, "n c 1+c"]
-    returned: Float[Array, "n b 1+c"]
-
-
 def linear_step(
     chain: Chain,
     command: Command,
@@ -167,12 +152,12 @@ def linear_step(
     Returns:
         The step.
     """
-    form = row_layout(chain, by_stroke=command.by_stroke is not None)
+    unit = unit_rows(chain, by_stroke=command.by_stroke is not None)
     unknowns = point.unknowns
     state = (chain, unknowns, memory, command.applied, at)
-    rows = linearise(*jax.tree.map(jax.lax.stop_gradient, state), form=form)
+    rows = linearise(*jax.tree.map(jax.lax.stop_gradient, state), unit=unit)
     residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.residual)
-    size = form.unknowns
+    size = unit.unknowns
     # Own unknowns as functions of 1, carried and beyond: du = response @ (1, c, b).
     right = jnp.concatenate([residual[..., None], rows.residual[..., size:]], axis=-1)
     response = -gauss_jordan(rows.residual[..., :size], right)
@@ -181,72 +166,58 @@ def linear_step(
         rest = jnp.pad(row[..., size:], ((0, 0), (0, 0), (1, 0)))
         return rest + row[..., :size] @ response
 
-    at_base = _tensions_carried(chain, form)
-    condensed, back = _condense(insert(rows.to_next), insert(rows.to_previous), form)
+    # What is carried to the first flexure per unit of base tension: the tension itself.
+    order, at_base = chain.tendon_order, np.zeros((unit.carried, chain.tendons))
+    at_base[unit.carried - len(order) + np.arange(len(order)), order] = 1.0
+    condensed, back = _condense(insert(rows.to_next), insert(rows.to_previous), unit)
     tension_step = command.target - point.base_tension
     if command.by_stroke is not None:
+        slopes, count = command_slopes(chain, command, at.base), len(order)
         by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ at_base], axis=1)
-        tension_step = _tension_step(chain, command, at.base, by_tension)
-    surroundings = _back_substitute(condensed, jnp.asarray(at_base) @ tension_step)
+        lengths = by_tension[len(back) - 2 * count :].reshape(2, count, -1)
+        # Rows in the order of the robot's tendons.
+        released, stretched = jnp.stack([lengths[:, row] for row in np.argsort(order)], axis=1)
+        by_base = slopes[1] @ released + slopes[2] @ stretched
+        matrix = slopes[0] + by_base[:, 1:]
+        # Where every contact sticks, the stroke does not depend on the tension; a small pivot keeps
+        # the step finite.
+        undetermined = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _ZERO_SLOPE)
+        missing = command_residual(chain, command, at.base) + by_base[:, 0]
+        pivots = _PIVOT_SHIFT * jnp.diag(undetermined.astype(float))
+        tension_step = -gauss_jordan(matrix + pivots, missing[:, None])[:, 0]
+
+    def follow(carried: Array, blocks: tuple[Array, Array]) -> tuple[Array, Array]:
+        to_next, returned = blocks
+        own = jnp.concatenate([jnp.ones(1), carried])
+        return to_next @ own, jnp.concatenate([own, returned @ own])
+
+    # (1, carried, from beyond) of every element, from the base to the tip.
+    surroundings = jax.lax.scan(follow, jnp.asarray(at_base) @ tension_step, condensed)[1]
     steps = jnp.einsum("nuz,nz->nu", response, surroundings)
     _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
     return Iterate(jax.vmap(unknowns_of)(steps), tension_step)
 
 
-def _tension_step(
-    chain: Chain,
-    command: Command,
-    base: BaseReaction,
-    back: Float[Array, "b 1+t"],
-) -> Float[Array, " t"]:
-    """Solve for the step of the base tensions to the commanded strokes."""
-    assert command.by_stroke is not None
-    slopes = command_slopes(chain, command, base)
-    order = chain.tendon_order
-    back = back[len(back) - 2 * len(order) :].reshape(2, len(order), -1)
-    # Rows in the order of the robot's tendons.
-    released_length, tension_length = jnp.stack([back[:, row] for row in np.argsort(order)], axis=1)
-    by_base = slopes[1] @ released_length + slopes[2] @ tension_length
-    matrix = slopes[0] + by_base[:, 1:]
-    # Where every contact sticks, the stroke does not depend on the tension; a small pivot keeps the
-    # step finite.
-    undetermined = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _ZERO_SLOPE)
-    missing = command_residual(chain, command, base) + by_base[:, 0]
-    return -gauss_jordan(
-        matrix + _PIVOT_SHIFT * jnp.diag(undetermined.astype(float)), missing[:, None]
-    )[:, 0]
-
-
-def _tensions_carried(chain: Chain, form: RowLayout) -> Float[np.ndarray, "c t"]:
-    """Return what is carried to the first flexure per unit of base tension: the tension itself."""
-    order, carried = chain.tendon_order, form.carried
-    at_base = np.zeros((carried, chain.tendons))
-    at_base[carried - len(order) + np.arange(len(order)), order] = 1.0
-    return at_base
-
-
 def _condense(
-    to_next: Float[Array, "n c z"], to_previous: Float[Array, "n b z"], form: RowLayout
-) -> tuple[_Condensed, Float[Array, "b 1+c"]]:
+    to_next: Float[Array, "n c z"], to_previous: Float[Array, "n b z"], unit: UnitRows
+) -> tuple[tuple[Float[Array, "n c 1+c"], Float[Array, "n b 1+c"]], Float[Array, "b 1+c"]]:
     """Eliminate the couplings between neighbours, from the tip.
 
-    Both arguments are rows over (1, carried, from beyond). Returns the condensed blocks, and the
-    rows that the first element passes to the base.
+    Both arguments are rows over (1, carried, from beyond). Returns rows over (1, carried) of what
+    every element carries to the next and receives from it, and of what the first hands to the base.
     """
-    size = 1 + form.carried
-    one = constant(np.eye(form.carried))
+    size = 1 + unit.carried
+    one = constant(np.eye(unit.carried))
 
-    def join(back: Array, item: tuple[Array, Array]) -> tuple[Array, _Condensed]:
+    def join(back: Array, item: tuple[Array, Array]) -> tuple[Array, tuple[Array, Array]]:
         to_next, to_previous = item
         by_back = to_next[:, size:]
         right = _add_constant(to_next[:, :size], by_back @ back[:, 0])
         carried_on = gauss_jordan(one - by_back @ back[:, 1:], right)
         returned = _add_constant(back[:, 1:] @ carried_on, back[:, 0])
-        return to_previous[:, :size] + to_previous[:, size:] @ returned, _Condensed(
-            carried_on, returned
-        )
+        return to_previous[:, :size] + to_previous[:, size:] @ returned, (carried_on, returned)
 
-    at_tip = jnp.zeros((form.beyond, size))
+    at_tip = jnp.zeros((unit.beyond, size))
     back, condensed = jax.lax.scan(join, at_tip, (to_next, to_previous), reverse=True)
     return condensed, back
 
@@ -254,16 +225,6 @@ def _condense(
 def _add_constant(rows: Float[Array, "k z"], by: Float[Array, " k"]) -> Float[Array, "k z"]:
     """Add constants to the first column of rows, that of 1."""
     return jnp.concatenate([rows[:, :1] + by[:, None], rows[:, 1:]], axis=1)
-
-
-def _back_substitute(condensed: _Condensed, carried: Float[Array, " c"]) -> Float[Array, "n z"]:
-    """Return (1, carried, from beyond) of every element, from what is carried to the first."""
-
-    def follow(carried: Array, blocks: _Condensed) -> tuple[Array, Array]:
-        own = jnp.concatenate([jnp.ones(1), carried])
-        return blocks.to_next @ own, jnp.concatenate([own, blocks.returned @ own])
-
-    return jax.lax.scan(follow, carried, condensed)[1]
 
 
 def gauss_jordan(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from enum import IntEnum
 from functools import partial
 from typing import NamedTuple
 
@@ -41,6 +42,8 @@ class LoadStepResult(NamedTuple):
         substeps: Number of substeps that converged.
         between: The state before the last substep, the origin of its friction history.
         fraction_before: Fraction of the load step at that state.
+        overdrawn: Inextensible tendons whose strokes no shape allows: in the last attempt their
+            tensions grew and the shape did not change.
     """
 
     solved: SolverState
@@ -51,57 +54,130 @@ class LoadStepResult(NamedTuple):
     substeps: Int[Array, ""]
     between: SolverState
     fraction_before: Float[Array, ""]
+    overdrawn: Bool[Array, " t"]
 
 
-# States before the last substep only provide the history: they may exceed the tolerance up to this
-# multiple of it, and up to this residual.
-_SUBSTEP_TOLERANCE, _SUBSTEP_RESIDUAL = 1e3, 1e-10
-# Fraction of a load step at which the external loads are complete, where they come first.
-_EXTERNAL_COMPLETE = 0.5
-# A notch that softens as it closes has limit points, where it snaps to another shape under constant
-# tension; fibres on a flat plateau lose nearly all stiffness. Substeps that fail below this
-# fraction of the load step are solved with an artificial viscosity, within these fractions of the
-# stiffness at rest, until the notches stand still.
-_SNAP_MAX_FRACTION, _VISCOSITY, _MIN_VISCOSITY, _MAX_VISCOSITY = 0.3, 0.1, 1e-4, 30.0
-# A contact at its bound starts slightly beyond it, so that it goes on sliding.
-_BEYOND_BOUND = 1.0 + 1e-12
-# Factor on the allowed iterations of a load with snaps.
-_SNAP_FACTOR = 4
-# Where Newton's method fails, sticking contacts are regularised: they get a compliance (slip in
-# heights of the notch per change of the log ratio) that is reduced from substep to substep, each
-# from the last shape, to zero. Many contacts on stiff tendons stick or slide in combinations that
-# are not found one contact at a time. The reduction adapts: a factor that fails is replaced by its
-# root, up to the largest. What is not found in a few iterations would be found by luck of rounding.
-_STICK_COMPLIANCE, _STICK_FACTOR, _MAX_STICK_FACTOR, _MIN_STICK = 1e-1, 1e-1, 0.8, 1e-8
-# Relaxed shapes only need this residual, within these iterations.
-_RELAXED_RESIDUAL, _RELAXED_ITERATIONS = 1e-8, 10
+class _Mode(IntEnum):
+    """How a substep is tried: by the equations as they are, or along regularised ones to them.
+
+    RELAXED: sticking contacts have a compliance. Many contacts on stiff tendons stick or slide in
+    combinations that are not found one contact at a time (benchmarks/hard_loads.py).
+    SNAPPING: the notches have a viscosity. A notch that softens as it closes has limit points,
+    where it snaps to another shape under constant tension; fibres on a flat plateau lose nearly all
+    stiffness (tests/solver/test_snapping.py).
+    """
+
+    PLAIN = 0
+    RELAXED = 1
+    SNAPPING = 2
 
 
-class _LoadStepSearch(NamedTuple):
+class _Attempt(NamedTuple):
+    """What is tried next.
+
+    Attributes:
+        fraction: Length of the substep, as a fraction of the load step.
+        predicts: Whether contacts are predicted, where strokes are commanded.
+        mode: Its mode.
+        regularisation: Compliance of sticking contacts, slip in heights of the notch per change of
+            the log ratio, or viscosity, a fraction of the stiffness at rest; 0 for neither.
+        factor: Compliance over that of the relaxed shape before; 0 for the first.
+    """
+
+    fraction: Float[Array, ""]
+    predicts: Bool[Array, ""]
+    mode: Int[Array, ""] | int = _Mode.PLAIN
+    regularisation: Float[Array, ""] | float = 0.0
+    factor: Float[Array, ""] | float = 0.0
+
+    def after_plain(self, converged: Array, can_relax: bool, can_snap: bool) -> _Attempt:
+        """Return what is tried after the equations as they are."""
+        relaxed = self._replace(mode=_Mode.RELAXED, regularisation=_COMPLIANCE, factor=0.0)
+        return choose(converged, self._longer(), relaxed if can_relax else self._shorter(can_snap))
+
+    def after_relaxed(self, converged: Array, can_snap: bool) -> _Attempt:
+        """Return what is tried after a relaxed shape, or after the equations from the last one.
+
+        A compliance that fails is approached by the root of the factor, for tendons that are all
+        but slack (tests/solver/test_slight_tensions.py).
+        """
+        compliance, root = self.regularisation, jnp.sqrt(self.factor)
+        factor = jnp.maximum(self.factor**2, _FACTOR)
+        smaller = jnp.where(compliance < _MIN_COMPLIANCE, 0.0, factor * compliance)
+        larger = self._replace(regularisation=compliance / root, factor=root)
+        retries = (compliance > 0.0) & (root > 0.0) & (root < _MAX_FACTOR)
+        relaxed = self._replace(regularisation=smaller, factor=factor)
+        return choose(
+            converged,
+            choose(compliance > 0.0, relaxed, self._longer()),
+            choose(retries, larger, self._shorter(can_snap)),
+        )
+
+    def after_snapping(self, converged: Array) -> _Attempt:
+        """Return what is tried after a viscous shape, or after the equations from the last one.
+
+        Under the same load the viscosity falls to zero while shapes are found, and rises when one
+        is not, up to the largest (tests/test_errors.py: the edges of a tendon's channel meet).
+        """
+        viscosity = self.regularisation
+        smaller = jnp.where(viscosity < _MIN_VISCOSITY, 0.0, 0.4 * viscosity)
+        larger = jnp.where(viscosity > 0.0, 3.0 * viscosity, _VISCOSITY)
+        viscous = self._replace(regularisation=jnp.where(converged, smaller, larger))
+        gives_up = ~converged & (viscosity >= _MAX_VISCOSITY)
+        attempt = choose(gives_up, _Attempt(self.fraction, jnp.array(True)), viscous)
+        return choose(converged & (viscosity == 0.0), self._longer(), attempt)
+
+    def _longer(self) -> _Attempt:
+        return _Attempt(2.0 * self.fraction, self.predicts)
+
+    def _shorter(self, can_snap: bool) -> _Attempt:
+        """Return half of it; of a robot that may snap with a viscosity, or the contacts otherwise.
+
+        A softening notch contradicts the predictor: the tension falls as the stroke rises
+        (`test_a_stroke_passes_the_limit_point`).
+        """
+        fraction = 0.5 * self.fraction
+        if not can_snap:
+            return _Attempt(fraction, self.predicts)
+        viscous = _Attempt(fraction, jnp.array(False), _Mode.SNAPPING, _VISCOSITY)
+        return choose(fraction < _SNAP_MAX_FRACTION, viscous, _Attempt(fraction, ~self.predicts))
+
+
+class _Substeps(NamedTuple):
     """State of the loop over substeps.
 
     Attributes:
         result: The result so far.
-        fraction: Length of the next substep, as a fraction of the load step.
         attempts: Number of substeps tried.
-        viscosity: Artificial viscosity of the next substep; 0 outside a snap.
-        stick_compliance: Regularisation of its sticking contacts; 0 for none.
-        stick_factor: Factor on the regularisation from one relaxed shape to the next.
-        from_compliance: Regularisation of the shape that it starts from; 0 for none.
-        start_iterate: Its start, to which the viscosity refers: the last solved state, or an
-            unconverged shape between it and the next.
-        predicts: Whether its contacts are predicted, where strokes are commanded.
+        attempt: The next.
+        start: Where it starts, to which a viscosity refers: the last solved state, or a
+            regularised shape between it and the next.
     """
 
     result: LoadStepResult
-    fraction: Float[Array, ""]
     attempts: Int[Array, ""]
-    viscosity: Float[Array, ""]
-    stick_compliance: Float[Array, ""]
-    stick_factor: Float[Array, ""]
-    from_compliance: Float[Array, ""]
-    start_iterate: Iterate
-    predicts: Bool[Array, ""]
+    attempt: _Attempt
+    start: Iterate
+
+
+# Scaled residuals that states before the end of a load step need, as they only provide the history,
+# and relaxed shapes, from which the next one starts.
+_SUBSTEP_RESIDUAL, _RELAXED_RESIDUAL = 1e-10, 1e-8
+# Iterations of a relaxed shape: what is not found in a few would be found by luck of rounding.
+_RELAXED_ITERATIONS = 10
+# First and smallest compliance, and the factors from one relaxed shape to the next.
+_COMPLIANCE, _MIN_COMPLIANCE, _FACTOR, _MAX_FACTOR = 1e-1, 1e-8, 1e-1, 0.8
+# Shorter substeps may be solved with a viscosity: the first, the smallest and the largest.
+_SNAP_MAX_FRACTION, _VISCOSITY, _MIN_VISCOSITY, _MAX_VISCOSITY = 0.3, 0.1, 1e-4, 30.0
+# Factor on the allowed iterations of a load with snaps, of which one took 625 in 71 paths of wrists
+# as in tests/solver/test_snapping.py.
+_SNAP_FACTOR = 4
+# A contact at its bound starts slightly beyond it, so that it goes on sliding.
+_BEYOND_BOUND = 1.0 + 1e-12
+# Least tension, in closing forces of a notch, and largest imbalance, in rad over it, where a tendon
+# is drawn further than the robot bends. Strokes beyond closing, and those that contradict each
+# other, end above 9e4 and below 1e-6; Gao's robot at 7.5 mm, without equilibrium, at 4e4 and 1e-4.
+_OVERDRAWN, _BALANCED = 1e3, 1e-5
 
 
 def solve_load_step(
@@ -126,182 +202,103 @@ def solve_load_step(
     Returns:
         The result.
     """
-    external_first = _external_first(chain, last)
     section = chain.rods.section
     can_snap = section.ends is not None or section.fibres is not None
     # With a single tendon, contacts are never the reason for a failure.
-    may_relax = chain.tendons > 1
+    can_relax = chain.tendons > 1
     max_iterations = settings.max_all_iterations * (_SNAP_FACTOR if can_snap else 1)
 
-    def proceed(search: _LoadStepSearch) -> Bool[Array, ""]:
-        result, fraction = search.result, search.fraction
-        more = search.attempts < settings.max_load_steps
-        more = more & (fraction >= settings.smallest_load_step)
+    def goes_on(state: _Substeps) -> Bool[Array, ""]:
+        result = state.result
+        more = state.attempts < settings.max_load_steps
+        more = more & (state.attempt.fraction >= settings.smallest_load_step)
         return ~result.converged & more & (result.iterations < max_iterations)
 
-    def substep(search: _LoadStepSearch) -> _LoadStepSearch:
-        reached = search.result.reached
-        first = external_first & (reached < _EXTERNAL_COMPLETE)
-        stop = jnp.where(first, _EXTERNAL_COMPLETE, 1.0)
-        end = jnp.minimum(reached + search.fraction, stop)
+    def proceed(state: _Substeps) -> _Substeps:
+        attempt, reached = state.attempt, state.result.reached
+        complete = _external_complete(chain, last)
+        stop = jnp.where(reached < complete, complete, 1.0)
+        end = jnp.minimum(reached + attempt.fraction, stop)
         target = interpolate_command(chain, command, last, end)
-        new = _solve_substep(chain, target, search, settings, end, can_snap)
-        result = _result_after(search, new, target, end)
-        return _search_after(search, new, result, can_snap, may_relax)
+        new = _solve_substep(chain, target, state, settings, end, can_snap)
+        result = _result_after(chain, state, new, target, end)
+        after = attempt.after_plain(new.converged, can_relax, can_snap)
+        if can_relax:
+            relaxed = attempt.after_relaxed(new.converged, can_snap)
+            after = choose(attempt.mode == _Mode.RELAXED, relaxed, after)
+        if can_snap:
+            snapping = attempt.after_snapping(new.converged)
+            after = choose(attempt.mode == _Mode.SNAPPING, snapping, after)
+        start = choose(new.converged, new.point, state.start)
+        start = choose(after.mode == attempt.mode, start, result.solved.point)
+        return _Substeps(result, state.attempts + 1, after, start)
 
-    return jax.lax.while_loop(proceed, substep, _begin(last)).result
-
-
-def _begin(last: SolverState) -> _LoadStepSearch:
-    """Return the state of the loop before the first substep, which is the whole load step."""
-    start = LoadStepResult(
-        solved=last,
-        residual=jnp.array(jnp.inf),
-        iterations=jnp.zeros((), int),
-        converged=jnp.array(False),
-        reached=jnp.zeros(()),
-        substeps=jnp.zeros((), int),
-        between=last,
-        fraction_before=jnp.zeros(()),
-    )
-    none = jnp.zeros(())
-    return _LoadStepSearch(
-        result=start,
-        fraction=jnp.ones(()),
-        attempts=jnp.zeros((), int),
-        viscosity=none,
-        stick_compliance=none,
-        stick_factor=none,
-        from_compliance=none,
-        start_iterate=last.point,
-        predicts=jnp.array(True),
-    )
+    zero, none = jnp.zeros(()), jnp.zeros((), int)
+    no, infinite, slack = jnp.array(False), jnp.array(jnp.inf), jnp.zeros(chain.tendons, bool)
+    begun = LoadStepResult(last, infinite, none, no, zero, none, last, zero, slack)
+    whole = _Attempt(jnp.ones(()), ~no, none, zero, zero)
+    return jax.lax.while_loop(goes_on, proceed, _Substeps(begun, none, whole, last.point)).result
 
 
 def _result_after(
-    search: _LoadStepSearch,
-    new: NewtonResult,
-    target: Command,
-    end: Float[Array, ""],
+    chain: Chain, state: _Substeps, new: NewtonResult, target: Command, end: Float[Array, ""]
 ) -> LoadStepResult:
     """Return the result after a substep; regularised states do not count."""
-    result = search.result
+    result = state.result
     memory = Memory(new.point.unknowns.log_ratio, new.slid, new.bound, new.material)
-    at_aim = SolverState(new.point, memory, new.stroke, target.applied)
-    solved = new.converged & (search.viscosity == 0.0) & ~(search.stick_compliance > 0.0)
-    return LoadStepResult(
-        solved=choose(solved, at_aim, result.solved),
+    overdrawn = result.overdrawn
+    if target.by_stroke is not None:
+        least = chain.closing_force * jnp.maximum(_OVERDRAWN, new.residual / _BALANCED)
+        pulled = (new.point.base_tension > least) & jnp.isinf(chain.axial_stiffness)
+        overdrawn = target.by_stroke & pulled
+    success = result._replace(
+        solved=SolverState(new.point, memory, new.stroke, target.applied),
+        converged=end >= 1.0,
+        reached=end,
+        substeps=result.substeps + 1,
+        between=result.solved,
+        fraction_before=result.reached,
+    )
+    solved = new.converged & (state.attempt.regularisation == 0.0)
+    return choose(solved, success, result)._replace(
         residual=new.residual,
         iterations=result.iterations + new.iterations,
-        converged=solved & (end >= 1.0),
-        reached=jnp.where(solved, end, result.reached),
-        substeps=result.substeps + solved,
-        between=choose(solved, result.solved, result.between),
-        fraction_before=jnp.where(solved, result.reached, result.fraction_before),
+        overdrawn=overdrawn,
     )
-
-
-def _search_after(
-    search: _LoadStepSearch,
-    new: NewtonResult,
-    result: LoadStepResult,
-    can_snap: bool,
-    may_relax: bool,
-) -> _LoadStepSearch:
-    """Return the settings of the next substep: its length, viscosity and regularisation."""
-    fraction, viscosity, before = search.fraction, search.viscosity, search.result.solved.point
-    inviscid, relaxed = viscosity == 0.0, search.stick_compliance > 0.0
-    relaxing = relaxed | (search.from_compliance > 0.0)
-    solved = new.converged & inviscid & ~relaxed
-    relaxes = relaxed & new.converged
-    from_unsolved_shape = jnp.any(search.start_iterate.unknowns.modes != before.unknowns.modes)
-    plain_fails = inviscid & ~relaxing & ~from_unsolved_shape & ~new.converged
-    starts_relaxing = plain_fails & may_relax
-    root = jnp.sqrt(search.stick_factor)
-    retries = relaxed & ~new.converged & (search.from_compliance > 0.0) & (root < _MAX_STICK_FACTOR)
-    factor = jnp.where(retries, root, jnp.maximum(search.stick_factor**2, _STICK_FACTOR))
-    from_compliance = jnp.where(relaxes, search.stick_compliance, search.from_compliance)
-    from_compliance = jnp.where(relaxes | retries, from_compliance, 0.0)
-    compliance = jnp.where(from_compliance < _MIN_STICK, 0.0, factor * from_compliance)
-    compliance = jnp.where(starts_relaxing, _STICK_COMPLIANCE, compliance)
-    abandons = relaxing & ~new.converged & ~retries
-    # A snap continues under the same load.
-    shorter = jnp.where((plain_fails & ~starts_relaxing) | abandons, 0.5 * fraction, fraction)
-    fraction = jnp.where(solved, 2.0 * fraction, shorter)
-    predicts = search.predicts
-    if can_snap:
-        keeps_viscosity = starts_relaxing | relaxes | retries
-        after = _next_viscosity(viscosity, new.converged, fraction)
-        viscosity = jnp.where(keeps_viscosity, viscosity, after)
-        abandons = abandons | (~inviscid & ~new.converged & (viscosity == 0.0))
-        # After a failure the substep is tried the other way, with or without predicted contacts.
-        next_predicts = (search.predicts == new.converged) & (viscosity == 0.0)
-        predicts = jnp.where(keeps_viscosity, predicts, next_predicts)
-    last_point = result.solved.point
-    start = choose(abandons, last_point, choose(new.converged, new.point, search.start_iterate))
-    attempts = search.attempts + 1
-    return _LoadStepSearch(
-        result,
-        fraction,
-        attempts,
-        viscosity,
-        compliance,
-        factor,
-        from_compliance,
-        start,
-        predicts,
-    )
-
-
-def _next_viscosity(
-    viscosity: Float[Array, ""], converged: Bool[Array, ""], fraction: Float[Array, ""]
-) -> Float[Array, ""]:
-    """Return the viscosity of the next substep, as a fraction of the stiffness at rest.
-
-    It starts after a short substep fails, falls to zero while substeps converge, and rises when one
-    fails.
-    """
-    smaller = jnp.where(viscosity < _MIN_VISCOSITY, 0.0, 0.4 * viscosity)
-    larger = jnp.where(viscosity < _MAX_VISCOSITY, 3.0 * viscosity, 0.0)
-    next_viscosity = jnp.where(converged, smaller, larger)
-    starts = ~converged & (fraction < _SNAP_MAX_FRACTION)
-    return jnp.where(viscosity > 0.0, next_viscosity, jnp.where(starts, _VISCOSITY, 0.0))
 
 
 def _solve_substep(
     chain: Chain,
     command: Command,
-    search: _LoadStepSearch,
+    state: _Substeps,
     settings: Settings,
-    end: Array,
+    end: Float[Array, ""],
     can_snap: bool,
 ) -> NewtonResult:
     """Solve for a command near the last solved state, from the predicted log ratios.
 
-    The history is that of the last solved state, not of unconverged shapes.
+    The history is that of the last solved state, not of regularised shapes.
     """
-    solved, iterate = search.result.solved, search.start_iterate
+    attempt, solved = state.attempt, state.result.solved
     memory, before = solved.memory, solved.point.base_tension
     base_tension = command.either(before, command.target)
     log_ratio = predict_log_ratios(chain, before, base_tension, memory)
-    start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), base_tension)
-    residual_target = jnp.minimum(_SUBSTEP_TOLERANCE * settings.tolerance, _SUBSTEP_RESIDUAL)
-    residual_target = jnp.where(end < 1.0, residual_target, 0.0)
-    relaxed = search.stick_compliance > 0.0
-    relaxed_target = jnp.maximum(residual_target, _RELAXED_RESIDUAL)
-    residual_target = jnp.where(relaxed, relaxed_target, residual_target)
-    predicts: Bool[Array, ""] | bool = True
+    predicts = attempt.predicts & (attempt.mode != _Mode.RELAXED)
     if command.by_stroke is not None:
         # Without prediction, contacts that slid before go on sliding.
-        predicts = search.predicts & ~(relaxed | (search.from_compliance > 0.0))
         sliding = jax.tree.map(lambda old: _BEYOND_BOUND * old, memory.log_ratio)
         log_ratio = choose(predicts, log_ratio, sliding)
-        start = start._replace(unknowns=start.unknowns._replace(log_ratio=log_ratio))
-    from_unsolved_shape = jnp.any(iterate.unknowns.modes != solved.point.unknowns.modes)
-    start = choose(from_unsolved_shape, iterate, start)
-    memory = memory._replace(stick_compliance=search.stick_compliance)
+    start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), base_tension)
+    regularised = jnp.any(state.start.unknowns.modes != solved.point.unknowns.modes)
+    start = choose(regularised, state.start, start)
+    compliance = jnp.where(attempt.mode == _Mode.RELAXED, attempt.regularisation, 0.0)
+    memory = memory._replace(stick_compliance=compliance)
     if can_snap:
-        memory = memory._replace(damping=(search.viscosity, iterate.unknowns.modes))
+        viscosity = attempt.regularisation - compliance
+        memory = memory._replace(damping=(viscosity, state.start.unknowns.modes))
+    relaxed = compliance > 0.0
+    residual_target = jnp.where(end < 1.0, _SUBSTEP_RESIDUAL, 0.0)
+    residual_target = jnp.where(relaxed, _RELAXED_RESIDUAL, residual_target)
     most = jnp.where(relaxed, _RELAXED_ITERATIONS, settings.max_iterations)
     settings = dataclasses.replace(settings, max_iterations=most)
     problem = NewtonProblem(chain, command, memory, solved.point, predicts)
@@ -312,21 +309,21 @@ def interpolate_command(
     chain: Chain, command: Command, last: SolverState, fraction: Float[Array, ""]
 ) -> Command:
     """Interpolate between a solved state and a command; exact at the end."""
-    external_first = _external_first(chain, last)
+    complete = _external_complete(chain, last)
     from_here = command.either(last.stroke, last.point.base_tension)
-    external = jnp.where(external_first, jnp.minimum(2.0 * fraction, 1.0), fraction)
-    tendons = jnp.where(external_first, jnp.maximum(2.0 * fraction - 1.0, 0.0), fraction)
-    only_external = external_first & (tendons == 0.0)
+    external = jnp.minimum(fraction / complete, 1.0)
+    tendons = jnp.maximum((fraction - (1.0 - complete)) / complete, 0.0)
+    only_external = (complete < 1.0) & (tendons == 0.0)
     by_stroke = None if command.by_stroke is None else command.by_stroke & ~only_external
     target = jnp.where(only_external, 0.0, _interpolate(from_here, command.target, tendons))
     applied = jax.tree.map(partial(_interpolate, fraction=external), last.applied, command.applied)
     return Command(target, by_stroke, applied)
 
 
-def _external_first(chain: Chain, last: SolverState) -> Bool[Array, ""]:
-    """Return whether external loads come before the tendons."""
+def _external_complete(chain: Chain, last: SolverState) -> Float[Array, ""]:
+    """Return the fraction of a load step at which external loads are complete: half if first."""
     slack = jnp.all(last.point.base_tension == 0.0)
-    return slack if chain.loaded else jnp.array(False)
+    return jnp.where(slack, 0.5, 1.0) if chain.loaded else jnp.ones(())
 
 
 def _interpolate(start: Float[Array, ...], end: Float[Array, ...], fraction: Array) -> Array:

@@ -14,7 +14,6 @@ computed.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -25,9 +24,9 @@ from notchflex.mechanics.chain import Chain
 from notchflex.solver.block_elimination import command_slopes
 from notchflex.solver.linear_step import (
     LinearisedRows,
-    RowLayout,
+    UnitRows,
     linearise,
-    row_layout,
+    unit_rows,
 )
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
@@ -58,22 +57,9 @@ _NEARLY_HELD, _DEPENDENT, _UNSTRESSED = 1e-3, 1e-6, 1e-9
 _BATCH = 16
 
 
-class HeldStiffness(NamedTuple):
-    """Stiffness of s states.
-
-    Attributes:
-        stiffness: Against the modes, N mm per unit of mode squared (N mm/rad for arc notches).
-        sign: Sign of the determinant of the whole system, with all that is eliminated; 0 where the
-            strokes of inextensible tendons depend on each other, so that many tensions answer them.
-    """
-
-    stiffness: Float[np.ndarray, "s modes modes"]
-    sign: Float[np.ndarray, " s"]
-
-
 def held_stiffness(
     prepared: PreparedChain, commands: Command, solved: SolverState
-) -> Iterator[HeldStiffness]:
+) -> Iterator[tuple[Float[np.ndarray, "s modes modes"], Float[np.ndarray, " s"]]]:
     """Compute the stiffness of the whole robot in every state, in batches.
 
     Args:
@@ -83,29 +69,41 @@ def held_stiffness(
         solved: The equilibria.
 
     Yields:
-        The stiffness of the next states; NaN where a state is not finite.
+        The stiffness of the next states against the modes, N mm per unit of mode squared (N mm/rad
+        for arc notches), and the sign of the determinant of the whole system, with all that is
+        eliminated; NaN where a state is not finite. The sign is 0 where the strokes of inextensible
+        tendons depend on each other, so that many tensions answer them.
     """
-    long = prepared.long
+    long, chain = prepared.long, prepared.chain
     loads, command_layout = prepared.padded_commands(commands)
     packed = np.asarray(prepared.state.pack(solved, leading=1))
     states = pad_rows(packed, prepared.state, long.state)
-    form = row_layout(prepared.chain, by_stroke=commands.by_stroke is not None)
+    form = unit_rows(chain, by_stroke=commands.by_stroke is not None)
+    modes = np.arange(chain.flexures)[:, None] * form.unknowns + np.arange(len(form.modes))
+    own = modes[np.asarray(chain.rods.padding_mask) == 0.0]  # without padding
     layouts = (long.static_structure, command_layout, long.state)
     for start in range(0, len(loads), _BATCH):
         some = slice(start, start + _BATCH)
         vectors = (np.zeros(1), long.dynamic_vector, loads[some], states[some])
         *rows, slopes = _rows.along((False, False, True, True), *vectors, *layouts)
-        rows = LinearisedRows(*(one[:, : prepared.chain.flexures] for one in rows))
+        rows = LinearisedRows(*(one[:, : chain.flexures] for one in rows))
         by_stroke = None if commands.by_stroke is None else np.asarray(commands.by_stroke)[some]
-        matrix, strokes = _assemble(prepared.chain, form, rows, slopes, by_stroke)
-        stiffness, sign = _condense_on_modes(prepared.chain, form, matrix)
+        matrix, strokes = _assemble(chain, form, rows, slopes, by_stroke)
+        others = np.setdiff1d(np.arange(matrix.shape[-1]), modes)
+        finite = np.isfinite(matrix).all(axis=(1, 2))
+        stiffness = np.full((len(matrix), len(own), len(own)), np.nan)
+        sign = np.full(len(matrix), np.nan)
+        good = matrix[finite]
+        response = np.linalg.solve(good[:, others[:, None], others], good[:, others[:, None], own])
+        stiffness[finite] = good[:, own[:, None], own] - good[:, own[:, None], others] @ response
+        sign[finite] = np.linalg.slogdet(good)[0]
         if by_stroke is not None:
             missing = np.asarray(solved.stroke)[some] - np.asarray(commands.target)[some]
-            determinate = _independent(prepared.chain, strokes, by_stroke, missing)
+            determinate = _independent(chain, strokes, by_stroke, missing)
             tension = np.asarray(solved.point[1])[some]
-            stressed = tension > _UNSTRESSED * float(prepared.chain.closing_force)
+            stressed = tension > _UNSTRESSED * float(chain.closing_force)
             sign = np.where(determinate | ~stressed.any(axis=-1), sign, 0.0)
-        yield HeldStiffness(stiffness, sign)
+        yield stiffness, sign
 
 
 @native(4, lane_sizes)
@@ -130,14 +128,14 @@ def _rows(
     )
     bound = tuple(span.bound for span in at.spans)
     memory = Memory(unknowns.log_ratio, slid, bound, solved.memory.material)
-    form = row_layout(chain, by_stroke=command.by_stroke is not None)
+    form = unit_rows(chain, by_stroke=command.by_stroke is not None)
     rows = linearise(chain, unknowns, memory, solved.applied, at, form)
     return carried, (*rows, jnp.stack(command_slopes(chain, command, at.base)))
 
 
 def _assemble(
     chain: Chain,
-    form: RowLayout,
+    form: UnitRows,
     rows: LinearisedRows,
     slopes: Float[np.ndarray, "s 3 t t"],
     by_stroke: np.ndarray | None,
@@ -147,14 +145,13 @@ def _assemble(
     And the derivatives of the strokes by the modes.
     """
     states, flexures, count = rows.residual.shape[:3]
-    order = np.array(chain.tendon_order, int)
+    order = np.array([] if by_stroke is None else chain.tendon_order, int)
     tensions = flexures * count + np.arange(len(order))
-    size = flexures * count + (0 if by_stroke is None else len(order))
+    size = flexures * count + len(order)
     unit = np.broadcast_to(np.eye(size), (states, size, size))
     # Rows of what is carried to each flexure, over all unknowns: only base tensions to the first.
     carried = [np.zeros((states, form.carried, size))]
-    if by_stroke is not None:
-        carried[0][:, form.carried - len(order) :] = unit[:, tensions[order]]
+    carried[0][:, form.carried - len(order) :] = unit[:, tensions[order]]
     own = [slice(number * count, (number + 1) * count) for number in range(flexures)]
     for number in range(flexures - 1):
         operands = np.concatenate([unit[:, own[number]], carried[-1]], axis=1)
@@ -165,17 +162,15 @@ def _assemble(
         matrix[:, own[number]] = np.asarray(rows.residual)[:, number] @ operands
         back = np.asarray(rows.to_previous)[:, number] @ operands
     first = np.arange(flexures)[:, None] * count
-    modes = first + np.arange(form.modes)
+    modes = first + np.arange(len(form.modes))
     matrix[:, modes] *= np.asarray(chain.stiffness)[..., None]
-    contacts = first + np.arange(form.modes, form.modes + sum(form.contact_pairs))
+    contacts = first + np.arange(len(form.modes), form.unknowns - 2 * len(chain.tendon_order))
     natural_gap = np.asarray(chain.rods.length).sum(-1)
     compliance = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.contact_stiffness) * natural_gap)
     matrix[:, contacts, contacts] += compliance[:, None]
-    lengths = np.zeros((2, states, 0, size))
+    by_tendon = back[:, form.beyond - 2 * len(order) :].reshape(states, 2, len(order), size)
+    lengths = np.moveaxis(by_tendon, 1, 0)[:, :, np.argsort(order)]
     if by_stroke is not None:
-        lengths = np.zeros((2, states, len(order), size))
-        by_tendon = back[:, form.beyond - 2 * len(order) :].reshape(states, 2, len(order), size)
-        lengths[:, :, order] = np.moveaxis(by_tendon, 1, 0)
         matrix[:, tensions] = slopes[:, 1] @ lengths[0] + slopes[:, 2] @ lengths[1]
         matrix[:, tensions[:, None], tensions] += slopes[:, 0]
         soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.stroke_stiffness))
@@ -203,31 +198,14 @@ def _independent(
     )
 
 
-def _condense_on_modes(
-    chain: Chain, form: RowLayout, matrix: Float[np.ndarray, "s m m"]
-) -> tuple[Float[np.ndarray, "s modes modes"], Float[np.ndarray, " s"]]:
-    """Condense the matrix to the robot's modes; also its determinant's sign."""
-    modes = np.arange(chain.flexures)[:, None] * form.unknowns + np.arange(form.modes)
-    others = np.setdiff1d(np.arange(matrix.shape[-1]), modes)
-    own = modes[np.asarray(chain.rods.padding_mask) == 0.0]  # without padding
-    finite = np.isfinite(matrix).all(axis=(1, 2))
-    stiffness = np.full((len(matrix), len(own), len(own)), np.nan)
-    sign = np.full(len(matrix), np.nan)
-    some = matrix[finite]
-    response = np.linalg.solve(some[:, others[:, None], others], some[:, others[:, None], own])
-    stiffness[finite] = some[:, own[:, None], own] - some[:, own[:, None], others] @ response
-    sign[finite] = np.linalg.slogdet(some)[0]
-    return stiffness, sign
-
-
 def stable(
     prepared: PreparedChain, commands: Command, solved: SolverState
 ) -> Bool[np.ndarray, " s"]:
     """Return whether every state is stable, with sticking contacts held."""
     verdicts = [
-        sign > 0.0 and bool(_positive_definite(one) or _smallest(one) > 0.0)
-        for held in held_stiffness(prepared, commands, solved)
-        for one, sign in zip(*held, strict=True)
+        sign > 0.0 and bool(_positive_definite(stiffness) or _smallest(stiffness) > 0.0)
+        for batch in held_stiffness(prepared, commands, solved)
+        for stiffness, sign in zip(*batch, strict=True)
     ]
     return np.array(verdicts, bool)
 
@@ -236,9 +214,9 @@ def stability(
     prepared: PreparedChain, commands: Command, solved: SolverState
 ) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
     """Return the smallest real part of the eigenvalues and the determinant's sign, by state."""
-    results = list(held_stiffness(prepared, commands, solved))
-    smallest = [_smallest(one) for held in results for one in held.stiffness]
-    return np.array(smallest), np.concatenate([held.sign for held in results])
+    batches = zip(*held_stiffness(prepared, commands, solved), strict=True)
+    stiffness, sign = map(np.concatenate, batches)
+    return np.array([_smallest(matrix) for matrix in stiffness]), sign
 
 
 def _positive_definite(stiffness: Float[np.ndarray, "m m"]) -> bool:

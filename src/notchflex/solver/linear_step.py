@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, NamedTuple, cast
+from functools import cached_property, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -32,6 +32,7 @@ from notchflex.solver.residual import (
     Unknowns,
     is_active,
     notch_heights,
+    of_group,
     select_anchors,
     select_back,
     slip_mask,
@@ -43,130 +44,94 @@ from notchflex.solver.residual import (
 
 
 class UnitRows(NamedTuple):
-    """Unit rows of all columns, in order.
+    """Unit rows of all columns: own unknowns, then carried from the base, then from the tip.
 
     Motions of bodies depend on few columns: their rows are short, over the modes and the motions of
     earlier bodies only, until `spread` inserts the others.
     """
 
-    modes: Array
-    contact_pairs: list[Array]
-    log_ratio: list[Array]
-    older: list[Array]
-    turn: Array
-    tension: list[Array]
-    transmitted: list[Array]
-    external: Array
-    released_length: list[Array]
-    tension_length: list[Array]
+    modes: Any
+    contact_pairs: Any
+    log_ratio: Any
+    older: Any
+    turn: Any
+    tension: Any
+    transmitted: Any
+    external: Any
+    released_length: Any
+    tension_length: Any
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns of a flexure."""
+        return _count(self[:3])
+
+    @property
+    def carried(self) -> int:
+        """Number of columns carried from the base: motions, turn, tensions last."""
+        return _count(self[3:6])
+
+    @property
+    def beyond(self) -> int:
+        """Number of columns that come from the tip: wrenches, loads, tendon lengths last."""
+        return _count(self[6:])
 
     @property
     def motions(self) -> list[Array]:
         """Short unit rows of the motions of bodies further back."""
-        modes, count = len(self.modes), sum(len(rows) for rows in self.older)
-        units = np.eye(modes + count)[modes:]
-        return [constant(rows) for rows in np.split(units, max(len(self.older), 1)) if len(rows)]
+        end = self.unknowns + _count(self.older)
+        return [rows[:, np.r_[: len(self.modes), self.unknowns : end]] for rows in self.older]
 
     def of_modes(self, rows: Array) -> Array:
         """Return the rows over the modes as short rows."""
-        return _pad(rows, sum(len(motion) for motion in self.older))
+        return _pad(rows, _count(self.older))
 
     def spread(self, rows: Array) -> Array:
         """Return short rows as rows over all columns."""
         modes, columns = self.modes.shape
-        between = sum(len(rows) for rows in (*self.contact_pairs, *self.log_ratio))
+        between = self.unknowns - modes
         beyond = columns - rows.shape[-1] - between
         return jnp.concatenate(
             [_pad(rows[..., :modes], between), _pad(rows[..., modes:], beyond)], axis=-1
         )
 
 
+def _count(rows: Any) -> int:
+    return sum(map(len, jax.tree.leaves(rows)))
+
+
 def _pad(rows: Array, columns: int) -> Array:
     return jnp.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, columns)])
 
 
-@dataclass(frozen=True)
-class RowLayout:
-    """Sizes of the parts of a row: own unknowns, then carried from the base, then from the tip.
+def unit_rows(chain: Chain, *, by_stroke: bool) -> UnitRows:
+    """Return the unit rows of a chain whose tendons are given by tension alone, or some by stroke.
 
     A tendon passes its released length and its tension times length from the tip. Slip over a
     contact depends only on a sum of the two, which suffices where no stroke is commanded.
+    Dead forces change with the rotation of the body in whose frame they are given; only their
+    moment comes from the tip.
     """
-
-    modes: int
-    contact_pairs: tuple[int, ...]
-    tendons: tuple[int, ...]
-    older: int
-    wrench: int
-    turn: int
-    follows: bool
-    by_stroke: bool
-
-    @property
-    def unknowns(self) -> int:
-        """Number of unknowns of a flexure."""
-        return self.modes + sum(self.contact_pairs) + 2 * sum(self.tendons)
-
-    @property
-    def carried(self) -> int:
-        """Number of columns carried from the base: motions, turn, tensions last."""
-        return self.older * self.wrench + self.turn + sum(self.tendons)
-
-    @property
-    def beyond(self) -> int:
-        """Number of columns that come from the tip: wrenches, loads, tendon lengths last."""
-        lengths = (1 + self.by_stroke) * sum(self.tendons)
-        return self.older * self.wrench + self.external + lengths
-
-    @property
-    def external(self) -> int:
-        """Number of columns of the external loads beyond.
-
-        Dead forces change with the rotation of the body in whose frame they are given; only their
-        moment comes from the tip.
-        """
-        return self.wrench if self.turn and self.follows else self.turn
-
-    def unit_rows(self) -> UnitRows:
-        """Return the unit rows of all columns, in order."""
-        wrenches = [self.wrench] * self.older
-        edges = [2 * count for count in self.tendons]
-        lengths = self.tendons if self.by_stroke else ()
-        own = [[self.modes], self.contact_pairs, edges]
-        carried = [wrenches, [self.turn], self.tendons]
-        groups = [*own, *carried, wrenches, [self.external], self.tendons, lengths]
-        ends = np.cumsum([size for group in groups for size in group])
-        rows = map(constant, np.split(np.eye(ends[-1]), ends[:-1]))
-        parts = [[next(rows) for _ in group] for group in groups]
-        single = {0, 4, 7}  # modes, turn and external loads
-        return UnitRows(*(part[0] if i in single else part for i, part in enumerate(parts)))  # pyright: ignore[reportArgumentType]
-
-
-def row_layout(chain: Chain, *, by_stroke: bool) -> RowLayout:
-    """Return the layout for a chain whose tendons are given by tension alone, or some by stroke."""
     wrench = chain.rods.basis.shape[-2] if chain.forces_on_bodies else 0
-    return RowLayout(
+    older = (wrench,) * (chain.window - 1 if wrench else 0)
+    turn = (3 if wrench == 6 else 1) if chain.loaded else 0
+    tendons = tuple(len(group.numbers) for group in chain.groups)
+    sizes = UnitRows(
         modes=chain.stiffness.shape[-1],
         contact_pairs=tuple(group.has_contact.shape[-1] for group in chain.contact_pairs),
-        tendons=tuple(len(group.numbers) for group in chain.groups),
-        older=chain.window - 1 if wrench else 0,
-        wrench=wrench,
-        turn=(3 if wrench == 6 else 1) if chain.loaded else 0,
-        follows=chain.follows,
-        by_stroke=by_stroke,
+        log_ratio=tuple(2 * count for count in tendons),
+        older=older,
+        turn=turn,
+        tension=tendons,
+        transmitted=older,
+        external=wrench if turn and chain.follows else turn,
+        released_length=tendons,
+        tension_length=tendons if by_stroke else (),
     )
-
-
-class RelativeMotionJacobian(NamedTuple):
-    """Motion of the bodies.
-
-    Attributes:
-        relative: Of the distal body relative to each of those before, in its own frame; short rows.
-        turn: Turn of the distal body against the base; None without external loads.
-    """
-
-    relative: list[Float[Array, "n w short"]]
-    turn: Float[Array, "n a z"] | None
+    leaves, structure = jax.tree.flatten(sizes)
+    ends = np.cumsum(leaves)
+    rows = np.split(np.eye(ends[-1]), ends[:-1])
+    return jax.tree.unflatten(structure, map(constant, rows))
 
 
 class TendonJacobian(NamedTuple):
@@ -196,276 +161,230 @@ class TendonJacobian(NamedTuple):
     tension_length: Float[Array, "n t z"] | None
 
 
-class ContactJacobian(NamedTuple):
-    """Rows of a kind of contacts.
-
-    Attributes:
-        gap: Of the gap; short rows.
-        wrench: Of the wrench on the distal body per force, short rows; None where it does not act
-            on bodies.
-    """
-
-    gap: Float[Array, "n l short"]
-    wrench: Float[Array, "n l w short"] | None
-
-
-def relative_motion_jacobian(
-    chain: Chain, at: Evaluation, unit: UnitRows
-) -> RelativeMotionJacobian:
-    """Linearise the motion of the bodies."""
-    pose, twist = at.flexure.pose, at.flexure.twist
-    if pose is None or twist is None:
-        return RelativeMotionJacobian([], None)
-    modes = unit.of_modes(twist)
-    inside = jax.vmap(Motion.twist_inside, (0, None))
-    relative = [modes, *(modes - inside(pose, older) for older in unit.motions)]
-    axes = len(unit.turn)
-    if not axes:
-        return RelativeMotionJacobian(relative, None)
-    before = jax.vmap(lambda rotation: turned(rotation.T, unit.turn))(pose.rotation)
-    return RelativeMotionJacobian(relative, unit.spread(modes[:, :axes]) + before)
-
-
-def _by_relative_motion(
-    chain: Chain, at: Evaluation, group: TendonGroup | ContactGroup, response: Callable[..., Any]
-) -> Any:
-    """Differentiate a crossing or contact by the motion relative to the anchor (last axis)."""
-    size = chain.rods.basis.shape[-2]
-    anchors = select_anchors(at.anchors, group.back)
-    assert anchors is not None  # acts_on_bodies asks for them
-
-    def slopes(one: Any, rod: Rod, flexure: Any, anchor: Motion) -> Any:
-        def moved(twist: Array) -> Any:
-            axes = angular(twist)
-            step = Motion(jnp.eye(3 if axes == 3 else 2) + skew(twist[:axes]), twist[axes:])
-            return response(one, rod, flexure, jax.vmap(Motion.then, (0, None))(anchor, step))
-
-        return jax.jacfwd(moved)(jnp.zeros(size))
-
-    return jax.vmap(slopes)(group, chain.rods, at.flexure, anchors)
-
-
-def _by_modes(chain: Chain, at: Evaluation, group: TendonGroup, modes: Array) -> Any:
-    """Differentiate a crossing by the modes of the flexure, anchor fixed (last axis)."""
-    with_pose = at.anchors is not None and group.acts_on_bodies
-    anchors = select_anchors(at.anchors, group.back) if with_pose else None
-
-    def slopes(one: Any, rod: Rod, memory: Any, anchor: Motion | None, at_modes: Array) -> Any:
-        def moved(varied: Array) -> Any:
-            state = flexure_state(rod, chain.law, memory, varied, with_pose=with_pose)
-            return one.cross(rod, state, anchor)
-
-        return jax.jacfwd(moved)(at_modes)
-
-    return jax.vmap(slopes)(group, chain.rods, at.flexure.memory, anchors, modes)
-
-
-def tendon_jacobian(
-    chain: Chain,
-    k: int,
-    unknowns: Unknowns,
-    at: Evaluation,
-    unit: UnitRows,
-    motion: RelativeMotionJacobian,
-) -> TendonJacobian:
-    """Linearise the k-th group of tendons."""
-    group, span = chain.groups[k], at.spans[k]
-    length, turning, wrench = _crossing_rows(chain, k, unknowns, at, unit, motion)
-    log_ratio = unit.log_ratio[k].reshape(-1, 2, unit.modes.shape[-1])
-    runs = group.runs[..., None]
-    ratio = span.tension_ratio[..., None]
-    in_gap, in_body = (
-        (tension + chain.friction.offset())[..., None]
-        for tension in (span.gap_tension, span.body_tension)
-    )
-    gap_tension = runs * (ratio[:, :, 0] * unit.tension[k][None] - in_gap * log_ratio[None, :, 0])
-    body_tension = runs * (ratio[:, :, 1] * gap_tension - in_body * log_ratio[None, :, 1])
-    in_body = body_tension * group.body_length[..., None]
-    stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None, :, None]
-    own_tension_length = gap_tension * group.natural_gap[..., None] + in_body
-    beyond = unit.released_length[k][None]
-    released_length = beyond - runs * unit.spread(length)
-    if not unit.tension_length:
-        tension_length = None
-        at_exit = released_length = released_length + own_tension_length / stiffness
-        at_entry = beyond + in_body / stiffness
-    else:
-        tension_length = unit.tension_length[k][None] + own_tension_length
-        at_exit = released_length + tension_length / stiffness
-        at_entry = beyond + (unit.tension_length[k][None] + in_body) / stiffness
-    return TendonJacobian(
-        turning=turning,
-        wrench=wrench,
-        log_ratio=log_ratio,
-        gap_tension=gap_tension,
-        carried=jnp.where(runs > 0.0, body_tension, unit.tension[k][None]),
-        at_edges=jnp.stack([at_exit, at_entry], axis=2),
-        released_length=released_length,
-        tension_length=tension_length,
-    )
-
-
-def _crossing_rows(
-    chain: Chain,
-    k: int,
-    unknowns: Unknowns,
-    at: Evaluation,
-    unit: UnitRows,
-    motion: RelativeMotionJacobian,
-) -> tuple[Array, Array, Array | None]:
-    """Compute short rows of span length, turning angles and wrench of the k-th group."""
-    group, crossing = chain.groups[k], at.spans[k].crossing
-    length, turning, wrench = [], [], None
-    if group.acts_on_bodies:
-        slopes = _by_relative_motion(chain, at, group, type(group).cross)
-        relative = select_back(motion.relative, group.back)
-        length.append(jnp.einsum("ntw,ntwz->ntz", slopes.length, relative))
-        both = jnp.stack([slopes.exit_turning, slopes.entry_turning], axis=1)
-        turning.append(jnp.einsum("nstw,ntwz->nstz", both, relative))
-        wrench = jnp.einsum("ntvw,ntwz->ntvz", slopes.wrench, relative)
-    if group.by_modes:
-        slopes = _by_modes(chain, at, group, unknowns.modes)
-        if crossing.slope is not None:
-            length.append(unit.of_modes(crossing.slope))
-        both = jnp.stack([slopes.exit_turning, slopes.entry_turning], axis=1)
-        turning.append(unit.of_modes(both))
-    return cast("Array", sum(length)), cast("Array", sum(turning)), wrench
-
-
-def contact_jacobian(
-    chain: Chain, k: int, at: Evaluation, unit: UnitRows, motion: RelativeMotionJacobian
-) -> ContactJacobian:
-    """Linearise the k-th kind of contacts."""
-    group, response = chain.contact_pairs[k], at.contacts[k]
-    if response.slope is not None:
-        return ContactJacobian(unit.of_modes(response.slope), None)
-    slopes = _by_relative_motion(chain, at, group, type(group).gap_response)
-    relative = select_back(motion.relative, group.back)
-    return ContactJacobian(
-        jnp.einsum("nlw,nlwz->nlz", slopes.gap, relative),
-        jnp.einsum("nlvw,nlwz->nlvz", slopes.wrench, relative),
-    )
-
-
-class StateJacobians(NamedTuple):
+@dataclass
+class StateJacobians:
     """A state, and the jacobians of its bodies, tendons and contacts."""
 
     chain: Chain
     unknowns: Unknowns
     memory: Memory
     applied: BodyLoads | None
-    at: Evaluation
+    at: Any
     unit: UnitRows
-    motion: RelativeMotionJacobian
-    tendons: list[TendonJacobian]
-    contacts: list[ContactJacobian]
 
+    @cached_property
+    def relative(self) -> list[Float[Array, "n w short"]]:
+        """Motion of the distal body relative to each of those before, in its own frame; short."""
+        pose, twist = self.at.flexure.pose, self.at.flexure.twist
+        if pose is None or twist is None:
+            return []
+        modes = self.unit.of_modes(twist)
+        inside = jax.vmap(Motion.twist_inside, (0, None))
+        return [modes, *(modes - inside(pose, older) for older in self.unit.motions)]
 
-def state_jacobians(
-    chain: Chain,
-    unknowns: Unknowns,
-    memory: Memory,
-    applied: BodyLoads | None,
-    at: Evaluation,
-    unit: UnitRows,
-) -> StateJacobians:
-    """Differentiate the motions of all bodies, tendons and contacts at a state."""
-    motion = relative_motion_jacobian(chain, at, unit)
-    tendons = [
-        tendon_jacobian(chain, k, unknowns, at, unit, motion) for k in range(len(chain.groups))
-    ]
-    contacts = [
-        contact_jacobian(chain, k, at, unit, motion) for k in range(len(chain.contact_pairs))
-    ]
-    return StateJacobians(chain, unknowns, memory, applied, at, unit, motion, tendons, contacts)
+    @cached_property
+    def turn(self) -> Float[Array, "n a z"]:
+        """Turn of the distal body against the base, where there are external loads."""
+        before = jax.vmap(lambda rotation: turned(rotation.T, self.unit.turn))
+        axes = len(self.unit.turn)
+        return self.unit.spread(self.relative[0][:, :axes]) + before(self.at.flexure.pose.rotation)
 
+    @cached_property
+    def tendons(self) -> list[TendonJacobian]:
+        """Rows of every group of tendons."""
+        return [self._tendon(k) for k in range(len(self.chain.groups))]
 
-def wrench_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n w z"], list[Array]]:
-    """Compute the rows of the resultant on the distal body and beyond, and of its reactions."""
-    chain, unit, wrenches = jacobians.chain, jacobians.unit, jacobians.at.wrenches
-    assert wrenches is not None
-    terminating = _terminating_rows(jacobians)
-    resultant = terminating[:, 0]
-    if unit.transmitted:
-        resultant = resultant + unit.transmitted[0][None]
-    to_previous = []
-    for number in range(1, chain.window):
-        rows = terminating[:, number]
-        if number < len(unit.transmitted):
-            rows = rows + unit.transmitted[number][None]
-        beyond = wrenches.terminating[:, number] + wrenches.transmitted[:, number]
-        to_previous.append(_hand_back(jacobians, rows, beyond))
-    if jacobians.applied is not None and jacobians.motion.turn is not None:
-        external = _external_rows(jacobians, jacobians.motion.turn)
-        resultant = resultant + external
-        back = _hand_back(jacobians, external, cast("Array", wrenches.external))
-        to_previous.append(back if chain.follows else back[:, : jacobians.motion.turn.shape[1]])
-    return resultant, to_previous
+    @cached_property
+    def contacts(
+        self,
+    ) -> list[tuple[Float[Array, "n l short"], Float[Array, "n l w short"] | None]]:
+        """Short rows of gap and of wrench per force of every kind of contacts.
 
+        The wrench is that on the distal body; None where it does not act on bodies.
+        """
+        return [self._contact(k) for k in range(len(self.chain.contact_pairs))]
 
-def _terminating_rows(jacobians: StateJacobians) -> Float[Array, "n window w z"]:
-    """Compute the rows of wrenches of spans and contacts that end at the distal body."""
-    chain, at, unit = jacobians.chain, jacobians.at, jacobians.unit
-    assert at.wrenches is not None
-    terminating = jnp.zeros((*at.wrenches.terminating.shape, unit.modes.shape[-1]))
-    for group, span, tendon in zip(chain.groups, at.spans, jacobians.tendons, strict=True):
-        if tendon.wrench is not None and span.crossing.wrench is not None:
-            along = tendon.gap_tension[:, :, None] * span.crossing.wrench[..., None]
-            pull = along + unit.spread(span.gap_tension[..., None, None] * tendon.wrench)
-            reach = span_mask(chain, group.back)
-            terminating = terminating - jnp.einsum("ntwz,ntk->nkwz", pull, reach)
-    for group, response, force, unit_force, contact in zip(
-        chain.contact_pairs,
-        at.contacts,
-        jacobians.unknowns.contact_force,
-        unit.contact_pairs,
-        jacobians.contacts,
-        strict=True,
-    ):
-        if contact.wrench is not None and response.wrench is not None:
-            along = unit_force[None, :, None] * response.wrench[..., None]
-            along = along + unit.spread(force[..., None, None] * contact.wrench)
-            push = group.has_contact[..., None, None] * along
-            reach = span_mask(chain, group.back)
-            terminating = terminating + jnp.einsum("nlwz,nlk->nkwz", push, reach)
-    return terminating
+    def _by_relative_motion(
+        self, group: TendonGroup | ContactGroup, response: Callable[..., Any]
+    ) -> Any:
+        """Differentiate a crossing or contact by the motion relative to the anchor (last axis)."""
+        chain = self.chain
+        size = chain.rods.basis.shape[-2]
+        anchors = select_anchors(self.at.anchors, group.back)
 
+        def slopes(part: Any, rod: Rod, flexure: Any, anchor: Any) -> Any:
+            def moved(twist: Array) -> Any:
+                axes = angular(twist)
+                step = Motion(jnp.eye(3 if axes == 3 else 2) + skew(twist[:axes]), twist[axes:])
+                return response(part, rod, flexure, jax.vmap(Motion.then, (0, None))(anchor, step))
 
-def _hand_back(
-    jacobians: StateJacobians, rows: Float[Array, "n w z"], wrench: Float[Array, "n w"]
-) -> Float[Array, "n w z"]:
-    """Transform rows of a wrench that moves with the distal body to the previous frame."""
-    turning = jax.vmap(wrench_turn)(wrench)
-    turned = jnp.einsum("nvw,nwz->nvz", turning, jacobians.motion.relative[0])
-    pose = cast("Motion", jacobians.at.flexure.pose)
-    return jax.vmap(Motion.wrench)(pose, rows + jacobians.unit.spread(turned))
+            return jax.jacfwd(moved)(jnp.zeros(size))
 
+        return jax.vmap(slopes)(group, chain.rods, self.at.flexure, anchors)
 
-def _external_rows(jacobians: StateJacobians, turn: Float[Array, "n a z"]) -> Float[Array, "n w z"]:
-    """Compute the rows of the external loads on the distal body and beyond."""
-    chain, at, unit = jacobians.chain, jacobians.at, jacobians.unit
-    assert at.wrenches is not None
-    assert at.wrenches.external is not None
-    assert at.rotation is not None
-    on_bodies = jax.tree.map(lambda leaf: leaf[1:], jacobians.applied)
-    on_body = jnp.einsum("nwa,naz->nwz", jax.vmap(_by_turn)(at.rotation, on_bodies), turn)
-    if chain.follows:
-        return unit.external[None] + on_body
-    # Dead forces keep their direction: they rotate relative to the body.
-    axes = turn.shape[1]
-    against = -jax.vmap(wrench_turn)(at.wrenches.external)[:, axes:, :axes]
-    forces = jnp.einsum("nwa,naz->nwz", against, turn)
-    return jnp.concatenate([unit.external[None] + on_body[:, :axes], forces], axis=1)
+    def _by_modes(self, group: TendonGroup) -> Any:
+        """Differentiate a crossing by the modes of the flexure, anchor fixed (last axis)."""
+        chain, anchors = self.chain, self.at.anchors
+        with_pose = anchors is not None and group.acts_on_bodies
+        anchors = select_anchors(anchors, group.back) if with_pose else None
 
+        def slopes(part: Any, rod: Rod, memory: Any, anchor: Any, modes: Array) -> Any:
+            def moved(varied: Array) -> Any:
+                state = flexure_state(rod, chain.law, memory, varied, with_pose=with_pose)
+                return part.cross(rod, state, anchor)
 
-def _by_turn(rotation: Array, load: BodyLoads) -> Float[Array, "w a"]:
-    """Differentiate a body's loads by its rotation about its own axes."""
-    axes = 3 if len(rotation) == 3 else 1
+            return jax.jacfwd(moved)(modes)
 
-    def at_turn(turn: Array) -> Array:
-        return body_wrench(rotation @ (jnp.eye(len(rotation)) + skew(turn)), load)
+        memory = self.at.flexure.memory
+        return jax.vmap(slopes)(group, chain.rods, memory, anchors, self.unknowns.modes)
 
-    return jax.jacfwd(at_turn)(jnp.zeros(axes))
+    def _tendon(self, k: int) -> TendonJacobian:
+        """Linearise the k-th group of tendons."""
+        chain, unit, span = self.chain, self.unit, self.at.spans[k]
+        group, tension = chain.groups[k], unit.tension[k][None]
+        length, turning, wrench = self._crossing(k)
+        log_ratio = unit.log_ratio[k].reshape(-1, 2, unit.modes.shape[-1])
+        runs = group.runs[..., None]
+        ratio = span.tension_ratio[..., None]
+        in_gap, in_body = (
+            (tension + chain.friction.offset())[..., None]
+            for tension in (span.gap_tension, span.body_tension)
+        )
+        gap_tension = runs * (ratio[:, :, 0] * tension - in_gap * log_ratio[None, :, 0])
+        body_tension = runs * (ratio[:, :, 1] * gap_tension - in_body * log_ratio[None, :, 1])
+        in_body = body_tension * group.body_length[..., None]
+        stiffness = of_group(chain.memory_stiffness, group)[None, :, None]
+        own_tension_length = gap_tension * group.natural_gap[..., None] + in_body
+        beyond = unit.released_length[k][None]
+        released_length = beyond - runs * unit.spread(length)
+        if not unit.tension_length:
+            tension_length = None
+            at_exit = released_length = released_length + own_tension_length / stiffness
+            at_entry = beyond + in_body / stiffness
+        else:
+            tension_length = unit.tension_length[k][None] + own_tension_length
+            at_exit = released_length + tension_length / stiffness
+            at_entry = beyond + (unit.tension_length[k][None] + in_body) / stiffness
+        return TendonJacobian(
+            turning=turning,
+            wrench=wrench,
+            log_ratio=log_ratio,
+            gap_tension=gap_tension,
+            carried=jnp.where(runs > 0.0, body_tension, tension),
+            at_edges=jnp.stack([at_exit, at_entry], axis=2),
+            released_length=released_length,
+            tension_length=tension_length,
+        )
+
+    def _crossing(self, k: int) -> tuple[Any, Any, Array | None]:
+        """Compute short rows of span length, turning angles and wrench of the k-th group."""
+        group, crossing = self.chain.groups[k], self.at.spans[k].crossing
+        length, turning, wrench = [], [], None
+        if group.acts_on_bodies:
+            slopes = self._by_relative_motion(group, type(group).cross)
+            relative = select_back(self.relative, group.back)
+            length.append(jnp.einsum("ntw,ntwz->ntz", slopes.length, relative))
+            both = jnp.stack([slopes.exit_turning, slopes.entry_turning], axis=1)
+            turning.append(jnp.einsum("nstw,ntwz->nstz", both, relative))
+            wrench = jnp.einsum("ntvw,ntwz->ntvz", slopes.wrench, relative)
+        if group.by_modes:
+            slopes = self._by_modes(group)
+            if crossing.slope is not None:
+                length.append(self.unit.of_modes(crossing.slope))
+            both = jnp.stack([slopes.exit_turning, slopes.entry_turning], axis=1)
+            turning.append(self.unit.of_modes(both))
+        return sum(length), sum(turning), wrench
+
+    def _contact(self, k: int) -> tuple[Array, Array | None]:
+        """Linearise the k-th kind of contacts."""
+        group, response = self.chain.contact_pairs[k], self.at.contacts[k]
+        if response.slope is not None:
+            return self.unit.of_modes(response.slope), None
+        slopes = self._by_relative_motion(group, type(group).gap_response)
+        relative = select_back(self.relative, group.back)
+        return (
+            jnp.einsum("nlw,nlwz->nlz", slopes.gap, relative),
+            jnp.einsum("nlvw,nlwz->nlvz", slopes.wrench, relative),
+        )
+
+    def wrenches(self) -> tuple[Float[Array, "n w z"], list[Array]]:
+        """Compute the rows of the resultant on the distal body and beyond, and of its reactions."""
+        chain, unit, wrenches = self.chain, self.unit, self.at.wrenches
+        terminating = self._terminating()
+        resultant = terminating[:, 0]
+        if unit.transmitted:
+            resultant = resultant + unit.transmitted[0][None]
+        to_previous = []
+        for number in range(1, chain.window):
+            rows = terminating[:, number]
+            if number < len(unit.transmitted):
+                rows = rows + unit.transmitted[number][None]
+            beyond = wrenches.terminating[:, number] + wrenches.transmitted[:, number]
+            to_previous.append(self._hand_back(rows, beyond))
+        if axes := len(unit.turn):
+            external = self._external()
+            resultant = resultant + external
+            back = self._hand_back(external, wrenches.external)
+            to_previous.append(back if chain.follows else back[:, :axes])
+        return resultant, to_previous
+
+    def _terminating(self) -> Float[Array, "n window w z"]:
+        """Compute the rows of wrenches of spans and contacts that end at the distal body."""
+        chain, at, unit = self.chain, self.at, self.unit
+        terminating = jnp.zeros((*at.wrenches.terminating.shape, unit.modes.shape[-1]))
+        for group, span, tendon in zip(chain.groups, at.spans, self.tendons, strict=True):
+            if tendon.wrench is not None:
+                along = tendon.gap_tension[:, :, None] * span.crossing.wrench[..., None]
+                pull = along + unit.spread(span.gap_tension[..., None, None] * tendon.wrench)
+                reach = span_mask(chain, group.back)
+                terminating = terminating - jnp.einsum("ntwz,ntk->nkwz", pull, reach)
+        for group, response, force, unit_force, (_, wrench) in zip(
+            chain.contact_pairs,
+            at.contacts,
+            self.unknowns.contact_force,
+            unit.contact_pairs,
+            self.contacts,
+            strict=True,
+        ):
+            if wrench is not None:
+                along = unit_force[None, :, None] * response.wrench[..., None]
+                along = along + unit.spread(force[..., None, None] * wrench)
+                push = group.has_contact[..., None, None] * along
+                reach = span_mask(chain, group.back)
+                terminating = terminating + jnp.einsum("nlwz,nlk->nkwz", push, reach)
+        return terminating
+
+    def _hand_back(
+        self, rows: Float[Array, "n w z"], wrench: Float[Array, "n w"]
+    ) -> Float[Array, "n w z"]:
+        """Transform rows of a wrench that moves with the distal body to the previous frame."""
+        turning = jax.vmap(wrench_turn)(wrench)
+        turned = jnp.einsum("nvw,nwz->nvz", turning, self.relative[0])
+        return jax.vmap(Motion.wrench)(self.at.flexure.pose, rows + self.unit.spread(turned))
+
+    def _external(self) -> Float[Array, "n w z"]:
+        """Compute the rows of the external loads on the distal body and beyond."""
+        at, unit, turn = self.at, self.unit, self.turn
+        axes = len(unit.turn)
+
+        def slopes(rotation: Array, load: BodyLoads) -> Float[Array, "w a"]:
+            """Differentiate a body's loads by its rotation about its own axes."""
+
+            def at_turn(turn: Array) -> Array:
+                return body_wrench(rotation @ (jnp.eye(len(rotation)) + skew(turn)), load)
+
+            return jax.jacfwd(at_turn)(jnp.zeros(axes))
+
+        on_bodies = jax.tree.map(lambda leaf: leaf[1:], self.applied)
+        on_body = jnp.einsum(
+            "nwa,naz->nwz", jax.vmap(slopes)(at.wrenches.rotation, on_bodies), turn
+        )
+        if self.chain.follows:
+            return unit.external[None] + on_body
+        # Dead forces keep their direction: they rotate relative to the body.
+        against = -jax.vmap(wrench_turn)(at.wrenches.external)[:, axes:, :axes]
+        forces = jnp.einsum("nwa,naz->nwz", against, turn)
+        return jnp.concatenate([unit.external[None] + on_body[:, :axes], forces], axis=1)
 
 
 # Linearisation of every flexure's residual, as rows over all that it depends on.
@@ -483,6 +402,10 @@ def _by_turn(rotation: Array, load: BodyLoads) -> Float[Array, "w a"]:
 #     moments alone; the released lengths of the tendons and their tension times length.
 #
 # JAX differentiates only the geometry of a span, a contact or a rod, each on its own.
+
+# Smallest slope of a mode, as a fraction of its stiffness at rest: the root of the rounding error,
+# so that neither the shift nor the cancelled digits matter.
+_MIN_RELATIVE_SLOPE = 1e-8
 
 
 class LinearisedRows(NamedTuple):
@@ -505,7 +428,7 @@ def linearise(
     memory: Memory,
     applied: BodyLoads | None,
     at: Evaluation,
-    form: RowLayout,
+    unit: UnitRows,
 ) -> LinearisedRows:
     """Linearise the residual of all flexures.
 
@@ -515,30 +438,26 @@ def linearise(
         memory: History of its contacts.
         applied: External loads on the bodies.
         at: Evaluation there.
-        form: Layout of the rows.
+        unit: Unit rows of all columns.
 
     Returns:
         The rows.
     """
-    unit = form.unit_rows()
-    jacobians = state_jacobians(chain, unknowns, memory, applied, at, unit)
-    motion, tendons = jacobians.motion, jacobians.tendons
+    jacobians = StateJacobians(chain, unknowns, memory, applied, at, unit)
+    tendons = jacobians.tendons
     balance, to_previous = _balance_rows(jacobians)
     residual = [balance / chain.stiffness[..., None], *_contact_rows(jacobians)]
     residual += [_friction_rows(jacobians, k) for k in range(len(tendons))]
-    to_next = [-unit.spread(motion.relative[number]) for number in range(form.older)]
-    to_next += [] if motion.turn is None else [motion.turn]
+    to_next = [-unit.spread(motion) for motion in jacobians.relative[: len(unit.older)]]
+    to_next += [jacobians.turn] if len(unit.turn) else []
     to_next += [tendon.carried for tendon in tendons]
     to_previous += [tendon.released_length for tendon in tendons]
-    to_previous += [one.tension_length for one in tendons if one.tension_length is not None]
-    return LinearisedRows(*(_stack(chain, rows, form) for rows in (residual, to_next, to_previous)))
-
-
-def _stack(chain: Chain, rows: list[Array], form: RowLayout) -> Float[Array, "n k z"]:
-    """Stack rows; of an empty list, return none."""
-    if not rows:
-        return jnp.zeros((chain.flexures, 0, form.unknowns + form.carried + form.beyond))
-    return jnp.concatenate(rows, axis=1)
+    lengths = (tendon.tension_length for tendon in tendons)
+    to_previous += [length for length in lengths if length is not None]
+    # Of an empty list, none.
+    none = jnp.zeros((chain.flexures, 0, unit.modes.shape[-1]))
+    stacked = (jnp.concatenate([none, *rows], axis=1) for rows in (residual, to_next, to_previous))
+    return LinearisedRows(*stacked)
 
 
 def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], list[Array]]:
@@ -549,7 +468,13 @@ def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], lis
         elastic = jax.vmap(material_tangent, in_axes=(0, None, 0, 0))(
             chain.rods, chain.law, jacobians.memory.material, at.flexure
         )
-        elastic = _regularise_pivots(chain, elastic)
+        # Just beyond the strain where plastic hardening begins (exp(b / x) at x = 0) the law is
+        # flat to the last digit. The modes are eliminated first, so their pivots must not vanish,
+        # though friction makes the whole system regular. Without friction the step becomes long but
+        # finite, and the limits of a step apply to it.
+        slope = jnp.abs(jnp.diagonal(elastic, axis1=1, axis2=2))
+        min_slope = _MIN_RELATIVE_SLOPE * chain.stiffness
+        elastic = elastic + jax.vmap(jnp.diag)(jnp.where(slope < min_slope, min_slope, 0.0))
         if jacobians.memory.damping is not None:
             elastic = elastic + jacobians.memory.damping[0] * jax.vmap(jnp.diag)(chain.stiffness)
     to_previous: list[Array] = []
@@ -560,7 +485,7 @@ def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], lis
         elastic = elastic - jax.vmap(geometric_stiffness)(
             chain.rods, jacobians.unknowns.modes, at.flexure.configuration, at.wrenches.resultant
         )
-        resultant, to_previous = wrench_rows(jacobians)
+        resultant, to_previous = jacobians.wrenches()
         balance = unit.spread(unit.of_modes(elastic)) - jnp.einsum(
             "nwm,nwz->nmz", at.flexure.twist, resultant
         )
@@ -576,31 +501,12 @@ def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], lis
     return balance, to_previous
 
 
-# Smallest slope of a mode, as a fraction of its stiffness at rest: the root of the rounding error,
-# so that neither the shift nor the cancelled digits matter.
-_MIN_RELATIVE_SLOPE = 1e-8
-
-
-def _regularise_pivots(chain: Chain, elastic: Float[Array, "n m m"]) -> Float[Array, "n m m"]:
-    """Shift pivots that vanish on a plateau of the material law.
-
-    Just beyond the strain where plastic hardening begins (exp(b / x) at x = 0) the law is flat to
-    the last digit. The modes are eliminated first, so their pivots must not vanish, though friction
-    makes the whole system regular. Without friction the step becomes long but finite, and the
-    limits of a step apply to it.
-    """
-    diagonal = jnp.diagonal(elastic, axis1=1, axis2=2)
-    min_slope = _MIN_RELATIVE_SLOPE * chain.stiffness
-    missing = jnp.where(jnp.abs(diagonal) < min_slope, min_slope, 0.0)
-    return elastic + jax.vmap(jnp.diag)(missing)
-
-
 def _contact_rows(jacobians: StateJacobians) -> list[Array]:
     """Compute the rows of Signorini's condition, for every kind of contacts."""
     chain, rows = jacobians.chain, list[Array]()
     height = notch_heights(chain)[:, None, None]
     stiffness = chain.contact_stiffness[:, None, None]
-    for group, response, force, unit_force, contact in zip(
+    for group, response, force, unit_force, (gap, _) in zip(
         chain.contact_pairs,
         jacobians.at.contacts,
         jacobians.unknowns.contact_force,
@@ -609,7 +515,7 @@ def _contact_rows(jacobians: StateJacobians) -> list[Array]:
         strict=True,
     ):
         active = is_active(chain, group, force, response.gap)[..., None]
-        closing = jacobians.unit.spread(contact.gap)
+        closing = jacobians.unit.spread(gap)
         if chain.contact_flexibility is not None:
             closing = closing + chain.contact_flexibility[:, None, None] * unit_force[None]
         rows.append(jnp.where(active, closing / height, unit_force[None] / (stiffness * height)))

@@ -33,6 +33,7 @@ from notchflex.solver.residual import (
     evaluate,
     is_active,
     notch_heights,
+    of_group,
     rounding_growth,
     slip_mask,
 )
@@ -161,7 +162,7 @@ class NewtonProblem(NamedTuple):
     command: Command
     memory: Memory
     last: Iterate
-    predicts: Bool[Array, ""] | bool = True
+    predicts: Bool[Array, ""]
 
 
 # Largest rotation of a flexure in one step, rad; compare `MAX_LOG_RATIO_STEP`.
@@ -234,9 +235,15 @@ def newton(
         )
 
     best = jax.lax.while_loop(proceed, iterate, _begin(problem, start)).best
-    best = best._replace(
-        point=choose(best.converged, _without_rounding(chain, command, best), best.point)
+    # Forces of contacts that do not press, and tensions of slack tendons, are exactly zero.
+    point = without_slack(chain, command, best.point, best.stroke)
+    pushing = jax.tree.map(
+        lambda presses, force: jnp.where(presses, jnp.maximum(force, 0.0), 0.0),
+        best.presses,
+        point.unknowns.contact_force,
     )
+    point = point._replace(unknowns=point.unknowns._replace(contact_force=pushing))
+    best = best._replace(point=choose(best.converged, point, best.point))
     if not chain.law.remembers:
         return best
     # The loop does not carry the memory: it is long, and only that of the last point counts.
@@ -244,16 +251,6 @@ def newton(
     return best._replace(
         material=flexure_states(chain, modes, memory.material, with_pose=False).memory
     )
-
-
-def _without_rounding(chain: Chain, command: Command, solved: NewtonResult) -> Iterate:
-    """Set to zero the forces of contacts that do not press, and the tensions of slack tendons."""
-    point = without_slack(chain, command, solved.point, solved.stroke)
-    pushing = tuple(
-        jnp.where(presses, jnp.maximum(force, 0.0), 0.0)
-        for presses, force in zip(solved.presses, point.unknowns.contact_force, strict=True)
-    )
-    return point._replace(unknowns=point.unknowns._replace(contact_force=pushing))
 
 
 def _begin(problem: NewtonProblem, start: Iterate) -> _Iteration:
@@ -288,7 +285,13 @@ def _result(
     iterations: Int[Array, ""],
     within: Bool[Array, ""],
 ) -> NewtonResult:
-    """Assemble the result at a point."""
+    """Assemble the result at a point: no notch may be beyond the range of its law of flattening."""
+    converged = within & tension_is_bounded(chain, command, point)
+    ends = chain.rods.section.ends
+    if ends is not None:
+        curvature = in_space(evaluation.flexure.strain)[..., 1]
+        beyond = (curvature < 0.0) & (ends.slope_factor(curvature) < 0.0)
+        converged = converged & ~jnp.any(beyond)
     return NewtonResult(
         point=point,
         slid=tuple(span.slid for span in evaluation.spans),
@@ -303,19 +306,8 @@ def _result(
         ),
         residual=residual,
         iterations=iterations,
-        converged=within
-        & tension_is_bounded(chain, command, point)
-        & _is_possible(chain, evaluation),
+        converged=converged,
     )
-
-
-def _is_possible(chain: Chain, evaluation: Evaluation) -> Bool[Array, ""]:
-    """Return whether every notch is within the range of its law of flattening."""
-    ends = chain.rods.section.ends
-    if ends is None:
-        return jnp.array(True)
-    curvature = in_space(evaluation.flexure.strain)[..., 1]
-    return ~jnp.any((curvature < 0.0) & (ends.slope_factor(curvature) < 0.0))
 
 
 def _next_step(
@@ -331,8 +323,7 @@ def _next_step(
     limited = partial(limit_closing, chain, point.unknowns, evaluation, step)
     limited_linear = limited(jnp.ones(())) if by_tension else step
     rotation = jnp.max(jnp.abs(limited_linear.unknowns.modes))
-    logs = [jnp.max(jnp.abs(leaf), initial=0.0) for leaf in step.unknowns.log_ratio]
-    log_ratio = jnp.max(jnp.array([0.0, *logs]))
+    log_ratio = jnp.max(jnp.abs(ravel_pytree(step.unknowns.log_ratio)[0]), initial=0.0)
     max_fraction = jnp.minimum(1.0, _MAX_ROTATION_STEP / rotation)
     linear_fraction = jnp.minimum(max_fraction, MAX_LOG_RATIO_STEP / log_ratio)
     if by_tension:
@@ -348,10 +339,8 @@ def _next_step(
 
     chosen = jax.lax.cond(early, predicted, lambda: step)
     fraction = jnp.where(early, max_fraction, linear_fraction)
-    if predicts is not True:
-        limited_step = limit_closing(chain, point.unknowns, evaluation, chosen, fraction)
-        chosen = choose(predicts, chosen, limited_step)
-    return chosen, fraction
+    limited_step = limit_closing(chain, point.unknowns, evaluation, chosen, fraction)
+    return choose(predicts, chosen, limited_step), fraction
 
 
 # Predictor of the tensions along a tendon: the play operator of hysteresis.
@@ -392,9 +381,9 @@ def predict_log_ratios(
     """
     predicted = []
     for group, old_ratio, bound in zip(chain.groups, memory.log_ratio, memory.bound, strict=True):
-        numbers = jnp.array(group.numbers)
         old, new = (
-            jnp.maximum(tension[numbers], _MIN_TENSION) for tension in (before, base_tension)
+            jnp.maximum(of_group(tension, group), _MIN_TENSION)
+            for tension in (before, base_tension)
         )
         zero = jnp.zeros_like(group.natural_gap)  # the loss at rest suffices for a prediction
         losses = chain.friction.constant_loss(zero, zero)
@@ -436,7 +425,7 @@ def limit_slack(chain: Chain, point: Iterate, step: Iterate) -> Iterate:
     logs = tuple(
         jnp.clip(change, -limit, limit)
         for group, change in zip(chain.groups, step.unknowns.log_ratio, strict=True)
-        for limit in (limits[jnp.array(group.numbers)][None, :, None],)
+        for limit in (of_group(limits, group)[None, :, None],)
     )
     return step._replace(unknowns=step.unknowns._replace(log_ratio=logs))
 
@@ -469,7 +458,7 @@ def predict_contacts(
     for group, new, present, change in zip(
         chain.groups, predicted, point.unknowns.log_ratio, step.unknowns.log_ratio, strict=True
     ):
-        by_stroke = command.by_stroke[jnp.array(group.numbers)][None, :, None]
+        by_stroke = of_group(command.by_stroke, group)[None, :, None]
         logs.append(jnp.where(by_stroke, new - present, linear_fraction * change) / fraction)
     return Iterate(
         step.unknowns._replace(log_ratio=tuple(logs)), (tension - point.base_tension) / fraction

@@ -19,17 +19,10 @@ from notchflex._quantity import REGISTERED, Quantity
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import in_space, rotation_error_estimate
 from notchflex.mechanics.material import peak_strain as peak_strain_of_section
+from notchflex.mechanics.motion import IN_PLANE
 from notchflex.solver.programs.static_structure import PytreeLayout
 from notchflex.solver.residual import Iterate, SolverState, bound_side, evaluate
-from notchflex.solver.solved_state import (
-    SolvedState,
-    along_contacts,
-    along_edges,
-    largest_moment,
-    notch_angles,
-    paired,
-)
-from notchflex.solver.solved_state import moment_error as error_of_modes
+from notchflex.solver.solved_state import SolvedState
 
 # States with a larger moment error count as not converged.
 MAX_MOMENT_ERROR = 0.35
@@ -38,6 +31,8 @@ MAX_MOMENT_ERROR = 0.35
 _BEYOND_FACES = 0.086
 # Rounding of the cosine between the directions of two notches.
 _ROUNDING = 1e-15
+# Smaller moments do not count, as a fraction of the largest stiffness of a mode (per rad).
+_MIN_RELATIVE_MOMENT = 1e-12
 # States with a larger error of rotation count as not converged, rad.
 _MAX_ROTATION_ERROR = 2e-6
 
@@ -61,9 +56,14 @@ def stroke(state: SolvedState) -> Array:
 def notch_angle(state: SolvedState) -> Array:
     """Rotation of the body beyond a notch against the body before it.
 
-    It includes the precurvature; the order is from base to tip.
+    It includes the precurvature; the order is from base to tip. The axis is y of the notch's frame,
+    turned by the notch's direction about the tube; angles of up to half a turn are distinguished.
     """
-    return notch_angles(state.chain, state.relative.rotation)
+    across, frame = state.chain.notch_frame[..., IN_PLANE], state.chain.frame
+    if frame is not None:
+        across = frame[:, IN_PLANE].T @ across
+    turned = jnp.einsum("nba,nbc,ncd->nad", across, state.relative.rotation, across)
+    return jnp.atan2(turned[:, 0, 1] - turned[:, 1, 0], turned[:, 0, 0] + turned[:, 1, 1])
 
 
 @Quantity("state", "edge angle", r"\phi_j", "deg", key="edge_angle_deg",
@@ -168,7 +168,7 @@ def span_tension(state: SolvedState) -> Array:
 
     These are the gaps and bodies that it runs through.
     """
-    spans = along_edges(state.chain, *state.tensions)[:, :-1]
+    spans = state.along_edges(*state.tensions)[:, :-1]
     return jnp.concatenate([state.solved.point.base_tension[:, None], spans], axis=1)
 
 
@@ -176,7 +176,9 @@ def span_tension(state: SolvedState) -> Array:
           column="notch_{notch}_moment_Nmm", per=("notch",))  # fmt: skip
 def notch_moment(state: SolvedState) -> Array:
     """Bending moment carried by what the cut of a notch leaves, the largest along it."""
-    return largest_moment(state.at.flexure)
+    moment = in_space(state.at.flexure.resultants)[..., 1]
+    where = jnp.argmax(jnp.abs(moment), axis=-1)
+    return jnp.take_along_axis(moment, where[:, None], axis=-1)[:, 0]
 
 
 @Quantity("state", "outer strain", r"\varepsilon_j", key="outer_strain",
@@ -223,26 +225,25 @@ def contact_log_ratio(state: SolvedState) -> Array:
 
     With a `constant_loss` both tensions are raised by it.
     """
-    pairs = [(own[..., 0], own[..., 1]) for own in state.solved.point.unknowns.log_ratio]
-    return along_contacts(state.chain, *paired(state.chain, pairs))
+    return state.along_contacts(state.solved.point.unknowns.log_ratio)
 
 
 @Quantity("state", "slid length", "s_i", "mm", key="contacts.slid_mm", per=("tendon", "contact"))
 def contact_slid(state: SolvedState) -> Array:
     """Tendon length that has slid over a friction contact toward the base."""
-    chain, spans = state.chain, state.at.spans
-    beyond = paired(chain, [(s.released_beyond, s.tension_length_beyond) for s in spans])
-    summed = paired(chain, [(s.released_length, s.tension_length) for s in spans])
+    spans = state.at.spans
+    beyond = state.paired([(s.released_beyond, s.tension_length_beyond) for s in spans])
+    summed = state.paired([(s.released_length, s.tension_length) for s in spans])
     in_body = state.tensions[1] * state.by_tendon("body_length")
     at_entry = beyond[0] + (beyond[1] + in_body) * state.compliance
-    return along_contacts(chain, summed[0] + summed[1] * state.compliance, at_entry)
+    return state.along_edges(summed[0] + summed[1] * state.compliance, at_entry)[:, :-1]
 
 
 @Quantity("state", "turning at a contact", r"\beta_i", "deg", key="contacts.turning_deg",
           per=("tendon", "contact"))  # fmt: skip
 def contact_turning(state: SolvedState) -> Array:
     """Angle by which a tendon turns at a friction contact."""
-    return along_contacts(state.chain, *state.turning)
+    return state.along_edges(*state.turning)[:, :-1]
 
 
 @Quantity("state", "state of a contact", key="contacts.state", per=("tendon", "contact"), kind=int,
@@ -255,14 +256,13 @@ def contact_state(state: SolvedState) -> Array:
         return side
     # Below its loss a tension draws nothing over the contact, though none is left behind it.
     before = state.quantity("span_tension")[:, :-1]
-    return jnp.where((side > 0) & (before < along_contacts(state.chain, *losses)), 0, side)
+    return jnp.where((side > 0) & (before < state.along_edges(*losses)[:, :-1]), 0, side)
 
 
 @Quantity("state", "largest tension ratio over a contact", "b_i", per=("tendon", "contact"))
 def contact_bound(state: SolvedState) -> Array:
     """Largest magnitude that the friction law allows the tension ratio over a contact."""
-    pairs = [(s.bound[..., 0], s.bound[..., 1]) for s in state.at.spans]
-    return along_contacts(state.chain, *paired(state.chain, pairs))
+    return state.along_contacts(span.bound for span in state.at.spans)
 
 
 @Quantity("state", "base force", "F", "N", key="base_force_N", column="base_force_{axis}_N",
@@ -288,7 +288,18 @@ def moment_error(state: SolvedState) -> Array:
 
     The error is the difference from the moment that the loads ask for: how well the modes serve.
     """
-    return error_of_modes(state.chain, state.solved.point.unknowns, state.at)
+    # Bending about x and y in space, about y in the plane.
+    chain, bending = state.chain, slice(1 if state.chain.frame is not None else 2)
+    required = state.required()[..., bending]
+    real = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
+    has_length = (real[:, None] & (chain.rods.length > 0.0))[..., None]
+    carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
+    missing = state.at.flexure.resultants[..., bending] - required
+    error = jnp.max(jnp.abs(missing) * has_length * carried)
+    largest = jnp.max(jnp.abs(required) * has_length)
+    # Smaller moments are rounding errors.
+    bends = largest > _MIN_RELATIVE_MOMENT * jnp.max(chain.stiffness)
+    return jnp.where(bends, error / jnp.where(bends, largest, 1.0), 0.0)
 
 
 @Quantity("solve", kind=bool)

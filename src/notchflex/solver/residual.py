@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Shaped
 
 from notchflex._jax import (
     constant,
@@ -30,8 +30,9 @@ from notchflex.mechanics.tendon import (
     Crossing,
     TendonGroup,
 )
+from notchflex.solver.block_elimination import stroke
 
-# Poses of bodies: against the base, with the external loads on them, and against those before.
+# Poses of bodies: against the base, and against those before.
 
 
 def body_poses(relative: Motion) -> Motion:
@@ -57,33 +58,13 @@ def body_poses(relative: Motion) -> Motion:
     return poses
 
 
-def external_wrenches(
-    pose: Motion, applied: BodyLoads | None
-) -> tuple[Float[Array, "n d d"] | None, Float[Array, "n w"] | None, Float[Array, " w"] | None]:
-    """Return rotations of the bodies, and the loads on each with all beyond and on the whole robot.
-
-    All are None where there are no loads.
-    """
-    if applied is None:
-        return None, None, None
-    bodies = body_poses(pose)
-    distal: Motion = jax.tree.map(lambda leaf: leaf[1:], bodies)
-    wrench = jax.vmap(body_wrench)(distal.rotation, jax.tree.map(lambda leaf: leaf[1:], applied))
-    in_base = jax.vmap(Motion.wrench)(distal, wrench)
-    summed = jnp.cumsum(in_base[::-1], axis=0)[::-1]
-    inside = jax.vmap(Motion.wrench_inside)(distal, summed)
-    return distal.rotation, inside, summed[0]
-
-
 def anchor_poses(chain: Chain, pose: Motion | None) -> Motion | None:
     """Return the pose of every body in the frames of those before it, within the window."""
     if pose is None:
         return None
-    poses = [pose]
-    before = pose
+    poses, before = [pose], pose
     for _ in range(chain.window - 1):
-        first = identity(pose.translation.shape[-1])
-        before: Motion = jax.tree.map(shift_from_base, before, first)
+        before = jax.tree.map(shift_from_base, before, identity(pose.translation.shape[-1]))
         poses.append(jax.vmap(Motion.then)(before, poses[-1]))
     return jax.tree.map(lambda *leaves: jnp.stack(leaves, axis=1), *poses)
 
@@ -92,11 +73,9 @@ def select_anchors(anchors: Motion | None, back: Array) -> Motion | None:
     """Select the anchor of every tendon or contact among the bodies before."""
     if anchors is None:
         return None
-
-    def of_leaf(leaf: Array) -> Array:
-        return select_back([leaf[:, number] for number in range(leaf.shape[1])], back)
-
-    return jax.tree.map(of_leaf, anchors)
+    return jax.tree.map(
+        lambda leaf: select_back([leaf[:, k] for k in range(leaf.shape[1])], back), anchors
+    )
 
 
 def select_back(by_body: Sequence[Array], back: Array) -> Float[Array, "n t *k"]:
@@ -144,15 +123,7 @@ class TendonSpans(NamedTuple):
     bound: Float[Array, "n t 2"]
 
 
-def crossings(
-    group: TendonGroup, chain: Chain, flexure: FlexureState, anchors: Motion | None
-) -> Crossing:
-    """Return the paths of a group of tendons over all gaps."""
-    selected = select_anchors(anchors, group.back) if group.acts_on_bodies else None
-    return jax.vmap(type(group).cross)(group, chain.rods, flexure, selected)
-
-
-def of_group(values: Float[Array, " all"], group: TendonGroup) -> Float[Array, " t"]:
+def of_group(values: Shaped[Array, " all"], group: TendonGroup) -> Shaped[Array, " t"]:
     """Select the tendons of a group by slices, whose adjoint the native compiler supports."""
     return jnp.stack([values[number] for number in group.numbers])
 
@@ -277,15 +248,6 @@ def is_active(
     return (force - chain.contact_stiffness[:, None] * gap > 0.0) & (group.has_contact > 0.0)
 
 
-def signorini(
-    chain: Chain, group: ContactGroup, force: Float[Array, "n l"], gap: Float[Array, "n l"]
-) -> Float[Array, "n l"]:
-    """Compute the residual of Signorini's condition, as a fraction of the notch's height."""
-    by_force = force / (chain.contact_stiffness * notch_heights(chain))[:, None]
-    by_gap = gap / notch_heights(chain)[:, None]
-    return jnp.where(is_active(chain, group, force, gap), by_gap, by_force)
-
-
 # Solved states with their memory; the first is the free robot.
 
 
@@ -303,6 +265,19 @@ class SolverState(NamedTuple):
     memory: Memory
     stroke: Float[Array, " t"]
     applied: BodyLoads | None
+
+
+def state_at(
+    chain: Chain, point: Iterate, evaluation: Evaluation, applied: BodyLoads | None
+) -> SolverState:
+    """Return the state at a solved point, with its memory."""
+    memory = Memory(
+        log_ratio=point.unknowns.log_ratio,
+        slid=tuple(span.slid for span in evaluation.spans),
+        bound=tuple(span.bound for span in evaluation.spans),
+        material=evaluation.flexure.memory,
+    )
+    return SolverState(point, memory, stroke(chain, evaluation.base), applied)
 
 
 def at_rest(chain: Chain) -> SolverState:
@@ -342,12 +317,16 @@ class BodyWrenches(NamedTuple):
         transmitted: The same of those that end beyond body j.
         external: External loads on body j and beyond; None where there are none.
         resultant: Sum of all on body j and beyond.
+        rotation: Rotation of every body against the base; None without external loads.
+        on_base: External loads on all bodies, about and along the base; None if there are none.
     """
 
     terminating: Float[Array, "n window w"]
     transmitted: Float[Array, "n window w"]
     external: Float[Array, "n w"] | None
     resultant: Float[Array, "n w"]
+    rotation: Float[Array, "n d d"] | None
+    on_base: Float[Array, " w"] | None
 
 
 class BaseReaction(NamedTuple):
@@ -357,13 +336,11 @@ class BaseReaction(NamedTuple):
         base_tension: Tension of every tendon, N.
         released_length: Length of every tendon released by the shape, mm.
         tension_length: Sum of tension times length of every tendon, N mm.
-        external: External loads on all bodies, about and along the base; None if there are none.
     """
 
     base_tension: Float[Array, " t"]
     released_length: Float[Array, " t"]
     tension_length: Float[Array, " t"]
-    external: Float[Array, " w"] | None
 
 
 class Evaluation(NamedTuple):
@@ -373,7 +350,6 @@ class Evaluation(NamedTuple):
         flexure: State of every flexure.
         anchors: Pose of body j in the frames of the bodies j - 1, j - 2 ..., as second axis; None
             where nothing acts on bodies.
-        rotation: Rotation of every body against the base; None without external loads.
         spans: For each group of tendons.
         contacts: For each kind of contacts.
         wrenches: On the bodies; None as the anchors.
@@ -383,7 +359,6 @@ class Evaluation(NamedTuple):
 
     flexure: FlexureState
     anchors: Motion | None
-    rotation: Float[Array, "n d d"] | None
     spans: tuple[TendonSpans, ...]
     contacts: tuple[GapResponse, ...]
     wrenches: BodyWrenches | None
@@ -411,35 +386,34 @@ def evaluate(
     Returns:
         The evaluation.
     """
-    unknowns, base_tension = point
+    unknowns = point.unknowns
     on_bodies = chain.forces_on_bodies
     flexure = flexure_states(chain, unknowns.modes, memory.material, with_pose=on_bodies)
     anchors = anchor_poses(chain, flexure.pose)
-    spans = tuple(
-        _spans(chain, k, crossings(group, chain, flexure, anchors), unknowns, base_tension)
-        for k, group in enumerate(chain.groups)
-    )
-    contacts = tuple(
-        _with_contact_compliance(
-            chain,
-            jax.vmap(type(group).gap_response)(
-                group, chain.rods, flexure, select_anchors(anchors, group.back)
-            ),
-            force,
-        )
-        for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True)
-    )
-    rotation, wrenches, at_base = None, None, None
+    spans = tuple(_spans(chain, k, flexure, anchors, point) for k in range(len(chain.groups)))
+    contacts = ()
+    for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
+        selected = select_anchors(anchors, group.back)
+        response = jax.vmap(type(group).gap_response)(group, chain.rods, flexure, selected)
+        if chain.contact_flexibility is not None:
+            closing = chain.contact_flexibility[:, None] * force
+            response = response._replace(gap=response.gap + closing)
+        contacts += (response,)
+    wrenches = None
     if on_bodies:
         assert flexure.pose is not None
-        rotation, external, at_base = external_wrenches(flexure.pose, applied)
-        wrenches = _wrenches(chain, flexure.pose, unknowns, spans, contacts, external)
+        wrenches = _wrenches(chain, flexure.pose, unknowns, spans, contacts, applied)
     balance = _balance(chain, unknowns, flexure, spans, contacts, wrenches)
     if memory.damping is not None:
         viscosity, before = memory.damping
         balance = balance + viscosity * chain.stiffness * (unknowns.modes - before)
-    contact_force = tuple(
-        signorini(chain, group, force, response.gap)
+    height = notch_heights(chain)
+    contact_force = tuple(  # as fractions of the notch's height
+        jnp.where(
+            is_active(chain, group, force, response.gap),
+            response.gap / height[:, None],
+            force / (chain.contact_stiffness * height)[:, None],
+        )
         for group, force, response in zip(
             chain.contact_pairs, unknowns.contact_force, contacts, strict=True
         )
@@ -450,12 +424,11 @@ def evaluate(
     )
     residual = Unknowns(balance / chain.stiffness, contact_force, log_ratio)
     base = BaseReaction(
-        base_tension,
+        point.base_tension,
         in_tendon_order(chain, tuple(span.released_length[0] for span in spans)),
         in_tendon_order(chain, tuple(span.tension_length[0] for span in spans)),
-        at_base,
     )
-    return Evaluation(flexure, anchors, rotation, spans, contacts, wrenches, base, residual)
+    return Evaluation(flexure, anchors, spans, contacts, wrenches, base, residual)
 
 
 def rounding_growth(chain: Chain, point: Iterate) -> Float[Array, ""]:
@@ -464,15 +437,6 @@ def rounding_growth(chain: Chain, point: Iterate) -> Float[Array, ""]:
     softest = jnp.min(jnp.where(chain.rods.padding_mask > 0.0, jnp.inf, chain.stiffness))
     largest_tension = jnp.max(jnp.maximum(point.base_tension, 0.0), initial=0.0)
     return jnp.minimum(1.0 + largest_tension * (height / softest), _MAX_ROUNDING_GROWTH)
-
-
-def _with_contact_compliance(
-    chain: Chain, response: GapResponse, force: Float[Array, "n l"]
-) -> GapResponse:
-    """Add the closing by the contact force to the gaps."""
-    if chain.contact_flexibility is None:
-        return response
-    return response._replace(gap=response.gap + chain.contact_flexibility[:, None] * force)
 
 
 def _balance(
@@ -503,17 +467,19 @@ def _balance(
 def _spans(
     chain: Chain,
     k: int,
-    crossing: Crossing,
-    unknowns: Unknowns,
-    base_tension: Float[Array, " t"],
+    flexure: FlexureState,
+    anchors: Motion | None,
+    point: Iterate,
 ) -> TendonSpans:
-    """Compute tensions, released lengths and friction bounds of the k-th group."""
-    group, log_ratio = chain.groups[k], unknowns.log_ratio[k]
+    """Compute paths, tensions, released lengths and friction bounds of the k-th group."""
+    group, log_ratio = chain.groups[k], point.unknowns.log_ratio[k]
     runs = group.runs
+    selected = select_anchors(anchors, group.back) if group.acts_on_bodies else None
+    crossing = jax.vmap(type(group).cross)(group, chain.rods, flexure, selected)
     # Not written with ln T, so that a slack tendon stays regular.
     turning = crossing.exit_turning, crossing.entry_turning
     offset = chain.friction.offset()
-    at_base = of_group(base_tension, group)[None] + offset
+    at_base = of_group(point.base_tension, group)[None] + offset
     tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
     beyond_both = at_base * jnp.cumprod(tension_ratio[..., 0] * tension_ratio[..., 1], axis=0)
     transmitted = shift_from_base(beyond_both, at_base[0])
@@ -549,9 +515,17 @@ def _wrenches(
     unknowns: Unknowns,
     spans: tuple[TendonSpans, ...],
     contacts: tuple[GapResponse, ...],
-    external: Float[Array, "n w"] | None,
+    applied: BodyLoads | None,
 ) -> BodyWrenches:
     """Compute the wrenches of spans, contacts and loads on the bodies."""
+    external, rotation, on_base = None, None, None
+    if applied is not None:
+        distal: Motion = jax.tree.map(lambda leaf: leaf[1:], body_poses(pose))
+        rotation = distal.rotation
+        loads = jax.tree.map(lambda leaf: leaf[1:], applied)
+        in_base = jax.vmap(Motion.wrench)(distal, jax.vmap(body_wrench)(rotation, loads))
+        summed = jnp.cumsum(in_base[::-1], axis=0)[::-1]
+        external, on_base = jax.vmap(Motion.wrench_inside)(distal, summed), summed[0]
     size = chain.rods.basis.shape[-2]
     terminating = jnp.zeros((chain.flexures, chain.window, size))
     for group, span in zip(chain.groups, spans, strict=True):
@@ -572,7 +546,8 @@ def _wrenches(
     resultant = terminating[:, 0] + transmitted[0]
     if external is not None:
         resultant = resultant + external
-    return BodyWrenches(terminating, jnp.stack(transmitted, axis=1), external, resultant)
+    transmitted = jnp.stack(transmitted, axis=1)
+    return BodyWrenches(terminating, transmitted, external, resultant, rotation, on_base)
 
 
 def span_mask(chain: Chain, back: Array) -> Float[Array, "n t window"]:

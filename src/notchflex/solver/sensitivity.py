@@ -7,7 +7,7 @@ theorem), in forward and reverse mode, and along a path through the memory.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from jaxtyping import Array, Bool, Float, Int
 
@@ -17,33 +17,27 @@ from notchflex._jax import (
 )
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.block_elimination import linear_step, stroke
+from notchflex.solver.block_elimination import linear_step
 from notchflex.solver.continuation import interpolate_command
-from notchflex.solver.residual import Memory, SolverState, evaluate
-
-
-class SubstepHistory(NamedTuple):
-    """How the solver reached a state from the one before, from `LoadStepResult`.
-
-    Attributes:
-        between: The state before the last substep.
-        fraction_before: Fraction of the load step at that state.
-        substeps: Number of substeps.
-        reached: Whether the load was reached.
-    """
-
-    between: SolverState
-    fraction_before: Float[Array, ""]
-    substeps: Int[Array, ""]
-    reached: Bool[Array, ""]
-
+from notchflex.solver.residual import (
+    SolverState,
+    evaluate,
+    state_at,
+)
 
 # From rest, loads on the bodies come before the tendons; a load step that fails is halved.
 _MAX_SUBSTEPS = 2
 
 
 def attach_derivatives(
-    chain: Chain, command: Command, last: SolverState, solved: SolverState, history: SubstepHistory
+    chain: Chain,
+    command: Command,
+    last: SolverState,
+    solved: SolverState,
+    between: SolverState,
+    fraction_before: Float[Array, ""],
+    substeps: Int[Array, ""],
+    reached: Bool[Array, ""],
 ) -> SolverState:
     """Return a solved state with its derivatives by chain, command and the previous state.
 
@@ -56,19 +50,20 @@ def attach_derivatives(
         command: The load.
         last: The previous state, with the memory of the contacts.
         solved: The solution.
-        history: Substeps that led to it.
+        between: The state before the last substep.
+        fraction_before: Fraction of the load step at that state.
+        substeps: Number of substeps.
+        reached: Whether the load was reached.
 
     Returns:
         The same state.
     """
     if not chain.remembers:
-        return _attach_to_substep(chain, command, last, solved, history.reached)
-    has_history = history.reached & (history.substeps <= _MAX_SUBSTEPS)
-    first_command = interpolate_command(
-        chain, command, last, _stop_gradient(history.fraction_before)
-    )
+        return _attach_to_substep(chain, command, last, solved, reached)
+    has_history = reached & (substeps <= _MAX_SUBSTEPS)
+    first_command = interpolate_command(chain, command, last, _stop_gradient(fraction_before))
     items = (
-        (first_command, history.between, history.substeps > 1),
+        (first_command, between, substeps > 1),
         (command, solved, jnp.array(True)),
     )
 
@@ -95,14 +90,7 @@ def _attach_to_substep(
     step = linear_step(chain, command, point, last.memory, evaluation)
     point = jax.tree.map(lambda value, by: value + by, point, step)
     evaluation = evaluate(chain, point, last.memory, command.applied)
-    memory = Memory(
-        log_ratio=point.unknowns.log_ratio,
-        slid=tuple(span.slid for span in evaluation.spans),
-        bound=tuple(span.bound for span in evaluation.spans),
-        material=evaluation.flexure.memory,
-    )
-    drawn = stroke(chain, evaluation.base)
-    varied_state = SolverState(point, memory, drawn, command.applied)
+    varied_state = state_at(chain, point, evaluation, command.applied)
     return jax.tree.map(
         lambda value, varied: value + _zero_with_tangent(reached, varied),
         _stop_gradient(solved),

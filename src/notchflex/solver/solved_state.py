@@ -6,20 +6,18 @@ The modes satisfy equilibrium only in a weighted mean along a flexure. The large
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property, partial
 
-import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import (
+    choose,
     jax,
     jnp,
 )
 from notchflex._quantity import REGISTERED
-from notchflex.loads.command import (
-    BodyLoads,
-    body_wrench,
-)
+from notchflex.loads.command import body_wrench
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import (
     FlexureState,
@@ -36,7 +34,6 @@ from notchflex.mechanics.flexure.rod_kinematics import (
 from notchflex.mechanics.material import Flattening, SectionStrain, section_strain
 from notchflex.mechanics.motion import IN_PLANE, Motion, wrench_at
 from notchflex.solver.residual import (
-    BaseReaction,
     Evaluation,
     SolverState,
     Unknowns,
@@ -81,7 +78,12 @@ class SolvedState:
     @cached_property
     def bodies(self) -> Motion:
         """Pose of every body, base first."""
-        return _in_space(self.chain, body_poses(self.relative))
+        poses, frame = body_poses(self.relative), self.chain.frame
+        if frame is None:
+            return poses
+        plane, about = frame[:, IN_PLANE], frame[:, 1:2]
+        rotation = plane @ poses.rotation @ plane.T + (about @ about.T)[None]
+        return Motion(rotation, poses.translation @ plane.T)
 
     @cached_property
     def section_strain(self) -> SectionStrain:
@@ -101,16 +103,15 @@ class SolvedState:
     @cached_property
     def turning(self) -> tuple[Array, Array]:
         """Turning angles at both edges of all gaps; 0 where a tendon has no contact."""
-        chain = self.chain
         visited = self.by_tendon("visits") > 0.0
         angles = [(s.crossing.exit_turning, s.crossing.entry_turning) for s in self.at.spans]
-        first, second = paired(chain, angles)
+        first, second = self.paired(angles)
         return jnp.where(visited, first, 0.0), jnp.where(visited, second, 0.0)
 
     @cached_property
     def tensions(self) -> tuple[Float[Array, "n t"], Float[Array, "n t"]]:
         """Tensions in the gaps and beside the bodies beyond them."""
-        return paired(self.chain, [(s.gap_tension, s.body_tension) for s in self.at.spans])
+        return self.paired([(s.gap_tension, s.body_tension) for s in self.at.spans])
 
     @cached_property
     def contact_pairs(self) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
@@ -119,8 +120,20 @@ class SolvedState:
 
     @cached_property
     def base(self) -> Float[Array, " 6"]:
-        """Moment and force of the holder on the base."""
-        return base_wrench(self.chain, self.at.base, self.solved.applied)
+        """Moment and force of the holder on the base, about its origin.
+
+        They balance the loads, and the tendon tensions where the tendons enter the base.
+        """
+        chain, wrenches, acting = self.chain, self.at.wrenches, jnp.zeros(6)
+        if wrenches is not None and wrenches.on_base is not None:
+            on_base = jax.tree.map(lambda leaf: leaf[0], self.solved.applied)
+            acting = in_space(
+                wrenches.on_base + body_wrench(jnp.eye(on_base.dead_force.shape[-1]), on_base)
+            )
+            if chain.frame is not None:
+                acting = (chain.frame @ acting.reshape(2, 3, 1)).reshape(6)
+        tendon_force = self.at.base.base_tension[:, None] * jnp.array([[0.0, 0.0, -1.0]])
+        return -acting - jnp.sum(jax.vmap(wrench_at)(chain.tendon_entry, tendon_force), axis=0)
 
     @cached_property
     def compliance(self) -> Float[Array, "n t"]:
@@ -131,6 +144,50 @@ class SolvedState:
         """Return a field of the tendon groups, for every gap and tendon of the robot."""
         return in_tendon_order(
             self.chain, tuple(getattr(group, name) for group in self.chain.groups)
+        )
+
+    def paired(self, pairs: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+        """Return both values of pairs per group, each in the order of the robot's tendons."""
+        first, second = zip(*pairs, strict=True)
+        return in_tendon_order(self.chain, first), in_tendon_order(self.chain, second)
+
+    def along_edges(
+        self, exit_value: Float[Array, "n t"], entry_value: Float[Array, "n t"]
+    ) -> Float[Array, "t edges"]:
+        """Return the values at the edges that each tendon meets, base to tip; NaN beyond its end.
+
+        The last edge, where the tendon enters its end body, is not a contact: it is fixed there.
+        """
+        contacts = self.chain.contacts
+        pairs = jnp.stack([exit_value, entry_value], axis=1)
+        flat = pairs.reshape(-1, pairs.shape[-1]).T
+        met = jnp.take_along_axis(flat, jnp.maximum(contacts, 0), axis=1)
+        beyond = jnp.roll(contacts, -1, axis=1).at[:, -1].set(-1)
+        return jnp.where(beyond >= 0, met, jnp.nan)
+
+    def along_contacts(self, values: Iterable[Float[Array, "n t 2"]]) -> Float[Array, "t contacts"]:
+        """Return values per group at the contacts of each tendon; NaN beyond its end."""
+        pairs = [(edges[..., 0], edges[..., 1]) for edges in values]
+        return self.along_edges(*self.paired(pairs))[:, :-1]
+
+    def required(self) -> Float[Array, "n nodes w"]:
+        """Return the wrench that loads, tendons and contacts require at every node, in its axes."""
+        chain, at, unknowns = self.chain, self.at, self.solved.point.unknowns
+        acting = jnp.zeros((chain.flexures, chain.rods.basis.shape[-2]))
+        for group, span in zip(chain.groups, at.spans, strict=True):
+            if group.fibre is not None:
+                weights = of_rod(chain.rods, fibre_stretch(group.fibre))
+                acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
+        for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
+            fibre = group.fibre(chain.rods)
+            if fibre is not None:
+                weights = of_rod(chain.rods, fibre_stretch(fibre))
+                acting = acting + (force * group.has_contact) * weights
+        required = jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)
+        if at.wrenches is None:
+            return required
+        return required + jax.vmap(_by_wrench)(
+            chain.rods, unknowns.modes, at.flexure, at.wrenches.resultant
         )
 
 
@@ -152,104 +209,7 @@ def notch_contact(
     return force, jnp.where(jnp.isinf(gap), jnp.nan, gap)
 
 
-def largest_moment(flexure: FlexureState) -> Float[Array, " n"]:
-    """Return the bending moment in the plane of each notch, largest along it, with its sign."""
-    moment = in_space(flexure.resultants)[..., 1]
-    where = jnp.argmax(jnp.abs(moment), axis=-1)
-    return jnp.take_along_axis(moment, where[:, None], axis=-1)[:, 0]
-
-
-def base_wrench(chain: Chain, base: BaseReaction, applied: BodyLoads | None) -> Float[Array, " 6"]:
-    """Compute the reaction at the base: moment about the base's origin, and force.
-
-    It balances the loads, and the tendon tensions where the tendons enter the base.
-    """
-    acting = jnp.zeros(6)
-    if applied is not None and base.external is not None:
-        on_base = jax.tree.map(lambda leaf: leaf[0], applied)
-        acting = in_space(
-            base.external + body_wrench(jnp.eye(on_base.dead_force.shape[-1]), on_base)
-        )
-        if chain.frame is not None:
-            acting = (chain.frame @ acting.reshape(2, 3, 1)).reshape(6)
-    tendon_force = base.base_tension[:, None] * jnp.array([[0.0, 0.0, -1.0]])
-    return -acting - jnp.sum(jax.vmap(wrench_at)(chain.tendon_entry, tendon_force), axis=0)
-
-
-def notch_angles(chain: Chain, relative: Float[Array, "n d d"]) -> Float[Array, " n"]:
-    """Compute the rotation of every body against the previous one, about its notch's bending axis.
-
-    The axis is y of the notch's frame, turned by the notch's direction about the tube; angles of
-    up to half a turn are distinguished.
-    """
-    across = chain.notch_frame[..., IN_PLANE]
-    if chain.frame is not None:
-        across = chain.frame[:, IN_PLANE].T @ across
-    turned = jnp.einsum("nba,nbc,ncd->nad", across, relative, across)
-    return jnp.atan2(turned[:, 0, 1] - turned[:, 1, 0], turned[:, 0, 0] + turned[:, 1, 1])
-
-
-def paired(chain: Chain, pairs: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Return both values of pairs per group, each in the order of the robot's tendons."""
-    first, second = zip(*pairs, strict=True)
-    return in_tendon_order(chain, first), in_tendon_order(chain, second)
-
-
-def _in_space(chain: Chain, poses: Motion) -> Motion:
-    """Transform poses of a chain, which may be planar, to the frame of the base."""
-    if chain.frame is None:
-        return poses
-    frame = chain.frame
-    plane = frame[:, IN_PLANE]
-    about = frame[:, 1:2]
-    rotation = plane @ poses.rotation @ plane.T + (about @ about.T)[None]
-    return Motion(rotation, poses.translation @ plane.T)
-
-
-def along_edges(
-    chain: Chain, exit_value: Float[Array, "n t"], entry_value: Float[Array, "n t"]
-) -> Float[Array, "t edges"]:
-    """Return the values at the edges that each tendon meets, base to tip; NaN beyond its end."""
-    pairs = jnp.stack([exit_value, entry_value], axis=1)
-    flat = pairs.reshape(-1, pairs.shape[-1]).T
-    met = jnp.take_along_axis(flat, jnp.maximum(chain.contacts, 0), axis=1)
-    beyond = jnp.roll(chain.contacts, -1, axis=1).at[:, -1].set(-1)
-    # The last edge, where the tendon enters its end body, is not a contact: it is fixed there.
-    return jnp.where(beyond >= 0, met, jnp.nan)
-
-
-def along_contacts(
-    chain: Chain, exit_value: Float[Array, "n t"], entry_value: Float[Array, "n t"]
-) -> Float[Array, "t contacts"]:
-    """Return the values at the contacts of each tendon, base to tip; NaN beyond its end."""
-    return along_edges(chain, exit_value, entry_value)[:, :-1]
-
-
-# Smaller moments do not count, as a fraction of the largest stiffness of a mode (per rad).
-_MIN_RELATIVE_MOMENT = 1e-12
-
-
-def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, ""]:
-    """Return the largest imbalance of bending moment at any node, over the largest moment."""
-    # Bending about x and y in space, about y in the plane.
-    bending = np.array([0, 1]) if chain.frame is None else np.array([0])
-    internal = at.flexure.resultants[..., bending]
-    required = _along_wall(chain, unknowns, at)
-    if at.wrenches is not None:
-        required = required + jax.vmap(_required)(
-            chain.rods, unknowns.modes, at.flexure, at.wrenches.resultant
-        )
-    real = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
-    has_length = (real[:, None] & (chain.rods.length > 0.0))[..., None]
-    carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
-    error = jnp.max(jnp.abs(internal - required[..., bending]) * has_length * carried)
-    largest = jnp.max(jnp.abs(required[..., bending]) * has_length)
-    # Smaller moments are rounding errors.
-    bends = largest > _MIN_RELATIVE_MOMENT * jnp.max(chain.stiffness)
-    return jnp.where(bends, error / jnp.where(bends, largest, 1.0), 0.0)
-
-
-def _required(
+def _by_wrench(
     rod: Rod, modes: Float[Array, " modes"], flexure: FlexureState, wrench: Float[Array, " w"]
 ) -> Float[Array, "nodes w"]:
     """Compute the wrench on all bodies beyond each node, about the node, in its section's axes."""
@@ -259,8 +219,11 @@ def _required(
     if rod.linear_kinematics is not None:
         # Moments of a linear beam are taken on the free shape, under forces in the body's frame.
         is_small = rod.linear_kinematics > 0.0
-        shapes = (body, nodes), (_about_free_end(rod, modes), _free_nodes(rod))
-        body, nodes = jax.tree.map(lambda large, small: jnp.where(is_small, small, large), *shapes)
+        start = Motion(rod.start_rotation, rod.start_offset)
+        end = Motion(rod_end(rod, modes).rotation, rod.curve_offset)
+        free_end = start.then(end).then(Motion(rod.end_rotation, rod.end_offset))
+        free = free_end, jax.vmap(start.then)(Motion(rod.node_rotation, rod.node_offset))
+        body, nodes = choose(is_small, free, (body, nodes))
 
     def at_node(node: Motion) -> Array:
         across = node.rotation.T @ body.rotation
@@ -268,31 +231,3 @@ def _required(
         return Motion(across, offset).wrench(wrench)
 
     return jax.vmap(at_node)(nodes)
-
-
-def _about_free_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
-    """Compute the pose of the distal body, rotated by the modes but not displaced."""
-    end = Motion(rod_end(rod, modes).rotation, rod.curve_offset)
-    start = Motion(rod.start_rotation, rod.start_offset)
-    return start.then(end).then(Motion(rod.end_rotation, rod.end_offset))
-
-
-def _free_nodes(rod: Rod) -> Motion:
-    """Compute the section poses at the nodes of the free rod, in the proximal frame."""
-    start = Motion(rod.start_rotation, rod.start_offset)
-    return jax.vmap(start.then)(Motion(rod.node_rotation, rod.node_offset))
-
-
-def _along_wall(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, "n nodes w"]:
-    """Compute the resultants required by tendons and contacts that act along the wall."""
-    acting = jnp.zeros((chain.flexures, chain.rods.basis.shape[-2]))
-    for group, span in zip(chain.groups, at.spans, strict=True):
-        if group.fibre is not None:
-            weights = of_rod(chain.rods, fibre_stretch(group.fibre))
-            acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
-    for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
-        fibre = group.fibre(chain.rods)
-        if fibre is not None:
-            weights = of_rod(chain.rods, fibre_stretch(fibre))
-            acting = acting + (force * group.has_contact) * weights
-    return jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)

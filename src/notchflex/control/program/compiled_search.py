@@ -36,7 +36,6 @@ from notchflex.mechanics.chain import Chain
 from notchflex.solver.block_elimination import (
     command_residual,
     linear_step,
-    stroke,
     tension_is_bounded,
 )
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
@@ -50,6 +49,7 @@ from notchflex.solver.residual import (
     Memory,
     SolverState,
     evaluate,
+    state_at,
 )
 from notchflex.solver.solved_state import SolvedState
 
@@ -283,7 +283,7 @@ class _Search:
             no, drive, no, no, no, count,
         )  # fmt: skip
         last = self.last
-        result = LoadStepResult(last, zero, count, jnp.array(True), zero, count, last, zero)
+        result = LoadStepResult(last, zero, count, ~no, zero, count, last, zero, none > 0.0)
         return SolvedRound(drive, at, result, count)
 
     def goes_on(self, state: SolvedRound) -> Bool[Array, ""]:
@@ -356,14 +356,7 @@ class _Search:
         """Quantities of a point in the world, its residual, and the state with its history."""
         chain, applied, outputs = self.chain, self.command.applied, self.layouts.outputs
         at = evaluate(chain, point, memory, applied)
-        history = Memory(
-            log_ratio=point.unknowns.log_ratio,
-            slid=tuple(span.slid for span in at.spans),
-            bound=tuple(span.bound for span in at.spans),
-            material=at.flexure.memory,
-        )
-        drawn = stroke(chain, at.base)
-        state = SolverState(point, history, drawn, applied)
+        state = state_at(chain, point, at, applied)
         quantities = report_quantities(chain, state, outputs)
         turned = [REGISTERED[name].turned(quantities[name], self.task.turn) for name in outputs]
         return jnp.concatenate([jnp.ravel(one) for one in turned]), (at, state)

@@ -47,7 +47,7 @@ from notchflex.solver.residual import SolverState, evaluate
 from notchflex.solver.solved_state import notch_contact
 
 # Columns behind the two states and the shape, see `_status`.
-_STATUS = 7
+_STATUS = 8
 
 
 def _column(number: int, kind: type = float) -> Any:
@@ -73,6 +73,7 @@ class SolverRun:
         reached: Fraction of the load step that was reached.
         substeps: Number of substeps that converged.
         fraction_before: Fraction of the load step at which the last of them began.
+        overdrawn: Sum of 2**k over the tendons k, from 0, whose strokes no shape allows.
     """
 
     residual: Float[np.ndarray, " s"] = _column(0)
@@ -82,6 +83,7 @@ class SolverRun:
     reached: Float[np.ndarray, " s"] = _column(4)
     substeps: Int[np.ndarray, " s"] = _column(5, int)
     fraction_before: Float[np.ndarray, " s"] = _column(6)
+    overdrawn: Int[np.ndarray, " s"] = _column(7, int)
 
     def __init__(
         self,
@@ -273,7 +275,8 @@ def _follow(
 def _status(result: LoadStepResult) -> Float[Array, " status"]:
     """Return the solver's status, in the order of the columns of `SolverRun`."""
     status = [result.residual, result.iterations, result.converged, True, result.reached]
-    status += [result.substeps, result.fraction_before]
+    powers = 2 ** jnp.arange(len(result.overdrawn))
+    status += [result.substeps, result.fraction_before, jnp.sum(result.overdrawn * powers)]
     return jnp.stack([jnp.asarray(value, float) for value in status])
 
 
