@@ -94,6 +94,8 @@ _HOME = {
             "Differentiable",
             "Kink",
             "SharedStroke",
+            "Step",
+            "Stepper",
             "TipResponse",
             "bodies_from_angles",
             "closing",

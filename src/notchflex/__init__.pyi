@@ -7,6 +7,8 @@ from notchflex.analysis import ClosingStatus as ClosingStatus
 from notchflex.analysis import Differentiable as Differentiable
 from notchflex.analysis import Kink as Kink
 from notchflex.analysis import SharedStroke as SharedStroke
+from notchflex.analysis import Step as Step
+from notchflex.analysis import Stepper as Stepper
 from notchflex.analysis import TipResponse as TipResponse
 from notchflex.analysis import bodies_from_angles as bodies_from_angles
 from notchflex.analysis import closing as closing

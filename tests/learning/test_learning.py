@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.stepping import BatchStepper
 
 pytest.importorskip("gymnasium", reason="the extra `learn` is not installed")
 
@@ -88,16 +87,17 @@ def test_states_of_rows_go_on_as_a_path_does(margin):
     wrist = nf.load_robot("pacheco2021-a")
     tops = np.array([0.6, 1.1, 1.7, 2.4])
     way = np.concatenate([np.linspace(0.2, 1.0, 5), np.linspace(0.9, 0.1, 5)])
-    stepper = BatchStepper(wrist, ("tip_position", "total_angle"), cores=2)
-    states, angles = stepper.at_rest(len(tops)), []
+    stepper = nf.Stepper(wrist, ("tip_position", "total_angle"), cores=2)
+    states, angles = stepper.rest(len(tops)), []
     for part in way:
-        states, found, good = stepper.step(states, part * tops[:, None])
-        assert good.all()
-        angles.append(found["total_angle"])
+        step = stepper.step(states, part * tops[:, None])
+        assert step.converged.all()
+        states = step.state
+        angles.append(step.values["total_angle"])
     for row, top in enumerate(tops):
         path = nf.simulate(wrist, [nf.Load(tension=float(part * top)) for part in way])
         margin.within("angle", np.array(angles)[:, row] - path.total_angle, 1e-12, "rad")
-    ahead = stepper.path(states[2], np.array([0.4]))
+    ahead = stepper.path(states[2], [0.4])
     expected = nf.simulate(wrist, nf.Load(tension=0.4), from_state=path_to(wrist, way * tops[2]))
     margin.within("next", ahead.total_angle - expected.total_angle, 1e-12, "rad")
 

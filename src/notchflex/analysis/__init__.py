@@ -35,6 +35,7 @@ from notchflex.analysis.kinematics import (
 )
 from notchflex.analysis.outputs import Batch
 from notchflex.analysis.solve import simulate, solve, solve_each
+from notchflex.analysis.stepping import Step, Stepper
 from notchflex.analysis.tangent import Kink
 
 __all__ = [
@@ -47,6 +48,8 @@ __all__ = [
     "Differentiable",
     "Kink",
     "SharedStroke",
+    "Step",
+    "Stepper",
     "TipResponse",
     "axis_places",
     "axis_points",

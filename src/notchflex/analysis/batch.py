@@ -466,9 +466,7 @@ def _simulate(
 ) -> dict[str, np.ndarray]:
     """Simulate paths, joined to one, each from rest."""
     names = with_converged(outputs)
-    threads = number_of_cores() if cores is None else check_integer(cores, "cores")
-    if threads < 1:
-        raise InputError.OUT_OF_RANGE(f"cores must be 1 or more, or None for all; got {threads}")
+    threads = number_of_threads(cores)
     given = len(robots.every)
     count = max(given, paths)
     if given not in (1, count) or paths not in (1, count):
@@ -478,6 +476,14 @@ def _simulate(
         )
     tables = tables_of(robots, joined, paths, count, names, refinement)
     return _solved(tables, count, np.array((settings or DEFAULT).numbers), threads, progress)
+
+
+def number_of_threads(cores: int | None) -> int:
+    """Return how many threads work, of the cores that a caller gives."""
+    threads = number_of_cores() if cores is None else check_integer(cores, "cores")
+    if threads < 1:
+        raise InputError.OUT_OF_RANGE(f"cores must be 1 or more, or None for all; got {threads}")
+    return threads
 
 
 def _solved(

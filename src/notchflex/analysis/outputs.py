@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NoReturn
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from notchflex._jax import (
     choose,
@@ -23,17 +24,22 @@ from notchflex.results.quantities import QUANTITIES
 from notchflex.solver.continuation import solve_load_step
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
-from notchflex.solver.quantities import believable
+from notchflex.solver.quantities import (
+    believable,
+    unpad_quantity,
+)
 from notchflex.solver.residual import (
     SolverState,
     at_rest,
 )
 from notchflex.solver.solved_state import SolvedState
 
-_OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]
+OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]
+"""What is reported of a state alone, without its path."""
 DEFAULT_OUTPUTS = ("total_angle", "notch_angle", "tip_position", "tip_rotation", "converged")
-OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *_OF_STATE]),)
+OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *OF_STATE]),)
 """What can be asked of a batch or of a function that can be differentiated."""
 WORKS = {name: one.work_of for name, one in REGISTERED.items() if one.work_of}
 """What can be asked of a batch besides: works, with what they are integrated of."""
@@ -87,18 +93,20 @@ class Batch(ByValue, Displayed, Mapping[str, np.ndarray]):
     def _summary(self) -> Summary:
         count = len(next(iter(self.values()), ()))
         title = f"Batch of {count} row{'s' * (count != 1)}"
-        rows = [(name, _range(name, array)) for name, array in self.items()]
+        rows = [(name, range_of(name, array)) for name, array in self.items()]
         return Summary(title, rows, "[name] is the array of one output")
 
 
-def _range(name: str, array: np.ndarray) -> str:
-    """Describe an array by its shape, and what its values lie between."""
+def range_of(name: str, array: np.ndarray) -> str:
+    """Describe an array by its shape, and what its values lie between; a number by itself."""
+    unit = QUANTITIES[name].python_unit if name in QUANTITIES else ""
+    if array.ndim == 0:
+        return f"{array if array.dtype == bool else short(float(array))} {unit}".rstrip()
     shape = "×".join(map(str, array.shape))
     if array.dtype == bool:
         return f"{shape}, {int(array.sum())} of {array.size} true"
     if not np.isfinite(array).any():
         return f"{shape}, no number"
-    unit = QUANTITIES[name].python_unit if name in QUANTITIES else ""
     ends = f"{short(float(np.nanmin(array)))} to {short(float(np.nanmax(array)))} {unit}"
     return f"{shape}, {ends}".rstrip()
 
@@ -140,7 +148,35 @@ def report_quantities(
 ) -> dict[str, Array]:
     """Return quantities of a solved state by name, in the frame of the base."""
     state = SolvedState(chain, solved)
-    return {name: state.quantity(name) for name in outputs if name in _OF_STATE}
+    return {name: state.quantity(name) for name in outputs if name in OF_STATE}
+
+
+@lru_cache(maxsize=64)
+def reported_shapes(
+    chain: StaticStructure, state: PytreeLayout, outputs: tuple[str, ...]
+) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of quantities of a state, as a program reports them."""
+
+    def report(numbers: Array, packed: Array) -> dict[str, Array]:
+        return report_quantities(chain.unpack(numbers), state.unpack(packed), outputs)
+
+    vectors = (jax.ShapeDtypeStruct((one.size,), float) for one in (chain, state))
+    reported = jax.eval_shape(report, *vectors)
+    return {name: reported[name].shape for name in outputs}
+
+
+def own_entries(ready: PreparedChain, outputs: Sequence[str]) -> dict[str, Int[np.ndarray, ...]]:
+    """Return where programs of the padded chain report the numbers of a robot's own quantities.
+
+    The index is -1 for numbers beyond the end of a tendon.
+    """
+    long, begin, indices = ready.long, 1, {}
+    shapes = reported_shapes(long.static_structure, long.state, tuple(outputs))
+    for name, shape in shapes.items():
+        end = begin + int(np.prod(shape))
+        numbers = unpad_quantity(ready.chain, name, np.arange(float(begin), end).reshape(shape))
+        begin, indices[name] = end, np.nan_to_num(numbers).astype(int) - 1
+    return indices
 
 
 @native(3, lane_sizes)
@@ -178,7 +214,7 @@ def follow_row(
         solved = choose(alive, result.solved, last)
         reached = alive & result.converged
         quantity = SolvedState(robot, solved).quantity
-        values = {name: quantity(name) for name in outputs if name in _OF_STATE} | {
+        values = {name: quantity(name) for name in outputs if name in OF_STATE} | {
             "residual": result.residual,
             "iterations": result.iterations,
             "converged": reached & believable(quantity),

@@ -1,167 +1,522 @@
-"""Incremental batches: rows of one robot, each with a friction history, loaded step by step.
+"""Steps of a robot whose next drives depend on its state: control, learning, estimation.
 
-`simulate_batch` takes all loads of a path in advance. In a control loop the next load depends on
-the state, so the states of all rows are returned and passed back.
+`simulate` takes all loads of a path in advance. Here the state is returned and passed back, and all
+that stays the same is packed once: robot, external loads, what is reported.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
-from lanewise import WIDTH
-from notchflex._jax import choose
-from notchflex.analysis.outputs import report_quantities
+from lanewise import WIDTH, FixedVector
+from notchflex._arrays import xp
+from notchflex._jax import (
+    choose,
+    jax,
+    jnp,
+)
+from notchflex._quantity import REGISTERED
+from notchflex._summary import Displayed, Summary
+from notchflex.analysis.batch import number_of_threads
+from notchflex.analysis.outputs import (
+    OF_STATE,
+    check_outputs,
+    own_entries,
+    range_of,
+    report_quantities,
+)
 from notchflex.analysis.solve import prepare_for, simulate
-from notchflex.loads import Load
-from notchflex.loads.command import make_commands
+from notchflex.errors import Failure, InputError
+from notchflex.loads import Load, LoadPath
+from notchflex.loads.command import (
+    Command,
+    make_commands,
+)
+from notchflex.loads.load import (
+    check_bool,
+    check_integer,
+    check_is_robot,
+    one_or_several,
+    rotation_of,
+    short_repr,
+)
 from notchflex.loads.load_path import load_path
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.state import State
+from notchflex.results.state import (
+    SavedState,
+    State,
+    check_robot,
+    fitted,
+    state_of,
+)
 from notchflex.robot import Robot
-from notchflex.solver.continuation import solve_load_step
+from notchflex.solver.continuation import before_tendons, solve_load_step
 from notchflex.solver.newton import (
     DEFAULT,
     Settings,
 )
-from notchflex.solver.programs.compiled import (
-    native,
-    number_of_cores,
-    on_cores,
-)
+from notchflex.solver.programs.compiled import native, on_cores
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
+from notchflex.solver.programs.static_structure import (
+    PytreeLayout,
+    StaticStructure,
+    lane_sizes,
+    pad_rows,
+    padded_indices,
+)
 from notchflex.solver.quantities import believable
+from notchflex.solver.residual import SolverState
+from notchflex.solver.sensitivity import attach_to_part
 from notchflex.solver.solved_state import SolvedState
 
-States = Float[np.ndarray, "k state"]
+Drive = Literal["tension", "stroke"]
+"""What a tendon is commanded: its tension (N) or its stroke (mm)."""
+
+_NOTHING = Load()
+# A contact that slides may exceed its bound by this part of it, by rounding.
+_ROUNDING = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class BatchStepper:
-    """A robot simulated in many independent rows, step by step.
+@dataclass(frozen=True, eq=False, repr=False)
+class Step(Displayed):
+    """One step of a robot; with rows of it, rows are the leading axis of everything.
+
+    A row that did not converge keeps its state; its values and slopes are NaN.
 
     Attributes:
+        stepper: What made the step.
+        before: The state before, packed.
+        drives: The drives, N or mm.
+        state: The state after, packed: the next step starts from it.
+        flat_values: All values, one after the other as in `Stepper.places`.
+        flat_jacobian: Change of these per unit of every drive, drives as last axis; no drives where
+            none is computed.
+        converged: Whether the drives have an equilibrium.
+    """
+
+    stepper: Stepper
+    before: Float[np.ndarray, "*k state"]
+    drives: Float[np.ndarray, "*k t"]
+    state: Float[np.ndarray, "*k state"]
+    flat_values: Float[np.ndarray, "*k m"]
+    flat_jacobian: Float[np.ndarray, "*k m t"]
+    converged: Bool[np.ndarray, "*k"]
+
+    @cached_property
+    def values(self) -> dict[str, np.ndarray]:
+        """The outputs by name, in the world as those of a path; mm, N, rad."""
+        return {
+            name: part
+            if REGISTERED[name].kind is float
+            else np.nan_to_num(part).astype(REGISTERED[name].kind)
+            for name, part in self.stepper.named(self.flat_values).items()
+        }
+
+    @cached_property
+    def jacobian(self) -> dict[str, np.ndarray]:
+        """Change of the outputs per unit of every drive (N or mm), by name, drives as last axis.
+
+        It is the derivative of `values` by the drives of this step, the state before unchanged:
+        going on as the step went. A contact that slid goes on sliding, one that stuck goes on
+        sticking; at a switch it is that of one side. NaN where a step with friction was so hard
+        that it was solved in parts.
+        """
+        parts = self.stepper.named(self.flat_jacobian.swapaxes(-1, -2))
+        return {
+            name: np.moveaxis(part, self.converged.ndim, -1)
+            for name, part in parts.items()
+            if REGISTERED[name].kind is float and self.stepper.jacobian
+        }
+
+    @property
+    def dead_band(self) -> Float[np.ndarray, "*k t 2"]:
+        """Lowest and highest value of every drive between which nothing moves, N or mm."""
+        return self.stepper.dead_band(self.state)
+
+    @cached_property
+    def code(self) -> Any:
+        """Name of the `Failure`, "" where it converged; with rows a list.
+
+        `Stepper.path` gives the reason as a sentence.
+        """
+        codes = np.full(self.converged.shape, "", object)
+        for row in map(tuple, np.argwhere(~self.converged)):
+            failure, _ = self.stepper.path(self.before[row], self.drives[row]).failures[0]
+            codes[row] = (failure or Failure.NO_EQUILIBRIUM).name
+        return codes.tolist()
+
+    def _summary(self) -> Summary:
+        rows = [(name, range_of(name, values)) for name, values in self.values.items()]
+        rows.append(("converged", range_of("converged", self.converged)))
+        hint = ".values and .jacobian by name; .state is where the next step starts"
+        return Summary(f"Step of {self.stepper.robot.name}", rows, hint)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stepper(Displayed):
+    """A robot that is driven step by step, each step from the state that the one before left.
+
+    It is for loops in which the next drives depend on the state: control, learning, estimation.
+    Everything that stays the same is prepared once. Many robots of one kind, each with its own
+    history, are rows of a state: they are solved together, on several cores.
+
+    Args:
         robot: The robot.
-        outputs: Quantities that a step returns; the base is not turned.
-        cores: Number of cores to use; all where not given.
+        outputs: Quantities to report, by names of `EquilibriumPath`.
+        drives: Whether a tendon is commanded by "tension" (N) or by "stroke" (mm): one word for
+            all, or one per tendon.
+        jacobian: Whether the slopes of the outputs by the drives are computed.
+        loads: External loads and rotation of the base in all steps; its tendons are not commanded.
+        from_state: A state that steps will start from, see `start`.
+        settings: Tolerance and limits of the solver.
+        refinement: More strain modes, as for `simulate`.
+        cores: Number of cores for rows; all where not given.
+
+    Raises:
+        InputError: Anything that cannot be used.
 
     Example:
         >>> from notchflex import load_robot
-        >>> stepper = BatchStepper(load_robot("pacheco2021-a"), ("total_angle",))
-        >>> states = stepper.at_rest(3)
-        >>> for tension in (1.0, 2.0, 1.0):
-        ...     states, found, good = stepper.step(states, np.full((3, 1), tension))
-        >>> found["total_angle"].shape, bool(good.all())
-        ((3,), True)
+        >>> stepper = Stepper(load_robot("pacheco2021-a"), "total_angle", jacobian=True)
+        >>> state = stepper.rest()
+        >>> for tension in (0.5, 1.0, 0.5):
+        ...     step = stepper.step(state, [tension])
+        ...     state = step.state
+        >>> round(float(step.values["total_angle"]), 3), step.dead_band.round(3).tolist()
+        (0.495, [[0.5, 0.513]])
+        >>> step.jacobian["total_angle"].shape
+        (1,)
     """
 
     robot: Robot
-    outputs: tuple[str, ...]
+    outputs: Sequence[str] = ("tip_position", "tip_rotation", "total_angle")
+    drives: Drive | Sequence[Drive] = "tension"
+    jacobian: bool = False
+    loads: Load = _NOTHING
+    from_state: State | SavedState | None = None
+    settings: Settings = DEFAULT
+    refinement: int = 0
     cores: int | None = None
 
-    def at_rest(self, rows: int) -> States:
-        """Return a number of rows of the free robot with slack tendons, packed."""
-        return np.repeat(self._prepared.rest_vector[None], rows, axis=0)
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        count, form = (
+            check_is_robot(self.robot).number_of_tendons,
+            'drives are "tension" or "stroke"',
+        )
+        words = one_or_several(self.drives, str, form)
+        words = tuple(count * words if len(words) == 1 else words)
+        if len(words) != count or not set(words) <= set(get_args(Drive)):
+            raise InputError.UNKNOWN_NAME(
+                f"{form}, one word for all tendons or one for each of {count}; "
+                f"got {short_repr(self.drives)}"
+            )
+        loads: Any = self.loads
+        if not isinstance(loads, Load) or (loads.tension, loads.stroke) != (None, None):
+            raise InputError.CONFLICT(
+                "loads are a notchflex.Load that leaves tension and stroke to the drives of each "
+                f"step; got {short_repr(loads)}"
+            )
+        if self.from_state is not None:
+            check_robot(self.from_state, self.robot)
+        check_bool(self.jacobian, "jacobian")
+        number_of_threads(self.cores)
+        vars(self).update(outputs=check_outputs(self.outputs, OF_STATE), drives=words)
+        _ = self.prepared  # what cannot be prepared is refused now
 
-    def step(
-        self, states: States, tension: Float[np.ndarray, "k t"]
-    ) -> tuple[States, dict[str, np.ndarray], Bool[np.ndarray, " k"]]:
-        """Pull the tendons of every row from its state.
+    def rest(self, rows: int | None = None) -> Float[np.ndarray, "*k state"]:
+        """Return the free robot with slack tendons, as a state to step from.
 
         Args:
-            states: Packed states before.
-            tension: Tension of every tendon, N.
+            rows: Number of rows; a single robot where not given.
+        """
+        return _repeated(self.prepared.rest_vector, rows)
+
+    def start(self, rows: int | None = None) -> Float[np.ndarray, "*k state"]:
+        """Return `from_state` as a state to step from; rest where none was given.
+
+        Args:
+            rows: Number of rows; a single robot where not given.
+        """
+        ready = self.prepared
+        return _repeated(np.asarray(ready.state.pack(fitted(self.from_state, ready.chain))), rows)
+
+    def step(self, state: Float[np.ndarray, "*k state"], drives: Any) -> Step:
+        """Move the tendons, from a state.
+
+        The result is that of `simulate` with `from_state`: to the last digit for a single robot, to
+        rounding for rows.
+
+        Args:
+            state: Where it starts: `rest()`, or the `state` of a step; with rows as leading axis.
+            drives: Tension (N) or stroke (mm) of every tendon, (t,); for k rows (k, t).
 
         Returns:
-            States, outputs by name, and which rows converged. A row that did not converge keeps its
-            state.
+            The state after it, and what was asked.
+
+        Raises:
+            InputError: Drives or a state of another shape, or not finite; a negative tension.
         """
-        loads = np.repeat(self._load[None], len(states), axis=0)
-        loads[:, self._targets] = tension
-        cores = self.cores or number_of_cores()
-        size = max(1, -(-len(states) // (cores * WIDTH))) * WIDTH
-        starts = range(0, len(states), size)
+        before, towards = self._checked(state, drives)
+        solve = self._single if before.ndim == 1 else self._parallel
+        after, flat, converged = solve(before, towards)
+        turn = rotation_of(tuple(self.loads.base_rotation))
+        for name, part in {} if turn is None else self.named(flat).items():
+            part[...] = REGISTERED[name].turned(part, turn)
+        values, slopes = flat[..., 0, :], flat[..., 1:, :].swapaxes(-1, -2)
+        if not converged.all():
+            values[~converged] = np.nan
+        return Step(self, before, towards, after, values, slopes, converged)
 
-        def solve(start: int) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
-            some = slice(start, start + size)
-            vectors = self._prepared.dynamic_vector, states[some], loads[some], self._numbers
-            return _step_row.rows((False, True, True, False), *vectors, *self._layouts)
+    def named(self, flat: Float[np.ndarray, "*k m"]) -> dict[str, np.ndarray]:
+        """Return views of flat values, on the last axis, by the names of the outputs."""
+        leading = flat.shape[:-1]
+        return {
+            name: flat[..., place].reshape(leading + shape)
+            for name, (place, shape) in self.places.items()
+        }
 
-        if len(starts) < 2:
-            return solve(0)
-        with closing(on_cores(solve, starts, cores)) as solving:
-            results = list(solving)
-        outputs = {name: np.concatenate([one[1][name] for one in results]) for name in self.outputs}
-        stack = np.concatenate
-        return stack([one[0] for one in results]), outputs, stack([one[2] for one in results])
+    def drives_of(self, state: Float[np.ndarray, "*k state"]) -> Float[np.ndarray, "*k t"]:
+        """Return what every tendon is at in a state: its tension (N), or its stroke (mm)."""
+        return state[..., self._drive_places]
 
-    def path(
-        self, state: Float[np.ndarray, " state"], tension: Float[np.ndarray, " t"]
-    ) -> EquilibriumPath:
-        """Return the next step of one row as a path of one load, with all quantities.
+    def dead_band(self, state: Float[np.ndarray, "*k state"]) -> Float[np.ndarray, "*k t 2"]:
+        """Return between which drives nothing moves, while those of the other tendons stay.
+
+        There the first contact of a tendon sticks: its tension passes nothing on until it has
+        changed by the friction of that contact. A stroke always moves something. With a
+        `constant_loss` of friction the band is approximate, to a part of that loss.
 
         Args:
-            state: Packed state before.
-            tension: Tension of every tendon, N.
+            state: A state of this stepper.
+
+        Returns:
+            Lowest and highest drive as last axis, N or mm.
         """
-        chain = self._prepared.chain
-        solved = self._prepared.state.unpack(state)
-        before = State(self.robot.name, solved, chain.level, chain.loaded, 0, self.robot)
-        return simulate(self.robot, Load(tension=tuple(tension)), from_state=before)
+        ratio, bound = state[..., self.contact_places[:2, :, 0]].swapaxes(0, -2)
+        return np.stack(dead_band(self.drives_of(state), ratio, bound, self._by_stroke), axis=-1)
+
+    def path(self, state: Float[np.ndarray, " state"], drives: Any) -> EquilibriumPath:
+        """Return a step of a single robot as a path: all quantities, and why it failed.
+
+        Args:
+            state: The state before.
+            drives: Tension (N) or stroke (mm) of every tendon.
+        """
+        before, towards = self._checked(state, drives)
+        options: Any = {"settings": self.settings, "refinement": self.refinement}
+        return simulate(
+            self.robot, self._load(towards), from_state=self.unpacked(before), **options
+        )
+
+    def unpacked(self, state: Float[np.ndarray, " state"]) -> State:
+        """Return a state of a single robot to save, or to `simulate` from."""
+        return state_of(self.robot, self.prepared.chain, self.prepared.state.unpack(state.copy()))
 
     @cached_property
-    def _prepared(self) -> PreparedChain:
-        return prepare_for(self.robot, self._slack)
+    def places(self) -> dict[str, tuple[slice, tuple[int, ...]]]:
+        """Where in `Step.flat_values` the numbers of each output are, and their shape."""
+        ends = np.cumsum([0, *(index.size for index in self._indices.values())]).tolist()
+        parts = map(slice, ends[:-1], ends[1:])
+        shaped = zip(parts, self._indices.items(), strict=True)
+        return {name: (part, index.shape) for part, (name, index) in shaped}
+
+    def _summary(self) -> Summary:
+        rows = [("outputs", ", ".join(self.outputs)), ("drives", ", ".join(self.drives))]
+        hint = ".rest() is a state to begin with; .step(state, drives) goes on from it"
+        return Summary(f"Stepper of {self.robot.name}", rows, hint)
+
+    def _checked(self, state: Any, drives: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Return copies of a state and drives."""
+        size, tendons = self.prepared.state.size, len(self.drives)
+        if not isinstance(state, np.ndarray) or state.shape[-1:] != (size,) or state.ndim > 2:
+            raise InputError.WRONG_TYPE(
+                "a state is what rest(), start() or a step of this stepper returned; "
+                f"got {short_repr(state)}"
+            )
+        try:
+            towards = np.array(drives)
+        except ValueError:  # rows of unlike lengths
+            towards = np.zeros(0, object)
+        shape = (*state.shape[:-1], tendons)
+        if towards.dtype.kind not in "iuf" or towards.shape != shape:
+            raise InputError.WRONG_SHAPE(
+                f"drives of this state are numbers of the shape {shape}, one for each tendon, with "
+                f"rows as leading axis; got {short_repr(drives)}"
+            )
+        if not (np.isfinite(towards) & (self._by_stroke | (towards >= 0.0))).all():
+            raise InputError.OUT_OF_RANGE(
+                f"a drive is finite, and a tension 0 N or more; got {short_repr(drives)}"
+            )
+        return state.copy(), towards.astype(float)
 
     @cached_property
-    def _slack(self) -> Any:
-        tendons = self.robot.number_of_tendons
-        return load_path(Load(tension=(0.0,) * tendons), tendons)
+    def _single(self) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, ...]]:
+        """Solves one load by the padded chain, as `simulate` does."""
+        ready, long = self.prepared, self.prepared.long
+        loads, layout = ready.padded_commands(self._command)
+        forms = long.static_structure, layout, long.state, self.outputs, self.jacobian
+        fixed = long.dynamic_vector, loads[0], self.settings.numbers
+        chain, load, numbers = map(FixedVector, fixed)
+        vectors = chain, long.rest_vector, load, np.zeros(len(self.drives)), numbers
+        program = _step.bound("once", None, (*vectors, *forms))
+        places = padded_indices(ready.state, long.state)
+
+        def solve(state: np.ndarray, drives: np.ndarray) -> tuple[np.ndarray, ...]:
+            padded = pad_rows(state, ready.state, long.state)
+            after, flat, converged = program((chain, padded, load, drives, numbers))
+            return after[places], flat[:, self.entries], converged
+
+        return solve
+
+    def _parallel(self, states: np.ndarray, drives: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Solve a load for every row, in pieces on several cores."""
+        ready, cores, command = self.prepared, number_of_threads(self.cores), self._command
+        layout, numbers = ready.command_layout(command), np.array(self.settings.numbers, float)
+        forms = ready.static_structure, layout, ready.state, self.outputs, self.jacobian
+        size = max(1, -(-len(states) // (cores * WIDTH))) * WIDTH
+
+        def solve(start: int) -> tuple[np.ndarray, ...]:
+            rows = slice(start, start + size)
+            vectors = ready.dynamic_vector, states[rows], command.packed()[0], drives[rows], numbers
+            return _step.rows((False, True, False, True, False), *vectors, *forms)
+
+        starts = range(0, max(1, len(states)), size)
+        with closing(on_cores(solve, starts, cores)) as solving:
+            after, flat, converged = map(np.concatenate, zip(*solving, strict=True))
+        return after, flat[..., :-1], converged
+
+    def _load(self, drives: Float[np.ndarray, " t"]) -> Load:
+        """Return one load, with its commands."""
+        commanded = {
+            word: [
+                float(one) if own == word else None
+                for own, one in zip(self.drives, drives, strict=True)
+            ]
+            for word in get_args(Drive)
+        }
+        return replace(self.loads, **commanded)
 
     @cached_property
-    def _command(self) -> tuple[np.ndarray, PytreeLayout]:
-        commands = make_commands(self._slack, self.robot, self._prepared.chain)
-        layout = self._prepared.command_layout(commands)
-        return np.asarray(layout.pack(commands, leading=1))[0], layout
-
-    @property
-    def _load(self) -> Float[np.ndarray, " command"]:
-        return self._command[0]
+    def _by_stroke(self) -> Bool[np.ndarray, " t"]:
+        return np.array(self.drives) == "stroke"
 
     @cached_property
-    def _targets(self) -> np.ndarray:
-        return self._command[1].indices[0]  # the first field of a `Command`
+    def _drive_places(self) -> Int[np.ndarray, " t"]:
+        layout = self.prepared.state
+        at: Any = jax.tree.unflatten(layout.structure, layout.indices)
+        return np.where(self._by_stroke, at.stroke, at.point.base_tension)
 
     @cached_property
-    def _layouts(self) -> tuple[StaticStructure, PytreeLayout, PytreeLayout, tuple[str, ...]]:
-        ready = self._prepared
-        return ready.static_structure, self._command[1], ready.state, self.outputs
+    def _one_load(self) -> LoadPath:
+        """A load whose drives are replaced in every step."""
+        return load_path(self._load(np.zeros(len(self.drives))), len(self.drives))
 
     @cached_property
-    def _numbers(self) -> np.ndarray:
-        return np.array(DEFAULT.numbers, float)
+    def prepared(self) -> PreparedChain:
+        """The robot as arrays, with modes enough for its loads and for the state before."""
+        return prepare_for(self.robot, self._one_load, self.from_state, self.refinement)
+
+    @cached_property
+    def _command(self) -> Command:
+        return make_commands(self._one_load, self.robot, self.prepared.chain)
+
+    @cached_property
+    def _indices(self) -> dict[str, Int[np.ndarray, ...]]:
+        return own_entries(self.prepared, self.outputs)
+
+    @cached_property
+    def entries(self) -> Int[np.ndarray, " m"]:
+        """Where a program of the padded chain reports the values."""
+        return np.concatenate([one.ravel() for one in self._indices.values()])
+
+    @cached_property
+    def contact_places(self) -> Int[np.ndarray, "3 t contacts"]:
+        """Where a state has log ratio, bound and slid length of all contacts; -1 beyond the end."""
+        layout, edges = self.prepared.state, np.asarray(self.prepared.chain.contacts)
+        memory: Any = jax.tree.unflatten(layout.structure, layout.indices).memory
+        places = np.full((3, *edges.shape), -1)
+        fields = memory.log_ratio, memory.bound, memory.slid
+        for group, *numbers in zip(self.prepared.chain.groups, *fields, strict=True):
+            for column, tendon in enumerate(group.numbers):
+                met = edges[tendon] >= 0
+                flexure, edge = np.divmod(edges[tendon, met], 2)
+                places[:, tendon, met] = [one[flexure, column, edge] for one in numbers]
+        return places
 
 
-@native(4, lane_sizes)
-def _step_row(
+def dead_band(drive: Any, ratio: Any, bound: Any, by_stroke: Any) -> tuple[Any, Any]:
+    """Return between which drives nothing moves, as the first contact of a tendon sticks.
+
+    Args:
+        drive: The drives, N or mm, (t,), of NumPy or JAX.
+        ratio: Log ratios of the first contacts, (t,).
+        bound: Their largest, (t,).
+        by_stroke: Which drives are strokes, (t,).
+    """
+    # The ratio of a contact that slides misses its bound by rounding, to either side.
+    still = by_stroke | (xp.abs(ratio) > (1.0 + _ROUNDING) * bound)
+    low, high = (drive * xp.exp(-ratio + side * bound) for side in (-1.0, 1.0))
+    low = xp.where(still, drive, xp.minimum(low, drive))
+    return low, xp.where(still, drive, xp.maximum(high, drive))
+
+
+def _repeated(
+    state: Float[np.ndarray, " state"], rows: int | None
+) -> Float[np.ndarray, "*k state"]:
+    if rows is None:
+        return state.copy()
+    if check_integer(rows, "rows") < 0:
+        raise InputError.OUT_OF_RANGE(f"rows must be 0 or more; got {rows}")
+    return np.repeat(state[None], rows, axis=0)
+
+
+@native(5, lane_sizes)
+def _step(
     chain: Float[Array, " chain"],
     before: Float[Array, " state"],
     load: Float[Array, " command"],
+    drives: Float[Array, " t"],
     numbers: Float[Array, " settings"],
     chain_layout: StaticStructure,
     command_layout: PytreeLayout,
     state_layout: PytreeLayout,
     outputs: tuple[str, ...],
-) -> tuple[Array, dict[str, Array], Array]:
-    """Solve one load from a state; a failure returns that state."""
+    jacobian: bool,
+) -> tuple[Array, Array, Array]:
+    """Solve one load from a state.
+
+    Returns:
+        The state, that before after a failure; the outputs and, as further rows, their change by
+        every drive, and in a last column NaN; and whether it converged.
+    """
     robot, last = chain_layout.unpack(chain), state_layout.unpack(before)
-    result = solve_load_step(robot, command_layout.unpack(load), last, Settings.of(numbers))
+    command: Command = command_layout.unpack(load)._replace(target=drives)
+    result = solve_load_step(robot, command, last, Settings.of(numbers))
     converged = result.converged & believable(SolvedState(robot, result.solved).quantity)
-    solved = choose(converged, result.solved, last)
-    return state_layout.pack(solved), report_quantities(robot, solved, outputs), converged
+    # What the contacts remember of parts of the step changes with the drives, unseen.
+    seen = before_tendons(robot, last, result.fraction_before) if robot.remembers else True
+
+    def flat(solved: SolverState) -> Array:
+        quantities = report_quantities(robot, solved, outputs)
+        return jnp.concatenate([jnp.ravel(quantities[name]) for name in outputs], dtype=float)
+
+    def moved(target: Array) -> Array:
+        towards = command._replace(target=target)
+        return flat(attach_to_part(robot, towards, result.between, result.solved, converged & seen))
+
+    if jacobian:
+        values, by_drives = jax.linearize(moved, drives)
+        table = jnp.concatenate([values[None], jax.lax.map(by_drives, jnp.eye(len(drives)))])
+    else:
+        table = flat(result.solved)[None]
+    table = jnp.pad(table, ((0, 0), (0, 1)), constant_values=jnp.nan)
+    packed = state_layout.pack(choose(converged, result.solved, last))
+    return packed, table, converged

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ from notchflex._jax import (
     jnp,
 )
 from notchflex._quantity import REGISTERED
-from notchflex.analysis.outputs import report_quantities
+from notchflex.analysis.outputs import own_entries, report_quantities, reported_shapes
 from notchflex.mechanics.chain import Chain
 from notchflex.results.path import EquilibriumPath
 from notchflex.solver.programs.compiled import native
@@ -261,7 +261,7 @@ def gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradie
     long = path.prepared.long
     tangents = PathTangents(path, tuple(weights))
     layouts = tangents.layouts
-    seeds = _packed(path, weights, _shapes(layouts))
+    seeds = _packed(path, weights)
     # No step beyond the last that counts: one that failed there must not matter.
     backwards = slice(int(np.flatnonzero(seeds.any(axis=1)).max(initial=0)), None, -1)
     steps = [one[backwards] for one in (*tangents.steps, tangents.loads, seeds)]
@@ -274,34 +274,16 @@ def gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradie
 
 
 def _packed(
-    path: EquilibriumPath, weights: Mapping[str, np.ndarray], shapes: dict[str, tuple[int, ...]]
+    path: EquilibriumPath, weights: Mapping[str, np.ndarray]
 ) -> Float[np.ndarray, "s outputs"]:
     """Pack weights in the frame of the base, for the outputs of the long chain."""
-    seeds: list[np.ndarray] = []
-    turn = path.load.base_to_world
+    turn, long = path.load.base_to_world, path.prepared.long
     back = None if turn is None else turn.T
-    for name, in_world in weights.items():
-        weight = REGISTERED[name].turned(in_world, back)
-        size = int(np.prod(shapes[name]))
-        padded = np.arange(float(size)).reshape(1, *shapes[name])
-        indices = unpad_quantity(path.chain, name, padded)[0]
-        is_there = np.isfinite(indices)  # tendons may meet fewer edges than there are
-        whole = np.zeros((len(weight), size))
-        whole[:, indices[is_there].astype(int)] = weight[:, is_there]
-        seeds.append(whole)
-    return np.concatenate(seeds, axis=1)
-
-
-@lru_cache(maxsize=64)
-def _shapes(layouts: StepLayouts) -> dict[str, tuple[int, ...]]:
-    """Return the shapes of the outputs of the long chain."""
-
-    def report(chain: Array, state: Array) -> dict[str, Array]:
-        unpacked = layouts.chain.unpack(chain), layouts.state.unpack(state)
-        return report_quantities(*unpacked, layouts.outputs)
-
-    vectors = (jax.ShapeDtypeStruct((one.size,), float) for one in (layouts.chain, layouts.state))
-    return {name: one.shape for name, one in jax.eval_shape(report, *vectors).items()}
+    shapes = reported_shapes(long.static_structure, long.state, tuple(weights))
+    seeds = np.zeros((len(path), sum(int(np.prod(shape)) for shape in shapes.values()) + 1))
+    for name, index in own_entries(path.prepared, [*weights]).items():
+        seeds[:, index] = REGISTERED[name].turned(weights[name], back)
+    return seeds[:, :-1]  # the last column takes what is beyond the end of a tendon
 
 
 @native(8, lanes_of)

@@ -151,9 +151,7 @@ class Observer:
         """
         if number not in self._seen:
             own, other = self._models[number], problem.model
-            self._seen[number] = DriveModel(
-                own.robot, other.load, other.outputs, other.start, other.settings
-            )
+            self._seen[number] = DriveModel(own.robot, other.load, other.outputs, other.start)
         return self._seen[number]
 
 

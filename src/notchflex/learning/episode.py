@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from notchflex._extras import need
 from notchflex.analysis.kinematics import tip_from_angles
-from notchflex.analysis.stepping import BatchStepper
+from notchflex.analysis.stepping import Stepper
 from notchflex.errors import InputError
 from notchflex.loads.load import (
     check_integer,
@@ -207,10 +207,10 @@ class EpisodeRows:
         """Put all robots at rest."""
         self.settings, self._follow = settings, follow
         robot = settings.model
-        self._stepper = BatchStepper(robot, ("tip_position",), cores)
-        self._rest = self._stepper.at_rest(1)
+        self._stepper = Stepper(robot, "tip_position", cores=cores)
+        self._rest = self._stepper.rest(1)
         slack = np.zeros((1, robot.number_of_tendons))
-        self._tip_at_rest = self._stepper.step(self._rest, slack)[1]["tip_position"][0]
+        self._tip_at_rest = self._stepper.step(self._rest, slack).values["tip_position"][0]
         self._states = np.repeat(self._rest, rows, axis=0)
         self._count = np.zeros(rows, int)
         self.tension = np.zeros((rows, robot.number_of_tendons))
@@ -248,21 +248,18 @@ class EpisodeRows:
             older = self._past[which, :-1]
             self._past[which, 0] = self._seen(which)
             self._past[which, 1:] = older
-        states, outputs, converged = self._stepper.step(self._states[which], tension)
-        code = [""] * len(which)
-        for row in np.flatnonzero(~converged):
-            path = self._stepper.path(self._states[which[row]], tension[row])
-            code[row] = path.reason_code[0] or "NO_EQUILIBRIUM"
+        step = self._stepper.step(self._states[which], tension)
+        converged, tip = step.converged, step.values["tip_position"]
         # Tensions without equilibrium are refused: the robot stays where it is.
         self.tension[which] = np.where(converged[:, None], tension, self.tension[which])
-        self.tip[which] = np.where(converged[:, None], outputs["tip_position"], self.tip[which])
-        self._states[which] = states
+        self.tip[which] = np.where(converged[:, None], tip, self.tip[which])
+        self._states[which] = step.state
         distance = self.distance[which]  # before the target moves on
         self._count[which] += 1
         reached = (distance <= settings.tolerance) & converged & (not self._follow)
         reward = REACHED * reached - distance / settings.length - FAILED * ~converged
         last = (self._count[which] >= settings.steps) & ~reached
-        return Outcome(reward, reached, last, code, distance)
+        return Outcome(reward, reached, last, step.code, distance)
 
     @property
     def target(self) -> Float[np.ndarray, "n 3"]:
@@ -304,11 +301,12 @@ class EpisodeRows:
                 [[random_pull(one, settings.directions) for _ in range(2)] for one in random]
             )
         states = np.repeat(self._rest, len(random), axis=0)
-        tips = np.empty((*pulls.shape[:2], 3))
-        for number in range(pulls.shape[1]):
-            states, outputs, _ = self._stepper.step(states, pulls[:, number])
-            tips[:, number] = outputs["tip_position"]
-        return tips if self._follow else tips[:, -1:]
+        tips = [np.repeat(self._tip_at_rest[None], len(random), axis=0)]
+        for pull in pulls.swapaxes(0, 1):
+            step = self._stepper.step(states, pull)
+            states, tip = step.state, step.values["tip_position"]
+            tips.append(np.where(step.converged[:, None], tip, tips[-1]))
+        return np.stack(tips[1:] if self._follow else tips[-1:], axis=1)
 
     def _checked(self, actions: Any, rows: int) -> np.ndarray:
         shape = rows, self.settings.model.number_of_tendons

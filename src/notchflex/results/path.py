@@ -21,7 +21,6 @@ from notchflex.loads import LoadPath
 from notchflex.loads.command import (
     Command,
     make_commands,
-    out_of_frame,
 )
 from notchflex.mechanics.chain import Chain, unchecked_dimensions
 from notchflex.mechanics.tendon import Straight
@@ -30,7 +29,11 @@ from notchflex.results.quantities import (
     PathQuantities,
     friction_front,
 )
-from notchflex.results.state import Equilibrium, State
+from notchflex.results.state import (
+    Equilibrium,
+    State,
+    state_of,
+)
 from notchflex.robot import Robot
 from notchflex.solver.block_elimination import closing_stroke
 from notchflex.solver.newton import (
@@ -454,11 +457,7 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
         solved: SolverState = tree_util.tree_map(
             lambda leaf: read_only(np.asarray(leaf)[step]), self.run.solved
         )
-        chain = self.chain
-        if solved.applied is not None and chain.frame is not None:
-            solved = solved._replace(applied=out_of_frame(solved.applied, chain.frame))
-        name = self.robot.name
-        return State(name, solved, chain.level, chain.loaded, chain.refinement, self.robot)
+        return state_of(self.robot, self.chain, solved)
 
     @property
     def state(self) -> State:

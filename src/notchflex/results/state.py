@@ -339,6 +339,13 @@ def check_robot(state: object, robot: Robot) -> None:
         )
 
 
+def state_of(robot: Robot, chain: Chain, solved: SolverState) -> State:
+    """Return a solved state of a robot's chain as one to save or to continue from."""
+    if solved.applied is not None and chain.frame is not None:
+        solved = solved._replace(applied=out_of_frame(solved.applied, chain.frame))
+    return State(robot.name, solved, chain.level, chain.loaded, chain.refinement, robot)
+
+
 def fitted(state: State | SavedState | None, chain: Chain) -> SolverState:
     """Return the start state on a chain: rest, or a given state, which must fit."""
     if state is None:

@@ -17,7 +17,7 @@ from notchflex.analysis.tangent import (
     PathTangents,
 )
 from notchflex.results.path import EquilibriumPath
-from notchflex.sensing.model import SensingModel, Step
+from notchflex.sensing.model import SensingModel, SensingStep
 from notchflex.sensing.search import Candidate, ReadingProblem, best, best_of_all
 from notchflex.solver.residual import SolverState
 
@@ -43,7 +43,7 @@ class History:
     """
 
     model: SensingModel
-    steps: list[Step]
+    steps: list[SensingStep]
     best: list[Candidate]
     covariance: list[Float[np.ndarray, "m m"]]
     alone: list[Float[np.ndarray, "m m"]]
@@ -75,7 +75,7 @@ def estimate(model: SensingModel, progress: Progress | None = None) -> History:
 
 def _estimate_one(
     model: SensingModel, number: int, state: SolverState | None, force: Float[np.ndarray, " d"]
-) -> tuple[Step, Candidate]:
+) -> tuple[SensingStep, Candidate]:
     step = model.step(number)
     problem = ReadingProblem(model, step, state, np.diag(step.variance**-0.5))
     at = best_of_all(problem, force[None])

@@ -125,7 +125,7 @@ _RESOLUTION = {"stroke": 1e-5, "tip_position": 1e-5, "notch_angle": 1e-6}
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class SensingStep:
     """One reading: which numbers were measured, and how exactly.
 
     Attributes:
@@ -176,7 +176,7 @@ class SensingModel:
         read = self.readings.read
         return tuple(name for name, values in read.items() if np.isfinite(values).any())
 
-    def step(self, number: int) -> Step:
+    def step(self, number: int) -> SensingStep:
         """Return what was measured in a reading, counted from 0."""
         read, deviation = self.readings.read, self.readings.deviation
         count = self.readings.count[number]
@@ -189,7 +189,7 @@ class SensingModel:
         )
         driving = self.readings.driving_deviation[number] ** 2 / count
         variance = noise / count + resolution
-        return Step(number, values[entries], entries, variance, noise, resolution, driving)
+        return SensingStep(number, values[entries], entries, variance, noise, resolution, driving)
 
     def load(self, steps: Iterable[int], forces: Float[np.ndarray, "k d"]) -> LoadPath:
         """Return loads: what drives the model in some readings, each with a force."""

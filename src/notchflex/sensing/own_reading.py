@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex.sensing.history import History, known_inverse, whitening_of
-from notchflex.sensing.model import Step
+from notchflex.sensing.model import SensingStep
 from notchflex.sensing.readings import Readings
 
 
@@ -33,7 +33,7 @@ class OwnReading:
     """
 
     number: int
-    step: Step
+    step: SensingStep
     extra: Float[np.ndarray, "m m"]
     part: float
     information: Float[np.ndarray, "m d"]

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.results.path import EquilibriumPath
-from notchflex.sensing.model import SensingModel, Step
+from notchflex.sensing.model import SensingModel, SensingStep
 from notchflex.solver.programs.run import SolverRun
 from notchflex.solver.residual import SolverState
 
@@ -96,7 +96,7 @@ class ReadingProblem:
     """
 
     model: SensingModel
-    step: Step
+    step: SensingStep
     start: SolverState | None
     whitening: Float[np.ndarray, "m m"]
     known: Known = field(default_factory=dict[bytes, Solved])

@@ -320,6 +320,12 @@ def interpolate_command(
     return Command(target, by_stroke, applied)
 
 
+def before_tendons(chain: Chain, last: SolverState, fraction: Array) -> Bool[Array, ""]:
+    """Return whether the tendons have not moved yet at a fraction of a load step."""
+    complete = _external_complete(chain, last)
+    return fraction <= jnp.where(complete < 1.0, complete, 0.0)
+
+
 def _external_complete(chain: Chain, last: SolverState) -> Float[Array, ""]:
     """Return the fraction of a load step at which external loads are complete: half if first."""
     slack = jnp.all(last.point.base_tension == 0.0)

@@ -59,7 +59,7 @@ def attach_derivatives(
         The same state.
     """
     if not chain.remembers:
-        return _attach_to_substep(chain, command, last, solved, reached)
+        return attach_to_part(chain, command, last, solved, reached)
     has_history = reached & (substeps <= _MAX_SUBSTEPS)
     first_command = interpolate_command(chain, command, last, _stop_gradient(fraction_before))
     items = (
@@ -73,7 +73,7 @@ def attach_derivatives(
         towards, solution, exists = item
 
         def attach() -> SolverState:
-            return _attach_to_substep(chain, towards, before, solution, has_history)
+            return attach_to_part(chain, towards, before, solution, has_history)
 
         return jax.lax.cond(exists, attach, lambda: before), None
 
@@ -81,10 +81,10 @@ def attach_derivatives(
     return jax.lax.scan(follow, last, both)[0]
 
 
-def _attach_to_substep(
+def attach_to_part(
     chain: Chain, command: Command, last: SolverState, solved: SolverState, reached: Bool[Array, ""]
 ) -> SolverState:
-    """Attach the derivatives to the solution of one substep."""
+    """Attach the derivatives to the solution of one substep; NaN where it was not reached."""
     point = _stop_gradient(solved.point)
     evaluation = evaluate(chain, point, last.memory, command.applied)
     step = linear_step(chain, command, point, last.memory, evaluation)

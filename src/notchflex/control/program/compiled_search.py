@@ -23,12 +23,12 @@ from notchflex._jax import (
 )
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import report_quantities
+from notchflex.analysis.stepping import dead_band
 from notchflex.control.program.drive_step import (
     FIRST_PART,
     GROWTH,
     NO_SLOPE,
     SLACK,
-    dead_band,
     drive_step,
 )
 from notchflex.loads.command import Command

@@ -1,12 +1,9 @@
-"""Steps of the drives: to a target by least squares, and across the dead bands of friction."""
+"""Steps of the drives to a target, by least squares."""
 
 from __future__ import annotations
 
-from typing import Any
-
 from jaxtyping import Array, Float
 
-from notchflex._arrays import xp
 from notchflex._jax import jnp
 from notchflex.solver.block_elimination import gauss_jordan
 
@@ -22,9 +19,6 @@ SLACK = 1e-10
 
 NO_SLOPE = 1e-12
 """Slopes whose square is this part of others move nothing."""
-
-# A contact that slides may exceed its bound by this part of it, by rounding.
-_ROUNDING = 1e-9
 
 # What a step weighs beside the error of the target, as a part of the slopes, for a target as far as
 # the drives reach.
@@ -80,25 +74,3 @@ def drive_step(
         free = free * (inside == step)
         step = inside
     return jnp.where(has_slope, step * driven, 0.0)
-
-
-def dead_band(
-    drive: Any,
-    ratio: Any,
-    bound: Any,
-    by_stroke: Any,
-) -> tuple[Any, Any]:
-    """Return between which drives nothing moves, as the first contact of a tendon sticks.
-
-    Exactly so while the other tendons stay as they are. A stroke always moves something.
-
-    Args:
-        drive: The drives, N or mm, (t,), of NumPy or JAX.
-        ratio: Log ratios of the first contacts, (t,).
-        bound: Their largest, (t,).
-        by_stroke: Which drives are strokes, (t,).
-    """
-    still = by_stroke | (xp.abs(ratio) > (1.0 + _ROUNDING) * bound)
-    low, high = (drive * xp.exp(-ratio + side * bound) for side in (-1.0, 1.0))
-    low = xp.where(still, drive, xp.minimum(low, drive))
-    return low, xp.where(still, drive, xp.maximum(high, drive))

@@ -135,7 +135,7 @@ def _rebuild(structure: Any, flat: Iterator[np.ndarray]) -> Any:
     _, shape, kind = structure
     values = next(flat)
     if len(shape) != 1:
-        values = values.reshape(*values.shape[:-1], *shape)
+        values = values.reshape((*values.shape[:-1], *shape))
     return values if kind == "<f8" else values.astype(kind)
 
 
