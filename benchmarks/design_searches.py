@@ -26,7 +26,6 @@ from notchflex.designing.design_robot import problems_of
 from notchflex.designing.search.local import search_from
 from notchflex.designing.search.problem import DesignProblem
 from notchflex.designing.specification import spec_from_table
-from notchflex.robot.numbers import VariedRobots
 
 # What a limit missed by its size adds to the sum, in sizes of the sum.
 _PENALTY = 10.0
@@ -160,18 +159,14 @@ def closed(problem: DesignProblem, points: np.ndarray) -> np.ndarray:
         "notch.height": x[:, 2],
         "tendon.radius": x[:, 3],
     }
-    robots = VariedRobots(variables.robot, numbers)
-    valid = robots.valid()
     load = nf.LoadPath(np.array([[0.7], [1.4], [1.6], [1.65]]), np.full((4, 1), np.nan))
     outputs = ("gap", "contact_force", "outer_strain", "total_angle", "converged")
-    batch = nf.simulate_batch(robots.take(valid), load, outputs=outputs)
+    batch = nf.batch(variables.robot, numbers, load, outputs=outputs)
     good = batch["converged"].all(axis=1) & (batch["contact_force"][:, 1] < 1e-6).all(axis=1)
     good &= (batch["gap"][:, 2] < 1e-9).all(axis=1)
     good &= (batch["outer_strain"][:, 3] <= 0.06 * (1.0 + 1e-6)).all(axis=1)
-    height = np.full(len(points), np.inf)
-    needed = x[valid, 2] * np.radians(90.0) / batch["total_angle"][:, 3]
-    height[valid] = np.where(good & (needed <= 1.5), needed, np.inf)
-    return height
+    needed = x[:, 2] * np.radians(90.0) / batch["total_angle"][:, 3]
+    return np.where(good & (needed <= 1.5), needed, np.inf)
 
 
 def links() -> None:

@@ -29,7 +29,6 @@ from pathlib import Path
 from typing import Any
 
 import notchflex as nf
-from notchflex.robot.numbers import VariedRobots
 from notchflex.sweeping.rows import Points
 
 OUTPUTS = ("total_angle", "tip_position", "converged")
@@ -60,15 +59,12 @@ def spent() -> float:
 def bare(rows: int, cores: int, clock: Any) -> float:
     """Return the time of the batch alone, s."""
     chosen, robot = plan(rows), nf.load_robot("pacheco2021-a")
-    ranges = {"notch.depth": (1.36, 1.42), "notch.height": (0.8, 1.2)}
     points = Points(chosen)
     taken = 0.0
     for start in range(-CHUNK, rows, CHUNK):  # the first is not counted: it prepares
         numbers = points.rows(max(start, 0), min(max(start, 0) + CHUNK, rows))
         begun = clock()
-        nf.solve_batch(
-            VariedRobots(robot, numbers, ranges), nf.Load(tension=1.0), outputs=OUTPUTS, cores=cores
-        )
+        nf.batch(robot, numbers, nf.Load(tension=1.0), outputs=OUTPUTS, cores=cores)
         taken += (clock() - begun) if start >= 0 else 0.0
     return taken
 

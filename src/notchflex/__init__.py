@@ -97,6 +97,7 @@ _HOME = {
             "Step",
             "Stepper",
             "TipResponse",
+            "batch",
             "bodies_from_angles",
             "closing",
             "differentiable",

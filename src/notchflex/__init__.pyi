@@ -10,6 +10,7 @@ from notchflex.analysis import SharedStroke as SharedStroke
 from notchflex.analysis import Step as Step
 from notchflex.analysis import Stepper as Stepper
 from notchflex.analysis import TipResponse as TipResponse
+from notchflex.analysis import batch as batch
 from notchflex.analysis import bodies_from_angles as bodies_from_angles
 from notchflex.analysis import closing as closing
 from notchflex.analysis import differentiable as differentiable

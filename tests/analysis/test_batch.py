@@ -158,6 +158,19 @@ def test_robots_of_unlike_length(wrist, load, margin):
     margin.within("tip", found["tip_position"][1] - nf.solve(robots[1], load).tip_position, 1e-9)
 
 
+def test_robots_with_unlike_tendons(wrist):
+    robots = [wrist, nf.load_robot("two-axis-wrist")]
+    load = nf.Load(tension=0.3, tip_force=(0.0, 0.01, 0.0))
+    found = nf.solve_batch(robots, load)
+    for row, robot in enumerate(robots):
+        np.testing.assert_allclose(
+            found["tip_position"][row], nf.solve(robot, load).tip_position, rtol=0.0, atol=1e-11
+        )
+        assert found.path(row).total_angle[0] == pytest.approx(found["total_angle"][row], rel=1e-12)
+    with refused("WRONG_SHAPE", "more tendons than"):
+        nf.solve_batch(robots, nf.Load(tension=[0.3, 0.1]))
+
+
 def test_an_unknown_output_is_an_input_error_that_names_what_there_is():
     batch = nf.solve_batch(nf.load_robot("pacheco2021-a"), nf.Load(tension=1.0))
     with pytest.raises(nf.InputError) as problem:

@@ -1,7 +1,8 @@
-"""Batches of robots that differ by a few numbers, against the same robots made one by one."""
+"""Batches of robots and loads with numbers of their own, against the same rows one by one."""
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,8 @@ from notchflex.analysis.draws import (
     tolerances_of,
     values_at,
 )
-from notchflex.robot.numbers import VariedRobots
+from notchflex.analysis.varied import VariedRobots
+from notchflex.errors import ErrorCode
 from notchflex.solver.programs import assembled
 from refusals import refused
 
@@ -23,14 +25,39 @@ RANDOM = np.random.default_rng(5)
 OUTPUTS = ("total_angle", "notch_angle", "tip_position", "peak_strain", "tension", "converged")
 
 
-def some(robot, widths, count):
-    return VariedRobots(
-        robot,
-        {
-            name: robot_value + width * RANDOM.uniform(-1.0, 1.0, count)
-            for name, (robot_value, width) in widths.items()
-        },
-    )
+def some(widths, count):
+    return {
+        name: middle + width * RANDOM.uniform(-1.0, 1.0, count)
+        for name, (middle, width) in widths.items()
+    }
+
+
+def robot_at(robot, values, row):
+    return robot.with_values({name: each[row] for name, each in values.items()})
+
+
+def same_as_single_rows(found, robots, loads, exactness=1e-11):
+    """Compare some rows with paths of their own: robots and loads by number of the row."""
+    for row, robot in robots.items():
+        alone = nf.simulate(robot, loads[row] if isinstance(loads, dict) else loads)
+        for name in set(found) - {"iterations"}:
+            exact = alone.quantity(name).reshape(found[name][row].shape)
+            size = np.abs(exact).max()
+            np.testing.assert_allclose(found[name][row], exact, rtol=0.0, atol=exactness * size)
+
+
+@pytest.fixture
+def compiled(monkeypatch):
+    """Which batches of robots were assembled by programs."""
+    made, packed = [], varied.CompiledChains.packed
+
+    def told(self, numbers):
+        chains, alike = packed(self, numbers)
+        made.append(alike)
+        return chains, alike
+
+    monkeypatch.setattr(varied.CompiledChains, "packed", told)
+    return made
 
 
 @pytest.mark.parametrize(
@@ -55,54 +82,46 @@ def some(robot, widths, count):
         ),
     ],
 )  # fmt: skip
-def test_rows_are_those_of_the_robots(name, widths, path, exactness):
+def test_rows_are_those_of_the_robots(name, widths, path, exactness, compiled):
     robot = nf.load_robot(name)
     if name == "two-axis-wrist":
         widths = {"notch.height": (robot.notches[0].height, 0.005),
                   "material.elastic_modulus": (robot.material.elastic_modulus, 500.0)}  # fmt: skip
         tensions = [[0.5, 0.2, 0.0, 0.0][: robot.number_of_tendons]]
         path = nf.LoadPath(tension=tensions, stroke=[[np.nan] * robot.number_of_tendons])
-    robots = some(robot, widths, 1200)
-    found = nf.simulate_batch(robots, path, outputs=OUTPUTS)
-    assert varied.varied_chains(robots, path, 0) is not None
-    rows = [0, 7, 1199]
-    exact = nf.simulate_batch([robots[row] for row in rows], path, outputs=OUTPUTS)
-    for name in OUTPUTS:
-        size = np.abs(exact[name]).max()
-        np.testing.assert_allclose(found[name][rows], exact[name], rtol=0.0, atol=exactness * size)
+    values = some(widths, 1200)
+    found = nf.batch(robot, values, path, outputs=OUTPUTS)
+    assert sum(map(len, compiled)) == 1200
+    assert all(alike.all() for alike in compiled)
+    robots = {row: robot_at(robot, values, row) for row in (0, 7, 1199)}
+    same_as_single_rows(found, robots, path, exactness)
 
 
 def test_rows_of_notches_with_elastic_ends_are_those_of_the_robots():
     notch = replace(WRIST.notch[0], ends="shell")
     widths = {"notch.depth": (1.4, 0.02), "notch.height": (0.8, 0.02),
               "tube.inner_diameter": (1.4, 0.02)}  # fmt: skip
-    robots = some(WRIST.replace(notch=(notch,)), widths, 3000)
+    robot, values = WRIST.replace(notch=(notch,)), some(widths, 3000)
     load, outputs = nf.Load(tension=0.5), ("total_angle", "tip_position")
-    found = nf.solve_batch(robots, load, outputs=outputs)
-    rows = [3, 1500, 2999]
-    exact = nf.solve_batch([robots[row] for row in rows], load, outputs=outputs)
-    for name in outputs:
-        size = np.abs(exact[name]).max()
-        np.testing.assert_allclose(found[name][rows], exact[name], rtol=0.0, atol=1e-11 * size)
+    found = nf.batch(robot, values, load, outputs=outputs)
+    robots = {row: robot_at(robot, values, row) for row in (3, 1500, 2999)}
+    same_as_single_rows(found, robots, load)
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["pacheco2021-a-true", "pacheco2021-b-true"])
-def test_assumed_tolerances_of_wrists_with_elastic_ends_need_no_robot_for_each_row(name):
+def test_assumed_tolerances_of_wrists_with_elastic_ends_need_no_robot_for_each_row(name, compiled):
     """Up to a quarter of the wall: a thousand robots were assembled one by one."""
     robot, load = nf.load_robot(name), nf.pull(0.5, 0.9, steps=2)
     exact_robot = robot.replace(tolerance=None)
     sources = sources_of(exact_robot, tolerances_of(robot)[0])
     levels = np.random.default_rng(1).uniform(1e-6, 1.0 - 1e-6, (2600, len(sources)))
-    robots = VariedRobots(exact_robot, values_at(sources, levels))
-    assert varied.varied_chains(robots, load, 0) is not None
+    values = values_at(sources, levels)
     outputs = ("total_angle", "tip_position", "peak_strain")
-    found = nf.simulate_batch(robots, load, outputs=outputs)
-    rows = [0, 7, 800, 1500, 2599]
-    exact = nf.simulate_batch([robots[row] for row in rows], load, outputs=outputs)
-    for name in outputs:
-        size = np.abs(exact[name]).max()
-        np.testing.assert_allclose(found[name][rows], exact[name], rtol=0.0, atol=1e-11 * size)
+    found = nf.batch(exact_robot, values, load, outputs=outputs)
+    assert sum(map(len, compiled)) == 2600
+    robots = {row: robot_at(exact_robot, values, row) for row in (0, 7, 800, 1500, 2599)}
+    same_as_single_rows(found, robots, load)
 
 
 def test_formulas_that_cannot_be_traced_are_told(monkeypatch):
@@ -111,73 +130,248 @@ def test_formulas_that_cannot_be_traced_are_told(monkeypatch):
     monkeypatch.setattr(
         assembled, "flexure", lambda notch, *rest: flexure(notch, *rest) if notch.depth > 0.0 else 0
     )
-    robots = some(WRIST.with_value("notch.direction_deg", 12.34), {"notch.depth": (1.4, 0.01)}, 256)
+    robot, values = (
+        WRIST.with_value("notch.direction_deg", 12.34),
+        some({"notch.depth": (1.4, 0.01)}, 257),
+    )
     load = nf.Load(tension=1.0)
     with pytest.warns(RuntimeWarning, match="JAX cannot trace"):
-        batch = nf.solve_batch(robots, load)
-    assert batch["total_angle"][3] == nf.solve_batch(robots[3], load)["total_angle"][0]
+        found = nf.batch(robot, values, load)
+    alone = nf.solve_batch([robot_at(robot, values, row) for row in (3, 4)], load)
+    assert found["total_angle"][3] == alone["total_angle"][0]
 
 
-def test_few_robots_are_made_one_by_one():
-    robots = some(WRIST, {"notch.depth": (1.4, 0.01)}, 8)
-    load = nf.Load(tension=1.0)
-    assert varied.varied_chains(robots, nf.pull(1.0, 1.0, steps=1), 0) is None
-    found = nf.solve_batch(robots, load)
-    assert found["total_angle"][3] == nf.solve_batch(robots[3], load)["total_angle"][0]
-
-
-def same_as_single_robots(robots, load, rows, outputs=("total_angle", "tip_position")):
-    batch = nf.solve_batch(robots, load, outputs=outputs)
-    for row in rows:
-        state = nf.solve(robots[row], load)
-        for name in outputs:
-            exact = state.quantity(name)
-            np.testing.assert_allclose(batch[name][row], exact, atol=1e-11 * np.abs(exact).max())
+def test_few_robots_are_made_one_by_one(compiled):
+    values, load = some({"notch.depth": (1.4, 0.01)}, 8), nf.Load(tension=1.0)
+    found = nf.batch(WRIST, values, load)
+    assert not compiled
+    alone = nf.solve_batch([robot_at(WRIST, values, row) for row in (3, 4)], load)
+    assert found["total_angle"][3] == alone["total_angle"][0]
 
 
 def test_a_kink_within_the_range():
     # Past the tube axis the farthest fibre is another one.
-    robots = some(WRIST, {"notch.depth": (0.81, 0.2)}, 300)
-    same_as_single_robots(robots, nf.Load(tension=1.0), range(0, 300, 60))
+    values, load = some({"notch.depth": (0.81, 0.2)}, 300), nf.Load(tension=1.0)
+    found = nf.batch(WRIST, values, load)
+    robots = {row: robot_at(WRIST, values, row) for row in range(0, 300, 60)}
+    same_as_single_rows(found, robots, load)
 
 
 @pytest.mark.nightly
-def test_robots_whose_arrays_are_of_another_form_are_solved_one_by_one():
+def test_robots_whose_arrays_are_of_another_form_are_solved_one_by_one(compiled):
     """A cut beyond the bore leaves a section of two pieces, one before it of three."""
     nitinol = {"kind": "nitinol", "elastic_modulus": 36e3, "plateau_stress": 350.0,
                "plateau_modulus": 6e3}  # fmt: skip
     robot = WRIST.with_values({"notch.cut": "off-axis", "notch[2].depth": 0.11})
-    robots = some(robot.replace(material=nitinol), {"notch[2].depth": (0.11, 0.02)}, 260)
-    load = nf.LoadPath([[0.3]])
-    chains = varied.varied_chains(robots, load, 0)
-    assert 0 < len(chains.rows(slice(None))[2]) < 260
-    same_as_single_robots(robots, load[0], range(0, 260, 26))
+    robot, values = robot.replace(material=nitinol), some({"notch[2].depth": (0.11, 0.02)}, 260)
+    load = nf.Load(tension=0.3)
+    found = nf.batch(robot, values, load)
+    assert 0 < sum((~alike).sum() for alike in compiled) < 260
+    robots = {row: robot_at(robot, values, row) for row in range(0, 260, 26)}
+    same_as_single_rows(found, robots, load)
+
+
+def test_factors_on_stiffness_beside_another_number(compiled):
+    """The robot has a factor of its own as well."""
+    robot = WRIST.with_value("notch[3].stiffness_factor", 1.2)
+    widths = {"notch.depth": (1.4, 0.02), "notch[1].stiffness_factor": (1.0, 0.1),
+              "notch[5].stiffness_factor": (1.0, 0.1)}  # fmt: skip
+    values, load = some(widths, 600), nf.Load(tension=1.0)
+    found = nf.batch(robot, values, load, outputs=("notch_angle", "peak_strain"))
+    assert compiled
+    robots = {row: robot_at(robot, values, row) for row in (0, 300, 599)}
+    same_as_single_rows(found, robots, load)
+
+
+LOADED = {
+    "tension": np.linspace(0.2, 1.0, 9),
+    "tip_force": np.array([[0.0, 0.0, 0.0], [0.01, 0.0, -0.02], [0.0, 0.01, 0.0]] * 3),
+    "tip_moment": np.array([[0.0, 0.05, 0.0]] * 3 + [[0.0] * 3] * 3 + [[0.02, 0.0, 0.01]] * 3),
+}
+
+
+def loads_at(values, row, base=(0.0, 0.0, 0.0), **others):
+    """One step, with tensions and loads of a row."""
+    at = {name: values[name][row] for name in ("tip_force", "tip_moment")}
+    load = nf.LoadPath([[values["tension"][row]]], base_rotation=base)
+    return load.loaded(**at, **others)
+
+
+@pytest.mark.parametrize(
+    ("base", "others"),
+    [
+        ((0.0, 0.0, 0.0), {}),
+        ((0.3, -0.2, 0.1), {"tip_mass": 2.0, "tip_point": (0.1, 0.0, 1.0)}),
+        ((0.0, 0.4, 0.0), {"following": True, "body_forces": [nf.BodyForce(2, (0.01, 0.0, 0.0))]}),
+    ],
+)
+def test_numbers_of_loads(base, others):
+    """None, in the plane and across it: each row has the strain modes that its own loads need."""
+    load = nf.Load(tension=1.0, base_rotation=base, **others)
+    found = nf.batch(WRIST, LOADED, load, outputs=(*OUTPUTS, "tip_rotation"))
+    loads = {row: loads_at(LOADED, row, base, **others) for row in range(9)}
+    same_as_single_rows(found, dict.fromkeys(range(9), WRIST), loads, 1e-12)
+
+
+def test_numbers_of_many_robots_and_their_loads(compiled):
+    values = some({"notch[2].depth": (1.4, 0.01), "tube.inner_diameter": (1.4, 0.01)}, 900)
+    of_loads = {name: np.tile(each.T, 100).T for name, each in LOADED.items()}
+    load = nf.Load(tension=1.0, base_rotation=(0.0, 0.0, 0.2), tip_mass=1.0)
+    found = nf.batch(WRIST, values | of_loads, load)
+    assert sum(map(len, compiled)) == 800  # those in the plane are few
+    rows = [*range(0, 9), *range(450, 459)]
+    robots = {row: robot_at(WRIST, values, row) for row in rows}
+    loads = {row: loads_at(of_loads, row, (0.0, 0.0, 0.2), tip_mass=1.0) for row in rows}
+    same_as_single_rows(found, robots, loads)
+
+
+def test_steps_and_tendons_of_loads():
+    """A number is that of all tendons which the loads command, or each step has its own."""
+    robot = nf.load_robot("two-axis-wrist")
+    tendons = robot.number_of_tendons
+    path = nf.LoadPath([[0.5, *[None] * (tendons - 1)]] * 2)
+    tension = np.zeros((2, 2, tendons))
+    tension[..., 0] = [[0.2, 0.4], [0.3, 0.1]]
+    found = nf.batch(robot, {"tension": tension}, path, outputs=("tension", "total_angle"))
+    assert found["tension"][..., 0].tolist() == pytest.approx(tension[..., 0], rel=1e-12)
+    same = nf.batch(robot, {"tension": [0.2, 0.3]}, path, outputs=("tension",))
+    assert same["tension"][:, 0, 0] == pytest.approx([0.2, 0.3], rel=1e-12)
+    assert (same["tension"][..., 1:] == 0.0).all()
+
+
+def test_all_combinations():
+    """Robots, then names in their order, then loads, of which the last are the fastest."""
+    robots = [WRIST, nf.load_robot("pacheco2021-b")]
+    paths = [nf.pull(0.0, top, steps=2).release() for top in (0.4, 0.8, 1.2)]
+    values = {"tip_force": [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]], "notch.height": [0.7, 0.8]}
+    found = nf.batch(robots, values, paths, product=True)["total_angle"]
+    assert found.shape == (24, 4)
+    grid = found.reshape(2, 2, 2, 3, 4)
+    for a, b, c, d in np.ndindex(grid.shape[:-1]):
+        robot = robots[a].with_value("notch.height", values["notch.height"][c])
+        alone = nf.simulate(robot, paths[d].loaded(tip_force=values["tip_force"][b]))
+        np.testing.assert_allclose(grid[a, b, c, d], alone.total_angle, atol=1e-12)
+
+
+def test_combinations_of_many_robots(compiled):
+    values = some({"notch.depth": (1.4, 0.01)}, 300) | {"tension": [0.5, 1.0]}
+    found = nf.batch(WRIST, values, nf.Load(tension=1.0), product=True)["total_angle"]
+    assert sum(map(len, compiled)) == 600
+    rows = [nf.batch(WRIST, {"notch.depth": values["notch.depth"], "tension": [one]},
+                     nf.Load(tension=1.0))["total_angle"] for one in (0.5, 1.0)]  # fmt: skip
+    np.testing.assert_array_equal(found.reshape(300, 2).T, rows)
+
+
+def test_lists_of_robots_of_one_form(compiled):
+    """Others among them are assembled alone."""
+    values = some({"notch[2].depth": (1.4, 0.01), "friction.coefficient": (0.13, 0.02)}, 300)
+    robots = [robot_at(WRIST, values, row) for row in range(300)]
+    robots[7] = nf.load_robot("pacheco2021-b")
+    robots[8] = WRIST
+    path = nf.pull(0.3, 0.6, steps=2).release()
+    found = nf.simulate_batch(robots, path)
+    assert sum(map(len, compiled)) == 298
+    some_rows = {row: robots[row] for row in (0, 7, 8, 299)}
+    same_as_single_rows(found, some_rows, path)
+    varied_too = nf.batch(robots[:9], {"notch.height": np.linspace(0.7, 0.8, 9)}, path)
+    robots = {row: robots[row].with_value("notch.height", 0.7 + row / 80) for row in (0, 7, 8)}
+    same_as_single_rows(varied_too, robots, path)
+
+
+def test_neither_order_nor_pieces_matter():
+    """To the last bit."""
+    values = some({"notch.depth": (1.4, 0.01), "tip_force": (0.0, 0.0)}, 700)
+    values["tip_force"] = RANDOM.normal(0.0, 0.01, (700, 3))
+    load, order = nf.Load(tension=0.8), RANDOM.permutation(700)
+    found = nf.batch(WRIST, values, load, cores=1)
+    other = nf.batch(WRIST, {name: each[order] for name, each in values.items()}, load, cores=3)
+    part = nf.batch(WRIST, {name: each[100:400] for name, each in values.items()}, load)
+    for name in set(found) - {"iterations"}:
+        np.testing.assert_array_equal(found[name][order], other[name])
+        np.testing.assert_array_equal(found[name][100:400], part[name])
+
+
+def test_rows_without_a_robot_are_told():
+    seen: list[tuple[int, int]] = []
+    values = {"notch.depth": [1.4, 1.7, 1.3], "stroke": [50.0, 1.0, 1.0]}  # of 1.62
+    found = nf.batch(WRIST, values, nf.Load(stroke=1.0), progress=lambda *told: seen.append(told))
+    assert found.valid.tolist() == [True, False, True]
+    assert found["converged"].tolist() == [False, False, True]
+    assert np.isnan(found["notch_angle"][:2]).all()
+    assert found.reason.shape == (3,)
+    assert found.reason[0] == nf.solve(WRIST, nf.Load(stroke=50.0)).reason
+    assert found.reason[1].startswith("`notch[1].depth` is 1.7 mm")
+    assert found.reason[2] == ""
+    assert seen[-1] == (3, 3)
+    with pytest.raises(nf.ConvergenceError, match="row 1 of 3: every notch closed") as problem:
+        found.raise_if_failed()
+    assert str(problem.value.code) == "NOTCHES_CLOSED"
+    assert found.path(2).total_angle[0] == pytest.approx(found["total_angle"][2], rel=1e-12)
+    with refused("INVALID_ROBOT", "1.7"):
+        found.path(1)
+    assert pickle.loads(pickle.dumps(found)).reason.tolist() == found.reason.tolist()
+
+
+def test_reasons_of_steps():
+    """Those after a failure are not tried."""
+    path = nf.stroke_path(0.0, 8.0, steps=5)
+    found = nf.batch([WRIST, WRIST.with_value("notch.depth", 1.39)], {}, path)
+    alone = nf.simulate(WRIST, path)
+    assert found["converged"][0].tolist() == alone.converged.tolist()
+    assert not alone.converged.all()
+    assert found.reason[0].tolist() == alone.reason
+    with pytest.raises(nf.ConvergenceError, match="row 1 of 2, step 3: every"):
+        found.raise_if_failed()
+    nothing = nf.batch(WRIST, {}, path[:2])
+    assert nothing.raise_if_failed() is nothing
+    assert nothing.reason.tolist() == [["", ""]]
+    with refused("NO_DATA", "without robots"):
+        nf.Batch({"converged": np.zeros(1, bool)}).path(0)
 
 
 def test_numbers_that_make_no_robot_are_found():
-    depths = [1.4, 1.7, 1.3]  # of 1.62
-    assert VariedRobots(WRIST, {"notch.depth": depths}).valid().tolist() == [True, False, True]
-    corner = VariedRobots(WRIST, {"notch[2].depth": depths[::2], "tube.inner_diameter": [1.3, 1.4]})
-    assert corner.valid().all()
+    depths = np.array([1.4, 1.7, 1.3])
+    assert list(VariedRobots.of(WRIST, {"notch.depth": depths}).errors) == [1]
+    corner = {"notch[2].depth": depths[::2], "tube.inner_diameter": np.array([1.3, 1.4])}
+    assert not VariedRobots.of(WRIST, corner).errors
 
 
-def test_numbers_that_cannot_be_varied():
-    with refused("UNKNOWN_NAME"):
-        VariedRobots(WRIST, {"notch.dept": [1.0]})
-    with refused("WRONG_SHAPE"):
-        VariedRobots(WRIST, {"notch.depth": [1.4, 1.39], "notch.height": [0.8]})
+def test_few_numbers_that_make_no_robot_need_few_robots(monkeypatch):
+    """Of boxes of numbers the corners are tried."""
+    tried, make = [], nf.Robot.with_values
+    monkeypatch.setattr(
+        nf.Robot, "with_values", lambda robot, values: tried.append(0) or make(robot, values)
+    )
+    values = some({"notch.depth": (1.4, 0.1), "notch.height": (0.8, 0.1)}, 20_000)
+    values["notch.depth"][[5, 17]] = 1.63, np.nan
+    assert sorted(VariedRobots.of(WRIST, values).errors) == [5, 17]
+    assert len(tried) < 5000
 
 
-def test_factors_on_stiffness_beside_another_number():
-    """The robot has a factor of its own as well."""
-    robot = WRIST.with_value("notch[3].stiffness_factor", 1.2)
-    generator = np.random.default_rng(3)
-    values = {
-        "notch.depth": generator.uniform(1.38, 1.42, 600),
-        "notch[1].stiffness_factor": generator.uniform(0.9, 1.1, 600),
-        "notch[5].stiffness_factor": generator.uniform(0.9, 1.1, 600),
-    }
-    load, outputs = nf.Load(tension=1.0), ("notch_angle", "peak_strain")
-    robots = VariedRobots(robot, values)
-    assert varied.varied_chains(robots, nf.LoadPath([[1.0]]), 0) is not None
-    same_as_single_robots(robots, load, (0, 300, 599), outputs)
+@pytest.mark.parametrize(
+    ("values", "code", "said"),
+    [
+        ({"notch.dept": [1.0]}, "UNKNOWN_NAME", "depth"),
+        ({"notch.depth": [1.4, 1.39], "notch.height": [0.8] * 3}, "WRONG_SHAPE", "2 notch.depth"),
+        ({"notch.depth": []}, "WRONG_SHAPE", "0 notch.depth"),
+        ({"notch.depth": 1.4}, "WRONG_SHAPE", "one for each row"),
+        ({"notch.depth": ["deep"]}, "WRONG_SHAPE", "one for each row"),
+        ({"notch.depth": [[1.4]]}, "WRONG_SHAPE", "one for each row"),
+        ({"notch.depth": [1.7, np.inf]}, "INVALID_ROBOT", "1.7"),
+        ({"stroke": [1.0]}, "NO_DATA", "no stroke"),
+        ({"tension": [-1.0, 1.0]}, "OUT_OF_RANGE", "-1 N"),
+        ({"tension": [np.nan]}, "NOT_FINITE", "tension"),
+        ({"tension": [[1.0, 2.0]]}, "WRONG_SHAPE", "(1, 2)"),
+        ({"tip_force": [0.0, 0.0, 1.0]}, "WRONG_SHAPE", "rows by 3"),
+    ],
+)
+def test_what_cannot_vary(values, code, said):
+    with refused(code, said):
+        nf.batch(WRIST, values, nf.Load(tension=1.0))
+
+
+def test_loads_that_are_none():
+    with refused(ErrorCode.WRONG_TYPE, "Load or LoadPath"):
+        nf.batch(WRIST, {}, 1.0)
+    with refused(ErrorCode.WRONG_SHAPE, "equally many steps"):
+        nf.batch(WRIST, {}, [nf.pull(0.0, 1.0, steps=2), nf.pull(0.0, 1.0, steps=3)])

@@ -19,7 +19,6 @@ from notchflex.analysis.draws import (
 from notchflex.designing.design_robot import problems_of
 from notchflex.designing.search.robust import Hold, RobustProblem
 from notchflex.designing.specification import spec_from_table
-from notchflex.robot.numbers import VariedRobots
 
 TOLERANCE = {
     "notch.depth": {"sd": 0.01, "per_notch": True},
@@ -57,8 +56,8 @@ def counted(robot: nf.Robot, draws: int = 4000) -> tuple[float, float]:
     """Parts of robots drawn one by one that meet the limit of the strain, and both limits."""
     sources = sources_of(robot, robot.replace(tolerance=TOLERANCE).tolerance)
     levels = np.random.default_rng(7).random((draws, len(sources)))
-    drawn = VariedRobots(robot, values_at(sources, levels))
-    found = nf.solve_batch(drawn, nf.Load(tension=2.0), outputs=("total_angle", "peak_strain"))
+    drawn = values_at(sources, levels)
+    found = nf.batch(robot, drawn, nf.Load(tension=2.0), outputs=("total_angle", "peak_strain"))
     strained = found["peak_strain"].max(axis=1) <= MOST
     bent = np.degrees(found["total_angle"]) >= LEAST
     return float(strained.mean()), float((strained & bent).mean())
@@ -170,10 +169,8 @@ def test_a_robust_wrist_closes_tip_first():
     assert of_all.interval[0] >= 0.95 > 0.1 > of_all.plain
     # Other draws, each closed by itself.
     sources = sources_of(made.robot, made.robot.replace(tolerance=spec["tolerance"]).tolerance)
-    drawn = VariedRobots(
-        made.robot,
-        values_at(sources, np.random.default_rng(3).uniform(1e-6, 1.0 - 1e-6, (60, len(sources)))),
-    )
+    levels = np.random.default_rng(3).uniform(1e-6, 1.0 - 1e-6, (60, len(sources)))
+    drawn = [made.robot.with_values(values_at(sources, one)) for one in levels]
     tension = np.array([nf.closing(one).tension for one in drawn])
     good = (np.diff(tension, axis=1) <= 0.0).all(axis=1) & (tension >= 1.3).all(axis=1)
     assert (good & (tension <= 1.7).all(axis=1)).mean() > 0.88

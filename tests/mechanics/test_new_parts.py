@@ -28,7 +28,6 @@ import numpy as np
 import notchflex as nf
 from notchflex.mechanics.chain import with_fibres
 from notchflex.robot.value_names import number_at
-from notchflex.robot.numbers import VariedRobots
 from notchflex.mechanics.flexure import rod
 robot = nf.Robot(
     name="new parts",
@@ -56,9 +55,8 @@ for name, slope in zip(names, slopes, strict=True):
     moved = [robot.with_value(name, at * part) for part in (0.999, 1.001)]
     ends = [nf.solve(one, load).total_angle for one in moved]
     assert abs((ends[1] - ends[0]) / (2e-3 * at) / slope - 1.0) < 1e-5
-robots = VariedRobots(robot, {{"notch.thickness": np.linspace(0.19, 0.21, 300)}})
-angles = nf.solve_batch(robots, load)["total_angle"]
-assert abs(angles[7] - nf.solve(robots[7], load).total_angle) < 1e-12
+many = nf.batch(robot, {{"notch.thickness": np.linspace(0.19, 0.21, 300)}}, load)
+assert abs(many["total_angle"][7] - many.path(7).total_angle[0]) < 1e-12
 print(json.dumps([state.converged, *state.notch_angle.tolist(), sorted(nf.json_schema()["$defs"])]))
 """
 

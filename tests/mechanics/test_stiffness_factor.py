@@ -10,7 +10,6 @@ from notchflex._jax import jax
 from notchflex.mechanics.chain import assemble
 from notchflex.plotting.shapes.robot_shape import shape_from_angles
 from notchflex.robot import robot_from_text, robot_text
-from notchflex.robot.numbers import VariedRobots
 
 FACTOR = "notch.stiffness_factor"
 
@@ -68,7 +67,7 @@ def test_it_varies_as_other_numbers_do(wrist: nf.Robot, margin):
     name, load = "notch[5].stiffness_factor", nf.Load(tension=0.2)
     factors = np.linspace(0.99, 1.01, 5)
     by_hand = [nf.solve(wrist.with_value(name, one), load).total_angle for one in factors]
-    batch = nf.solve_batch(VariedRobots(wrist, {name: factors}), load, outputs=("total_angle",))
+    batch = nf.batch(wrist, {name: factors}, load, outputs=("total_angle",))
     angles = batch["total_angle"].ravel()
     margin.within("batch", angles - np.ravel(by_hand), 1e-9, "rad")
     bands = nf.uncertain(wrist, load, {name: 0.05, FACTOR: 0.02}, draws=8)

@@ -7,6 +7,8 @@ from notchflex.analysis.bands import (
     uncertain,
 )
 from notchflex.analysis.batch import (
+    Batch,
+    batch,
     simulate_batch,
     solve_batch,
 )
@@ -33,7 +35,6 @@ from notchflex.analysis.kinematics import (
     points_on_axis,
     tip_from_angles,
 )
-from notchflex.analysis.outputs import Batch
 from notchflex.analysis.solve import simulate, solve, solve_each
 from notchflex.analysis.stepping import Step, Stepper
 from notchflex.analysis.tangent import Kink
@@ -54,6 +55,7 @@ __all__ = [
     "axis_places",
     "axis_points",
     "band_names",
+    "batch",
     "bodies_from_angles",
     "closing",
     "differentiable",

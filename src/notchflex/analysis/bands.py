@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary, course
-from notchflex.analysis.batch import simulate_batch, solve_batch
+from notchflex.analysis.batch import batch
 from notchflex.analysis.closing_loads import Closing
 from notchflex.analysis.draws import draw_robots, tolerances_of
 from notchflex.analysis.outputs import OUTPUTS, check_outputs
@@ -247,7 +247,7 @@ def uncertain(
         seed: The same seed makes the same robots.
         settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
-        cores: As for `simulate_batch`.
+        cores: As for `batch`.
         progress: Called with the draws done and all of them.
 
     Returns:
@@ -275,8 +275,9 @@ def uncertain(
     asked = check_outputs(USUAL if outputs is None else outputs)
     names = [name for name in asked if _has_band(name) and holds(path, QUANTITIES[name])]
     drawn = draw_robots(robot, chosen, draws, check_integer(seed, "seed"))
-    results = simulate_batch(
-        drawn.robots,
+    results = batch(
+        drawn.robot if drawn.values else [drawn.robot] * draws,
+        drawn.values,
         path.load,
         outputs=names,
         settings=settings,
@@ -433,16 +434,13 @@ def _closing(
 
 def _by_depth(robot: Robot, load: LoadPath) -> float:
     """Return the change of the total angle for each 10 µm of depth, by a central difference."""
-    exact = robot.replace(tolerance=None)
     try:
         depths = numbers_at(robot, "notch.depth")
-        both = [
-            exact.with_values({name: depth + sign * DEPTH for name, depth in depths.items()})
-            for sign in (1.0, -1.0)
-        ]
-    except InputError:  # no depth, or a spine thinner than that
+    except InputError:  # no depth
         return float("nan")
-    deeper, shallower = solve_batch(both, load, outputs=("total_angle",))["total_angle"]
+    values = {name: depth + DEPTH * np.array([1.0, -1.0]) for name, depth in depths.items()}
+    found = batch(robot.replace(tolerance=None), values, load, outputs=("total_angle",))
+    deeper, shallower = found["total_angle"][:, 0]  # NaN where the spine is thinner than that
     return 0.5 * float(deeper - shallower)
 
 

@@ -1,437 +1,296 @@
 """Batches: many robots or many loads at once, in pieces that fit the cache.
 
-One program solves all robots of one form (equal numbers of notches, tendons and modes, the same
-laws), one row of numbers each. A batch is divided into pieces that the cores take in turn, which
-bounds the memory. Where JAX has a GPU, whole pieces run there in parallel.
+A row of a batch is a robot and a path of loads; both may be one of several, with numbers of their
+own. One program solves all rows of one form (equal numbers of notches, tendons and modes, the same
+laws, the same kinds of loads), one row of numbers each. A batch is divided into pieces that the
+cores take in turn, which bounds the memory. Where JAX has a GPU, whole pieces run there in
+parallel.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any
+from functools import cached_property
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
+from numpy.typing import ArrayLike
 
 from lanewise import WIDTH
-from notchflex._jax import jax
 from notchflex._quantity import REGISTERED
+from notchflex._summary import Displayed, Summary, short
+from notchflex._values import ByValue, frozen
 from notchflex.analysis.outputs import (
     DEFAULT_OUTPUTS,
     OUTPUTS,
     WORKS,
-    Batch,
+    UnknownOutputError,
     check_outputs,
     follow_row,
 )
-from notchflex.analysis.solve import prepare_for
-from notchflex.errors import InputError
+from notchflex.analysis.solve import check_refinement, follow_path
+from notchflex.analysis.varied import FEW, Chains, VariedRobots, prepare_kind, single_chains
+from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.command import (
-    Command,
-    follows,
-    is_planar,
-    is_unloaded,
-    make_commands,
+    DRAWN,
+    acting,
+    row_commands,
 )
 from notchflex.loads.load import (
+    NO_VECTOR,
     check_integer,
     one_or_several,
     short_repr,
 )
 from notchflex.loads.load_path import (
+    TENDONS,
+    TIP,
     join_paths,
     load_path,
 )
-from notchflex.mechanics.chain import Chain
-from notchflex.results.quantities import work_of_steps
+from notchflex.results.path import EquilibriumPath
+from notchflex.results.quantities import QUANTITIES, work_of_steps
 from notchflex.robot import Robot
-from notchflex.robot.numbers import (
-    VariedRobots,
-    apart,
-    parts_of,
-    places_of,
-)
-from notchflex.robot.value_names import parse_path
 from notchflex.solver.newton import (
     DEFAULT,
     Settings,
 )
-from notchflex.solver.programs.assembled import AssembledRobots
 from notchflex.solver.programs.compiled import (
     number_of_cores,
     on_cores,
 )
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure
-
-# Chains and commands of robots that differ from one by a few numbers, as rows of a batch.
-
-# Fewer robots are assembled in Python before programs for them are compiled.
-_MIN_ROBOTS = 256
-
-
-@dataclass(frozen=True, eq=False)
-class VariedChains:
-    """Chains and commands of varied robots, as the rows of a batch.
-
-    Attributes:
-        robots: The robots.
-        load: The loads of every robot.
-        refinement: More strain modes, as for `simulate`.
-        ready: The chain of the robot that is varied.
-        programs: Programs that make the chains.
-        numbers: All numbers of every robot.
-        command: Layout of one load.
-    """
-
-    robots: VariedRobots
-    load: LoadPath
-    refinement: int
-    ready: PreparedChain
-    programs: AssembledRobots
-    numbers: Float[np.ndarray, "robots numbers"]
-    command: PytreeLayout
-
-    @property
-    def structure(self) -> StaticStructure:
-        """Layout of the chains for programs."""
-        return self.programs.joined.structure
-
-    def rows(self, index: slice) -> tuple[np.ndarray, np.ndarray, Int[np.ndarray, " m"]]:
-        """Return chains and commands of some robots, packed for programs.
-
-        Returns:
-            Chains, commands (robots and then steps as leading axes), and which of the robots have
-            a chain of another form: theirs are wrong.
-        """
-        chains, alike = self.programs.chains(self.numbers[index])
-        commands = make_commands(self.load, self.robots.robot, self._bodies(chains))
-        if commands.applied is None:
-            packed = self.command.pack(commands, leading=1)[None].repeat(len(chains), axis=0)
-        else:
-            shape = (len(chains), *np.shape(commands.target))
-            targets: list[Any] = [
-                None if values is None else np.broadcast_to(values, shape)
-                for values in (commands.target, commands.by_stroke)
-            ]
-            commands = Command(targets[0], targets[1], commands.applied)
-            packed = self.command.pack(commands, leading=2)
-        return chains, packed, np.flatnonzero(~alike)
-
-    def _bodies(self, chains: Float[np.ndarray, "k chain"]) -> Chain:
-        """Return the chain with the masses and lengths of the bodies of every robot."""
-        form = self.structure.form
-        indices: Chain = jax.tree.unflatten(form.structure, form.indices)
-        names = ("body_length", "body_mass", "body_centre")
-        values: dict[str, Any] = {
-            name: chains[:, self.structure.indices_of(getattr(indices, name))] for name in names
-        }
-        return dataclasses.replace(self.ready.chain, **values)
-
-
-def varied_chains(robots: VariedRobots, load: LoadPath, refinement: int) -> VariedChains | None:
-    """Return chains of varied robots under one path of loads.
-
-    Args:
-        robots: The robots.
-        load: The loads of every robot.
-        refinement: More strain modes, as for `simulate`.
-
-    Returns:
-        The chains; None where each robot is assembled by itself.
-    """
-    if len(robots) < _MIN_ROBOTS or not robots.valid().all():
-        return None
-    # Values of all notches come before those of one, as in a robot file.
-    names = sorted(robots.names, key=lambda name: parse_path(name).number is not None)
-    robot, programs, ready = _programs(robots.robot, (*names,), load, refinement)
-    if programs is None:
-        return None
-    form = programs.form
-    numbers = np.tile(form.numbers_of(parts_of(robot)), (len(robots), 1))
-    for name in names:
-        places = places_of(robot, name)
-        if not set(places) <= set(form.places):  # a direction, or no finite number
-            return None
-        for place in places:
-            numbers[:, form.places.index(place)] = robots.values[name]
-    if programs.joined.structure.form is not ready.chain_layout:
-        return None
-    commands = make_commands(load, robot, ready.chain)
-    command = ready.command_layout(commands)
-    return VariedChains(robots, load, refinement, ready, programs, numbers, command)
-
-
-@lru_cache(maxsize=8)
-def _programs(
-    robot: Robot, names: tuple[str, ...], load: LoadPath, refinement: int
-) -> tuple[Robot, AssembledRobots | None, PreparedChain]:
-    """Return the robot with a notch of its own for every name of one, and programs for others."""
-    robot = apart(robot, names)
-    ready = prepare_for(robot, load, None, refinement)
-    varied = [place for name in names for place in places_of(robot, name)]
-    return robot, AssembledRobots.tried(robot, ready.chain, varied), ready
-
 
 # Largest number of rows of a piece, by the number of rows.
 _PIECE_SIZES = {0: 64, 512: 256, 8192: 2048}
+_CONVERGES_ALONE = "solved alone this row converges; `path` of the batch returns it"
 
 
-@dataclass(frozen=True)
-class BatchRobots:
-    """The robots of a batch.
+class Batch(ByValue, Displayed, Mapping[str, np.ndarray]):
+    """Result of a batch: arrays by name, the rows of the batch as leading axis.
 
-    Attributes:
-        every: One for all rows, or one per row.
-        varied: The same as one robot with varied numbers, where the robots need not be built.
+    Example:
+        >>> from notchflex import batch, load_robot, pull
+        >>> wrist = load_robot("pacheco2021-a")
+        >>> found = batch(wrist, {"notch.depth": [1.39, 1.7]}, pull(0.0, 2.0, steps=3))
+        >>> found["tip_position"].shape, found["converged"].tolist()
+        ((2, 3, 3), [[True, True, True], [False, False, False]])
+        >>> print(found.reason[1, 0].partition(";")[0])
+        `notch[1].depth` is 1.7 mm
     """
 
-    every: Sequence[Robot]
-    varied: VariedRobots | None = None
+    def __init__(self, arrays: Mapping[str, np.ndarray], rows: BatchRows | None = None) -> None:
+        """Hold arrays by name, and the rows that they are of."""
+        self._arrays = {name: frozen(values) for name, values in arrays.items()}
+        self._rows = rows
 
-    @classmethod
-    def of(cls, robots: Any) -> BatchRobots:
-        """Convert the robots that a caller gives."""
-        if isinstance(robots, VariedRobots):
-            return cls(robots, robots)
-        message = "a batch needs a notchflex.Robot, or some of them"
-        every = one_or_several(robots, Robot, message)
-        if not every or not all(isinstance(robot, Robot) for robot in every):
-            raise InputError.WRONG_TYPE(f"{message}; got {short_repr(robots)}")
-        return cls(every)
+    def _value(self) -> Any:
+        return self._arrays
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return one of the arrays."""
+        if name not in self._arrays:
+            raise UnknownOutputError(name, self._arrays)
+        return self._arrays[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self._arrays)
+
+    def __len__(self) -> int:
+        """Return the number of arrays."""
+        return len(self._arrays)
 
     @property
-    def max_tendons(self) -> int:
-        """Largest number of tendons of a robot."""
-        unlike = self.every if self.varied is None else [self.varied.robot]
-        return max(robot.number_of_tendons for robot in unlike)
+    def valid(self) -> Bool[np.ndarray, " rows"]:
+        """Whether the numbers of each row make a valid robot."""
+        return self._known_rows.valid
+
+    def path(self, row: int) -> EquilibriumPath:
+        """Solve one row alone, for all that a path has.
+
+        Args:
+            row: Number of the row, from 0.
+
+        Raises:
+            InputError: Its numbers make no valid robot.
+        """
+        return self._known_rows.alone(row)
+
+    @cached_property
+    def reason(self) -> np.ndarray:
+        """Why a row or step did not converge, in the shape of `converged`; empty where it did."""
+        converged = self["converged"]
+        reasons = np.full(converged.shape, "", object)
+        table, states = (one.reshape(len(converged), -1) for one in (reasons, converged))
+        for row in np.flatnonzero(~states.all(axis=1)).tolist():
+            texts = [text for _, text in self._failures(row)]
+            table[row] = np.where(states[row], "", texts)
+        return frozen(reasons)
+
+    def raise_if_failed(self) -> Batch:
+        """Return itself, if every row converged.
+
+        Raises:
+            ConvergenceError: A row did not; the message says which and why.
+        """
+        converged = self["converged"]
+        states = converged.reshape(len(converged), -1)
+        if not states.all():
+            row, step = divmod(int(np.argmin(states)), states.shape[1])
+            failure, text = self._failures(row)[step]
+            place = f"row {row + 1} of {len(states)}" + f", step {step + 1}" * (converged.ndim > 1)
+            raise ConvergenceError(f"{place}: {text}", failure)
+        return self
+
+    def _failures(self, row: int) -> Sequence[tuple[Failure | None, str]]:
+        """Return the failure of every step of a row, and a sentence on it."""
+        try:
+            failures = self.path(row).failures
+        except InputError as error:
+            return [(None, str(error))] * self["converged"][row].size
+        return [(failure, text or _CONVERGES_ALONE) for failure, text in failures]
+
+    @property
+    def _known_rows(self) -> BatchRows:
+        if self._rows is None:
+            raise InputError.NO_DATA("this batch holds arrays alone, without robots and loads")
+        return self._rows
+
+    def _summary(self) -> Summary:
+        count = len(next(iter(self.values()), ()))
+        title = f"Batch of {count} row{'s' * (count != 1)}"
+        rows = [(name, range_of(name, array)) for name, array in self.items()]
+        return Summary(title, rows, "[name] is the array of one output; .reason, .path(row)")
 
 
-@dataclass(frozen=True)
-class BatchRows:
-    """Rows of a batch whose robots run through one program.
+def range_of(name: str, array: np.ndarray) -> str:
+    """Describe an array by its shape, and what its values lie between."""
+    shape = "×".join(map(str, array.shape))
+    if array.dtype == bool:
+        return f"{shape}, {int(array.sum())} of {array.size} true"
+    if not np.isfinite(array).any():
+        return f"{shape}, no number"
+    unit = QUANTITIES[name].python_unit if name in QUANTITIES else ""
+    ends = f"{short(float(np.nanmin(array)))} to {short(float(np.nanmax(array)))} {unit}"
+    return f"{shape}, {ends}".rstrip()
 
-    Attributes:
-        rows: Indices of these rows in the batch.
-        chains: A row per robot, or one for all.
-        commands: A row per path, or one for all, then the steps.
-        layouts: Layouts of the chains and of one command, and names of the outputs.
-        turn: Rotation from the base to the world; None for the identity.
+
+class BatchOptions(TypedDict, total=False):
+    """Further arguments of a batch; see `batch`."""
+
+    outputs: Sequence[str]
+    settings: Settings | None
+    refinement: int
+    cores: int | None
+    progress: Callable[[int, int], None] | None
+
+
+def batch(
+    robots: Robot | Sequence[Robot],
+    values: Mapping[str, ArrayLike],
+    loads: Load | LoadPath | Sequence[Load] | Sequence[LoadPath],
+    *,
+    product: bool = False,
+    **options: Unpack[BatchOptions],
+) -> Batch:
+    """Solve many robots and many loads at once, each from rest, on all cores.
+
+    A row is a robot under a load, or along a path of loads with friction history. Of robots, of
+    loads and of each named number there is one, for all rows, or one for each row. With `product`
+    they are the axes of a grid, whose points are the rows: robots, then names in their order, then
+    loads, the last of them fastest.
+
+    Args:
+        robots: A robot, or several, which may differ in everything.
+        values: Numbers by name, rows as leading axis: numbers of robots, named as for
+            `Robot.with_value`, in the units of the robot file; and of loads "tension" (N) and
+            "stroke" (mm), where the loads command them, "tip_force" (N) and "tip_moment" (N mm),
+            with tendons or components as last axis, and steps before it where they differ. One
+            tension or stroke for each row is that of all tendons.
+        loads: A `Load` or a `LoadPath`, or several, paths of equally many steps.
+        product: Whether to solve all combinations.
+        options: `outputs`, names of `EquilibriumPath` (fewer need less memory); `settings`,
+            tolerance and limits of the solver; `refinement`, more strain modes, as for `simulate`;
+            `cores`, the number of cores to use (all where not given); `progress`, called with the
+            rows done and the rows of the whole batch.
+
+    Returns:
+        Arrays by name, rows and, of paths, steps as leading axes, in the world, and `converged`
+        always. A row that did not converge, or whose numbers make no valid robot, holds NaN;
+        `reason` says why.
+
+    Raises:
+        InputError: Unequal numbers of rows, no such name or output, invalid loads, or not one valid
+            robot.
+
+    Example:
+        >>> from notchflex import Load, load_robot
+        >>> wrist = load_robot("pacheco2021-a")
+        >>> values = {"notch[2].depth": [1.38, 1.40], "tension": [0.5, 1.0, 1.5]}
+        >>> found = batch(wrist, values, Load(tension=1.0), product=True)
+        >>> np.degrees(found["total_angle"].reshape(2, 3)).round(1).tolist()
+        [[25.5, 49.8, 106.5], [26.4, 51.5, 111.6]]
     """
-
-    rows: np.ndarray
-    chains: Float[np.ndarray, "k chain"]
-    commands: Float[np.ndarray, "k s command"]
-    layouts: tuple[StaticStructure, PytreeLayout, tuple[str, ...]]
-    turn: Float[np.ndarray, "3 3"] | None
-
-    def pieces(self, cores: int) -> Iterator[slice]:
-        """Return the rows of each call of the program: equal pieces, balanced over the cores."""
-        rows = len(self.rows)
-        max_size = max(size for limit, size in _PIECE_SIZES.items() if rows >= limit)
-        each = -(-rows // (max_size * cores))
-        size = -(-rows // (each * cores * WIDTH)) * WIDTH
-        return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
-
-    def packed(self, index: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return chains of a piece of the rows (one if shared), commands, and which are wrong."""
-        commands = self.commands[index]
-        if len(self.commands) == 1:
-            commands = np.repeat(self.commands, index.stop - index.start, axis=0)
-        chains = self.chains[0] if len(self.chains) == 1 else self.chains[index]
-        return chains, commands, np.zeros(0, int)
-
-    def run(self, index: slice, numbers: np.ndarray) -> dict[str, np.ndarray]:
-        """Solve a piece of the rows: quantities in the world, NaN where they are not known."""
-        chains, commands, wrong = self.packed(index)
-        by_row = (chains.ndim == 2, True, False)
-        robot, command, names = self.layouts
-        solved = tuple(dict.fromkeys(one for name in names for one in WORKS.get(name, (name,))))
-        found = follow_row.rows(by_row, chains, commands, numbers, robot, command, solved)
-        outputs = found | {name: _work(found, name) for name in names if name in WORKS}
-        outputs = {name: outputs[name] for name in sorted(names)}
-        failed = ~outputs["converged"]
-        for name, values in outputs.items():
-            if name in REGISTERED and values.dtype.kind == "f":
-                outputs[name] = REGISTERED[name].turned(values, self.turn)
-                if failed.any():
-                    outputs[name][failed] = np.nan
-        if len(wrong):
-            for name, values in self.separately(wrong + index.start, numbers).items():
-                outputs[name][wrong] = values
-        return outputs
-
-    def separately(self, rows: np.ndarray, numbers: np.ndarray) -> dict[str, np.ndarray]:
-        """Solve rows whose chains are not of the form of the others."""
-        raise NotImplementedError
-
-
-def _work(found: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-    """Return the work since rest, where force and length are 0, rows and steps as leading axes."""
-    force, length = (
-        (np.concatenate([np.zeros_like(after[:, :1]), after[:, :-1]], axis=1), after)
-        for after in (found[one] for one in WORKS[name])
-    )
-    return np.cumsum(work_of_steps(force, length), axis=1)
-
-
-@dataclass(frozen=True)
-class VariedRows(BatchRows):
-    """Rows whose robots differ by a few numbers: chains are computed piece by piece."""
-
-    varied: VariedChains
-
-    def packed(self, index: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return chains, commands and wrong ones of a piece of the rows."""
-        return self.varied.rows(index)
-
-    def separately(self, rows: np.ndarray, numbers: np.ndarray) -> dict[str, np.ndarray]:
-        """Solve robots one by one."""
-        robots, load = BatchRobots(self.varied.robots.take(rows)), self.varied.load
-        tables = tables_of(robots, load, 1, len(rows), self.layouts[2], self.varied.refinement)
-        return _solved(tables, len(rows), numbers, 1, None)
-
-
-def missing_value(values: np.ndarray) -> float:
-    """Return the value for missing entries: NaN, or 0 for integers and flags."""
-    return np.nan if values.dtype.kind == "f" else 0
-
-
-def tables_of(
-    robots: BatchRobots,
-    joined: LoadPath,
-    paths: int,
-    count: int,
-    outputs: tuple[str, ...],
-    refinement: int,
-) -> Sequence[BatchRows]:
-    """Return rows of a batch by the structure of their robots."""
-    steps = len(joined) // paths
-    if robots.varied is not None and paths == 1:
-        varied = varied_chains(robots.varied, joined, refinement)
-        if varied is not None:
-            layouts, nothing = (varied.structure, varied.command, outputs), np.zeros((0, 0))
-            form = np.arange(count), nothing, nothing, layouts, joined.base_to_world
-            return [VariedRows(*form, varied)]
-    groups: dict[Any, list[tuple[np.ndarray, np.ndarray, np.ndarray]]] = {}
-    for kind, rows, robot, part in _parts(robots.every, joined, paths):
-        ready = prepare_for(robot, part, None, refinement)
-        commands = make_commands(part, robot, ready.chain)
-        layout = ready.command_layout(commands)
-        packed = layout.pack(commands, leading=1).reshape(-1, steps, layout.size)
-        group = groups.setdefault((ready.static_structure, layout, kind), [])
-        group.append((rows, ready.dynamic_vector, packed))
-    tables = []
-    for (structure, layout, _), entries in groups.items():
-        numbers, chains, commands = zip(*entries, strict=True)
-        packed = np.stack(chains), np.concatenate(commands)
-        layouts = structure, layout, outputs
-        tables.append(BatchRows(np.concatenate(numbers), *packed, layouts, joined.base_to_world))
-    return tables
-
-
-def _parts(
-    robots: Sequence[Robot], joined: LoadPath, paths: int
-) -> Iterator[tuple[int, np.ndarray, Robot, LoadPath]]:
-    """Return rows that are prepared together: what acts, their numbers, robot and loads.
-
-    Rows of one robot are apart where other kinds of loads act: none changes another's modes.
-    """
-    steps = np.arange(len(joined)).reshape(paths, -1)
-    if len(robots) > 1:
-        for row, robot in enumerate(robots):
-            yield 0, np.array([row]), robot, joined if paths == 1 else joined[steps[row]]
-        return
-    if len(joined.different) == 1 and not joined.draws:  # the usual case, of many rows
-        yield 0, np.arange(paths), robots[0], joined
-        return
-    kinds = np.bitwise_or.reduce(_kinds(robots[0], joined).reshape(paths, -1), axis=1)
-    for kind in np.unique(kinds).tolist():
-        rows = np.flatnonzero(kinds == kind)
-        part = joined if len(rows) == paths else joined[steps[rows].ravel()]
-        yield kind, rows, robots[0], part
-
-
-def _kinds(robot: Robot, load: LoadPath) -> Int[np.ndarray, " s"]:
-    """Return what acts in each step, as bits: loads, across the plane, following, strokes."""
-    alone = [replace(load[:1], external=(external,)) for external in load.different]
-    acting = np.array(
-        [
-            (not is_unloaded(one)) + 2 * (not is_planar(one, robot)) + 4 * follows(one)
-            for one in alone
-        ]
-    )
-    return acting[load.which] + 8 * ~np.isnan(load.stroke).all(axis=1)
+    several = _robots(robots)
+    message = "a batch needs a notchflex.Load or LoadPath, or some in order"
+    listed = [loads] if isinstance(loads, Load) else one_or_several(loads, LoadPath, message)
+    paths = [load_path(one, _tendons(several)) for one in listed]
+    if not paths or len({len(path) for path in paths}) > 1:
+        raise InputError.WRONG_SHAPE("a batch needs one path or more, all of equally many steps")
+    joined = LoadRows(paths[0] if len(paths) == 1 else join_paths(paths), len(paths[0]))
+    single = all(isinstance(one, Load) for one in listed)
+    return _solved(_rows(several, values, joined, product, options), options, single)
 
 
 def solve_batch(
     robots: Robot | Sequence[Robot],
     loads: Load | LoadPath | Sequence[Load],
-    *,
-    outputs: Sequence[str] = DEFAULT_OUTPUTS,
-    settings: Settings | None = None,
-    refinement: int = 0,
-    cores: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    **options: Unpack[BatchOptions],
 ) -> Batch:
     """Solve many loads or many robots, each from rest.
 
     Args:
         robots: One robot, or one per row.
         loads: One load, or one per row (the steps of a `LoadPath` are loads of their own here).
-        outputs: What to return, by names of `EquilibriumPath`; fewer names need less memory.
-        settings: Tolerance and limits of the solver.
-        refinement: More strain modes, as for `simulate`.
-        cores: Number of cores to use; all where not given.
-        progress: Called with the rows done and the rows of the whole batch.
+        options: As for `batch`.
 
     Returns:
-        Arrays by name, rows as leading axis, in the world, and `converged` always. A row that did
-        not converge holds NaN.
+        As of `batch`, without an axis of steps.
 
     Raises:
         InputError: Robots and loads that are not one or equally many, no such output, or no core.
 
     Example:
         >>> from notchflex import load_robot, pull
-        >>> batch = solve_batch(load_robot("pacheco2021-a"), pull(1.0, 2.0, steps=100))
-        >>> batch["total_angle"].shape
+        >>> found = solve_batch(load_robot("pacheco2021-a"), pull(1.0, 2.0, steps=100))
+        >>> found["total_angle"].shape
         (100,)
     """
-    every = BatchRobots.of(robots)
-    path = load_path(loads, every.max_tendons)
-    arrays = _simulate(every, path, len(path), outputs, settings, refinement, cores, progress)
-    return Batch({name: array[:, 0] for name, array in arrays.items()})
+    several = _robots(robots)
+    each = LoadRows(load_path(loads, _tendons(several)), 1)
+    return _solved(_rows(several, {}, each, False, options), options, True)
 
 
 def simulate_batch(
     robots: Robot | Sequence[Robot],
     loads: LoadPath | Sequence[LoadPath],
-    *,
-    outputs: Sequence[str] = DEFAULT_OUTPUTS,
-    settings: Settings | None = None,
-    refinement: int = 0,
-    cores: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    **options: Unpack[BatchOptions],
 ) -> Batch:
     """Simulate many paths of loads, each with its own friction history.
 
     Args:
         robots: One robot, or one per row.
         loads: One path, or one per row, of equally many steps.
-        outputs: What to return, as for `solve_batch`.
-        settings: As for `solve_batch`.
-        refinement: As for `solve_batch`.
-        cores: As for `solve_batch`.
-        progress: As for `solve_batch`.
+        options: As for `batch`.
 
     Returns:
-        Arrays by name, rows and then steps as leading axes.
+        As of `batch`.
 
     Raises:
         InputError: Robots and paths that are not one or equally many, paths of unlike lengths, no
@@ -443,39 +302,88 @@ def simulate_batch(
         >>> simulate_batch(load_robot("pacheco2021-a"), paths)["total_angle"].shape
         (2, 8)
     """
-    every = BatchRobots.of(robots)
-    tendons = every.max_tendons
-    message = "simulate_batch needs a notchflex.LoadPath, or some in order"
-    paths = [load_path(one, tendons) for one in one_or_several(loads, LoadPath, message)]
-    if not paths or len({len(path) for path in paths}) > 1:
-        raise InputError.WRONG_SHAPE("a batch needs one path or more, all of equally many steps")
-    joined = paths[0] if len(paths) == 1 else join_paths(paths)
-    common = (outputs, settings, refinement, cores, progress)
-    return Batch(_simulate(every, joined, len(paths), *common))
+    return batch(robots, {}, loads, **options)
 
 
-def _simulate(
-    robots: BatchRobots,
-    joined: LoadPath,
-    paths: int,
-    outputs: Sequence[str],
-    settings: Settings | None,
-    refinement: int,
-    cores: int | None,
-    progress: Callable[[int, int], None] | None,
-) -> dict[str, np.ndarray]:
-    """Simulate paths, joined to one, each from rest."""
-    names = with_converged(outputs)
-    threads = number_of_threads(cores)
-    given = len(robots.every)
-    count = max(given, paths)
-    if given not in (1, count) or paths not in (1, count):
+def _robots(robots: Any) -> list[Robot]:
+    """Return the robots that a caller gives, checked."""
+    message = "a batch needs a notchflex.Robot, or some of them"
+    several = one_or_several(robots, Robot, message)
+    if not several or not all(isinstance(robot, Robot) for robot in several):
+        raise InputError.WRONG_TYPE(f"{message}; got {short_repr(robots)}")
+    return several
+
+
+def _tendons(robots: Sequence[Robot]) -> int:
+    return max(robot.number_of_tendons for robot in robots)
+
+
+def _rows(
+    robots: Sequence[Robot],
+    values: Mapping[str, ArrayLike],
+    loads: LoadRows,
+    product: bool,
+    options: BatchOptions,
+) -> BatchRows:
+    """Return the rows of a batch."""
+    numbers = {name: _numbers(name, each) for name, each in values.items()}
+    sizes = {"robots": len(robots)} | {name: len(each) for name, each in numbers.items()}
+    sizes["loads"] = len(loads)
+    count, places = _places(sizes, product)
+
+    def distinct(names: list[str]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Return which combination of some names each row has, and the places of each."""
+        own = {name: sizes[name] for name in names}
+        number, own_places = _places(own, product)
+        if not product:
+            return np.arange(count) % number, own_places
+        index = [places[name] for name in names]
+        return np.ravel_multi_index(index, tuple(own.values())), own_places
+
+    of_loads = [name for name in numbers if name in (*TENDONS, *TIP)]
+    robot_of, of_robot = distinct(["robots", *(name for name in numbers if name not in of_loads)])
+    path_of, of_path = distinct([*of_loads, "loads"])
+    which = of_robot.pop("robots")
+    varied = VariedRobots(robots, which, {name: numbers[name][at] for name, at in of_robot.items()})
+    which = of_path.pop("loads")
+    paths = loads.varied(which, {name: numbers[name][at] for name, at in of_path.items()})
+    names = check_outputs(options.get("outputs", DEFAULT_OUTPUTS), (*OUTPUTS, *WORKS))
+    outputs = tuple(dict.fromkeys([*names, "converged"]))
+    check_refinement(refinement := options.get("refinement", 0))
+    settings = options.get("settings") or DEFAULT
+    return BatchRows(varied, paths, robot_of, path_of, outputs, settings, refinement)
+
+
+def _numbers(name: str, values: ArrayLike) -> np.ndarray:
+    """Return the numbers of a name as an array."""
+    try:
+        numbers = np.asarray(values, float)
+    except (TypeError, ValueError):
+        numbers = np.zeros(())
+    if numbers.ndim == 0 or (numbers.ndim > 1 and name not in (*TENDONS, *TIP)):
         raise InputError.WRONG_SHAPE(
-            "a batch needs as many robots as loads, or one of either; "
-            f"got {given} robots and {paths} loads"
+            f"`{name}` needs numbers, one for each row; got {short_repr(values)}"
         )
-    tables = tables_of(robots, joined, paths, count, names, refinement)
-    return _solved(tables, count, np.array((settings or DEFAULT).numbers), threads, progress)
+    if not np.isfinite(numbers).all() and name in (*TENDONS, *TIP):
+        raise InputError.NOT_FINITE(f"`{name}` needs finite numbers; got {short_repr(values)}")
+    return numbers
+
+
+def _places(sizes: Mapping[str, int], product: bool) -> tuple[int, dict[str, np.ndarray]]:
+    """Return the number of rows, and of everything that varies its place in each row."""
+    if product:
+        shape = tuple(sizes.values())
+        count = math.prod(shape)
+        places = np.unravel_index(np.arange(count), shape)
+        return count, dict(zip(sizes, places, strict=True))
+    count = max(sizes.values())
+    if not set(sizes.values()) <= {1, count}:
+        listed = " and ".join(f"{size} {name}" for name, size in sizes.items() if size != 1)
+        raise InputError.WRONG_SHAPE(
+            f"a batch needs equally many of all that varies, or one of it; got {listed}; "
+            "product=True solves all combinations"
+        )
+    return count, {name: np.arange(count) % size for name, size in sizes.items()}
 
 
 def number_of_threads(cores: int | None) -> int:
@@ -486,46 +394,272 @@ def number_of_threads(cores: int | None) -> int:
     return threads
 
 
-def _solved(
-    tables: Sequence[BatchRows],
-    count: int,
-    numbers: Float[np.ndarray, " settings"],
-    threads: int,
-    progress: Callable[[int, int], None] | None,
-) -> dict[str, np.ndarray]:
-    """Solve all rows of tables, on several cores."""
-    arrays: dict[str, np.ndarray] = {}
-    done = 0
-    work = [(table, index) for table in tables for index in table.pieces(threads)]
-    solving = on_cores(lambda one: one[0].run(one[1], numbers), work, threads)
-    with closing(solving) as pieces:
-        for (table, index), piece in zip(work, pieces, strict=True):
-            rows = table.rows[index]
-            for name, values in piece.items():
-                _store(arrays, name, rows, values, count)
-            done += len(rows)
-            if progress is not None:
-                progress(done, count)
-    return arrays
+def _solved(rows: BatchRows, options: BatchOptions, single: bool) -> Batch:
+    """Solve the rows of a batch; single loads have no axis of steps."""
+    threads = number_of_threads(options.get("cores"))
+    if not len(rows.robot_of):
+        raise InputError.NO_DATA("a batch needs one row or more")
+    if not rows.valid.any():
+        raise next(iter(rows.robots.errors.values()))
+    arrays = rows.solved(threads, rows.tables(compiled=True), options.get("progress"))
+    if single:
+        arrays = {name: array[:, 0] for name, array in arrays.items()}
+    return Batch(arrays, rows)
 
 
-def with_converged(outputs: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of outputs, checked; `converged` is always among them."""
-    return tuple(dict.fromkeys([*check_outputs(outputs, (*OUTPUTS, *WORKS)), "converged"]))
+@dataclass(frozen=True, eq=False)
+class LoadRows:
+    """Paths of loads of equally many steps.
+
+    Attributes:
+        load: All steps of all paths.
+        steps: Number of steps of a path.
+        tip: Force and moment at the tip in every step, where they are not those of `load`.
+    """
+
+    load: LoadPath
+    steps: int
+    tip: Float[np.ndarray, "s 6"] | None = None
+
+    def __len__(self) -> int:
+        """Return the number of paths."""
+        return len(self.load) // self.steps
+
+    def steps_of(self, paths: Int[np.ndarray, " k"]) -> Int[np.ndarray, "k steps"]:
+        """Return the steps of some paths."""
+        return paths[:, None] * self.steps + np.arange(self.steps)
+
+    def __getitem__(self, path: int) -> LoadPath:
+        """Return one of the paths."""
+        steps = self.steps_of(np.array([path]))[0]
+        load = self.load[steps]
+        if self.tip is None:
+            return load
+        external = tuple(
+            replace(one, tip_force=tip[:3], tip_moment=tip[3:])
+            for one, tip in zip(load.external, self.tip[steps].tolist(), strict=True)
+        )
+        return replace(load, external=external)
+
+    def varied(self, which: Int[np.ndarray, " n"], values: Mapping[str, np.ndarray]) -> LoadRows:
+        """Return paths made of some of these and of numbers of their own.
+
+        Args:
+            which: Which of these each is made of.
+            values: Numbers of each by name.
+
+        Raises:
+            InputError: Numbers of another shape, that are not finite, or that no load can have.
+        """
+        if not values and np.array_equal(which, np.arange(len(self))):
+            return self
+        load = self.load[self.steps_of(which).ravel()]
+        tables = {
+            name: self._table(name, each, load.numbers(name)) for name, each in values.items()
+        }
+        load = load.commanding(tables)
+        if not any(name in TIP for name in tables):
+            return replace(self, load=load)
+        tip = np.hstack([tables[one] if one in tables else load.numbers(one) for one in TIP])
+        load = load.loaded(tip_force=NO_VECTOR, tip_moment=NO_VECTOR)
+        return replace(self, load=load, tip=tip)
+
+    def _table(
+        self, name: str, values: np.ndarray, present: Float[np.ndarray, "s k"]
+    ) -> Float[np.ndarray, "s k"]:
+        """Return numbers of paths in every step."""
+        shape = (len(values), self.steps, present.shape[1])
+        steps = values if values.ndim > 2 else values.reshape(len(values), 1, -1)
+        try:
+            if name in TIP and steps.shape[2] != 3:
+                raise ValueError
+            return np.broadcast_to(steps, shape).reshape(present.shape)
+        except ValueError:
+            last = "3" if name in TIP else f"{shape[2]} tendons or 1"
+            raise InputError.WRONG_SHAPE(
+                f"`{name}` needs rows by {last}, or rows by {self.steps} steps by {last}; "
+                f"got numbers of shape {values.shape}"
+            ) from None
+
+    def kinds(self, robot: Robot, paths: Int[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
+        """Return what acts on a robot along some paths, as bits; see `acting`."""
+        kinds = acting(self.load, robot, self.steps_of(paths), self.tip)
+        return np.bitwise_or.reduce(kinds, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class BatchRows:
+    """Rows of a batch: robots and paths of loads.
+
+    Attributes:
+        robots: All robots.
+        loads: All paths.
+        robot_of: Number of the robot of each row.
+        path_of: Number of the path of each row.
+        outputs: Names of what is returned.
+        settings: Tolerance and limits of the solver.
+        refinement: More strain modes, as for `simulate`.
+    """
+
+    robots: VariedRobots
+    loads: LoadRows
+    robot_of: Int[np.ndarray, " rows"]
+    path_of: Int[np.ndarray, " rows"]
+    outputs: tuple[str, ...]
+    settings: Settings
+    refinement: int
+
+    @cached_property
+    def valid(self) -> Bool[np.ndarray, " rows"]:
+        """Whether the numbers of each row make a valid robot."""
+        return np.isin(self.robot_of, [*self.robots.errors], invert=True)
+
+    def alone(self, row: int) -> EquilibriumPath:
+        """Solve one row alone."""
+        robot, load = self.robots[int(self.robot_of[row])], self.loads[int(self.path_of[row])]
+        tendons = slice(robot.number_of_tendons)
+        load = replace(load, tension=load.tension[:, tendons], stroke=load.stroke[:, tendons])
+        return follow_path(robot, load, None, self.settings, self.refinement)
+
+    def tables(self, compiled: bool) -> Iterator[BatchTable]:
+        """Yield the valid rows by the programs that they run through.
+
+        Args:
+            compiled: Whether programs may make the chains of many robots.
+        """
+        rows = np.flatnonzero(self.valid)
+        if compiled and len(self.robots) > FEW:
+            few = [rows[:0]]
+            for form in self.robots.forms(np.unique(self.robot_of[rows])):
+                own = rows[np.isin(self.robot_of[rows], form.members)]
+                for kind, part in self._by_kind(form.example, own):
+                    number = len(np.unique(self.robot_of[part]))
+                    chains = form.chains(kind, self.refinement, number)
+                    if chains is None:
+                        few.append(part)
+                    else:
+                        yield BatchTable(self, part, chains, kind)
+            rows = np.concatenate(few)
+        yield from self._one_by_one(rows)
+
+    def _by_kind(
+        self, robot: Robot, rows: Int[np.ndarray, " k"]
+    ) -> Iterator[tuple[int, Int[np.ndarray, " m"]]]:
+        """Yield what acts, and rows where it does: no row changes the modes of another."""
+        kinds = self.loads.kinds(robot, self.path_of[rows])
+        for kind in np.unique(kinds).tolist():
+            yield kind, rows[kinds == kind]
+
+    def _one_by_one(self, rows: Int[np.ndarray, " k"]) -> Iterator[BatchTable]:
+        """Yield rows whose robots are assembled in Python, by the structures of their chains."""
+        groups: dict[Any, tuple[list[np.ndarray], dict[int, PreparedChain]]] = {}
+        rows = rows[np.argsort(self.robot_of[rows], kind="stable")]
+        numbers, first = np.unique(self.robot_of[rows], return_index=True)
+        for number, own in zip(numbers.tolist(), np.split(rows, first)[1:], strict=True):
+            robot = self.robots[number]
+            for kind, part in self._by_kind(robot, own):
+                ready = prepare_kind(robot, kind, self.refinement)
+                parts, chains = groups.setdefault((ready.static_structure, kind), ([], {}))
+                parts.append(part)
+                chains[number] = ready
+        for (_, kind), (parts, chains) in groups.items():
+            yield BatchTable(self, np.sort(np.concatenate(parts)), single_chains(chains), kind)
+
+    def solved(
+        self,
+        threads: int,
+        tables: Iterable[BatchTable],
+        progress: Callable[[int, int], None] | None = None,
+    ) -> dict[str, np.ndarray]:
+        """Solve the rows of tables, on several cores."""
+        arrays: dict[str, np.ndarray] = {}
+        count, done = len(self.robot_of), int((~self.valid).sum())
+        work = [(table, index) for table in tables for index in table.pieces(threads)]
+        solving = on_cores(lambda one: one[0].run(one[1]), work, threads)
+        with closing(solving) as pieces:
+            for (table, index), piece in zip(work, pieces, strict=True):
+                rows = table.rows[index]
+                for name, values in piece.items():
+                    _store(arrays, name, rows, values, count)
+                done += len(rows)
+                if progress is not None:
+                    progress(done, count)
+        return arrays
+
+
+@dataclass(frozen=True, eq=False)
+class BatchTable:
+    """Rows of a batch that run through one program.
+
+    Attributes:
+        batch: The batch.
+        rows: Numbers of these rows, ascending.
+        chains: Chains of their robots.
+        kind: What acts, as bits; see `acting`.
+    """
+
+    batch: BatchRows
+    rows: Int[np.ndarray, " k"]
+    chains: Chains
+    kind: int
+
+    def pieces(self, cores: int) -> Iterator[slice]:
+        """Return the rows of each call of the program: equal pieces, balanced over the cores."""
+        rows = len(self.rows)
+        max_size = max(size for limit, size in _PIECE_SIZES.items() if rows >= limit)
+        each = -(-rows // (max_size * cores))
+        size = -(-rows // (each * cores * WIDTH)) * WIDTH
+        return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
+
+    def run(self, index: slice) -> dict[str, np.ndarray]:
+        """Solve a piece of the rows: quantities in the world, NaN where they are not known."""
+        batch, rows = self.batch, self.rows[index]
+        load, names = batch.loads.load, batch.outputs
+        robots, paths = batch.robot_of[rows], batch.path_of[rows]
+        chains, alike = self.chains.packed(robots)
+        steps, bodies = batch.loads.steps_of(paths), self.chains.bodies(chains)
+        drawn = bool(self.kind & DRAWN)
+        commands = row_commands(load, steps, bodies, batch.loads.tip, drawn=drawn)
+        layout = self.chains.ready.command_layout(commands)
+        solved = tuple(dict.fromkeys(one for name in names for one in WORKS.get(name, (name,))))
+        found = follow_row.rows(
+            (chains.ndim == 2, True, False),
+            *(chains, layout.pack(commands, leading=2), np.array(batch.settings.numbers)),
+            *(self.chains.structure, layout, solved),
+        )
+        outputs = found | {name: _work(found, name) for name in names if name in WORKS}
+        outputs = {name: outputs[name] for name in sorted(names)}
+        failed = ~outputs["converged"]
+        for name, values in outputs.items():
+            if name in REGISTERED and values.dtype.kind == "f":
+                outputs[name] = REGISTERED[name].turned(values, load.base_to_world)
+                if failed.any():
+                    outputs[name][failed] = np.nan
+        if not alike.all():
+            wrong = ~alike
+            alone = replace(batch, robot_of=robots[wrong], path_of=paths[wrong])
+            for name, values in alone.solved(1, alone.tables(compiled=False)).items():
+                outputs[name][wrong] = values
+        return outputs
+
+
+def _work(found: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+    """Return the work since rest, where force and length are 0, rows and steps as leading axes."""
+    force, length = (
+        (np.concatenate([np.zeros_like(after[:, :1]), after[:, :-1]], axis=1), after)
+        for after in (found[one] for one in WORKS[name])
+    )
+    return np.cumsum(work_of_steps(force, length), axis=1)
 
 
 def _store(
     arrays: dict[str, np.ndarray], name: str, rows: np.ndarray, values: np.ndarray, count: int
 ) -> None:
     """Store the values of some rows; NaN where robots have fewer notches than others."""
-    array = arrays.get(name, np.empty((count, *values.shape[1:]), values.dtype))
-    shape = tuple(np.maximum(array.shape[1:], values.shape[1:]))
-    if shape != array.shape[1:]:
-        wider = [(0, 0), *((0, b - a) for a, b in zip(array.shape[1:], shape, strict=True))]
-        array = np.pad(array, wider, constant_values=missing_value(values))
-    first, last = int(rows[0]), int(rows[-1]) + 1
-    where = rows if last - first > len(rows) else slice(first, last)
-    if shape != values.shape[1:]:
-        array[where] = missing_value(values)
-    array[(where, *(slice(size) for size in values.shape[1:]))] = values
+    missing = np.nan if values.dtype.kind == "f" else 0
+    array = arrays.get(name, np.full((count, *values.shape[1:]), missing, values.dtype))
+    wider = np.maximum(array.shape[1:], values.shape[1:]) - array.shape[1:]
+    if wider.any():
+        array = np.pad(array, [(0, more) for more in (0, *wider)], constant_values=missing)
+    array[(rows, *(slice(size) for size in values.shape[1:]))] = values
     arrays[name] = array

@@ -7,14 +7,14 @@ costs a notch one trial, not its result.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from notchflex._jax import (
     jax,
@@ -23,10 +23,11 @@ from notchflex._jax import (
 )
 from notchflex._summary import Displayed, Summary, short
 from notchflex.analysis.batch import (
-    VariedChains,
-    varied_chains,
+    BatchRows,
+    BatchTable,
+    LoadRows,
 )
-from notchflex.analysis.outputs import follow_row
+from notchflex.analysis.varied import VariedRobots
 from notchflex.loads import LoadPath
 from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import Chain, assemble, sites_of
@@ -39,13 +40,12 @@ from notchflex.mechanics.material import FibreSection, SectionLaw, peak_strain, 
 from notchflex.results.quantities import DEGREES, QUANTITIES
 from notchflex.robot import Robot, Tube
 from notchflex.robot.kinds import Notch
-from notchflex.robot.numbers import VariedRobots
 from notchflex.robot.part import fields_of, unit_of
 from notchflex.solver.newton import (
     DEFAULT,
     Settings,
 )
-from notchflex.solver.programs.compiled import on_cores
+from notchflex.solver.programs.compiled import number_of_cores
 from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run, solve_contacts
 
@@ -391,8 +391,6 @@ def _pull(
     return np.where(converged, overlap, np.nan), np.where(converged, angle, np.nan)
 
 
-# Number of rows in one call of the program.
-_BATCH = 1024
 # First tension, relative to that of the robot that is varied.
 _FIRST = 1.05
 # Relative precision of a tension: limits are compared to 1e-6.
@@ -400,79 +398,61 @@ _PRECISION = 1e-9
 _OUTPUTS = ("contact_force", "gap", "converged")
 
 
-def closing_tensions_of(robots: VariedRobots) -> Float[np.ndarray, "robots n"]:
+def closing_tensions_of(
+    robot: Robot, values: Mapping[str, Float[np.ndarray, " robots"]]
+) -> Float[np.ndarray, "robots n"]:
     """Find the tension that closes every notch of many robots, as `closing` does for one.
 
     Args:
-        robots: The robots, all of them valid.
+        robot: The robot that is varied.
+        values: Numbers of the robots by name.
 
     Returns:
-        Base tensions, N; NaN where none was found.
+        Base tensions, N; NaN where none was found, or where the numbers make no valid robot.
     """
-    own = closing(robots.robot)
-    chain = assemble(robots.robot, flat=False)
+    own = closing(robot)
+    chain = assemble(robot, flat=False)
     closing_angle, arm = closing_angles(chain.rods), moment_arms(chain)
     unit = np.eye(chain.tendons)[own.tendon - 1]
-    load = LoadPath(np.ones((1, chain.tendons)))
-    chains = varied_chains(robots, load, 0) if np.isfinite(closing_angle).all() else None
-    if chains is None:  # edges of rigid pieces, or few robots: one after the other
-        return np.reshape([closing(one).tension for one in robots], (len(robots), -1))
+    robots = VariedRobots.of(robot, values)
+    tension = np.full((len(robots), chain.flexures), np.nan)
+    valid = np.setdiff1d(np.arange(len(robots)), [*robots.errors])
+    chains = None
+    if np.isfinite(closing_angle).all() and len(valid):  # not edges of rigid pieces
+        chains = next(robots.forms(valid)).chains(0, 0, len(valid))
+    if chains is None:  # few robots
+        for number in valid.tolist():
+            tension[number] = closing(robots[number]).tension
+        return tension
     longest = arm[np.arange(len(arm)), own.tendon - 1]
     notches = np.flatnonzero((longest > 0.0) & (np.asarray(closing_angle) > 0.0))
-    tension = np.full((len(robots), chain.flexures), np.nan)
-    if len(notches) == 0:
-        return tension
     with np.errstate(divide="ignore"):
         linear = np.asarray(chain.stiffness)[:, 0] * np.asarray(closing_angle) / longest
     guess = np.where(np.isfinite(own.tension), _FIRST * own.tension, linear)[notches]
-    search = _Rows(chains, notches, unit[notches], np.asarray(chain.contact_stiffness)[notches])
-    closing_tension, _ = closing_tensions(search.overlap, np.tile(guess, len(robots)), _PRECISION)
-    tension[:, notches] = closing_tension.reshape(len(robots), -1)
-    return tension
-
-
-class _Rows:
-    """Rows of a batch: one per robot and notch to close."""
-
-    def __init__(
-        self,
-        chains: VariedChains,
-        notches: Int[np.ndarray, " k"],
-        unit: Float[np.ndarray, "k t"],
-        stiffness: Float[np.ndarray, " k"],
-    ) -> None:
-        """Store chains, notches to close, unit tensions that pull them, and their stiffness."""
-        self.chains, self.notches, self.unit, self.stiffness = chains, notches, unit, stiffness
-        self.robots, _, wrong = chains.rows(slice(None))
-        self.robots[wrong] = np.nan
+    # The root does not depend on the stiffness: that of one robot serves for all.
+    stiffness = np.asarray(chain.contact_stiffness)[notches]
+    table, alike = chains.packed(valid)
+    known = replace(chains, packed=lambda numbers: (table[numbers], alike[numbers]))
+    some = VariedRobots.of(robot, {name: each[valid] for name, each in values.items()})
 
     def overlap(
-        self, tension: Float[np.ndarray, " rows"], mask: Bool[np.ndarray, " rows"]
+        tension: Float[np.ndarray, " rows"], mask: Bool[np.ndarray, " rows"]
     ) -> Float[np.ndarray, " rows"]:
-        """Compute contact force / stiffness - gap of the masked rows, mm; NaN for others."""
-        rows = np.flatnonzero(mask)
-        values_of_rows = np.full(len(tension), np.nan)
-        pieces = [rows[k : k + _BATCH] for k in range(0, len(rows), _BATCH)]
-        solving = on_cores(lambda one: self._overlap(one, tension[one]), pieces)
-        for piece, values in zip(pieces, solving, strict=True):
-            values_of_rows[piece] = values
-        return values_of_rows
+        """Compute contact force / stiffness - gap of the masked rows: robots by notches."""
+        places = np.flatnonzero(mask)
+        numbers, notch = np.divmod(places, len(notches))
+        load, each = LoadPath(tension[places, None] * unit[notch]), np.arange(len(places))
+        rows = BatchRows(some, LoadRows(load, 1), numbers, each, _OUTPUTS, DEFAULT, 0)
+        solved = rows.solved(number_of_cores(), [BatchTable(rows, each, known, 0)])
+        force, gap = (solved[name][each, 0, notches[notch]] for name in ("contact_force", "gap"))
+        overlaps = np.full(len(tension), np.nan)
+        overlaps[places] = force / stiffness[notch] - gap
+        return overlaps
 
-    def _overlap(
-        self, rows: Int[np.ndarray, " m"], tension: Float[np.ndarray, " m"]
-    ) -> Float[np.ndarray, " m"]:
-        robot, notch = np.divmod(rows, len(self.notches))
-        commands = tension_commands(tension[:, None] * self.unit[notch])
-        layout = self.chains.ready.command_layout(commands)
-        packed = layout.pack(commands, leading=1)[:, None]
-        settings = np.array(DEFAULT.numbers)
-        layouts = (self.chains.structure, layout, _OUTPUTS)
-        by_row = (True, True, False)
-        states = follow_row.rows(by_row, self.robots[robot], packed, settings, *layouts)
-        own = np.arange(len(rows)), 0, self.notches[notch]
-        # The root does not depend on the stiffness: that of one robot serves for all.
-        overlap = states["contact_force"][own] / self.stiffness[notch] - states["gap"][own]
-        return np.where(states["converged"][:, 0], overlap, np.nan)
+    if len(notches):
+        roots, _ = closing_tensions(overlap, np.tile(guess, len(valid)), _PRECISION)
+        tension[np.ix_(valid, notches)] = roots.reshape(len(valid), -1)
+    return tension
 
 
 # Geometry, section and closing of every notch, one row each.

@@ -35,7 +35,11 @@ from notchflex.loads.load import (
     check_is_robot,
     short_repr,
 )
-from notchflex.loads.load_path import load_path
+from notchflex.loads.load_path import (
+    TENDONS,
+    TIP,
+    load_path,
+)
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
@@ -107,14 +111,7 @@ def differentiable(
 
 def _present(robot: Robot, path: LoadPath, name: str) -> Any:
     """Return the present value of a parameter."""
-    if name in TIP:
-        return np.array([getattr(one, name) for one in path.external])
-    if name not in TENDONS:
-        return number_at(robot, name)
-    commanded = getattr(path, name)
-    if np.isnan(commanded).all():
-        raise InputError.NO_DATA(f"the loads give no {name} that could vary")
-    return np.nan_to_num(commanded)
+    return path.numbers(name) if name in (*TENDONS, *TIP) else number_at(robot, name)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -237,12 +234,7 @@ class Differentiable(Displayed):
         return lru_cache(maxsize=4)(made)
 
     def _load(self, values: Mapping[str, Any]) -> LoadPath:
-        load = self.load
-        for name in TENDONS:
-            if name in values:
-                commanded = getattr(load, name)
-                value = np.where(np.isnan(commanded), np.nan, np.asarray(values[name]))
-                load = dataclasses.replace(load, **{name: value})
+        load = self.load.commanding(values)
         tip = {name: np.asarray(values[name]) for name in self._tip}
         if tip:
             external = tuple(
@@ -326,8 +318,6 @@ class Differentiable(Displayed):
 # JAX calls back to compiled programs of the library, so that user code around it does not compile
 # the mechanics again.
 
-TENDONS = ("tension", "stroke")
-TIP = ("tip_force", "tip_moment")
 # Number of robots whose derivatives by their numbers are cached.
 _REMEMBERED = 16
 

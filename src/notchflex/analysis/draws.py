@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from notchflex.analysis.varied import VariedRobots
 from notchflex.errors import InputError
 from notchflex.robot import Nitinol, Robot
 from notchflex.robot.part import fields_of, unit_of
@@ -29,12 +30,12 @@ class Draws(NamedTuple):
     """Robots within tolerances.
 
     Attributes:
-        robots: The robots, without tolerances of their own.
+        robot: The robot of the drawing, without tolerances.
         values: The numbers that were drawn, by name, one per robot.
         redrawn: How many draws made no valid robot and were drawn again.
     """
 
-    robots: list[Robot]
+    robot: Robot
     values: Mapping[str, Float[np.ndarray, " draws"]]
     redrawn: int
 
@@ -125,27 +126,21 @@ def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed:
     exact = robot.replace(tolerance=None)
     sources = sources_of(exact, tolerances)
     random = np.random.default_rng(seed)
-    robots: list[Robot] = []
-    values: list[dict[str, float]] = []
-    redrawn = 0
-    for level in _levels(draws, len(sources), random):
-        for tried in range(_TRIES):
-            drawn = {name: float(one) for name, one in values_at(sources, level).items()}
+    levels = _levels(draws, len(sources), random)
+    errors = VariedRobots.of(exact, values_at(sources, levels)).errors if sources else {}
+    for row in sorted(errors):
+        for tried in range(2, _TRIES + 1):
+            levels[row] = random.random(len(sources))
             try:
-                robots.append(exact.with_values(drawn))
+                exact.with_values(values_at(sources, levels[row]))
+                break
             except InputError as error:
-                if tried + 1 == _TRIES:
+                if tried == _TRIES:
                     raise InputError.OUT_OF_RANGE(
                         f"{_TRIES} draws within the tolerances made no valid robot; make the "
                         f"tolerances smaller. The last one: {error}"
                     ) from None
-                level = random.random(len(sources))
-                continue
-            values.append(drawn)
-            redrawn += tried > 0
-            break
-    names = values[0] if values else {}
-    return Draws(robots, {name: np.array([one[name] for one in values]) for name in names}, redrawn)
+    return Draws(exact, values_at(sources, levels), len(errors))
 
 
 def _levels(

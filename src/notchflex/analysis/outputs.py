@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any, NoReturn
 
@@ -15,12 +15,9 @@ from notchflex._jax import (
     jnp,
 )
 from notchflex._quantity import REGISTERED
-from notchflex._summary import Displayed, Summary, short
-from notchflex._values import ByValue, frozen
 from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.load import short_repr
 from notchflex.mechanics.chain import Chain
-from notchflex.results.quantities import QUANTITIES
 from notchflex.solver.continuation import solve_load_step
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
@@ -57,58 +54,6 @@ class UnknownOutputError(InputError, KeyError):
     def __str__(self) -> str:
         """Return the message; a `KeyError` would put it in quotes."""
         return str(self.args[0])
-
-
-class Batch(ByValue, Displayed, Mapping[str, np.ndarray]):
-    """Result of a batch: arrays by name, the rows of the batch as leading axis.
-
-    Example:
-        >>> from notchflex import load_robot, pull, solve_batch
-        >>> batch = solve_batch(load_robot("pacheco2021-a"), pull(0.0, 2.0, steps=3))
-        >>> batch["tip_position"].shape, bool(batch["converged"].all())
-        ((3, 3), True)
-    """
-
-    def __init__(self, arrays: dict[str, np.ndarray]) -> None:
-        """Hold arrays by name."""
-        self._arrays = {name: frozen(values) for name, values in arrays.items()}
-
-    def _value(self) -> Any:
-        return self._arrays
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """Return one of the arrays."""
-        if name not in self._arrays:
-            raise UnknownOutputError(name, self._arrays)
-        return self._arrays[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the names."""
-        return iter(self._arrays)
-
-    def __len__(self) -> int:
-        """Return the number of arrays."""
-        return len(self._arrays)
-
-    def _summary(self) -> Summary:
-        count = len(next(iter(self.values()), ()))
-        title = f"Batch of {count} row{'s' * (count != 1)}"
-        rows = [(name, range_of(name, array)) for name, array in self.items()]
-        return Summary(title, rows, "[name] is the array of one output")
-
-
-def range_of(name: str, array: np.ndarray) -> str:
-    """Describe an array by its shape, and what its values lie between; a number by itself."""
-    unit = QUANTITIES[name].python_unit if name in QUANTITIES else ""
-    if array.ndim == 0:
-        return f"{array if array.dtype == bool else short(float(array))} {unit}".rstrip()
-    shape = "×".join(map(str, array.shape))
-    if array.dtype == bool:
-        return f"{shape}, {int(array.sum())} of {array.size} true"
-    if not np.isfinite(array).any():
-        return f"{shape}, no number"
-    ends = f"{short(float(np.nanmin(array)))} to {short(float(np.nanmax(array)))} {unit}"
-    return f"{shape}, {ends}".rstrip()
 
 
 @jax.tree_util.register_pytree_with_keys_class

@@ -144,11 +144,24 @@ def _follow(
     if from_state is not None:
         check_robot(from_state, robot)
     load = load_path(loads, check_is_robot(robot).number_of_tendons)
+    path = follow_path(robot, load, from_state, settings, refinement, each_from_rest)
+    for warning in unlikely_loads(load, path.prepared.usual_loads):
+        warnings.warn(warning, stacklevel=3)
+    return path
+
+
+def follow_path(
+    robot: Robot,
+    load: LoadPath,
+    from_state: State | SavedState | None,
+    settings: Settings,
+    refinement: int,
+    each_from_rest: bool = False,
+) -> EquilibriumPath:
+    """Follow a path for the tendons of a robot, as `simulate` does, without warnings."""
     ready = prepare_for(robot, load, from_state, refinement)
     start = None if from_state is None else fitted(from_state, ready.chain)
     commands = make_commands(load, robot, ready.chain)
-    for warning in unlikely_loads(load, ready.usual_loads):
-        warnings.warn(warning, stacklevel=3)
     states = run(ready, commands, start, settings, each_from_start=each_from_rest)
     return EquilibriumPath(robot, load, ready, states, each_from_rest, settings)
 
@@ -176,10 +189,21 @@ def prepare_for(
         )
     loaded = not is_unloaded(load)
     turning = loaded and follows(load)
-    level = "plane" if loaded else "tendons"
-    if not tendons_in_plane(robot) or (loaded and not is_planar(load, robot)):
-        level = "space"
+    level = level_of(robot, loaded, loaded and not is_planar(load, robot))
     if from_state is not None:
         loaded, turning = loaded or from_state.loaded, turning or from_state.follows
         level = max(level, from_state.level, key=LEVELS.index)
     return prepare(robot, level, loaded, turning, refinement)
+
+
+def level_of(robot: Robot, loaded: bool, sideways: bool) -> str:
+    """Return the level of the strain modes that loads need.
+
+    Args:
+        robot: The robot.
+        loaded: Whether external loads act.
+        sideways: Whether these leave the robot's plane of bending.
+    """
+    if sideways or not tendons_in_plane(robot):
+        return "space"
+    return "plane" if loaded else "tendons"

@@ -24,12 +24,11 @@ from notchflex._jax import (
 )
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
-from notchflex.analysis.batch import number_of_threads
+from notchflex.analysis.batch import number_of_threads, range_of
 from notchflex.analysis.outputs import (
     OF_STATE,
     check_outputs,
     own_entries,
-    range_of,
     report_quantities,
 )
 from notchflex.analysis.solve import prepare_for, simulate

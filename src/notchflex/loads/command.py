@@ -14,7 +14,7 @@ from math import hypot, pi
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._arrays import xp
 from notchflex._jax import (
@@ -75,8 +75,7 @@ def applied(
     Raises:
         InputError: A body that the robot does not have, or gravity where nothing has a mass.
     """
-    frame = None if chain.frame is None else tuple(np.asarray(chain.frame).ravel().tolist())
-    axes = _axes(tuple(load_path.base_rotation.tolist()), frame)
+    axes = _axes_of(load_path, chain)
     mass, moment, tip = bodies or body_numbers(chain)
     sums: list[tuple[np.ndarray, ...]] = []
     for external in load_path.different:
@@ -178,35 +177,57 @@ def is_planar(load_path: LoadPath, robot: Robot) -> bool:
     about its normal. Own weight counts as acting on the tube axis. A robot whose notches bend in
     several planes has no such plane.
     """
+    turn = load_path.base_to_world
+    return not any(_sideways(external, robot, turn) for external in load_path.different)
+
+
+def _sideways(
+    external: ExternalLoad,
+    robot: Robot,
+    turn: Float[np.ndarray, "3 3"] | None,
+    at_tip: Sequence[Any] = (),
+) -> Any:
+    """Return whether external loads, and others at the tip (see `_forces`), leave the plane."""
     normal = bending_normal(robot)
     if normal is None:
-        return False
-    turn = load_path.base_to_world
-    turned_normal = normal if turn is None else turn @ normal
-    for external in load_path.different:
-        # Only directions matter here, not the mass or its position on the tube axis.
-        forces = list(_forces(external, 0))
-        if external.gravity is not None:
-            forces.append((0, external.weight(1.0), _NONE, _NONE, False, False))
-        for _, force, moment, point, following, _ in forces:
-            if _sticks_out(force, moment, point, normal if following else turned_normal, normal):
-                return False
-    return True
+        return True
+    turned_normal = (normal if turn is None else turn @ normal).tolist()
+    # Only directions matter here, not the mass or its position on the tube axis.
+    forces = list(_forces(external, 0, at_tip))
+    if external.gravity is not None:
+        forces.append((0, external.weight(1.0), _NONE, _NONE, False, False))
+    leaves = False
+    normal = normal.tolist()
+    for _, force, moment, point, following, _ in forces:
+        leaves |= _sticks_out(force, moment, point, normal if following else turned_normal, normal)
+    return leaves
 
 
 def _sticks_out(
-    force: Sequence[float],
-    moment: Sequence[float],
+    force: Sequence[Any],
+    moment: Sequence[Any],
     point: Sequence[float],
-    normal: Float[np.ndarray, " 3"],
-    normal_of_body: Float[np.ndarray, " 3"],
-) -> bool:
-    """Return whether a force or its point leaves a plane, or a moment's axis is not its normal."""
+    normal: Sequence[float],
+    normal_of_body: Sequence[float],
+) -> Any:
+    """Return whether a force or its point leaves a plane, or a moment's axis is not its normal.
+
+    Components are numbers, or arrays of them.
+    """
     return (
-        abs(np.dot(force, normal)) > _ROUNDING * hypot(*force)
-        or hypot(*_cross(moment, normal.tolist())) > _ROUNDING * hypot(*moment)
-        or (any(force) and abs(np.dot(point, normal_of_body)) > _ROUNDING * hypot(*point))
+        (abs(_dot(force, normal)) > _ROUNDING * _norm(force))
+        | (_norm(_cross(moment, normal)) > _ROUNDING * _norm(moment))
+        | ((_norm(force) > 0.0) & (abs(_dot(point, normal_of_body)) > _ROUNDING * _norm(point)))
     )
+
+
+def _dot(first: Sequence[Any], second: Sequence[Any]) -> Any:
+    (a, b, c), (x, y, z) = first, second
+    return a * x + b * y + c * z
+
+
+def _norm(vector: Sequence[Any]) -> Any:
+    return _dot(vector, vector) ** 0.5
 
 
 def _components(vector: Sequence[float], axes: tuple[Sequence[float], ...]) -> list[float]:
@@ -214,9 +235,99 @@ def _components(vector: Sequence[float], axes: tuple[Sequence[float], ...]) -> l
     return [x * a + y * b + z * c for a, b, c in axes]
 
 
-def _cross(first: Sequence[float], second: Sequence[float]) -> list[float]:
+def _cross(first: Sequence[Any], second: Sequence[Any]) -> list[Any]:
     (a, b, c), (x, y, z) = first, second
     return [b * z - c * y, c * x - a * z, a * y - b * x]
+
+
+LOADED, SIDEWAYS, FOLLOWING, DRAWN = 1, 2, 4, 8
+
+
+def acting(
+    load: LoadPath,
+    robot: Robot,
+    steps: Int[np.ndarray, "*k"],
+    tip: Float[np.ndarray, "s 6"] | None = None,
+) -> Int[np.ndarray, "*k"]:
+    """Return what acts in some steps of a path, as bits: `LOADED` and so on.
+
+    Args:
+        load: The path of s steps.
+        robot: The robot.
+        steps: Numbers of the steps.
+        tip: Force and moment at the tip in every step, where they are not those of the path.
+
+    Raises:
+        InputError: A tendon or a body that the robot does not have, or gravity where nothing has a
+            mass.
+    """
+    tendons = robot.number_of_tendons
+    commands = load.tension, load.stroke
+    if any(not np.isnan(table[steps, tendons:]).all() for table in commands):
+        raise InputError.WRONG_SHAPE(
+            f"a load commands more tendons than {robot.name} has: {tendons}"
+        )
+    kinds = DRAWN * ~np.isnan(load.stroke[steps]).all(axis=-1).ravel()
+    for number, places in _places_of_each(load.which[steps]):
+        external = load.different[number]
+        _check(external, robot)
+        at_tip = () if tip is None else [*tip[steps.ravel()[places]].T]
+        pushed = np.any(at_tip, axis=0)
+        kinds[places] += (
+            LOADED * (pushed | (not external.is_nothing))
+            + SIDEWAYS * _sideways(external, robot, load.base_to_world, at_tip)
+            + FOLLOWING * (pushed & external.following | external.follows)
+        )
+    return kinds.reshape(steps.shape)
+
+
+def _places_of_each(numbers: Int[np.ndarray, ...]) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield each distinct number, and its places in the flat array."""
+    order = np.argsort(numbers, axis=None, kind="stable")
+    distinct, first = np.unique(numbers.ravel()[order], return_index=True)
+    return zip(distinct.tolist(), np.split(order, first[1:]), strict=True)
+
+
+def row_commands(
+    load: LoadPath,
+    steps: Int[np.ndarray, "k s"],
+    chain: Chain,
+    tip: Float[np.ndarray, "all 6"] | None = None,
+    *,
+    drawn: bool,
+) -> Command:
+    """Return the commands of rows of a batch, k rows and their s steps as leading axes.
+
+    Args:
+        load: All steps of all paths.
+        steps: Which of them those of each row are.
+        chain: The chain; masses and lengths of its bodies may have the rows as leading axis.
+        tip: As for `acting`.
+        drawn: Whether strokes are commanded.
+    """
+    own = steps, slice(chain.tendons)
+    by_stroke: Any = ~np.isnan(load.stroke[own]) if drawn else None
+    target: Any = load.target[own]
+    if not chain.loaded:
+        return Command(target, by_stroke, None)
+    axes, bodies = _axes_of(load, chain), body_numbers(chain)
+    by_row = bodies[2].ndim
+    fields: list[np.ndarray] = []
+    for number, places in _places_of_each(load.which[steps]):
+        masses = [one[places // steps.shape[1]] for one in bodies] if by_row else bodies
+        at_tip = () if tip is None else [*tip[steps.ravel()[places]].T]
+        sums = _sums(load.different[number], axes, *masses, at_tip=at_tip)
+        shapes = [one.shape[by_row if tip is None else 1 :] for one in sums]
+        fields = fields or [np.empty((steps.size, *shape)) for shape in shapes]
+        for field, values in zip(fields, sums, strict=True):
+            field[places] = values
+    applied_loads: list[Any] = [one.reshape(*steps.shape, *one.shape[1:]) for one in fields]
+    return Command(target, by_stroke, BodyLoads(*applied_loads))
+
+
+def _axes_of(load: LoadPath, chain: Chain) -> _Axes:
+    frame = None if chain.frame is None else tuple(np.asarray(chain.frame).ravel().tolist())
+    return _axes(tuple(load.base_rotation.tolist()), frame)
 
 
 def _check(external: ExternalLoad, robot: Robot) -> None:
@@ -240,14 +351,17 @@ _AXIS = (0.0, 0.0, 1.0)  # of the tube, to the tip
 _Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool, bool]
 
 
-def _forces(external: ExternalLoad, last: int) -> Iterator[_Force]:
+def _forces(external: ExternalLoad, last: int, at_tip: Sequence[Any] = ()) -> Iterator[_Force]:
     """List all loads but the robot's weight: body, force, moment, point, if it follows, if at tip.
 
-    Points at the tip are relative to it.
+    Points at the tip are relative to it. Six more components of force and moment there may be
+    arrays, of many loads.
     """
     for one in external.body_forces:
         yield one.body, one.force, one.moment, one.point, one.following, False
     point = external.tip_point
+    if at_tip:
+        yield last, at_tip[:3], at_tip[3:], point, external.following, True
     if any(external.tip_force) or any(external.tip_moment):
         yield last, external.tip_force, external.tip_moment, point, external.following, True
     if external.tip_mass:
@@ -275,27 +389,32 @@ def _sums(
     body_mass: Float[np.ndarray, "*rows bodies"],
     mass_moment: Float[np.ndarray, "*rows bodies 3"],
     tip: Float[np.ndarray, "*rows"],
+    at_tip: Sequence[Any] = (),
 ) -> tuple[np.ndarray, ...]:
     """Return the sums for all bodies; the tip is `tip` (mm) beyond the origin of the last one."""
     along, about, world_along, world_about = axes
     *rows, count = body_mass.shape
+    rows = np.broadcast_shapes(tuple(rows), np.shape(at_tip)[1:])
     d, a = len(along), len(about)
     moments, arms_end = d + a, d + a + d * d
     table = np.zeros((*rows, count, arms_end + a + d))
-    for body, force, moment, point, follows, at_tip in _forces(external, count - 1):
+    for body, force, moment, point, follows, is_at_tip in _forces(external, count - 1, at_tip):
         if follows:
             turning = [one + more for one, more in zip(moment, _cross(point, force), strict=True)]
-            table[..., body, arms_end:] += _components(turning, about) + _components(force, along)
-            if at_tip:
-                by_tip = _components(_cross(_AXIS, force), about)
-                table[..., body, arms_end : arms_end + a] += np.multiply.outer(tip, by_tip)
+            turning = _components(turning, about) + _components(force, along)
+            table[..., body, arms_end:] += np.array(turning).T
+            if is_at_tip:
+                by_tip = np.array(_components(_cross(_AXIS, force), about)).T
+                table[..., body, arms_end : arms_end + a] += tip[..., None] * by_tip
         else:
             dead = _components(force, world_along)
             arms = [part * one for part in _components(point, along) for one in dead]
-            table[..., body, :arms_end] += dead + _components(moment, world_about) + arms
-            if at_tip:
+            table[..., body, :arms_end] += np.array(
+                dead + _components(moment, world_about) + arms
+            ).T
+            if is_at_tip:
                 by_tip = [part * one for part in _components(_AXIS, along) for one in dead]
-                table[..., body, moments:arms_end] += np.multiply.outer(tip, by_tip)
+                table[..., body, moments:arms_end] += tip[..., None] * np.array(by_tip).T
     if external.gravity is not None:
         weight = np.array(_components(external.weight(1.0), world_along))
         arms = (mass_moment @ np.array(along).T)[..., None] * weight

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, TypeGuard, overload
@@ -33,6 +33,9 @@ from notchflex.loads.load import (
 if TYPE_CHECKING:
     from notchflex.loads.load import ExternalLoad, Load
 
+
+TENDONS, TIP = ("tension", "stroke"), ("tip_force", "tip_moment")
+"""Names of the numbers of a load that may vary: one for each tendon, and vectors."""
 
 _TURNED = (
     "base_rotation must be the same for all loads of a path and for all paths of a batch; "
@@ -190,6 +193,33 @@ class LoadPath(ByValue, Displayed):
         seen = {id(one): one for one in self.external}
         by_identity = {identity: number[one] for identity, one in seen.items()}
         return np.array([by_identity[id(one)] for one in self.external])
+
+    def numbers(self, name: str) -> Float[np.ndarray, "s k"]:
+        """Return the numbers of a name of `TENDONS` (0 where not commanded) or `TIP`, by steps.
+
+        Raises:
+            InputError: No tendon is commanded so.
+        """
+        if name in TIP:
+            return np.array([getattr(one, name) for one in self.external])
+        commanded = getattr(self, name)
+        if np.isnan(commanded).all():
+            raise InputError.NO_DATA(f"the loads give no {name} that could vary")
+        return np.nan_to_num(commanded)
+
+    def commanding(self, values: Mapping[str, Any]) -> LoadPath:
+        """Return the path with other tensions (N) or strokes (mm) where it commands them.
+
+        Args:
+            values: Numbers by name, of which only those of `TENDONS` count.
+
+        Raises:
+            InputError: A negative tension, or a number that is not finite.
+        """
+        tables = {name: np.asarray(values[name]) for name in TENDONS if name in values}
+        for name, table in tables.items():
+            tables[name] = np.where(np.isnan(getattr(self, name)), np.nan, table)
+        return replace(self, **tables) if tables else self
 
     def release(self) -> LoadPath:
         """Return the path there and back, the peak twice.

@@ -166,20 +166,7 @@ def _at_level(variable: SweepVariable, level: Float[np.ndarray, " k"]) -> np.nda
 
 @dataclass(frozen=True, eq=False)
 class SweepModel(PieceStudy):
-    """A study whose robots lie between limits.
-
-    Attributes:
-        between: The limits, by name.
-    """
-
-    between: Mapping[str, tuple[float, float]] = dataclasses.field(
-        default_factory=dict[str, tuple[float, float]]
-    )
-
-    @cached_property
-    def ranges(self) -> dict[str, tuple[float, float]]:
-        """Between what the numbers lie, by name."""
-        return dict(self.between)
+    """A study of the robots of a sweep."""
 
     @cached_property
     def columns(self) -> dict[str, Criterion]:
@@ -220,7 +207,7 @@ def model_of(plan: SweepPlan, robot: Robot) -> SweepModel:
         raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
     return SweepModel(
         base, (), paths, tuple(criteria.values()), None, plan.refinement, 1,
-        between=between, sample=Points(plan).sample(SAMPLE),
+        sample=Points(plan).sample(SAMPLE),
     )  # fmt: skip
 
 

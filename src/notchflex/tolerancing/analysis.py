@@ -339,7 +339,7 @@ def tolerance_analysis(
         seed: The same seed draws the same robots.
         settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
-        cores: As for `simulate_batch`.
+        cores: As for `batch`.
         progress: Called with what is computed, how much of it is done, and how much there is.
         folder: Draw in pieces, which this folder keeps: for more draws than fit into memory, by
             many processes (`PieceFolder`), resumed by the same call.

@@ -18,14 +18,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from notchflex.analysis.batch import simulate_batch
+from notchflex.analysis.batch import batch
 from notchflex.analysis.draws import (
     ToleranceSource,
     sources_of,
     values_at,
 )
 from notchflex.analysis.solve import simulate
-from notchflex.errors import InputError
+from notchflex.errors import ErrorCode, InputError
 from notchflex.loads import LoadPath
 from notchflex.pieces.folder import (
     ACCEPTED,
@@ -44,7 +44,6 @@ from notchflex.pieces.sketch import Scale, Sketch
 from notchflex.pieces.sobol import SobolPart
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.robot.numbers import VariedRobots
 from notchflex.robot.problems import Tolerance
 from notchflex.robot.robot import to_table
 from notchflex.solver.newton import Settings
@@ -84,7 +83,7 @@ class Study:
         criteria: The numbers that have limits.
         settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
-        cores: As for `simulate_batch`.
+        cores: As for `batch`.
     """
 
     robot: Robot
@@ -113,12 +112,6 @@ class Study:
             last[one.load] = max(last.get(one.load, 0), one.step + 1)
         return {name: self.paths[name].load[:steps] for name, steps in last.items()}
 
-    @cached_property
-    def ranges(self) -> dict[str, tuple[float, float]]:
-        """Between what the numbers of drawn robots lie, by name."""
-        low, high = (self.drawn(np.full((1, len(self.sources)), level)) for level in (0.0, 1.0))
-        return {name: (float(low[name][0]), float(high[name][0])) for name in low}
-
     def drawn(self, levels: Float[np.ndarray, "robots d"]) -> dict[str, Float[np.ndarray, " r"]]:
         """Return the numbers of robots by name, at levels of the sources; see `TAIL`."""
         return values_at(self.sources, np.clip(levels, TAIL, 1.0 - TAIL))
@@ -145,27 +138,27 @@ class Study:
             progress: Called with the robots done and all of them.
         """
         values = np.full((count, len(self.criteria)), np.nan)
-        every = VariedRobots(self.exact, drawn, self.ranges)
-        valid = every.valid()
-        robots, rows = every.take(valid), np.flatnonzero(valid)
-        codes = np.where(valid, ACCEPTED, INVALID)
+        codes = np.full(count, ACCEPTED)
         for number, (name, load) in enumerate(self.loads.items()):
-            if not len(rows):
-                break
             own = [index for index, one in enumerate(self.criteria) if one.load == name]
             outputs = tuple(dict.fromkeys(self.criteria[index].quantity.name for index in own))
             part = _part_of(progress, number, len(self.loads))
-            quantities = simulate_batch(
-                robots, load, outputs=outputs, settings=self.settings,
-                refinement=self.refinement, cores=self.cores, progress=part,
-            )  # fmt: skip
+            try:
+                quantities = batch(
+                    self.exact, drawn, load, outputs=outputs, settings=self.settings,
+                    refinement=self.refinement, cores=self.cores, progress=part,
+                )  # fmt: skip
+            except InputError as error:
+                if error.code is not ErrorCode.INVALID_ROBOT:
+                    raise
+                return Outcomes(values, np.full(count, INVALID))
+            converged = quantities["converged"]
             for index in own:
                 criterion = self.criteria[index]
-                accepted = quantities["converged"][:, criterion.step]
                 result = criterion.of(quantities[criterion.quantity.name])
-                values[rows, index] = np.where(accepted, result, np.nan)
-            failed = ~quantities["converged"].all(axis=1)
-            codes[rows[failed]] = FAILED
+                values[:, index] = np.where(converged[:, criterion.step], result, np.nan)
+            codes[~converged.all(axis=1)] = FAILED
+            codes[~quantities.valid] = INVALID
         codes[(codes == ACCEPTED) & ~self.within(values).all(axis=1)] = REJECTED
         return Outcomes(values, codes)
 

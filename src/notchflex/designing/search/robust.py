@@ -24,7 +24,7 @@ from notchflex.analysis.draws import (
     sources_of,
     values_at,
 )
-from notchflex.designing.model.point import CLOSINGS, Point, Solver
+from notchflex.designing.model.point import CLOSINGS, Point
 from notchflex.designing.model.quantities import CLOSING, Reading
 from notchflex.designing.model.variables import deviations_of
 from notchflex.designing.model.wishes import Wish
@@ -43,8 +43,8 @@ from notchflex.designing.search.problem import (
 )
 from notchflex.designing.search.search import Searches, SearchResult, solved
 from notchflex.designing.specification import DesignConstraint, DesignSpec, RobustOptions
-from notchflex.errors import InputError
-from notchflex.robot.numbers import VariedRobots
+from notchflex.errors import ErrorCode, InputError
+from notchflex.robot import Robot
 from notchflex.robot.problems import Tolerance
 from notchflex.tolerancing.study import TAIL
 from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicates, yield_interval
@@ -233,7 +233,7 @@ def met_by(
     z: Vector,
     tolerances: Sequence[Tolerance],
     levels: Float[np.ndarray, "draws d"],
-    numbers: Sequence[int],
+    targets: Sequence[int],
 ) -> Bool[np.ndarray, "draws k"]:
     """Solve robots within tolerances, and return which meet which constraints.
 
@@ -242,7 +242,7 @@ def met_by(
         z: The scaled variables of the robot of the drawing.
         tolerances: What deviates.
         levels: Levels of what deviates, each between 0 and 1.
-        numbers: Numbers of the constraints.
+        targets: Numbers of the constraints.
 
     Returns:
         Whether each robot meets each of these constraints; no robot that cannot be made or solved
@@ -251,58 +251,50 @@ def met_by(
     solver, x = problem.solver, problem.x(z)
     exact = solver.variables.robot_at(x).replace(tolerance=None)
     sources = sources_of(exact, tolerances)
-    drawn = VariedRobots(exact, values_at(sources, np.clip(levels, TAIL, 1.0 - TAIL)))
-    valid = drawn.valid()
-    robots = drawn.take(valid)
-    met = np.zeros((len(levels), len(numbers)), bool)
-    every = [(k, problem.constraints[number]) for k, number in enumerate(numbers)]
+    numbers = values_at(sources, np.clip(levels, TAIL, 1.0 - TAIL))
+    met, rows = np.zeros((len(levels), len(targets)), bool), np.arange(len(levels))
+    every = [(k, problem.constraints[number]) for k, number in enumerate(targets)]
     of_states = [
         (k, wish) for k, wish in every if wish.asked.state is not None or wish.curve is not None
     ]
+    closings = [one for one in every if one[1].asked.quantity == CLOSING]
+    others = [one for one in every if one not in of_states and one not in closings]
     if of_states:
-        arrays, converged = solved(solver, robots, [x])
+        try:
+            arrays, converged = solved(solver, exact, [x], numbers)
+        except InputError as error:
+            if error.code is not ErrorCode.INVALID_ROBOT:
+                raise
+            return met
+        rows = np.flatnonzero(converged)
         with_curves = any(one.curve is not None for _, one in of_states)
 
         def at(row: int) -> Point:
             own = {name: values[row] for name, values in arrays.items()}
-            robot = robots[row] if with_curves else exact  # of which nothing else is asked
+            # Of a robot without curves nothing else is asked.
+            robot = _robot_at(exact, numbers, row) if with_curves else exact
             return Point(solver.variables, x, robot, solver.paths, own)
 
-        points = (at(row) for row in np.flatnonzero(converged).tolist())
-        rows = _rows([one for _, one in of_states], points)
-        for column, (k, _) in enumerate(of_states):
-            met[np.flatnonzero(valid)[converged], k] = rows[:, column]
-        valid[valid] = converged
-    robots = drawn.take(valid)
-    closings = [one for one in every if one[1].asked.quantity == CLOSING]
-    others = [one for one in every if one not in of_states and one not in closings]
-    for part, reader in ((closings, _of_closings), (others, _of_robots)):
-        if part:
-            rows = reader([one for _, one in part], solver, x, robots)
-            met[np.ix_(np.flatnonzero(valid), np.array([k for k, _ in part]))] = rows
+        solved_rows = _rows([one for _, one in of_states], map(at, rows.tolist()))
+        met[rows[:, None], [k for k, _ in of_states]] = solved_rows
+    if closings and len(rows):
+        tensions = closing_tensions_of(exact, {name: one[rows] for name, one in numbers.items()})
+        closed = (
+            Point(solver.variables, x, exact, solver.paths, {}, kept={CLOSINGS: one})
+            for one in tensions
+        )
+        met[rows[:, None], [k for k, _ in closings]] = _rows([one for _, one in closings], closed)
+    for row in rows.tolist() if others else ():
+        try:
+            point = Point(solver.variables, x, _robot_at(exact, numbers, row), solver.paths, {})
+        except InputError:  # numbers that make no robot
+            continue
+        met[row, [k for k, _ in others]] = _rows([one for _, one in others], [point])[0]
     return met
 
 
-def _of_closings(
-    wishes: Sequence[Wish], solver: Solver, x: Vector, robots: VariedRobots
-) -> Bool[np.ndarray, "robots k"]:
-    """Tell which robots meet constraints of closing tensions."""
-    if not len(robots):
-        return np.zeros((0, len(wishes)), bool)
-
-    def at(tensions: Float[np.ndarray, " n"]) -> Point:
-        overrides = {CLOSINGS: tensions}
-        return Point(solver.variables, x, robots.robot, solver.paths, {}, kept=overrides)
-
-    return _rows(wishes, map(at, closing_tensions_of(robots)))
-
-
-def _of_robots(
-    wishes: Sequence[Wish], solver: Solver, x: Vector, robots: VariedRobots
-) -> Bool[np.ndarray, "robots k"]:
-    """Tell which robots meet other constraints that need no state."""
-    points = (Point(solver.variables, x, robot, solver.paths, {}) for robot in robots)
-    return _rows(wishes, points)
+def _robot_at(robot: Robot, numbers: Mapping[str, np.ndarray], row: int) -> Robot:
+    return robot.with_values({name: float(values[row]) for name, values in numbers.items()})
 
 
 def _rows(wishes: Sequence[Wish], points: Iterable[Point]) -> Bool[np.ndarray, "robots k"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from notchflex.analysis.batch import simulate_batch
+from notchflex.analysis.batch import batch
 from notchflex.designing.model.point import Point, Solver
 from notchflex.designing.search.local import LocalOptimum, is_followed, search_from, search_on
 from notchflex.designing.search.problem import (
@@ -121,7 +121,7 @@ def evaluate_all(
             robots.append(None)
     valid = [number for number, robot in enumerate(robots) if robot is not None]
     every = [robot for robot in robots if robot is not None]
-    arrays, converged = solved(solver, every, [problem.x(vectors[i]) for i in valid])
+    arrays, converged = solved(solver, every, [problem.x(vectors[i]) for i in valid], {})
     solver.counts["solves"] += len(valid)
     evaluations: list[tuple[Vector, DesignEvaluation | None]] = [(z, None) for z in vectors]
     for row, number in enumerate(valid):
@@ -138,7 +138,10 @@ def evaluate_all(
 
 
 def solved(
-    solver: Solver, robots: Sequence[Robot], vectors: Sequence[Vector]
+    solver: Solver,
+    robots: Robot | Sequence[Robot],
+    vectors: Sequence[Vector],
+    numbers: Mapping[str, np.ndarray],
 ) -> tuple[dict[str, np.ndarray], Bool[np.ndarray, " robots"]]:
     """Solve robots by batches.
 
@@ -146,13 +149,14 @@ def solved(
         solver: The solver.
         robots: The robots.
         vectors: The vector of each, or one for all, of which the loads are.
+        numbers: Numbers of each by name, where they are not those of `robots`.
 
     Returns:
         Quantities of every step of all robots, and whether all their steps converged.
     """
     paths = solver.paths
-    if not len(robots) or not paths.pieces:
-        return {}, np.ones(len(robots), bool)
+    if robots == [] or not paths.pieces:
+        return {}, np.ones(len(next(iter(numbers.values()), vectors)), bool)
     same = all(column.load is None for column in solver.variables.columns)
     loads = [solver.path_at(x) for x in (vectors[:1] if same else vectors)]
     pieces: list[dict[str, np.ndarray]] = []
@@ -161,7 +165,7 @@ def solved(
         parts: list[LoadPath] = [path[start : start + length] for path in loads]
         names = solver.outputs
         common = parts[0] if len(parts) == 1 else parts
-        pieces.append(dict(simulate_batch(robots, common, outputs=names)))
+        pieces.append(dict(batch(robots, numbers, common, outputs=names)))
         start += length
     joined = {name: np.concatenate([one[name] for one in pieces], axis=1) for name in pieces[0]}
     return joined, np.asarray(joined["converged"].all(axis=1))

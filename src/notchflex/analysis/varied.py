@@ -1,0 +1,287 @@
+"""Chains of the robots of a batch: robots that differ by numbers, and any others."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from notchflex._jax import jax
+from notchflex.analysis.solve import level_of
+from notchflex.errors import ErrorCode, InputError
+from notchflex.loads.command import (
+    FOLLOWING,
+    LOADED,
+    SIDEWAYS,
+)
+from notchflex.mechanics.chain import Chain
+from notchflex.robot import Robot
+from notchflex.robot.numbers import (
+    PartsForm,
+    Place,
+    apart,
+    parts_of,
+    places_of,
+)
+from notchflex.robot.value_names import parse_path
+from notchflex.solver.programs.assembled import AssembledRobots
+from notchflex.solver.programs.prepare import PreparedChain, prepare
+from notchflex.solver.programs.static_structure import StaticStructure
+
+FEW = 256
+"""So many robots are assembled in Python before programs for them are compiled."""
+
+# By how much of its width a box is widened, so that the next numbers lie in it too.
+_WIDER = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class VariedRobots:
+    """Robots made of some robots and numbers of their own; each is made when asked for.
+
+    Attributes:
+        robots: What they are made of.
+        which: Which of these each is made of.
+        values: Numbers of each by name, as for `Robot.with_value`.
+    """
+
+    robots: Sequence[Robot]
+    which: Int[np.ndarray, " n"]
+    values: Mapping[str, Float[np.ndarray, " n"]]
+
+    @classmethod
+    def of(cls, robot: Robot, values: Mapping[str, Float[np.ndarray, " n"]]) -> VariedRobots:
+        """Return robots that are made of one."""
+        return cls([robot], np.zeros(len(next(iter(values.values()))), int), values)
+
+    def __len__(self) -> int:
+        """Return the number of robots."""
+        return len(self.which)
+
+    def __getitem__(self, number: int) -> Robot:
+        """Make one of the robots.
+
+        Raises:
+            InputError: The numbers make no valid robot.
+        """
+        robot = self.robots[self.which[number]]
+        values = {name: float(each[number]) for name, each in self.values.items()}
+        return robot.with_values(values) if values else robot
+
+    @cached_property
+    def errors(self) -> dict[int, InputError]:
+        """Why numbers make no valid robot, by number of the robot."""
+        errors = dict[int, InputError]()
+        for number, robot in enumerate(self.robots if self.values else ()):
+            members = np.flatnonzero(self.which == number)
+            table = np.stack([each[members] for each in self.values.values()], axis=1)
+            names = tuple(self.values)
+            with np.errstate(invalid="ignore"):  # numbers may be infinite, or none
+                for row, error in _errors(robot, names, table, np.arange(len(members))):
+                    errors[int(members[row])] = error
+        return errors
+
+    def forms(self, numbers: Int[np.ndarray, " k"]) -> Iterator[RobotForm]:
+        """Yield some of the robots by the forms of their parts."""
+        # Values of all notches come before those of one, as in a robot file.
+        names = sorted(self.values, key=lambda name: parse_path(name).number is not None)
+        forms = dict[PartsForm, RobotForm]()
+        for number in np.unique(self.which[numbers]).tolist():
+            robot = apart(self.robots[number], names)
+            columns = [(place, name) for name in names for place in places_of(robot, name)]
+            form = PartsForm.of(parts_of(robot), [place for place, _ in columns])
+            of_form = forms.setdefault(form, RobotForm(self, numbers, form, {}, columns))
+            of_form.bases[number] = robot
+        for of_form in forms.values():
+            members = numbers[np.isin(self.which[numbers], list(of_form.bases))]
+            yield of_form._replace(members=members)
+
+
+def _errors(
+    robot: Robot,
+    names: tuple[str, ...],
+    table: Float[np.ndarray, "n d"],
+    rows: Int[np.ndarray, " k"],
+) -> Iterator[tuple[int, InputError]]:
+    """Yield rows of a table whose numbers make no valid robot, with the reason.
+
+    Rules tie a number to its limits, to the tube, a tendon or another number of the same notch,
+    each of them monotonic: if all corners of a box are valid, so is all inside. Other boxes are
+    halved.
+    """
+    notches = [parse_path(name).number if "notch" in name else None for name in names]
+    cliques = tuple(
+        tuple(place for place, notch in enumerate(notches) if notch in (None, own))
+        for own in dict.fromkeys(one for one in notches if one is not None) or [None]
+    )
+    numbers = table[rows]
+    if sum(2 ** len(one) for one in cliques) <= len(rows):
+        low, high = numbers.min(axis=0), numbers.max(axis=0)
+        known, wider = _known_box(robot, names), _WIDER * (high - low)
+        if known and (known[0] <= low).all() and (high <= known[1]).all():
+            return
+        for box in ((low - wider, high + wider), (low, high)):
+            if _corners_are_valid(robot, names, cliques, np.array(box)):
+                known[:] = box
+                return
+        spread = np.nan_to_num((high - low) / np.ptp(table, axis=0))
+        order = np.argsort(numbers[:, np.argmax(spread)], kind="stable")
+        for half in np.array_split(rows[order], 2):
+            yield from _errors(robot, names, table, half)
+        return
+    for row in rows.tolist():
+        if (error := _error(robot, names, table[row])) is not None:
+            yield row, error
+
+
+@lru_cache(maxsize=16)
+def _known_box(robot: Robot, names: tuple[str, ...]) -> list[np.ndarray]:
+    """Return the ends of the last box of numbers that was found valid; none at first."""
+    del robot, names
+    return []
+
+
+def _corners_are_valid(
+    robot: Robot,
+    names: tuple[str, ...],
+    cliques: tuple[tuple[int, ...], ...],
+    ends: Float[np.ndarray, "2 d"],
+) -> bool:
+    """Return whether all corners of a box make a valid robot, of numbers that belong together."""
+    for clique in cliques:
+        for corner in itertools.product(*ends[:, list(clique)].T):
+            numbers = ends.mean(axis=0)
+            numbers[list(clique)] = corner
+            if _error(robot, names, numbers) is not None:
+                return False
+    return True
+
+
+def _error(
+    robot: Robot, names: tuple[str, ...], numbers: Float[np.ndarray, " d"]
+) -> InputError | None:
+    """Return why numbers make no valid robot; None where they make one."""
+    try:
+        robot.with_values(dict(zip(names, numbers.tolist(), strict=True)))
+    except InputError as error:
+        if error.code is not ErrorCode.INVALID_ROBOT:  # no robot of this kind has such a number
+            raise
+        return error
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """Chains of robots, packed for programs.
+
+    Attributes:
+        ready: One of the chains.
+        structure: Layout of all.
+        packed: Returns the chains of some robots by their numbers (one where all have the same),
+            and which are right.
+    """
+
+    ready: PreparedChain
+    structure: StaticStructure
+    packed: Callable[[Int[np.ndarray, " k"]], tuple[np.ndarray, Bool[np.ndarray, " k"]]]
+
+    def bodies(self, chains: Float[np.ndarray, "k chain"]) -> Chain:
+        """Return the chain with the masses and lengths of the bodies of every robot, for loads."""
+        if chains.ndim == 1 or not self.ready.chain.loaded:
+            return self.ready.chain
+        form = self.structure.form
+        indices: Chain = jax.tree.unflatten(form.structure, form.indices)
+        names = ("body_length", "body_mass", "body_centre")
+        values: dict[str, Any] = {
+            name: chains[:, self.structure.indices_of(getattr(indices, name))] for name in names
+        }
+        return dataclasses.replace(self.ready.chain, **values)
+
+
+def single_chains(prepared: Mapping[int, PreparedChain]) -> Chains:
+    """Return chains of one structure that were assembled one by one, by the robots' numbers."""
+    ready = next(iter(prepared.values()))
+    table = np.stack([one.dynamic_vector for one in prepared.values()])
+    rows = np.zeros(max(prepared) + 1, int)
+    rows[list(prepared)] = np.arange(len(prepared))
+
+    def packed(numbers: Int[np.ndarray, " k"]) -> tuple[np.ndarray, Bool[np.ndarray, " k"]]:
+        chains = table[0] if len(table) == 1 else table[rows[numbers]]
+        return chains, np.ones(len(numbers), bool)
+
+    return Chains(ready, ready.static_structure, packed)
+
+
+class RobotForm(NamedTuple):
+    """Robots whose parts have one form.
+
+    Attributes:
+        robots: All robots of the batch.
+        members: Numbers of those of this form.
+        form: The form.
+        bases: What they are made of, by numbers; notches that have a name stand alone.
+        columns: Places of the numbers that vary, with their names.
+    """
+
+    robots: VariedRobots
+    members: Int[np.ndarray, " k"]
+    form: PartsForm
+    bases: dict[int, Robot]
+    columns: list[tuple[Place, str]]
+
+    @property
+    def example(self) -> Robot:
+        """One of these robots."""
+        return next(iter(self.bases.values()))
+
+    def chains(self, kind: int, refinement: int, count: int) -> Chains | None:
+        """Return the chains for a kind of loads; None where each is assembled by itself.
+
+        Args:
+            kind: Bits of `loads.command.acting`.
+            refinement: More strain modes.
+            count: How many robots there are.
+        """
+        form, places = self.form, tuple(place for place, _ in self.columns)
+        # A direction, or no finite number, is no number of a form.
+        if count <= FEW or not set(places) <= set(form.places):
+            return None
+        programs, ready = _programs(self.example, places, kind, refinement)
+        if programs is None or programs.joined.structure.form is not ready.chain_layout:
+            return None
+        table = np.zeros((len(self.robots.robots), len(form.places)))
+        table[list(self.bases)] = [form.numbers_of(parts_of(one)) for one in self.bases.values()]
+
+        def packed(numbers: Int[np.ndarray, " k"]) -> tuple[np.ndarray, Bool[np.ndarray, " k"]]:
+            distinct, inverse = np.unique(numbers, return_inverse=True)
+            rows = table[self.robots.which[distinct]]
+            for place, name in self.columns:
+                rows[:, form.places.index(place)] = self.robots.values[name][distinct]
+            chains, alike = programs.chains(rows)
+            if np.array_equal(distinct, numbers):  # a copy would take time
+                return chains, alike
+            return chains[inverse], alike[inverse]
+
+        return Chains(ready, programs.joined.structure, packed)
+
+
+def prepare_kind(robot: Robot, kind: int, refinement: int) -> PreparedChain:
+    """Prepare a robot for a kind of loads: bits of `loads.command.acting`."""
+    loaded = bool(kind & LOADED)
+    level = level_of(robot, loaded, loaded and bool(kind & SIDEWAYS))
+    return prepare(robot, level, loaded, loaded and bool(kind & FOLLOWING), refinement)
+
+
+@lru_cache(maxsize=8)
+def _programs(
+    robot: Robot, varied: tuple[Place, ...], kind: int, refinement: int
+) -> tuple[AssembledRobots | None, PreparedChain]:
+    """Return programs for robots that differ in some of their numbers, and one prepared."""
+    ready = prepare_kind(robot, kind, refinement)
+    return AssembledRobots.tried(robot, ready.chain, varied), ready
