@@ -42,10 +42,9 @@ from notchflex.mechanics.flexure import (
     validity_warnings,
     with_level,
 )
-from notchflex.mechanics.flexure.rod import planar_points
 from notchflex.mechanics.friction import FrictionLaw, friction_law
 from notchflex.mechanics.material import Fibres, SectionLaw, section_law
-from notchflex.mechanics.motion import Motion, rotation_about
+from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
 from notchflex.mechanics.tendon import (
@@ -556,7 +555,7 @@ def _flat(chain: Chain, frame: Float[Array, "3 3"]) -> Chain:
     def planar(part: Any) -> Any:
         points = [name for name in ("leaves", "enters", "along", "normal") if hasattr(part, name)]
         return replace(
-            part, **{name: planar_points(getattr(part, name) @ frame) for name in points}
+            part, **{name: (getattr(part, name) @ frame)[..., IN_PLANE] for name in points}
         )
 
     return replace(

@@ -250,7 +250,7 @@ def left_slope_change(
 
 
 def _squared(vector: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
-    return vector @ vector if vector.ndim == 1 else (vector * vector).sum(axis=-1)
+    return (vector * vector).sum(axis=-1)
 
 
 def _each(values: Float[Array, "*n"]) -> Float[Array, "*n 1 1"]:

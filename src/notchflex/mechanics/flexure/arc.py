@@ -27,6 +27,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     about_neutral_axis,
     build_rod,
     legendre_modes,
+    rod_quadrature,
     shifted,
 )
 from notchflex.mechanics.flexure.rod import (
@@ -36,7 +37,6 @@ from notchflex.mechanics.flexure.rod import (
     section_fibres,
     validity_warnings,
 )
-from notchflex.mechanics.flexure.rod_kinematics import rod_quadrature
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.section import FibresAt, Section
 from notchflex.robot import ArcNotch, Tube

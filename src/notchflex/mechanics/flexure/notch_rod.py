@@ -8,26 +8,209 @@ to the notch's direction and fills the arrays of a `Rod`.
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import ArrayLike
 
-from notchflex._arrays import xp
+from notchflex._arrays import cached, xp
 from notchflex._jax import (
     constant,
     jax,
 )
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.rod_kinematics import (
-    RodQuadrature,
-    legendre,
-)
 from notchflex.mechanics.material import FibreSection
-from notchflex.mechanics.motion import Motion, rotation_about
-from notchflex.mechanics.section import Section
+from notchflex.mechanics.motion import Motion, outer_twists, rotation_about
+from notchflex.mechanics.section import Section, leggauss
+
+# Quadrature of a rod.
+#
+# A rod consists of pieces on which its strains are smooth. Strains and resultants have their own
+# nodes, the pose has others, and points between neighbours of these integrate the rotation exactly.
+# A flexure evaluates its strains at all points (`every`) at once.
+
+
+def gauss_nodes(ends: Any, count: int) -> tuple[Array, Array]:
+    """Return Gauss's nodes and weights in every interval between neighbouring numbers."""
+    low, half = xp.asarray(ends[:-1]), 0.5 * xp.diff(xp.asarray(ends, float))
+    points, weight = leggauss(count)
+    positions = low[:, None] + half[:, None] * (1.0 + points)
+    return positions.ravel(), (half[:, None] * weight).ravel()
+
+
+@cached(64)
+def rod_quadrature(
+    ends: tuple[float, ...], nodes: tuple[int, ...], poses: tuple[int, ...]
+) -> RodQuadrature:
+    """Return the cached quadrature of a rod; notches that only differ by site share it."""
+    return RodQuadrature(ends, nodes, poses)
+
+
+def legendre(points: Float[Array, " k"], count: int) -> Float[Array, "k count"]:
+    """Return the first Legendre polynomials at points between -1 and 1."""
+    values = [xp.ones_like(points), points]
+    for degree in range(2, count):
+        last, before = values[-1], values[-2]
+        values.append(((2.0 * degree - 1.0) * points * last - (degree - 1.0) * before) / degree)
+    return xp.stack(values[:count], axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _projection(count: int) -> Float[Array, "count nodes"]:
+    """Return the coefficients, of Legendre polynomials, of Lagrange's at Gauss's nodes."""
+    points, weights = leggauss(count)
+    return (xp.arange(count) + 0.5)[:, None] * (weights[:, None] * legendre(points, count)).T
+
+
+def up_to(count: int, parts: Float[Array, " k"]) -> Float[Array, "k nodes"]:
+    """Integrate the Lagrange polynomials of Gauss's nodes on (0, 1) from 0 to given parts."""
+    values = legendre(2.0 * xp.asarray(parts) - 1.0, count + 1)
+    higher = (values[:, 2:] - values[:, :-2]) / (2.0 * xp.arange(1, count) + 1.0)
+    integrals = xp.concatenate([1.0 + values[:, 1:2], higher], axis=1)
+    return 0.5 * integrals @ _projection(count)
+
+
+_BETWEEN = 4  # Gauss's points between neighbouring nodes of the rotation
+_BEFORE = up_to(_BETWEEN, 0.5 * (1.0 + leggauss(_BETWEEN)[0]))
+
+
+@dataclass(frozen=True)
+class RodQuadrature:
+    """Quadrature nodes along a rod.
+
+    Attributes:
+        ends: Ends of its pieces, from 0 to its length, mm.
+        nodes: Gauss's nodes of strains and resultants on each piece.
+        poses: Those of the pose.
+    """
+
+    ends: tuple[float, ...]
+    nodes: tuple[int, ...]
+    poses: tuple[int, ...]
+
+    def _pieces(self, counts: tuple[int, ...]) -> list[tuple[Array, Array]]:
+        pairs = zip(self.ends[:-1], self.ends[1:], counts, strict=True)
+        return [gauss_nodes((low, high), count) for low, high, count in pairs]
+
+    @cached_property
+    def at_nodes(self) -> tuple[Float[Array, " nodes"], Float[Array, " nodes"]]:
+        """Nodes of the strains, and their weights, mm."""
+        positions, lengths = map(xp.concatenate, zip(*self._pieces(self.nodes), strict=True))
+        return positions, lengths
+
+    @cached_property
+    def at_poses(self) -> tuple[Float[Array, " gauss"], Float[Array, " gauss"]]:
+        """Nodes of the pose, and their weights, mm."""
+        # Between pieces there is one more node, of weight 0: rotations are integrated from node to
+        # node, and strains may jump there.
+        (positions, lengths), *others = self._pieces(self.poses)
+        for low, (more, weights) in zip(self.ends[1:], others, strict=False):
+            positions = xp.concatenate([positions, xp.reshape(low, 1), more])
+            lengths = xp.concatenate([lengths, np.zeros(1), weights])
+        return positions, lengths
+
+    @cached_property
+    def between(self) -> tuple[Float[Array, " fine"], Float[Array, " fine"]]:
+        """Points between the neighbours of start, nodes of the pose and end, and their lengths."""
+        ends = xp.asarray(self.ends)
+        return gauss_nodes(xp.concatenate([ends[:1], self.at_poses[0], ends[-1:]]), _BETWEEN)
+
+    @cached_property
+    def before(self) -> tuple[Float[Array, " more"], Float[Array, " more"]]:
+        """Points between the start, the nodes of the strains and the ends, and their lengths."""
+        return gauss_nodes(self._stops, _BETWEEN)
+
+    @cached_property
+    def _stops(self) -> Float[Array, " stops"]:
+        """The start, the nodes of the strains, and the ends between pieces, rising."""
+        nodes = xp.split(self.at_nodes[0], np.cumsum(self.nodes)[:-1])
+        starts = xp.asarray(self.ends)[:-1, None]
+        return xp.concatenate([part for pair in zip(starts, nodes, strict=True) for part in pair])
+
+    @cached_property
+    def unit(self) -> RodQuadrature:
+        """The same with pieces of length 1: for what their lengths do not change."""
+        return rod_quadrature(tuple(map(float, range(len(self.ends)))), self.nodes, self.poses)
+
+    @cached_property
+    def every(self) -> Float[Array, " every"]:
+        """All points, in the order of the properties above."""
+        parts = (self.at_nodes, self.at_poses, self.between, self.before)
+        return xp.concatenate([positions for positions, _ in parts])
+
+    @property
+    def weight(self) -> Float[Array, " every"]:
+        """Weights of all points in an integral over the nodes of the strains."""
+        weights = self.at_nodes[1]
+        return xp.pad(weights, (0, len(self.every) - len(weights)))
+
+    def fields(
+        self,
+        curve: Motion | None,
+        basis: Float[Array, "every 6 modes"],
+        reference: Float[Array, "every 6"] | None = None,
+    ) -> dict[str, Any]:
+        """Return the fields of a rod for its strains and its pose."""
+        free = xp.zeros(basis.shape[:2]) if reference is None else reference
+        twists = constant(xp.concatenate([free[..., None], basis], axis=-1))
+        if curve is None:
+            count = len(twists)
+            curve = Motion(constant([xp.eye(3)] * count), constant(xp.zeros((count, 3))))
+        else:
+            twists = outer_twists(curve, twists)
+        counts = [len(part[0]) for part in (self.at_nodes, self.at_poses, self.between)]
+        _, steps, between, before = xp.split(twists, xp.cumsum(counts))
+        turns = _grouped(between[:, :3], self.between[1])
+        at_node = slice(counts[0])
+        unit = self.unit
+        stop = np.searchsorted(unit._stops, unit.at_nodes[0]) - 1
+        return {
+            "length": constant(self.at_nodes[1]),
+            "basis": constant(basis[at_node]),
+            "turn": constant(xp.cumsum(turns, axis=0)),
+            "turn_pair": constant(_pairs(between[:, :3], self.between[1])),
+            "step": constant(self.at_poses[1][:, None, None] * steps[:, 3:]),
+            "node_turn": constant(xp.cumsum(_grouped(before[:, :3], self.before[1]), axis=0)[stop]),
+            "node_index": np.searchsorted(unit.at_poses[0], unit.at_nodes[0], side="right"),
+            "node_reach": constant(unit._reach),
+            "node_rotation": constant(curve.rotation[at_node]),
+            "node_offset": constant(curve.translation[at_node]),
+        }
+
+    @cached_property
+    def _reach(self) -> Float[Array, "nodes gauss"]:
+        """Compute the fraction of each pose node's step before each node of the strains."""
+        nodes = self.at_nodes[0]
+        columns = []
+        for low, high, count in zip(self.ends[:-1], self.ends[1:], self.poses, strict=True):
+            part = xp.clip((nodes - low) / (high - low), 0.0, 1.0)
+            columns += [up_to(count, part) / (0.5 * leggauss(count)[1]), xp.zeros((len(nodes), 1))]
+        return xp.concatenate(columns[:-1], axis=1)
+
+
+def _grouped(values: Float[Array, "fine ..."], lengths: Float[Array, " fine"]) -> Any:
+    """Integrate over every run of points."""
+    weighted = lengths.reshape(-1, *(1,) * (values.ndim - 1)) * values
+    return weighted.reshape(-1, _BETWEEN, *values.shape[1:]).sum(axis=1)
+
+
+def _pairs(
+    turning: Float[Array, "fine 3 hat"], lengths: Float[Array, " fine"]
+) -> Float[Array, "places 3 hat hat"]:
+    """Compute the second term of the Magnus series on every run of points, for pairs of modes."""
+    # It is half the integral of a(t) x a(s) over t < s, for a motion in the moving frame.
+    modes = turning.shape[-1]
+    rates, weights = turning.reshape(-1, _BETWEEN, 3 * modes), lengths.reshape(-1, _BETWEEN, 1)
+    so_far = weights.sum(axis=1, keepdims=True) * (_BEFORE @ rates)
+    products = (xp.swapaxes(weights * so_far, 1, 2) @ rates).reshape(-1, 3, modes, 3, modes)
+    pairs = 0.5 * xp.stack(
+        [products[:, k - 2, :, k - 1] - products[:, k - 1, :, k - 2] for k in range(3)], axis=1
+    )
+    return 0.5 * (pairs + xp.swapaxes(pairs, -1, -2))
+
 
 STRAIGHT = xp.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 """Strains of a straight, unloaded rod: a stretch of 1 along z."""

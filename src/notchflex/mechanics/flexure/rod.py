@@ -12,6 +12,7 @@ Gauss's nodes and its steps at them are stored (`rod_kinematics.py`).
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
@@ -32,11 +33,6 @@ from notchflex.mechanics.motion import IN_PLANE, PLANE
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FibresAt
 from notchflex.robot import Tube
-
-_TWISTS = ("reference_strain", "basis")
-_TURNS = ("turn", "node_turn")
-_POINTS = ("start_offset", "curve_offset", "end_offset", "node_offset")
-_ROTATIONS = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")
 
 
 class Rod(Pytree):
@@ -87,7 +83,7 @@ class Rod(Pytree):
     reference_strain: Float[Array, "*n nodes w"]
     basis: Float[Array, "*n nodes w modes"]
     turn: Float[Array, "*n places a hat"]
-    turn_pair: Float[Array, "*n places 3 hat hat"] | None
+    turn_pair: Float[Array, "*n gaps 3 hat hat"] | None
     step: Float[Array, "*n gauss d hat"]
     node_turn: Float[Array, "*n nodes a hat"]
     node_index: Int[Array, "*n nodes"]
@@ -109,28 +105,34 @@ class Rod(Pytree):
         return self.basis.shape[-1]
 
 
-def flattened(rods: Rod, frame: Float[Array, "3 3"]) -> Rod:
-    """Reduce spatial rods to the plane that their robot stays in."""
-    turned = {
-        "start_rotation": frame.T @ rods.start_rotation,
-        "start_offset": rods.start_offset @ frame,
-        "end_rotation": rods.end_rotation @ frame,
+_AXES = {
+    field.name: "".join(re.findall("'(.*)'", str(field.type))).split()[1:]
+    for field in dataclasses.fields(Rod)
+}
+"""Axes of the arrays of a rod, behind the leading one, as their types name them."""
+
+
+def _selected(rod: Rod, selection: dict[str, Any]) -> Rod:
+    """Select entries along named axes of all arrays."""
+    chosen = {
+        name: getattr(rod, name)[(..., *(selection.get(axis, slice(None)) for axis in axes))]
+        for name, axes in _AXES.items()
+        if getattr(rod, name) is not None and not selection.keys().isdisjoint(axes)
     }
-
-    def own(name: str) -> Array:
-        return constant(turned[name]) if name in turned else getattr(rods, name)
-
-    kept = {name: constant(getattr(rods, name)[:, :, PLANE]) for name in _TWISTS}
-    kept |= {name: constant(getattr(rods, name)[:, :, 1:2]) for name in _TURNS}
-    kept["step"] = constant(rods.step[:, :, IN_PLANE])
-    kept |= {name: planar_points(own(name)) for name in _POINTS}
-    kept |= {name: own(name)[..., IN_PLANE, :][..., IN_PLANE] for name in _ROTATIONS}
-    return dataclasses.replace(rods, **kept, turn_pair=None)
+    return dataclasses.replace(rod, **chosen)
 
 
-def planar_points(points: Float[Array, "*shape 3"]) -> Float[Array, "*shape 2"]:
-    """Return the components of points or forces in the plane."""
-    return constant(xp.asarray(points)[..., IN_PLANE])
+def flattened(rods: Rod, frame: Float[Array, "3 3"]) -> Rod:
+    """Reduce spatial rods to the x-z plane of a frame, which their robot stays in."""
+    # They have no modes that leave the plane: twists keep three components and points two.
+    turned = dataclasses.replace(
+        rods,
+        start_rotation=frame.T @ rods.start_rotation,
+        start_offset=rods.start_offset @ frame,
+        end_rotation=rods.end_rotation @ frame,
+        turn_pair=None,
+    )
+    return _selected(turned, {"d": IN_PLANE, "w": PLANE, "a": slice(1, 2)})
 
 
 LEVELS = ("tendons", "plane", "space")
@@ -139,33 +141,21 @@ LEVELS = ("tendons", "plane", "space")
 MAX_REFINEMENT = 3
 """Largest number of refinements of the modes of a flexure."""
 
-_HAT = ("turn", "step", "node_turn")
-_AT_NODES = (
-    "reference_strain",
-    "basis",
-    "node_turn",
-    "node_index",
-    "node_reach",
-    "node_rotation",
-    "node_offset",
-)
-
 
 def with_level(rod: Rod, level: str) -> Rod:
     """Keep the modes that a level of loads needs; constant strains keep one node."""
     modes = rod.levels[LEVELS.index(level)]
-    kept: dict[str, Any] = {name: getattr(rod, name)[..., : modes + 1] for name in _HAT}
-    kept |= {"basis": rod.basis[..., :modes], "padding_mask": rod.padding_mask[..., :modes]}
-    if rod.turn_pair is not None:
-        kept["turn_pair"] = rod.turn_pair[..., : modes + 1, : modes + 1]
-    arrays = (rod.reference_strain, kept["basis"], *jax.tree.leaves(rod.section))
-    if decide(xp.all(xp.stack([xp.all(leaf == leaf[:1]) for leaf in arrays]))):
-        # The one node in the middle.
-        middle = slice(len(rod.length) // 2, len(rod.length) // 2 + 1)
-        kept |= {name: kept.get(name, getattr(rod, name))[middle] for name in _AT_NODES}
-        kept["section"] = jax.tree.map(lambda leaf: leaf[middle], rod.section)
-        kept["length"] = constant([rod.length.sum()])
-    return dataclasses.replace(rod, **kept)
+    rod = _selected(rod, {"modes": slice(modes), "hat": slice(modes + 1)})
+    arrays = (rod.reference_strain, rod.basis, *jax.tree.leaves(rod.section))
+    if not decide(xp.all(xp.stack([xp.all(leaf == leaf[:1]) for leaf in arrays]))):
+        return rod
+    count = len(rod.length)
+    middle = slice(count // 2, count // 2 + 1)
+    return dataclasses.replace(
+        _selected(rod, {"nodes": middle}),
+        section=jax.tree.map(lambda leaf: leaf[middle], rod.section),
+        length=constant([rod.length.sum()]),
+    )
 
 
 def stack(rods: Sequence[Rod]) -> Rod:
@@ -188,10 +178,8 @@ def stack(rods: Sequence[Rod]) -> Rod:
 
 def _with_ends(rod: Rod) -> Rod:
     """Return the rod with ends, rigid ones where it has none."""
-    rigid = xp.zeros(xp.shape(rod.section.area))
-    ends = (
-        jax.tree.map(lambda _: rigid, NotchEnds()) if rod.section.ends is None else rod.section.ends
-    )
+    zeros = xp.zeros(xp.shape(rod.section.area))
+    ends = rod.section.ends or jax.tree.map(lambda _: zeros, NotchEnds())
     return dataclasses.replace(rod, section=dataclasses.replace(rod.section, ends=ends))
 
 
@@ -202,31 +190,20 @@ def _filled(rod: Rod, modes: int, nodes: int, poses: int, levels: tuple[int, ...
     if (more, further, count, levels) == (0, 0, nodes, rod.levels):
         return rod
     index = xp.minimum(xp.arange(nodes), count - 1)
-    at_end = xp.minimum(xp.arange(poses + 1), rod.step.shape[0])
-
-    def wider(values: Array, axes: int = 1) -> Array:
-        return constant(xp.pad(values, [(0, 0)] * (values.ndim - axes) + [(0, more)] * axes))
-
-    def longer(values: Array) -> Array:
-        return constant(xp.pad(values, [(0, further)] + [(0, 0)] * (values.ndim - 1)))
-
-    pair = None if rod.turn_pair is None else longer(wider(rod.turn_pair, 2))
-    reach = xp.pad(rod.node_reach[index], ((0, 0), (0, further)))
+    reached = xp.minimum(xp.arange(poses + 1), poses - further)
+    longer = _selected(rod, {"nodes": index, "places": reached})
+    added = {"modes": more, "hat": more, "gauss": further, "gaps": further}
+    padded = {
+        name: xp.pad(getattr(longer, name), [(0, added.get(axis, 0)) for axis in axes])
+        for name, axes in _AXES.items()
+        if not added.keys().isdisjoint(axes) and getattr(longer, name) is not None
+    }
+    padded["padding_mask"] = constant(xp.arange(modes) >= rod.modes)
     return dataclasses.replace(
-        rod,
-        length=rod.length[index] * (xp.arange(nodes) < count),
-        reference_strain=rod.reference_strain[index],
-        basis=wider(rod.basis)[index],
-        turn=wider(rod.turn)[at_end],
-        turn_pair=pair,
-        step=longer(wider(rod.step)),
-        node_turn=wider(rod.node_turn)[index],
-        node_index=rod.node_index[index],
-        node_reach=reach,
-        node_rotation=rod.node_rotation[index],
-        node_offset=rod.node_offset[index],
+        longer,
+        **padded,
+        length=longer.length * (xp.arange(nodes) < count),
         section=jax.tree.map(lambda leaf: leaf[index], rod.section),
-        padding_mask=constant(xp.arange(modes) >= rod.modes),
         levels=levels,
     )
 

@@ -7,27 +7,18 @@ eq. 42). The end is the sum of all steps, each rotated by the rotation at its no
 
 First and second derivatives of the pose by the modes are written out: derived by JAX they cost ten
 times as much, to run and to compile.
-
-A rod consists of pieces on which its strains are smooth. Strains and resultants have their own
-nodes, the pose has others, and points between neighbours of these integrate the rotation exactly.
-A flexure evaluates its strains at all points (`every`) at once.
 """
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
 from itertools import accumulate
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._arrays import cached, is_traced, xp
+from notchflex._arrays import xp
 from notchflex._jax import (
-    constant,
     jax,
     jnp,
 )
@@ -37,12 +28,11 @@ from notchflex.mechanics.motion import (
     cross,
     left_slope,
     left_slope_change,
-    outer_twists,
+    moment_of,
     rotation_about,
     sine_cosine,
     unskew,
 )
-from notchflex.mechanics.section import leggauss
 
 
 class RodConfiguration(NamedTuple):
@@ -71,8 +61,8 @@ def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
         rotation, turn = _in_plane(rod.turn[:, 0] @ hat), rod.turn[..., 1:]
     else:
         turns, slope = _turns(rod, hat)
-        rotation = _products(_rotations(turns))
-        turning = rotations_before(rotation) @ left_slopes(turns) @ slope
+        rotation = _products(rotation_about(turns))
+        turning = rotations_before(rotation) @ left_slope(turns) @ slope
         from_place, turn = (turns, slope, turning), xp.cumsum(turning, axis=0)
     stepped = _stepped(rod, rotation)
     return RodConfiguration(rotation, turn, stepped @ hat, stepped[..., 1:], from_place)
@@ -83,7 +73,7 @@ def free_pose(rod: Rod) -> Motion:
     # It equals `relative_pose` without modes, and omits terms that only the derivatives need.
     assert rod.turn_pair is not None
     turns = xp.diff(rod.turn[..., 0], axis=0, prepend=0.0) + rod.turn_pair[..., 0, 0]
-    rotation = _products(_rotations(constant(turns)))
+    rotation = _products(rotation_about(turns))
     end = Motion(rotation[-1], _stepped(rod, rotation)[..., 0].sum(axis=0))
     return Motion(rod.start_rotation, rod.start_offset).then(end).then(tail_pose(rod))
 
@@ -125,19 +115,6 @@ def rotation_error_estimate(rod: Rod, modes: Float[Array, " modes"]) -> Float[Ar
     return 0.05 * jnp.sum(jnp.linalg.norm(turns, axis=-1) * jnp.linalg.norm(second, axis=-1))
 
 
-def _rotations(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
-    if not is_traced(turns):
-        return rotation_about(turns)
-    return jax.vmap(rotation_about)(turns)
-
-
-def left_slopes(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
-    """Return the left Jacobians of the exponential at rotation vectors."""
-    if not is_traced(turns):
-        return left_slope(turns)
-    return jax.vmap(left_slope)(turns)
-
-
 def _products(parts: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
     """Multiply all rotations up to each."""
     return xp.stack(list(accumulate(parts, operator.matmul)))
@@ -156,12 +133,12 @@ def _small_motion(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
     return Motion(rotation, end + cross(turn, end) + moved - rotation @ end)
 
 
-def _end_motion(rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration) -> Motion:
+def _end_motion(rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration) -> Motion:
     """Compute the motion from the end of the reference curve to that of the rod."""
     if rod.linear_kinematics is None:
-        return own.end
+        return state.end
     is_small = rod.linear_kinematics > 0.0
-    pairs = zip(_small_motion(rod, modes), own.end, strict=True)
+    pairs = zip(_small_motion(rod, modes), state.end, strict=True)
     return Motion(*(xp.where(is_small, small, large) for small, large in pairs))
 
 
@@ -180,35 +157,28 @@ def tail_pose(rod: Rod) -> Motion:
 
 
 def relative_pose(
-    rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration | None = None
+    rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration | None = None
 ) -> Motion:
     """Return the pose of the distal body in the proximal frame."""
-    end_motion = _end_motion(rod, modes, integrate_rod(rod, modes) if own is None else own)
+    end_motion = _end_motion(rod, modes, integrate_rod(rod, modes) if state is None else state)
     return Motion(rod.start_rotation, rod.start_offset).then(end_motion).then(tail_pose(rod))
 
 
 def twist_slope(
-    rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration
+    rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration
 ) -> Float[Array, "w modes"]:
     """Return the twist (angular, linear) of the distal body, in its own frame, per unit of mode."""
-    end = own.rotation[-1]
-    turn = own.turn[-1] if len(end) == 2 else end.T @ own.turn[-1]
-    twist = jnp.concatenate([turn, end.T @ end_displacement(own)])
+    end = state.rotation[-1]
+    turn = state.turn[-1] if len(end) == 2 else end.T @ state.turn[-1]
+    twist = jnp.concatenate([turn, end.T @ end_displacement(state)])
     if rod.linear_kinematics is not None:
         twist = jnp.where(rod.linear_kinematics > 0.0, small_twist(rod, modes), twist)
     return tail_pose(rod).twist_inside(twist)
 
 
-def end_displacement(own: RodConfiguration) -> Float[Array, "d modes"]:
+def end_displacement(state: RodConfiguration) -> Float[Array, "d modes"]:
     """Return the displacement of the end per unit of mode, along the axes of the start."""
-    return jnp.sum(own.stepped + _crossed(own.turn[:-1], own.step[..., None]), axis=0)
-
-
-def _crossed(turn: Array, vector: Array) -> Array:
-    """Cross rotations (places, a, modes) with vectors (places, d, 1 or modes)."""
-    if turn.shape[1] == 1:
-        return jnp.concatenate([turn * vector[:, 1:], -turn * vector[:, :1]], axis=1)
-    return jnp.cross(turn, jnp.broadcast_to(vector, turn.shape), axis=1)
+    return jnp.sum(state.stepped + jax.vmap(cross)(state.turn[:-1], state.step[..., None]), axis=0)
 
 
 def small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w modes"]:
@@ -221,288 +191,96 @@ def small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w mode
 
 
 def node_poses(
-    rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration | None = None
+    rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration | None = None
 ) -> Motion:
     """Return the poses of the sections at the nodes of the strains, in the proximal frame."""
     # Between the nodes of the rotation the Magnus terms are omitted, and polynomials interpolate
     # the steps: accurate enough for error estimates, not for the solution.
-    own = integrate_rod(rod, modes) if own is None else own
+    state = integrate_rod(rod, modes) if state is None else state
     start = Motion(rod.start_rotation, rod.start_offset)
     turns = jnp.concatenate([jnp.zeros_like(rod.turn[:1]), rod.turn])
-    rotation_vectors = (rod.node_turn - turns[rod.node_index]) @ jnp.concatenate(
-        [jnp.ones(1), modes]
-    )
-    unturned = jnp.eye(len(own.rotation[0]))[None]
-    before = jnp.concatenate([unturned, own.rotation])[rod.node_index]
+    hat = jnp.concatenate([jnp.ones(1), modes])
+    vectors = (rod.node_turn - turns[rod.node_index]) @ hat
+    unturned = jnp.eye(len(state.rotation[0]))[None]
+    before = jnp.concatenate([unturned, state.rotation])[rod.node_index]
 
     def at_node(turned: Array, turn: Array, moved: Array, free: Motion) -> Motion:
         return start.then(Motion(turned @ rotation_about(turn), moved)).then(free)
 
     free = Motion(rod.node_rotation, rod.node_offset)
-    return jax.vmap(at_node)(before, rotation_vectors, rod.node_reach @ own.step, free)
-
-
-# Gauss's points between neighbouring nodes of the rotation.
-_BETWEEN = 4
-
-
-def gauss_nodes(
-    ends: Sequence[float] | Float[Array, " k"], per_interval: int | Sequence[int] = 3
-) -> tuple[Float[Array, " nodes"], Float[Array, " nodes"]]:
-    """Return Gauss's nodes and weights in every interval between neighbouring numbers."""
-    half = 0.5 * xp.diff(xp.asarray(ends, float))
-    if isinstance(per_interval, int):
-        points, weight = leggauss(per_interval)
-        positions = xp.asarray(ends[:-1])[:, None] + half[:, None] * (1.0 + points)
-        return positions.ravel(), (half[:, None] * weight).ravel()
-    rules = [leggauss(count) for count in per_interval]
-    positions = [low + h * (1.0 + x) for low, h, (x, _) in zip(ends, half, rules, strict=False)]
-    weights = [h * w for h, (_, w) in zip(half, rules, strict=True)]
-    return xp.concatenate(positions), xp.concatenate(weights)
-
-
-@cached(64)
-def rod_quadrature(
-    ends: tuple[float, ...], nodes: tuple[int, ...], poses: tuple[int, ...]
-) -> RodQuadrature:
-    """Return the cached quadrature of a rod; notches that only differ by site share it."""
-    return RodQuadrature(ends, nodes, poses)
-
-
-def legendre(at: Float[Array, " k"], count: int) -> Float[Array, "k count"]:
-    """Return the first Legendre polynomials at points between -1 and 1."""
-    values = [xp.ones_like(at), at]
-    for degree in range(2, count):
-        last, before = values[-1], values[-2]
-        values.append(((2.0 * degree - 1.0) * at * last - (degree - 1.0) * before) / degree)
-    return xp.stack(values[:count], axis=-1)
-
-
-@lru_cache(maxsize=64)
-def _projection(count: int) -> Float[Array, "count nodes"]:
-    """Return the coefficients, of Legendre polynomials, of Lagrange's at Gauss's nodes."""
-    points, weights = leggauss(count)
-    return (xp.arange(count) + 0.5)[:, None] * (weights[:, None] * legendre(points, count)).T
-
-
-def up_to(count: int, parts: Float[Array, " k"]) -> Float[Array, "k nodes"]:
-    """Integrate the Lagrange polynomials of Gauss's nodes on (0, 1) from 0 to given parts."""
-    values = legendre(2.0 * xp.asarray(parts) - 1.0, count + 1)
-    higher = (values[:, 2:] - values[:, :-2]) / (2.0 * xp.arange(1, count) + 1.0)
-    integrals = xp.concatenate([1.0 + values[:, 1:2], higher], axis=1)
-    return 0.5 * integrals @ _projection(count)
-
-
-_BEFORE = up_to(_BETWEEN, 0.5 * (1.0 + leggauss(_BETWEEN)[0]))
-
-
-@dataclass(frozen=True)
-class RodQuadrature:
-    """Quadrature nodes along a rod.
-
-    Attributes:
-        ends: Ends of its pieces, from 0 to its length, mm.
-        nodes: Gauss's nodes of strains and resultants on each piece.
-        poses: Those of the pose.
-    """
-
-    ends: tuple[float, ...]
-    nodes: tuple[int, ...]
-    poses: tuple[int, ...]
-
-    @cached_property
-    def at_nodes(self) -> tuple[Float[Array, " nodes"], Float[Array, " nodes"]]:
-        """Nodes of the strains, and their weights, mm."""
-        return gauss_nodes(self.ends, self.nodes)
-
-    @cached_property
-    def at_poses(self) -> tuple[Float[Array, " gauss"], Float[Array, " gauss"]]:
-        """Nodes of the pose, and their weights, mm."""
-        # Between pieces there is one more node, of weight 0: rotations are integrated from node to
-        # node, and strains may jump there.
-        pieces = [
-            gauss_nodes(ends, count)
-            for *ends, count in zip(self.ends[:-1], self.ends[1:], self.poses, strict=True)
-        ]
-        positions, lengths = pieces[0]
-        for low, (more, stand_for) in zip(self.ends[1:], pieces[1:], strict=False):
-            positions = xp.concatenate([positions, xp.reshape(low, 1), more])
-            lengths = xp.concatenate([lengths, np.zeros(1), stand_for])
-        return positions, lengths
-
-    @cached_property
-    def between(self) -> tuple[Float[Array, " fine"], Float[Array, " fine"]]:
-        """Points between the neighbours of start, nodes of the pose and end, and their lengths."""
-        ends = xp.asarray(self.ends)
-        return gauss_nodes(xp.concatenate([ends[:1], self.at_poses[0], ends[-1:]]), _BETWEEN)
-
-    @cached_property
-    def before(self) -> tuple[Float[Array, " more"], Float[Array, " more"]]:
-        """Points between the start, the nodes of the strains and the ends, and their lengths."""
-        return gauss_nodes(self._stops, _BETWEEN)
-
-    @cached_property
-    def _stops(self) -> Float[Array, " stops"]:
-        """The start, the nodes of the strains, and the ends between pieces, rising."""
-        nodes = xp.split(self.at_nodes[0], np.cumsum(self.nodes)[:-1])
-        starts = xp.asarray(self.ends)[:-1, None]
-        return xp.concatenate([part for pair in zip(starts, nodes, strict=True) for part in pair])
-
-    @cached_property
-    def unit(self) -> RodQuadrature:
-        """The same with pieces of length 1: for what their lengths do not change."""
-        return rod_quadrature(tuple(map(float, range(len(self.ends)))), self.nodes, self.poses)
-
-    @cached_property
-    def every(self) -> Float[Array, " every"]:
-        """All points, in the order of the properties above."""
-        parts = (self.at_nodes, self.at_poses, self.between, self.before)
-        return xp.concatenate([positions for positions, _ in parts])
-
-    @property
-    def weight(self) -> Float[Array, " every"]:
-        """Weights of all points in an integral over the nodes of the strains."""
-        own = self.at_nodes[1]
-        return xp.pad(own, (0, len(self.every) - len(own)))
-
-    def fields(
-        self,
-        curve: Motion | None,
-        basis: Float[Array, "every 6 modes"],
-        reference: Float[Array, "every 6"] | None = None,
-    ) -> dict[str, Any]:
-        """Return the fields of a rod for its strains and its pose."""
-        free = xp.zeros(basis.shape[:2]) if reference is None else reference
-        hat = xp.concatenate([free[..., None], basis], axis=-1)
-        if curve is None:
-            count = len(hat)
-            twists = constant(hat)
-            curve = Motion(constant([xp.eye(3)] * count), constant(xp.zeros((count, 3))))
-        else:
-            twists = outer_twists(curve, constant(hat))
-        counts = [len(part[0]) for part in (self.at_nodes, self.at_poses, self.between)]
-        _, at_poses, between, before = xp.split(twists, xp.cumsum(counts))
-        turns = _grouped(between[:, :3], self.between[1])
-        at_node = slice(counts[0])
-        unit = self.unit
-        stop = np.searchsorted(unit._stops, unit.at_nodes[0]) - 1
-        return {
-            "length": constant(self.at_nodes[1]),
-            "basis": constant(basis[at_node]),
-            "turn": constant(xp.cumsum(turns, axis=0)),
-            "turn_pair": constant(_pairs(between[:, :3], self.between[1])),
-            "step": constant(self.at_poses[1][:, None, None] * at_poses[:, 3:]),
-            "node_turn": constant(xp.cumsum(_grouped(before[:, :3], self.before[1]), axis=0)[stop]),
-            "node_index": np.searchsorted(unit.at_poses[0], unit.at_nodes[0], side="right"),
-            "node_reach": constant(unit._reach),
-            "node_rotation": constant(curve.rotation[at_node]),
-            "node_offset": constant(curve.translation[at_node]),
-        }
-
-    @cached_property
-    def _reach(self) -> Float[Array, "nodes gauss"]:
-        """Compute the fraction of each pose node's step before each node of the strains."""
-        nodes = self.at_nodes[0]
-        columns = []
-        for low, high, count in zip(self.ends[:-1], self.ends[1:], self.poses, strict=True):
-            part = xp.clip((nodes - low) / (high - low), 0.0, 1.0)
-            columns += [up_to(count, part) / (0.5 * leggauss(count)[1]), xp.zeros((len(nodes), 1))]
-        return xp.concatenate(columns[:-1], axis=1)
-
-
-def _grouped(values: Float[Array, "fine ..."], lengths: Float[Array, " fine"]) -> Any:
-    """Integrate over every run of points."""
-    weighted = lengths.reshape(-1, *(1,) * (values.ndim - 1)) * values
-    return weighted.reshape(-1, _BETWEEN, *values.shape[1:]).sum(axis=1)
-
-
-def _pairs(
-    turning: Float[Array, "fine 3 hat"], lengths: Float[Array, " fine"]
-) -> Float[Array, "places 3 hat hat"]:
-    """Compute the second term of the Magnus series on every run of points, for pairs of modes."""
-    # It is half the integral of a(t) x a(s) over t < s, for a motion in the moving frame.
-    modes = turning.shape[-1]
-    rates, weights = turning.reshape(-1, _BETWEEN, 3 * modes), lengths.reshape(-1, _BETWEEN, 1)
-    so_far = weights.sum(axis=1, keepdims=True) * (_BEFORE @ rates)
-    products = (xp.swapaxes(weights * so_far, 1, 2) @ rates).reshape(-1, 3, modes, 3, modes)
-    pairs = 0.5 * xp.stack(
-        [products[:, k - 2, :, k - 1] - products[:, k - 1, :, k - 2] for k in range(3)], axis=1
-    )
-    return 0.5 * (pairs + xp.swapaxes(pairs, -1, -2))
+    return jax.vmap(at_node)(before, vectors, rod.node_reach @ state.step, free)
 
 
 # Geometric stiffness: change of the generalised forces of a wrench with the modes.
 
 
 def geometric_stiffness(
-    rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration, wrench: Float[Array, " w"]
+    rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration, wrench: Float[Array, " w"]
 ) -> Float[Array, "modes modes"]:
     """Compute the change of the generalised forces of a wrench with the modes."""
     # It is the derivative of twist_slope^T wrench for a wrench that moves with the body; rows are
     # the modes that it acts on. With F the force and M the moment about the end, along the axes of
     # the start, the generalised force is M . turn + F . (sum of the moved steps).
-    axes = own.turn.shape[1]
-    at_end = tail_pose(rod).wrench(wrench)
-    end = own.rotation[-1]
-    force = end @ at_end[axes:]
-    arms = _arms(rod, own, force)
-    turn = own.turn[:-1]
+    axes = state.turn.shape[1]
+    end_wrench = tail_pose(rod).wrench(wrench)
+    end = state.rotation[-1]
+    force = end @ end_wrench[axes:]
+    arms = _arms(rod, state, force)
+    turn = state.turn[:-1]
     # Second-order effect of two rotations on a step along the force, symmetrised.
-    along = 0.5 * (own.step @ force)
+    along = 0.5 * (state.step @ force)
     mixed = jnp.einsum("gci,gcj->ij", arms - along[:, None, None] * turn, turn)
-    leaving = _moments(end_displacement(own)[None], force)[0].T @ own.turn[-1]
+    leaving = _moments(end_displacement(state)[None], force)[0].T @ state.turn[-1]
     change = mixed + mixed.T - leaving
     if axes == 3:
-        change = change + _noncommuting_terms(rod, own, at_end)
+        change = change + _noncommuting_terms(rod, state, end_wrench)
     if rod.linear_kinematics is not None:
-        small = jax.jacfwd(lambda varied: small_twist(rod, varied).T @ at_end)(modes)
+        small = jax.jacfwd(lambda varied: small_twist(rod, varied).T @ end_wrench)(modes)
         change = jnp.where(rod.linear_kinematics > 0.0, small, change)
     return change
 
 
-def _arms(rod: Rod, own: RodConfiguration, force: Array) -> Float[Array, "gauss a modes"]:
+def _arms(rod: Rod, state: RodConfiguration, force: Array) -> Float[Array, "gauss a modes"]:
     """Compute the moments of the force through each step, per unit of mode, about the start."""
     if len(force) == 3:
-        return _moments(own.stepped, force)
+        return _moments(state.stepped, force)
     # The result is a scalar: rotating the force is cheaper than the steps of all modes.
     across = jnp.stack([-force[1], force[0]])
-    across = jnp.einsum("gdc,d->gc", own.rotation[:-1], across)
+    across = jnp.einsum("gdc,d->gc", state.rotation[:-1], across)
     return jnp.einsum("gc,gci->gi", across, rod.step[..., 1:])[:, None]
 
 
 def _moments(points: Array, force: Array) -> Float[Array, "places a modes"]:
     """Compute the moments of one force at points (places, d, modes) about the start."""
-    if len(force) == 2:
-        return points[:, 1:] * force[0] - points[:, :1] * force[1]
-    return jnp.cross(points, jnp.broadcast_to(force[:, None], points.shape), axis=1)
+    return jax.vmap(moment_of, in_axes=(0, None))(points, force[:, None])
 
 
 def _noncommuting_terms(
-    rod: Rod, own: RodConfiguration, at_end: Float[Array, " 6"]
+    rod: Rod, state: RodConfiguration, end_wrench: Float[Array, " 6"]
 ) -> Float[Array, "modes modes"]:
     """Compute the terms of `geometric_stiffness` in space, where rotations do not commute."""
     # The slopes of the rotations change with the modes: with the rotations before, with the slope
     # of the exponential, and with the pairs of the Magnus series.
     assert rod.turn_pair is not None
-    assert own.from_place is not None
-    turns, slope, turning = own.from_place
-    end = own.rotation[-1]
-    moment, force = end @ at_end[:3], end @ at_end[3:]
-    nodes = own.turn[:-1]
+    assert state.from_place is not None
+    turns, slope, turning = state.from_place
+    end = state.rotation[-1]
+    moment, force = end @ end_wrench[:3], end @ end_wrench[3:]
+    nodes = state.turn[:-1]
     # Contribution of each point to the wrench, then of all points from it on.
-    shares = jnp.cross(own.step, jnp.broadcast_to(force, own.step.shape))
+    shares = jax.vmap(cross, in_axes=(0, None))(state.step, force)
     shares = jnp.concatenate([shares, moment[None]])
     beyond = jnp.cumsum(shares[::-1], axis=0)[::-1]
-    turned_before = jnp.concatenate([jnp.zeros_like(own.turn[:1]), own.turn[:-1]])
-    lever = jnp.cross(turning, jnp.broadcast_to(beyond[..., None], turning.shape), axis=1)
+    turned_before = jnp.concatenate([jnp.zeros_like(state.turn[:1]), state.turn[:-1]])
+    lever = jax.vmap(cross)(turning, beyond[..., None])
     change = jnp.einsum("kci,kcj->ij", lever, turned_before)
-    inside = jnp.einsum("kdc,kd->kc", rotations_before(own.rotation), beyond)
+    inside = jnp.einsum("kdc,kd->kc", rotations_before(state.rotation), beyond)
     bending = jax.vmap(left_slope_change)(turns, inside)
     change = change + jnp.einsum("kci,kcd,kdj->ij", slope, bending, slope)
-    answers = jnp.einsum("kdc,kd->kc", left_slopes(turns), inside)
+    answers = jnp.einsum("kdc,kd->kc", left_slope(turns), inside)
     change = change + 2.0 * jnp.einsum("kcij,kc->ij", rod.turn_pair[..., 1:, 1:], answers)
     # The end rotates the first node's wrench, and steps leave the plane of their rotations.
-    last = own.turn[-1]
-    change = change + jnp.einsum("ci,cj->ij", last, jnp.cross(last, moment[:, None], axis=0))
+    last = state.turn[-1]
+    change = change + jnp.einsum("ci,cj->ij", last, cross(last, moment[:, None]))
     by_force = jnp.einsum("gcj,c->gj", nodes, force)
-    return change + jnp.einsum("gci,gc,gj->ij", nodes, own.step, by_force)
+    return change + jnp.einsum("gci,gc,gj->ij", nodes, state.step, by_force)

@@ -38,12 +38,12 @@ from jaxtyping import Array, Float
 from notchflex._arrays import plain_number, xp
 from notchflex.mechanics.ends import Dimension
 from notchflex.mechanics.flexure.notch_rod import (
+    RodQuadrature,
     about_neutral_axis,
     course_poses,
     course_rod,
 )
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
 from notchflex.mechanics.material import FibreSection, NotchEnds
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import (

@@ -54,12 +54,9 @@ def fibre_stretch(across: Float[Array, "*shape 2"]) -> Float[Array, "*shape 6"]:
     # The length of a fibre at (x, y) from the neutral axis is the rod's stretch plus its curvatures
     # times their lever arms, v_z + u_x y - u_y x. This holds for the concentric wall arc of
     # Pacheco's tendon (its l = h - theta (r_i + ybar)) and for the edge of a notch.
-    weights = across @ _ACROSS
-    return weights + xp.broadcast_to(_ALONG, weights.shape)
-
-
-_ALONG = xp.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-_ACROSS = xp.array([[0.0, -1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+    x, y = across[..., 0], across[..., 1]
+    none = xp.zeros_like(x)
+    return xp.stack([y, -x, none, none, none, none + 1.0], axis=-1)
 
 
 def of_rod(rod: Rod, values: Float[Array, "*shape 6"]) -> Float[Array, "*shape w"]:
@@ -87,10 +84,11 @@ def flexure_state(
     with_pose: bool,
 ) -> FlexureState:
     """Compute the state of a flexure from its modes."""
-    own, pose, twist = None, None, None
+    configuration, pose, twist = None, None, None
     if with_pose:
-        own = integrate_rod(rod, modes)
-        pose, twist = relative_pose(rod, modes, own), twist_slope(rod, modes, own)
+        configuration = integrate_rod(rod, modes)
+        pose = relative_pose(rod, modes, configuration)
+        twist = twist_slope(rod, modes, configuration)
     elastic = rod.basis @ modes
     if response is None:
         response = law.respond_all(in_space(elastic), rod.section, memory)
@@ -102,7 +100,7 @@ def flexure_state(
     axes = min(angular(elastic[0]), 2)
     bending = jnp.einsum("i,icm->cm", rod.length, rod.basis[:, :axes])
     return FlexureState(
-        configuration=own,
+        configuration=configuration,
         pose=pose,
         twist=twist,
         resultants=resultants,
@@ -123,16 +121,15 @@ def material_tangent(
     """Differentiate the internal forces of the modes (`internal`) by the modes."""
 
     def resultant_slope(
-        strain: Array, section: Any, at_node: Any, slope: Array | None, columns: Array
+        strain: Array, section: Any, past: Any, slope: Array | None, columns: Array
     ) -> Array:
         if slope is not None:
-            every = in_space(columns.T)
-            elastic = law.elastic(every.T, jax.tree.map(lambda leaf: leaf[..., None], section))
-            weak = xp.arange(6) == 1
-            return of_rod(rod, jnp.where(weak, slope * every, elastic)).T
+            strains = in_space(columns.T)
+            elastic = law.elastic(strains.T, jax.tree.map(lambda leaf: leaf[..., None], section))
+            return of_rod(rod, jnp.where(xp.arange(6) == 1, slope * strains, elastic)).T
 
         def resultants(varied: Array) -> Array:
-            return of_rod(rod, law.respond(in_space(varied), section, at_node).resultants)
+            return of_rod(rod, law.respond(in_space(varied), section, past).resultants)
 
         return jax.vmap(
             lambda column: jax.jvp(resultants, (strain,), (column,))[1], in_axes=1, out_axes=1

@@ -17,12 +17,12 @@ from notchflex._jax import constant
 from notchflex.mechanics.ends import Dimension, left_ranges
 from notchflex.mechanics.flexure.notch_rod import (
     NeutralAxis,
+    RodQuadrature,
     about_neutral_axis,
     build_rod,
     legendre_modes,
 )
 from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres, validity_warnings
-from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
 from notchflex.mechanics.flexure.roots import (
     STRIP_UNCHECKED,
     rooted_strip_rod,

@@ -30,9 +30,9 @@ from notchflex.mechanics.flexure.notch_rod import (
     about_neutral_axis,
     course_poses,
     course_rod,
+    rod_quadrature,
 )
 from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres, validity_warnings
-from notchflex.mechanics.flexure.rod_kinematics import rod_quadrature
 from notchflex.mechanics.flexure.roots import (
     STRIP_UNCHECKED,
     rooted_strip_rod,

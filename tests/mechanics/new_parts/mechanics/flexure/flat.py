@@ -6,7 +6,6 @@ from notchflex.mechanics.flexure.rod import (
     rod,
     section_fibres,
 )
-from notchflex.mechanics.flexure.rod_kinematics import RodQuadrature
 from notchflex.mechanics.section import two_walls, two_walls_fibres
 from notchflex.robot import Tube
 from notchflex.robot.notches.flat import FlatNotch
@@ -14,7 +13,7 @@ from notchflex.robot.notches.flat import FlatNotch
 
 @rod.register
 def _(notch: FlatNotch, tube: Tube, refinement: int = 0) -> Rod:
-    points = RodQuadrature((0.0, notch.height), (7 + refinement,), (10 + refinement,))
+    points = nr.RodQuadrature((0.0, notch.height), (7 + refinement,), (10 + refinement,))
     axis = nr.NeutralAxis(points, nr.shifted(-notch.offset), nr.shifted(notch.offset))
     strip = two_walls(0.5 * notch.width, notch.thickness, 0.25 * notch.width)
     modes = nr.legendre_modes(points, 2 + refinement, 2 + refinement, 1, tendon_modes=1)
