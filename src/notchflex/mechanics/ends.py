@@ -10,7 +10,7 @@ import numpy as np
 from notchflex._arrays import cached, plain_number, xp
 from notchflex.mechanics.cuts import SECTION_OF_CUT
 from notchflex.mechanics.ring import Side, WallSector, arc_of, end_compliance
-from notchflex.mechanics.section import Section
+from notchflex.mechanics.section import Section, leggauss
 
 # Torsion of a notch whose ends restrain warping of its section, and its shear.
 #
@@ -24,35 +24,20 @@ from notchflex.mechanics.section import Section
 # numbers and the spring λ_w were fitted to cells of chains of equal notches.
 
 
-def warping_constant(arc: WallSector) -> float:
-    """Compute the warping constant C_w of the arc about its shear centre."""
-    r, t, a = arc.radius, arc.wall, arc.half_angle
+def torsion_length(
+    arc: WallSector, outer: float, height: float, poisson_ratio: float, section: Section
+) -> float:
+    """Compute the effective length ℓ in free torsion of the notch with its ends, mm."""
+    r, t, a, diameter = arc.radius, arc.wall, arc.half_angle, 2.0 * outer
     sine, cosine = xp.sin(a), xp.cos(a)
     line = a**3 - 6.0 * (sine - a * cosine) ** 2 / (a - sine * cosine)
-    return 2.0 / 3.0 * t * r**5 * line + (2.0 * a * r * t) ** 3 / 144.0
-
-
-def torsion_length(
-    arc: WallSector,
-    outer: float,
-    height: float,
-    poisson_ratio: float,
-    section: Section,
-) -> float:
-    """Compute the effective length ℓ in free torsion of the notch with its ends."""
-    t, a, diameter = arc.wall, arc.half_angle, 2.0 * outer
+    # C_w about the shear centre: of the middle line and of the wall, mm⁶.
+    warping_constant = 2.0 / 3.0 * t * r**5 * line + (2.0 * a * r * t) ** 3 / 144.0
     shear_over_young = 0.5 / (1.0 + poisson_ratio)
-    rate = xp.sqrt(shear_over_young * section.torsion_constant / warping_constant(arc))
-    width = 2.0 * a * arc.radius / diameter
-    spring = 0.004 * diameter * (t / diameter) ** -1.98 * xp.exp(0.16 * width)
+    rate = xp.sqrt(shear_over_young * section.torsion_constant / warping_constant)
+    spring = 0.004 * diameter * (t / diameter) ** -1.98 * xp.exp(0.16 * (2.0 * a * r / diameter))
     warping = 2.0 / (rate * (1.0 / xp.tanh(0.5 * rate * height) + spring * rate))
     return height + t * (3.11 - 1.60 * a) - warping
-
-
-def shear_centre(arc: WallSector, height: float, section: Section) -> float:
-    """Compute the distance of the centre of twist from the tube axis, toward the spine."""
-    width = 2.0 * arc.half_angle * arc.radius
-    return plain_number(section.shear_centre) * (1.0 + 0.027 * width / (height + 0.72 * width))
 
 
 # Softening of a notch as it closes, by flattening of its curved spine.
@@ -69,23 +54,16 @@ def shear_centre(arc: WallSector, height: float, section: Section) -> float:
 # and the tangent stiffness $K_0(1 - b\theta - 3e\theta^2)/q^3$ is zero at the limit point, beyond
 # which a constant moment closes the notch at once.
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-
-# Fitted between notches: what a ring imposes at the edge, k = k0 (1 - exp(-(c / (c1 r))²)), and a
-# factor on Brazier. First and last notches of wrists are met by the same numbers (6 % to closing).
-_EDGE = (0.207, 1.69)
-_BRAZIER = 0.97
-# One notch alone between two clamped rings, as test specimens are.
-_EDGE_OF_SPECIMEN, _BRAZIER_OF_SPECIMEN = (0.465, 1.51), 0.74
-
 
 def edge_and_brazier(radius: float, sides: Sequence[Side]) -> tuple[float, float]:
     """Compute the mean k of the two sides, and the factor c_b on Brazier's flattening."""
-    specimen = all(side.boundary == "clamped" for side in sides)
-    factor, decay = _EDGE_OF_SPECIMEN if specimen else _EDGE
-    # The flattening k that a ring of some length imposes at the edge of the notch.
-    both = [-factor * xp.expm1(-((side.length / (decay * radius)) ** 2)) for side in sides]
-    return 0.5 * (both[0] + both[1]), _BRAZIER_OF_SPECIMEN if specimen else _BRAZIER
+    # Fitted between notches: what a ring imposes at the edge, k = k0 (1 - exp(-(c / (c1 r))²)), and
+    # a factor on Brazier. First and last notches of wrists are met by the same numbers (6 % to
+    # closing), one notch alone between two clamped rings, as test specimens are, by others.
+    is_specimen = all(side.boundary == "clamped" for side in sides)
+    factor, decay, brazier = (0.465, 1.51, 0.74) if is_specimen else (0.207, 1.69, 0.97)
+    imposed = [-factor * xp.expm1(-((side.length / (decay * radius)) ** 2)) for side in sides]
+    return 0.5 * (imposed[0] + imposed[1]), brazier
 
 
 def flattening_numbers(
@@ -103,14 +81,15 @@ def flattening_numbers(
     a = outer_angle
     if cut == "off-axis":
         a = xp.arccos(xp.minimum((depth - outer) / radius, 1.0 - 1e-9))
-    angle = 0.5 * a * (1.0 + _NODES)
+    nodes, weights = leggauss(24)
+    angle = 0.5 * a * (1.0 + nodes)
     slope = xp.sin(a) / a
     bent = (
         0.5 * (xp.sin(a) ** 2 + xp.sin(angle) ** 2)
         + slope * (xp.cos(a) - xp.cos(angle))
         - slope * angle * xp.sin(angle)
     )
-    first, second = (0.5 * a * (moment @ _WEIGHTS) for moment in (bent, bent**2))
+    first, second = (0.5 * a * (moment @ weights) for moment in (bent, bent**2))
     weak = section.second_moment_weak
     phi = 2.0 * wall * radius**3 * xp.abs(first) / weak
     brazier = 48.0 * (1.0 - poisson_ratio**2) * radius**7 * second / (wall * weak)
@@ -131,20 +110,6 @@ def flattening_numbers(
 # each direction were fitted to cells of chains of equal notches.
 
 
-class _Powers(NamedTuple):
-    """The factor K and the powers of t, b, ℓ and c, each over the outer diameter."""
-
-    factor: float
-    wall: float
-    width: float
-    length: float
-    ring: float
-
-
-_IN_PLANE = _Powers(1.37, -1.80, -2.10, 1.00, 0.30)
-_SIDEWAYS = _Powers(2.35, -1.17, -0.84, 1.31, 0.06)
-
-
 def shear_compliances(
     arc: WallSector,
     outer: float,
@@ -152,28 +117,18 @@ def shear_compliances(
     second_moments: tuple[float, float],
     sides: Sequence[Side],
 ) -> tuple[float, float]:
-    """Compute the compliance of the two directions across the tube."""
+    """Compute the compliance of the two directions across the tube, times E, 1/mm."""
     diameter = 2.0 * outer
     wall, width = arc.wall / diameter, 2.0 * arc.half_angle * arc.radius / diameter
 
-    def compliance(powers: _Powers, length: float, second_moment: float) -> float:
-        rings = sum((side.length / diameter) ** powers.ring for side in sides) / len(sides)
-        arc_and_rings = wall**powers.wall * width**powers.width * rings
-        distorted = powers.factor * arc_and_rings * (length / diameter) ** powers.length
-        return plain_number(length**3 / (12.0 * second_moment) + distorted / diameter)
+    def compliance(of: int, factor: float, p: float, q: float, m: float, n: float) -> float:
+        rings = sum((side.length / diameter) ** n for side in sides) / len(sides)
+        distorted = factor * (wall**p * width**q * rings) * (lengths[of] / diameter) ** m
+        bent = lengths[of] ** 3 / (12.0 * second_moments[of])
+        return plain_number(bent + distorted / diameter)
 
-    in_plane, sideways = map(compliance, (_IN_PLANE, _SIDEWAYS), lengths, second_moments)
-    return in_plane, sideways
-
-
-# Finite elements with contact of one tube (OD 1.62, ID 1.40, depth 1.4, height 0.8 mm): angle at
-# first contact over h/(r_o + ȳ), and stiffness 1 to 3° beyond over E t r², the same for both cuts.
-_CLOSING_FACTOR = {"on-axis": 1.0248, "off-axis": 1.0203}
-_CLOSED_STIFFNESS = 0.354
-
-# Reach of the edge of a ring, in r √(r/t). Beyond it an added length changes by less than 0.1 % of
-# the diameter, for walls of 0.08 to 0.47 mean radii (tests/mechanics/ends/test_ring.py).
-_REACH = 3.33
+    in_plane = compliance(0, 1.37, -1.80, -2.10, 1.00, 0.30)
+    return in_plane, compliance(1, 2.35, -1.17, -0.84, 1.31, 0.06)
 
 
 class NotchStiffness(NamedTuple):
@@ -206,8 +161,10 @@ class NotchStiffness(NamedTuple):
 
 def reach_of(arc: WallSector) -> float:
     """Return how far along a ring the effects of its edge reach, mm."""
-    # The ovalising load reaches farthest; it decays over a length that grows with r √(r/t).
-    return plain_number(_REACH * arc.radius * xp.sqrt(arc.radius / arc.wall))
+    # The ovalising load reaches farthest; it decays over a length that grows with r √(r/t). Farther
+    # off an added length changes by less than 0.1 % of the diameter, for walls of 0.08 to 0.47 mean
+    # radii (tests/mechanics/ends/test_ring.py).
+    return plain_number(3.33 * arc.radius * xp.sqrt(arc.radius / arc.wall))
 
 
 @cached(1024)
@@ -243,19 +200,24 @@ def notch_stiffness(
         (plain_number(section.second_moment_weak), plain_number(section.second_moment_strong)),
         sides,
     )
-    closed = _CLOSED_STIFFNESS * arc.wall * arc.radius**2 * length / section.second_moment_weak
+    # Finite elements with contact of one tube (OD 1.62, ID 1.40, depth 1.4, height 0.8 mm): angle
+    # at first contact over h/(r_o + ȳ), and stiffness 1 to 3° beyond over E t r².
+    closing_factor = {"on-axis": 1.0248, "off-axis": 1.0203}[cut]
+    closed = 0.354 * arc.wall * arc.radius**2 * length / section.second_moment_weak
+    width = 2.0 * arc.half_angle * arc.radius
+    moved_out = 1.0 + 0.027 * width / (height + 0.72 * width)  # by the ends of short notches
     return NotchStiffness(
         weak=plain_number(length),
         strong=plain_number(height + strong),
         axial=plain_number(height + axial),
         coupling=plain_number(coupling),
         torsion=plain_number(torsion_length(arc, outer_radius, height, poisson_ratio, section)),
-        shear_centre=shear_centre(arc, height, section),
+        shear_centre=plain_number(section.shear_centre) * moved_out,
         shear=shear,
         sway=sway,
         alpha=plain_number(arc.radius * phi * imposed / length**2),
         beta=plain_number(share * brazier * height / length**3),
-        closing_factor=_CLOSING_FACTOR[cut],
+        closing_factor=closing_factor,
         closed_ratio=plain_number(closed),
     )
 

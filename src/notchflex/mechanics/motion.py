@@ -12,8 +12,9 @@ wrenches have three numbers, `PLANE` of the six of space, and points two, `IN_PL
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import factorial
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -30,10 +31,7 @@ PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 # Coefficients of sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 as polynomials in a^2, used for
 # angles up to one radian: with eleven terms the first one left out is below 1e-22 there. The
 # closed forms, used above, would lose digits near zero, and have no derivative at it.
-_SERIES_BELOW = 1.0  # of the squared angle
-_TERMS = 11
-_SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(_TERMS)] for start in (1, 2, 3)]
-_TURN = xp.array([[0.0, 1.0], [-1.0, 0.0]])
+_SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(11)] for start in (1, 2, 3)]
 
 
 class Motion(NamedTuple):
@@ -88,8 +86,8 @@ def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[A
     # small matrices the overhead of a separate product exceeds its cost.
     if not is_traced((matrix, other)):
         return matrix @ other
-    every = matrix.reshape(*matrix.shape, *(1,) * (other.ndim - 1))
-    return (every * other[None]).sum(axis=1)
+    entries = matrix.reshape(*matrix.shape, *(1,) * (other.ndim - 1))
+    return (entries * other[None]).sum(axis=1)
 
 
 def angular(twist: Float[Array, "w ..."]) -> int:
@@ -113,7 +111,7 @@ def skew(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
     """Return the matrix of the cross product with an angular vector: `skew(a) @ b = a x b`."""
     # In space it accepts many vectors.
     if vector.shape[-1] == 1:
-        return vector[0] * _TURN
+        return vector[0] * xp.array([[0.0, 1.0], [-1.0, 0.0]])
     x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
     nothing = xp.zeros_like(x)
     rows = [nothing, -z, y, z, nothing, -x, -y, x, nothing]
@@ -147,23 +145,24 @@ def unskew(matrix: Float[Array, "d d"]) -> Float[Array, " a"]:
 
 def _coefficients(squared: Float[Array, ""]) -> tuple[Array, Array, Array]:
     """Compute sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 from a squared angle."""
-    small = squared < _SERIES_BELOW
+    small = squared < 1.0
     near = xp.where(small, squared, 0.0)
-    angle = xp.sqrt(xp.where(small, _SERIES_BELOW, squared))
+    angle = xp.sqrt(xp.where(small, 1.0, squared))
     sine, cosine = sine_cosine(angle)
     far = (sine / angle, (1.0 - cosine) / angle**2, (angle - sine) / angle**3)
     first, second, third = (
-        xp.where(small, _polynomial(series, near), closed)
+        xp.where(small, polynomial(series, near), closed)
         for series, closed in zip(_SERIES, far, strict=True)
     )
     return first, second, third
 
 
-def _polynomial(coefficients: list[float], at: Float[Array, ""]) -> Float[Array, ""]:
+def polynomial(coefficients: Sequence[float], variable: Any) -> Any:
+    """Evaluate a polynomial, its lowest coefficient first."""
     value = coefficients[-1]
     for coefficient in reversed(coefficients[:-1]):
-        value = value * at + coefficient
-    return cast("Array", value)
+        value = value * variable + coefficient
+    return value
 
 
 def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
@@ -172,17 +171,14 @@ def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Ar
     # to half a turn, a quarter of it is put into the series, and the result is doubled twice.
     if not is_traced(angle):
         return cast("tuple[Array, Array]", (xp.sin(angle), xp.cos(angle)))
-    quarter = 0.25 * (angle - _WHOLE_TURN * jnp.round(angle / _WHOLE_TURN))
+    turn = 2.0 * np.pi
+    quarter = 0.25 * (angle - turn * jnp.round(angle / turn))
     squared = quarter * quarter
-    sine, versine = quarter * _polynomial(_SINE, squared), squared * _polynomial(_VERSINE, squared)
+    sine = quarter * polynomial(_SERIES[0][:9], squared)
+    versine = squared * polynomial(_SERIES[1][:9], squared)
     cosine = 1.0 - versine
     sine, cosine = 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
     return 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
-
-
-_WHOLE_TURN = 2.0 * np.pi
-_SINE = [(-1.0) ** k / factorial(2 * k + 1) for k in range(9)]
-_VERSINE = [(-1.0) ** k / factorial(2 * k + 2) for k in range(9)]
 
 
 def wrench_at(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Array, " w"]:

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import sys
 from functools import cache
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Array
@@ -52,10 +52,6 @@ class Side(NamedTuple):
     turned: bool = False
 
 
-# Length over radius of the shortest ring. Rounding errors grow as it gets shorter; with a radius of
-# 1 mm it would be 1 micrometre long, which is no part of a tube.
-_SHORTEST = 1e-3
-
 HARMONICS = 41  # n = 0 ... 40
 _DEGREE = 18
 _EDGE = 4  # polynomials of each half that move an edge: along, around, outward and its slope
@@ -73,7 +69,7 @@ def _halves() -> list[list[tuple[int, int]]]:
     return [[term for term in half if term[1] <= _DEGREE] for half in halves]
 
 
-def _polynomial(displacement: int, degree: int) -> Array:
+def _polynomial(displacement: int, degree: int) -> np.ndarray:
     """Compute value and two derivatives by z / length at the far edge, the loaded one, the rule."""
     legendre = np.polynomial.legendre
     unit = np.eye(_DEGREE + 1)
@@ -81,8 +77,8 @@ def _polynomial(displacement: int, degree: int) -> Array:
         series = legendre.legint(unit[degree - 2], 2, lbnd=-1.0)
     else:
         series = unit[degree] - (unit[degree - 2] if degree >= 2 else 0.0)
-    at = np.concatenate([[1.0, -1.0], _GAUSS[0]])
-    return np.array([legendre.legval(at, legendre.legder(series, d, 2.0)) for d in range(3)])
+    places = np.concatenate([[1.0, -1.0], _GAUSS[0]])
+    return np.array([legendre.legval(places, legendre.legder(series, d, 2.0)) for d in range(3)])
 
 
 # The first half has one polynomial less.
@@ -107,7 +103,7 @@ _STRAINS = (
 
 # Robots with rigid ends do without; this takes 40 ms.
 @cache
-def _energies() -> Array:
+def _energies() -> np.ndarray:
     """Integrate the products of strains in the energy, for r = 1, the highest degrees first."""
     strains = np.zeros((2, 3, 3, 6, _DEGREE + 1, len(_EMPTY) + _BAND))
     for half, terms in enumerate(_halves()):
@@ -115,8 +111,9 @@ def _energies() -> Array:
             table = _polynomial(displacement, degree)[:, 2:]
             for strain, of, power, derivative, factor in _STRAINS:
                 if of == displacement:
-                    at = half, power, derivative, strain, slice(None), _ROWS - 1 - number
-                    strains[at] = factor * table[derivative]
+                    strains[half, power, derivative, strain, :, _ROWS - 1 - number] = (
+                        factor * table[derivative]
+                    )
     plane = np.array([np.diag([1.0, 1.0, 0.5]), [[0, 1, 0], [1, 0, 0], [0, 0, -0.5]]])
     stiffness = np.einsum("ab,ac,mst->ambsct", np.eye(2), np.eye(2), plane).reshape(2, 2, 6, 6)
     near = strains[..., np.arange(len(_EMPTY))[:, None] + np.arange(_BAND)]
@@ -129,7 +126,7 @@ def _energies() -> Array:
 
 
 @cache
-def _edges() -> Array:
+def _edges() -> np.ndarray:
     """Return the first polynomials of both halves by what moves, shape (halves, _EDGE, 2 _EDGE)."""
     # The order is u, v, w and slope at the far edge, then v, w, u and slope at the loaded one.
     moved = np.zeros((2 * _EDGE, 2 * _EDGE))
@@ -142,7 +139,7 @@ def _edges() -> Array:
     return np.linalg.inv(moved).reshape(2, _EDGE, 2 * _EDGE)
 
 
-def _held(boundary: str) -> Array:
+def _held(boundary: str) -> np.ndarray:
     """Return what is held at the edges, in the order of `_edges`, (2 _EDGE, harmonics)."""
     held = np.zeros((2 * _EDGE, HARMONICS))
     held[[1, 4], 0] = 1.0  # no torsion
@@ -157,27 +154,24 @@ def _held(boundary: str) -> Array:
 
 _POWERS = np.arange(HARMONICS, dtype=float) ** np.arange(5.0)[:, None]
 _HELD = {boundary: _held(boundary) for boundary in ("between", "clamped", "free")}
-_SHIFTED = np.arange(1, _BAND)[:, None] + np.arange(_BAND)
 _ROW, _COLUMN = np.indices((_EDGE, _EDGE))
 _SQUARE = np.minimum(_ROW, _COLUMN), np.abs(_ROW - _COLUMN)
-_SYMMETRIC = np.array([[0, 1], [1, 2]])
-_DIAGONAL = np.eye(2 * _EDGE)[..., None]
 
 
-def _flexibility(by_power: Array, powers: Array, held: Array) -> Array:
+def _flexibility(by_power: Any, powers: Any, held: Any) -> Any:
     """Solve for u by tension, u by moment and slope by moment, (3, harmonics)."""
     rows = xp.tensordot(by_power, powers, ((0,), (0,))) + _EMPTY
-    window = rows[:_BAND]
+    window, shifted = rows[:_BAND], np.arange(1, _BAND)[:, None] + np.arange(_BAND)
     for following in range(_BAND, len(rows)):  # the first row of the window goes
         first = window[0]
         factor = first[1:] * (1.0 / first[:1])
-        taken = factor[:, None] * xp.concatenate([first, 0.0 * first])[_SHIFTED]
+        taken = factor[:, None] * xp.concatenate([first, 0.0 * first])[shifted]
         window = xp.concatenate([window[1:] - taken, rows[following : following + 1]])
     edges = _edges()
     half = xp.einsum("ijpn,pjb->pibn", window[_SQUARE][::-1, ::-1], edges)
     stiffness = xp.einsum("pia,pibn->abn", edges, half)
     free = (1.0 - held[:, None]) * (1.0 - held[None])
-    stiffness = free * stiffness + _DIAGONAL * held[None]
+    stiffness = free * stiffness + np.eye(len(held))[..., None] * held[None]
     for _ in range(2 * _EDGE - 2):
         factor = stiffness[:1, 1:] * (1.0 / stiffness[:1, :1])
         stiffness = stiffness[1:, 1:] - stiffness[1:, :1] * factor
@@ -191,7 +185,8 @@ def edge_compliance(
     radius: float, wall: float, length: float, poisson_ratio: float, boundary: str
 ) -> Array:
     """Compute the compliance of an edge to its loads, for each harmonic."""
-    length = xp.maximum(length, _SHORTEST * radius)
+    # Rounding errors grow as a ring gets shorter; one of a micrometre is no part of a tube.
+    length = xp.maximum(length, 1e-3 * radius)
     ratio = radius / length
     # Strains of the membrane come per 1/r, those of bending per 1/r².
     parts = xp.stack([1.0, wall**2 / (12.0 * radius**2)])
@@ -210,7 +205,7 @@ def edge_compliance(
     # Displacements are of order r² per N/mm over E t length; a slope along z has one length less.
     scale = (1.0 - poisson_ratio**2) * radius**2 / (wall * length)
     units = xp.stack([scale, scale / length, scale / length**2])
-    return read_only((flexibility * units[None])[:, _SYMMETRIC])
+    return read_only((flexibility * units[None])[:, np.array([[0, 1], [1, 2]])])
 
 
 # End compliance: the compliance that the ring beside a notch adds to the notch.
@@ -222,10 +217,7 @@ def edge_compliance(
 # follow in closed form, and so do their harmonics.
 #
 # A prescribed stress makes the ring too compliant; that the stress at the interface relaxes is one
-# fitted factor on the harmonics from n = 2.
-
-RELAXATION = 0.833
-"""λ, factor on the compliance of the harmonics from n = 2, fitted to finite elements."""
+# factor on the harmonics from n = 2, fitted to finite elements.
 
 
 class WallSector(NamedTuple):
@@ -278,7 +270,7 @@ def arc_harmonics(arc: WallSector) -> tuple[Array, Array, Array]:
 
 
 _NORM = np.pi * xp.where(xp.arange(HARMONICS) == 0, 2.0, 1.0)
-_RELAXED = xp.where(xp.arange(HARMONICS) < 2, 1.0, RELAXATION)
+_RELAXED = xp.where(xp.arange(HARMONICS) < 2, 1.0, 0.833)
 
 
 def end_compliance(
@@ -297,8 +289,8 @@ def end_compliance(
     flexibility = edge_compliance(arc.radius, arc.wall, ring_length, poisson_ratio, side.boundary)
     weights = _NORM * relaxation
 
-    def energy(one: Array, other: Array) -> float:
-        return arc.radius * xp.einsum("n,ni,nij,nj->", weights, one, flexibility, other)
+    def energy(first: Array, second: Array) -> float:
+        return arc.radius * xp.einsum("n,ni,nij,nj->", weights, first, flexibility, second)
 
     # As a beam, the ring has the compliances c/(E I_tube) in bending and c/(E A_tube) in tension.
     bends = ring_length / (0.25 * np.pi * (outer**4 - inner**4))

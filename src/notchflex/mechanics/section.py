@@ -20,6 +20,14 @@ from notchflex._jax import (
     scan,
 )
 from notchflex._values import read_only
+from notchflex.mechanics.motion import polynomial
+
+
+@lru_cache(maxsize=64)
+def leggauss(count: int) -> Any:
+    """Return Gauss's nodes from -1 to 1 and their weights, read-only."""
+    return tuple(map(read_only, legendre.leggauss(count)))
+
 
 # Sums of angles, sines and cosines that stay accurate where their terms cancel.
 #
@@ -27,9 +35,6 @@ from notchflex._values import read_only
 # of order α³ to α⁷ while the terms of the closed forms are of order α: α − sin α cos α is
 # 2α³/3. Each such sum is written once, as a list of terms, and evaluated from its Taylor series
 # below one radian and as it stands above.
-
-_SERIES_BELOW = 1.0  # rad; above it the closed forms lose at most two digits
-_TERMS = 16  # of the series: the first one left out is below 1e-16 of the sum at one radian
 
 Term = tuple[Fraction | int, int, str, int]
 """(c, n, "sin" or "cos", m) stands for c αⁿ sin(mα) or c αⁿ cos(mα)."""
@@ -40,24 +45,23 @@ def cancelling_sum(terms: Sequence[Term]) -> Callable[[Array], Array]:
     series: dict[int, Fraction] = {}
     for factor, power, kind, multiple in terms:
         start = 1 if kind == "sin" else 0
-        for k in range(_TERMS + 4):
+        for k in range(20):
             order = 2 * k + start
             value = Fraction(factor) * (-1) ** k * Fraction(multiple**order, factorial(order))
             series[power + order] = series.get(power + order, Fraction(0)) + value
     first = min(order for order, value in series.items() if value)
-    coefficients = [float(series[first + 2 * k]) for k in range(_TERMS)]
+    # The first term left out is below 1e-16 of the sum at one radian; above it the closed forms lose
+    # at most two digits.
+    coefficients = [float(series[first + 2 * k]) for k in range(16)]
 
     def evaluate(angle: Array) -> Array:
         if isinstance(angle, np.ndarray) and angle.ndim == 0:  # of one notch: no arrays needed
             plain: Any = float(angle)
-            return xp.asarray(near(plain) if plain < _SERIES_BELOW else far(plain))  # pyright: ignore[reportReturnType]
-        return xp.where(angle < _SERIES_BELOW, near(angle), far(angle))
+            return xp.asarray(near(plain) if plain < 1.0 else far(plain))  # pyright: ignore[reportReturnType]
+        return xp.where(angle < 1.0, near(angle), far(angle))
 
     def near(angle: Any) -> Any:
-        square, total = angle * angle, coefficients[-1]
-        for coefficient in reversed(coefficients[:-1]):
-            total = total * square + coefficient
-        return total * angle**first
+        return polynomial(coefficients, angle * angle) * angle**first
 
     def far(angle: Any) -> Any:
         total = 0.0
@@ -151,9 +155,6 @@ def of_any_shape(
 #
 # Used when a robot is assembled, so plain NumPy.
 
-_ODD = 2.0 * xp.arange(8) + 1.0
-_FIFTH_POWERS = 31.0 / 32.0 * 1.0369277551433699  # sum of n^-5 over odd n, from zeta(5)
-
 
 def two_walls(width: ArrayLike, thickness: ArrayLike, middle: ArrayLike) -> Section:
     r"""Compute the section of two equal walls side by side.
@@ -173,22 +174,20 @@ def two_walls(width: ArrayLike, thickness: ArrayLike, middle: ArrayLike) -> Sect
         >>> print(f"{strip.second_moment_weak:.4f} mm⁴, torsion {strip.torsion_constant:.4f} mm⁴")
         1.1250 mm⁴, torsion 2.4362 mm⁴
     """
-    b, h, c = (
-        xp.asarray(value, dtype=float) for value in xp.broadcast_arrays(width, thickness, middle)
-    )
+    b, h, c = map(constant, xp.broadcast_arrays(width, thickness, middle))
     nought = xp.zeros_like(b)
     return Section(
-        area=constant(2.0 * b * h),
-        centroid=constant(nought),
-        second_moment_weak=constant(2.0 * b * h**3 / 12.0),
-        second_moment_strong=constant(2.0 * (h * b**3 / 12.0 + b * h * c**2)),
-        torsion_constant=constant(2.0 * rectangle_torsion_constant(b, h)),
-        shear_centre=constant(nought),
-        edge_near=constant(0.5 * h),
-        edge_spine=constant(0.5 * h),
-        edge_across=constant(c + 0.5 * b),
-        outer_radius=constant(nought),
-        half_angle=constant(nought),
+        area=2.0 * b * h,
+        centroid=nought,
+        second_moment_weak=2.0 * b * h**3 / 12.0,
+        second_moment_strong=2.0 * (h * b**3 / 12.0 + b * h * c**2),
+        torsion_constant=2.0 * rectangle_torsion_constant(b, h),
+        shear_centre=nought,
+        edge_near=0.5 * h,
+        edge_spine=0.5 * h,
+        edge_across=c + 0.5 * b,
+        outer_radius=nought,
+        half_angle=nought,
     )
 
 
@@ -198,11 +197,13 @@ def rectangle_torsion_constant(width: ArrayLike, thickness: ArrayLike) -> Array:
     # $$J = \frac{bh^3}{3}\Big[1 - \frac{192}{\pi^5}\frac hb
     # \sum_{n=1,3,\dots}\frac{\tanh(n\pi b/2h)}{n^5}\Big]$$
     # The sum of $n^{-5}$ is known, and what the tanh takes off falls with $e^{-n\pi}$ or faster.
-    one, other = xp.asarray(width, dtype=float), xp.asarray(thickness, dtype=float)
-    b, h = xp.maximum(one, other), xp.minimum(one, other)
-    decay = xp.exp(-np.pi * _ODD * (b / h)[..., None])
-    taken_off = xp.sum(2.0 * decay / (1.0 + decay) / _ODD**5, axis=-1)
-    return b * h**3 / 3.0 * (1.0 - 192.0 / np.pi**5 * (h / b) * (_FIFTH_POWERS - taken_off))
+    sides = constant(width), constant(thickness)
+    b, h = xp.maximum(*sides), xp.minimum(*sides)
+    odd = 2.0 * xp.arange(8) + 1.0
+    decay = xp.exp(-np.pi * odd * (b / h)[..., None])
+    taken_off = xp.sum(2.0 * decay / (1.0 + decay) / odd**5, axis=-1)
+    fifth_powers = 31.0 / 32.0 * 1.0369277551433699  # sum of n^-5 over odd n, from zeta(5)
+    return b * h**3 / 3.0 * (1.0 - 192.0 / np.pi**5 * (h / b) * (fifth_powers - taken_off))
 
 
 def clamped_torsion_constant(
@@ -215,8 +216,7 @@ def clamped_torsion_constant(
     # $$J_\text{clamped} = \frac{J}{1 - \tanh u/u},\qquad
     # u = \frac L2\sqrt{\frac{GJ}{EI_\omega}},$$
     # (Vlasov 1961, Thin-Walled Elastic Beams): for short strips $12EI_\omega/GL^2$, two beams.
-    free = xp.asarray(section.torsion_constant)
-    warping = xp.asarray(section.second_moment_weak) * xp.asarray(middle, dtype=float) ** 2
+    free, warping = section.torsion_constant, section.second_moment_weak * constant(middle) ** 2
     u = 0.5 * length * xp.sqrt(free / (2.0 * (1.0 + poisson_ratio) * warping))
     return free / _beyond_tanh(u)
 
@@ -226,13 +226,9 @@ def _beyond_tanh(u: Array) -> Array:
     small = u < 0.1
     square = xp.where(small, u, 0.0) ** 2
     # The series of tanh; the first term left out is below 1e-14 of the sum.
-    coefficients = (-21844.0 / 6081075.0, 1382.0 / 155925.0, -62.0 / 2835.0, 17.0 / 315.0)
-    series = xp.zeros_like(square)
-    for coefficient in coefficients:
-        series = series * square + coefficient
-    series = square * (1.0 / 3.0 - square * (2.0 / 15.0 - square * series))
+    series = 1 / 3, -2 / 15, 17 / 315, -62 / 2835, 1382 / 155925, -21844 / 6081075
     large = xp.where(small, 1.0, u)
-    return xp.where(small, series, 1.0 - xp.tanh(large) / large)
+    return xp.where(small, square * polynomial(series, square), 1.0 - xp.tanh(large) / large)
 
 
 # Fibres of a section: arms from the neutral axis and areas, by Gauss's rule.
@@ -241,13 +237,7 @@ def _beyond_tanh(u: Array) -> Array:
 # centroid and second moment equal those of the section to rounding: the arms are shifted and scaled
 # by the error of the strips, about 1e-7.
 
-leggauss = lru_cache(maxsize=16)(legendre.leggauss)
-
 FIBRES = 20
-# A node is searched in eighths of an angle; five times, and the error is below 1e-4 rad.
-_PARTS, _WIDTHS = np.arange(1, 8)[:, None], np.pi / 8.0 ** np.arange(1, 6)
-
-Strips = Float[Array, " strips"]
 Points = tuple[Float[Array, "*nodes fibres"], Float[Array, "*nodes fibres"]]
 """Arms (mm) and areas (mm^2)."""
 
@@ -275,7 +265,7 @@ def fitted(points: Points, area: Any, second_moment: Any) -> Points:
     return arm * xp.sqrt(second_moment[:, None] / total(areas * arm**2)), areas
 
 
-def gauss_rule(points: Strips, weights: Strips, count: int) -> Points:
+def gauss_rule(points: Array, weights: Array, count: int) -> Points:
     """Compute the Gauss rule of a discrete measure, exact up to degree 2 count - 1."""
     # The nodes are the roots of the last of the polynomials orthogonal over the points. Signs of
     # the others tell how many lie above a place; they are searched along the angle of its cosine,
@@ -300,14 +290,16 @@ def gauss_rule(points: Strips, weights: Strips, count: int) -> Points:
     def place(angle: Any) -> Any:
         return 0.5 * (low + high) - 0.5 * (high - low) * xp.cos(angle)
 
-    def narrow(angle: Any, width: Any) -> Any:
-        above = _polynomials(fixed, place(angle + width[0] * _PARTS))[-1]
-        return angle + width[0] * xp.sum(
-            above >= np.arange(count, 0, -1)[None], 0, keepdims=True
-        ), ()
+    # A node is searched in eighths of an angle; five times, and the error is below 1e-4 rad.
+    parts, widths = np.arange(1, 8)[:, None], np.pi / 8.0 ** np.arange(1, 6)
 
-    angle = scan(narrow, xp.zeros_like(fixed[0][None]), (_WIDTHS,))[0]
-    nodes = place(angle + 0.5 * _WIDTHS[-1])
+    def narrow(angle: Any, width: Any) -> Any:
+        above = _polynomials(fixed, place(angle + width[0] * parts))[-1]
+        beyond = xp.sum(above >= np.arange(count, 0, -1)[None], 0, keepdims=True)
+        return angle + width[0] * beyond, ()
+
+    angle = scan(narrow, xp.zeros_like(fixed[0][None]), (widths,))[0]
+    nodes = place(angle + 0.5 * widths[-1])
     for known in (fixed, fixed, fixed, recurrence):  # Newton's steps for the last two's ratio
         before, last, squares, _ = _polynomials(known, nodes)
         nodes = nodes - before * last / squares

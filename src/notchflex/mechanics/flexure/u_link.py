@@ -42,13 +42,11 @@ from notchflex.mechanics.flexure.roots import (
 from notchflex.mechanics.section import (
     FibresAt,
     clamped_torsion_constant,
+    leggauss,
     two_walls,
     two_walls_fibres,
 )
 from notchflex.robot import Tube, ULink
-
-# The arc length is a smooth integral over t, a third of a turn at most: ten nodes are exact.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
 
 @dataclass(frozen=True)
@@ -113,7 +111,8 @@ class CurvedEnd:
     def length(self, t: Any = 1.0) -> Array:
         """Compute the length of the middle line from 0 to t, mm (Gao 2017, eq. 9 for t = 1)."""
         t = xp.asarray(t)
-        return 0.5 * t * (self._speed(0.5 * t[..., None] * (1.0 + _NODES)) @ _WEIGHTS)
+        nodes, weights = leggauss(10)  # exact for this smooth integral, a third of a turn at most
+        return 0.5 * t * (self._speed(0.5 * t[..., None] * (1.0 + nodes)) @ weights)
 
     def _speed(self, t: Array) -> Array:
         """Compute |C'|, written out: it is evaluated at some thousand points per link."""
@@ -230,7 +229,7 @@ def u_link_rod(
     # The distal body's frame: level with the strip's lower edge, on the tube axis.
     distal, modes = 2.0 * notch.slot_radius, (moment_modes, force_modes)
     poses = course_poses(course.along, course.above, course.heading, middle, hand)
-    options = {"free": free, "direction_deg": notch.direction_deg}
+    options: dict[str, Any] = {"free": free, "direction_deg": notch.direction_deg}
     return course_rod(points, poses, section, middle, modes, distal, poisson_ratio, **options)
 
 

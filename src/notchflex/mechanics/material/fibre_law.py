@@ -118,7 +118,7 @@ settle_fibres = jax.custom_batching.custom_vmap(_settle)
 
 @settle_fibres.def_vmap
 def _(size: int, batched: Any, law: FibreLaw, *sections: Any) -> tuple[Any, Any]:
-    all_batched = True, True, FibreSums(*[True] * 5)
+    all_batched = True, True, FibreSums._make([True] * 5)
     if any(jax.tree.leaves(batched[0])):  # rows of a batch that is not one of sections
         axes = jax.tree.map(lambda varies: 0 if varies else None, tuple(batched))
         return jax.vmap(_settle, in_axes=axes)(law, *sections), all_batched

@@ -19,9 +19,8 @@ import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial, singledispatch
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, cast
 
-import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._arrays import decide, xp
@@ -32,6 +31,7 @@ from notchflex._jax import (
     jnp,
 )
 from notchflex._packages import unregistered
+from notchflex.mechanics.section import leggauss
 
 Scalar = Float[Array, ""]
 Each = Float[Array, "*shape"]
@@ -185,8 +185,8 @@ class FibreSection(Pytree):
 #
 # A change of e thus dissipates (K X(kappa) - H'(e)) de, which is zero without hysteresis.
 
-_POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
-NODES, WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
+_GAUSS = leggauss(64)
+NODES, WEIGHTS = 0.5 + 0.5 * _GAUSS[0], 0.5 * _GAUSS[1]
 """Gauss's rule on 0 ... 1."""
 
 
@@ -253,7 +253,9 @@ def _middle(
         law: SectionLaw, section: FibreSection, present: Array, stiffness: Array, reduced: Array
     ) -> tuple[Array, Array]:
         bent = law.bent(reduced, section, ())
-        return reduced - bent.moment / stiffness - present, 1.0 - bent.slope / stiffness
+        return reduced - bent.moment / stiffness - present, 1.0 - cast(
+            "Array", bent.slope
+        ) / stiffness
 
     # s is largest at kappa^2 = 1 / even; the transformation is a fraction of it. Where a section
     # does not flatten, `even` is negligible, but above 0.
