@@ -49,7 +49,6 @@ from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
 from notchflex.mechanics.tendon import (
     RoutedTendons,
-    RoutingContext,
     TendonGroup,
     route,
 )
@@ -526,16 +525,21 @@ def _build_template(
     rods = replace(rods, start_offset=rods.start_offset + lead)
     free = jax.tree.map(lambda *leaves: xp.stack(leaves)[rod_index], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
-    context = RoutingContext(
-        notches, tube.outer_radius, rods, free, body_length, turns_with_chord=turns_with_chord
-    )
     sides = dict.fromkeys(notch.direction_deg for notch in notches)
     turns = {side: rotation_about(constant(_UP * xp.radians(side))) for side in sides}
     return ChainTemplate(
         distinct_rods,
         rod_index,
         rods,
-        route(tendons, context),
+        route(
+            tendons,
+            notches,
+            tube.outer_radius,
+            rods,
+            free,
+            body_length,
+            turns_with_chord=turns_with_chord,
+        ),
         build_contacts(notches, tube, rods, body_length),
         body_length,
         constant(xp.stack([turns[notch.direction_deg] for notch in notches])),

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Array
-from numpy.typing import ArrayLike
 
 from notchflex._arrays import cached, decide, xp
 from notchflex._jax import constant
@@ -116,11 +115,8 @@ _bow = cancelling_sum([(1, 0, "sin", 1), (-1, 1, "cos", 1)])
 _sag = cancelling_sum([(1, 1, "cos", 0), (-1, 0, "sin", 1)])
 
 
-def annular_sector(
-    outer_radius: ArrayLike,
-    inner_radius: ArrayLike,
-    depth: ArrayLike,
-) -> Section:
+@of_any_shape
+def annular_sector(outer_radius: Array, inner_radius: Array, depth: Array) -> Section:
     r"""Compute the section that an on-axis cut leaves of a tube.
 
     With the half-angle $a = \arccos((g - r_o)/r_o)$, the mean radius $m$, the wall $t$,
@@ -158,11 +154,7 @@ def annular_sector(
         >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
         0.125376 mm², 0.686533 mm
     """
-    return _sector(outer_radius, inner_radius, depth)
-
-
-def _sector_properties(outer: Array, inner: Array, depth: Array) -> Section:
-    """Compute all properties of arrays of one shape."""
+    outer, inner = outer_radius, inner_radius
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     a = half_angle(outer, left, depth)
     # Sine and cosine from the lengths: exact to rounding also near a = π.
@@ -200,9 +192,6 @@ def _sector_properties(outer: Array, inner: Array, depth: Array) -> Section:
         outer_radius=outer,
         half_angle=a,
     )
-
-
-_sector = of_any_shape(_sector_properties)
 
 
 # Annular segment: what an off-axis cut leaves, with one flat cut plane.
@@ -359,11 +348,8 @@ _sideways = cancelling_sum(
 )
 
 
-def annular_segment(
-    outer_radius: ArrayLike,
-    inner_radius: ArrayLike,
-    depth: ArrayLike,
-) -> Section:
+@of_any_shape
+def annular_segment(outer_radius: Array, inner_radius: Array, depth: Array) -> Section:
     r"""Compute the section that an off-axis cut leaves of a tube.
 
     The section is a segment of the outer circle less a segment of the inner one. With the
@@ -405,11 +391,7 @@ def annular_segment(
         >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
         0.111621 mm², 0.701661 mm
     """
-    return _segment(outer_radius, inner_radius, depth)
-
-
-def _segment_properties(outer: Array, inner: Array, depth: Array) -> Section:
-    """Compute all properties of arrays of one shape."""
+    outer, inner = outer_radius, inner_radius
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     plane = depth - outer  # d
     alpha = half_angle(outer, left, depth)
@@ -457,9 +439,6 @@ def _segment_properties(outer: Array, inner: Array, depth: Array) -> Section:
         outer_radius=outer,
         half_angle=alpha,
     )
-
-
-_segment = of_any_shape(_segment_properties)
 
 
 @cached(1024)  # the same for all sites and heights

@@ -34,6 +34,12 @@ PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 _SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(11)] for start in (1, 2, 3)]
 
 
+Vector = Float[Array, "d ..."]
+Angular = Float[Array, "a ..."]
+Wrench = Float[Array, "w ..."]
+Matrix = Float[Array, "*n d d"]
+
+
 class Motion(NamedTuple):
     """A rigid motion, from an inner frame to the outer one (translation in mm)."""
 
@@ -47,15 +53,15 @@ class Motion(NamedTuple):
             _times(self.rotation, inner.translation) + self.translation,
         )
 
-    def point(self, inside: Float[Array, " d"]) -> Float[Array, " d"]:
+    def point(self, inside: Vector) -> Vector:
         """Transform a point of the inner frame to outer coordinates (mm)."""
         return _times(self.rotation, inside) + self.translation
 
-    def point_inside(self, outside: Float[Array, "*n d"]) -> Float[Array, "*n d"]:
+    def point_inside(self, outside: Vector) -> Vector:
         """Transform a point of the outer frame, or many, to inner coordinates (mm)."""
         return _times(self.rotation.T, (outside - self.translation).T).T
 
-    def wrench(self, inside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
+    def wrench(self, inside: Wrench) -> Wrench:
         """Transform a wrench (moment, force) from the inner to the outer frame."""
         # This and the two methods below also accept many, as columns.
         axes = angular(inside)
@@ -63,7 +69,7 @@ class Motion(NamedTuple):
         moment = turned(self.rotation, inside[:axes]) + moment_of(self.translation, force)
         return xp.concatenate([moment, force])
 
-    def wrench_inside(self, outside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
+    def wrench_inside(self, outside: Wrench) -> Wrench:
         """Transform a wrench from the outer to the inner frame."""
         axes = angular(outside)
         force = outside[axes:]
@@ -72,7 +78,7 @@ class Motion(NamedTuple):
         along = _times(self.rotation.T, force)
         return xp.concatenate([inside, along])
 
-    def twist_inside(self, outside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
+    def twist_inside(self, outside: Wrench) -> Wrench:
         """Transform a twist from the outer to the inner frame."""
         axes = angular(outside)
         moved = outside[axes:] + cross(outside[:axes], self.translation)
@@ -80,7 +86,7 @@ class Motion(NamedTuple):
         return xp.concatenate([turn, _times(self.rotation.T, moved)])
 
 
-def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[Array, "d ..."]:
+def _times(matrix: Matrix, other: Vector) -> Vector:
     """Multiply by a vector or by columns."""
     # In compiled code the product is written out, so that it fuses with its surroundings: for such
     # small matrices the overhead of a separate product exceeds its cost.
@@ -90,7 +96,7 @@ def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[A
     return (entries * other[None]).sum(axis=1)
 
 
-def angular(twist: Float[Array, "w ..."]) -> int:
+def angular(twist: Wrench) -> int:
     """Return the number of angular components of a twist or wrench: 3 in space, 1 in the plane."""
     return 3 if twist.shape[0] == 6 else 1
 
@@ -100,14 +106,14 @@ def identity(dimensions: int = 3) -> Motion:
     return Motion(constant(xp.eye(dimensions)), constant(xp.zeros(dimensions)))
 
 
-def turned(rotation: Float[Array, "d d"], axis: Float[Array, "a ..."]) -> Float[Array, "a ..."]:
+def turned(rotation: Matrix, axis: Angular) -> Angular:
     """Rotate angular vectors to the outer frame; in the plane a mirror changes their sign."""
     if axis.shape[0] == 3:
         return _times(rotation, axis)
     return (rotation[0, 0] * rotation[1, 1] - rotation[0, 1] * rotation[1, 0]) * axis
 
 
-def skew(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
+def skew(vector: Float[Array, "*n a"]) -> Matrix:
     """Return the matrix of the cross product with an angular vector: `skew(a) @ b = a x b`."""
     # In space it accepts many vectors.
     if vector.shape[-1] == 1:
@@ -118,7 +124,7 @@ def skew(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
     return xp.stack(rows, axis=-1).reshape(*vector.shape, 3)
 
 
-def cross(first: Float[Array, "a ..."], second: Float[Array, "d ..."]) -> Float[Array, "d ..."]:
+def cross(first: Angular, second: Vector) -> Vector:
     """Compute the cross product of an angular vector and a linear one (in space, of any two)."""
     # Written out it compiles and runs faster than as a matrix.
     if first.shape[0] == 1:
@@ -127,14 +133,14 @@ def cross(first: Float[Array, "a ..."], second: Float[Array, "d ..."]) -> Float[
     return xp.stack([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
-def moment_of(point: Float[Array, "d ..."], force: Float[Array, "d ..."]) -> Float[Array, "a ..."]:
+def moment_of(point: Vector, force: Vector) -> Angular:
     """Return the moment about the origin of a force at a point, or of any two linear vectors."""
     if point.shape[0] == 3:
         return cross(point, force)
     return xp.stack([point[1] * force[0] - point[0] * force[1]])
 
 
-def unskew(matrix: Float[Array, "d d"]) -> Float[Array, " a"]:
+def unskew(matrix: Matrix) -> Angular:
     """Return the vector of the skew part of a matrix, the inverse of `skew`."""
     if matrix.shape[0] == 2:
         return 0.5 * xp.stack([matrix[0, 1] - matrix[1, 0]])
@@ -181,12 +187,12 @@ def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Ar
     return 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
 
 
-def wrench_at(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Array, " w"]:
+def wrench_at(point: Vector, force: Vector) -> Wrench:
     """Return the wrench (moment, force) about the origin of a force at a point."""
     return xp.concatenate([moment_of(point, force), force])
 
 
-def wrench_turn(wrench: Float[Array, " w"]) -> Float[Array, "w w"]:
+def wrench_turn(wrench: Wrench) -> Float[Array, "w w"]:
     """Differentiate a wrench that moves with a frame by the twist of the frame."""
     # With moment m and force f, a twist (omega, v) changes it by (omega x m + v x f, omega x f).
     axes = angular(wrench)
@@ -211,7 +217,7 @@ def outer_twists(motion: Motion, twists: Float[Array, "*n 6 k"]) -> Float[Array,
     return constant(xp.concatenate([turn, moved], axis=-2))
 
 
-def rotation_about(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
+def rotation_about(vector: Float[Array, "*n a"]) -> Matrix:
     """Return the rotation matrix of a rotation vector (rad); in space of many."""
     if vector.shape[-1] == 1:
         sine, cosine = sine_cosine(vector[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, wraps
 from math import factorial
 from typing import Any, NamedTuple
 
@@ -50,8 +50,8 @@ def cancelling_sum(terms: Sequence[Term]) -> Callable[[Array], Array]:
             value = Fraction(factor) * (-1) ** k * Fraction(multiple**order, factorial(order))
             series[power + order] = series.get(power + order, Fraction(0)) + value
     first = min(order for order, value in series.items() if value)
-    # The first term left out is below 1e-16 of the sum at one radian; above it the closed forms lose
-    # at most two digits.
+    # The first term left out is below 1e-16 of the sum at one radian; above it the closed forms
+    # lose at most two digits.
     coefficients = [float(series[first + 2 * k]) for k in range(16)]
 
     def evaluate(angle: Array) -> Array:
@@ -133,15 +133,17 @@ class Section(NamedTuple):
     half_angle: Array
 
 
-def of_any_shape(
-    properties: Callable[[Array, Array, Array], Section],
-) -> Callable[[ArrayLike, ArrayLike, ArrayLike], Section]:
-    """Let a formula for arrays of one shape take radii and depth in any form."""
+def of_any_shape(properties: Callable[[Array, Array, Array], Section]) -> Callable[..., Section]:
+    """Let a formula for arrays of one shape take radii and depth in any form, and be cached."""
 
     @cached(1024)  # notches of a tube, and their sites, share sections
-    def section(outer: ArrayLike, inner: ArrayLike, depth: ArrayLike) -> Section:
-        numbers = xp.broadcast_arrays(*map(constant, (outer, inner, depth)))
-        return Section(*map(read_only, properties(*numbers)))
+    def known(*numbers: ArrayLike) -> Section:
+        arrays = xp.broadcast_arrays(*map(constant, numbers))
+        return Section(*map(read_only, properties(*arrays)))
+
+    @wraps(properties)
+    def section(outer_radius: ArrayLike, inner_radius: ArrayLike, depth: ArrayLike) -> Section:
+        return known(outer_radius, inner_radius, depth)
 
     return section
 

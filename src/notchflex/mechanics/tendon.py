@@ -34,12 +34,18 @@ from notchflex.robot.kinds import (
 # business.
 
 
+OfTendons = Float[Array, " t"]
+PerTendon = Float[Array, "*n t"]
+Points = Float[Array, "*n t d"]
+Vectors = Float[Array, "*s d"]
+
+
 class Crossing(NamedTuple):
     """A group of t tendons over one gap (mm, rad)."""
 
-    length: Float[Array, " t"]  # Length of the way across the gap
-    exit_turning: Float[Array, " t"]  # Turning angle at the edge of the body before, >= 0
-    entry_turning: Float[Array, " t"]  # Turning angle at the edge of the distal body, >= 0
+    length: OfTendons  # Length of the way across the gap
+    exit_turning: OfTendons  # Turning angle at the edge of the body before, >= 0
+    entry_turning: OfTendons  # Turning angle at the edge of the distal body, >= 0
     # Moment and force on the distal body per unit of the span's tension, reversed, about and along
     # its frame; its opposite acts on the anchor. None for a group that does not act on bodies
     wrench: Float[Array, "t w"] | None
@@ -56,13 +62,13 @@ class TendonGroup(Pytree, ABC):
     # flexure alone
     acts_on_bodies: ClassVar[bool]
     numbers: tuple[int, ...] = static()  # Which tendons of the robot these are, from 0
-    present: Float[Array, "*n t"]  # 1 where the tendon crosses this gap
-    visits: Float[Array, "*n t"]  # 1 where it passes through (or ends in) the distal body
-    ends: Float[Array, "*n t"]  # 1 where it is fixed in the distal body
+    present: PerTendon  # 1 where the tendon crosses this gap
+    visits: PerTendon  # 1 where it passes through (or ends in) the distal body
+    ends: PerTendon  # 1 where it is fixed in the distal body
     # How many bodies before the distal one its anchor is, 1 where it skips none
     back: Int[Array, "*n t"]
-    body_length: Float[Array, "*n t"]  # Length of tendon inside the distal body
-    natural_gap: Float[Array, "*n t"]  # Length of its way across the gap in the free robot
+    body_length: PerTendon  # Length of tendon inside the distal body
+    natural_gap: PerTendon  # Length of its way across the gap in the free robot
 
     @property
     def by_modes(self) -> bool:
@@ -70,7 +76,7 @@ class TendonGroup(Pytree, ABC):
         return not self.acts_on_bodies
 
     @property
-    def runs(self) -> Float[Array, "*n t"]:
+    def runs(self) -> PerTendon:
         """1 where the tendon has a span that ends at the distal body."""
         return self.visits
 
@@ -86,8 +92,8 @@ class TendonGroup(Pytree, ABC):
 
 
 def guarded_norm(
-    vector: Float[Array, "*s d"],
-    slope: Float[Array, "*s d"] | None = None,
+    vector: Vectors,
+    slope: Vectors | None = None,
     rounding: float = 0.0,
 ) -> Float[Array, "*s"]:
     """Return the length of vectors, with a stated derivative where it is 0."""
@@ -100,7 +106,7 @@ def guarded_norm(
     return jnp.where(squared <= rounding**2, stop(length) + (along - stop(along)), length)
 
 
-def direction(vector: Float[Array, "*s d"]) -> Float[Array, "*s d"]:
+def direction(vector: Vectors) -> Vectors:
     """Return unit vectors; 0 for vectors that are 0."""
     length = guarded_norm(vector)
     return vector / jnp.where(length == 0.0, 1.0, length)[..., None]
@@ -125,9 +131,9 @@ class Straight(TendonGroup):
 
     acts_on_bodies = True
 
-    leaves: Float[Array, "*n t d"]  # Where the tendon leaves its anchor, in the anchor's frame, mm
-    enters: Float[Array, "*n t d"]  # Where it enters the distal body, in that body's frame, mm
-    along: Float[Array, "*n t d"]  # Unit direction of its channels, in the frames of the bodies
+    leaves: Points  # Where the tendon leaves its anchor, in the anchor's frame, mm
+    enters: Points  # Where it enters the distal body, in that body's frame, mm
+    along: Points  # Unit direction of its channels, in the frames of the bodies
     # Along what it pulls: the "gap", or the channel of the body before ("dead") or behind
     # ("follower")
     pulls: str = static()
@@ -162,7 +168,7 @@ class Straight(TendonGroup):
         found = jax.vmap(one)(anchors, self.leaves, self.enters, self.along)
         return Crossing(*found, slope=None)
 
-    def _onward(self, flexure: FlexureState, channel: Float[Array, " d"]) -> Float[Array, " d"]:
+    def _onward(self, flexure: FlexureState, channel: Vectors) -> Vectors:
         """Direction in which the tendon goes on by the chord's turn, in the distal body's frame."""
         pose, turn = flexure.pose, flexure.chord_turn
         assert pose is not None
@@ -171,9 +177,7 @@ class Straight(TendonGroup):
         return (turn @ before) @ pose.rotation
 
 
-def turning(
-    before: Float[Array, " d"], after: Float[Array, " d"], axis: Float[Array, " a"]
-) -> Float[Array, ""]:
+def turning(before: Vectors, after: Vectors, axis: Float[Array, " a"]) -> Float[Array, ""]:
     """Return the angle between two unit directions, exact for small angles."""
     # A straight tendon turns with any rotation, to whichever side; its slope here is that of the
     # rotation that its own pull causes. With it the first step from rest knows the friction. A span
@@ -205,7 +209,7 @@ class WallArc(TendonGroup):
         return self.across
 
     @property
-    def runs(self) -> Float[Array, "*n t"]:
+    def runs(self) -> PerTendon:
         """Over every notch up to its end."""
         return self.present
 
@@ -296,47 +300,52 @@ def passages(
 _PULLS = {"straight": "gap", "straight-dead": "dead", "straight-follower": "follower"}
 
 
-class RoutingContext(NamedTuple):
-    """What tendons are laid through."""
-
-    notches: Sequence[Notch]  # Every notch, base to tip
-    outer_radius: float  # Outer radius of the tube, mm
-    rods: Rod  # All flexures of the chain
-    free: Motion  # Relative poses of all flexures in the free robot
-    # Length of the rigid pieces on the tube axis, base first, mm
-    body_length: Float[Array, " bodies"]
-    turns_with_chord: bool  # Whether tendons turn with the chords of the flexures
-
-
 class RoutedTendons(NamedTuple):
     """Tendons laid through a robot."""
 
     groups: tuple[TendonGroup, ...]  # One group per kind of path in use
     # Where every tendon crosses a section of the tube, mm from its axis
     place: Float[Array, "t 3"]
-    base_length: Float[Array, " t"]  # Length of every tendon inside the base, mm
+    base_length: OfTendons  # Length of every tendon inside the base, mm
 
 
-def route(tendons: Sequence[Tendon], ground: RoutingContext) -> RoutedTendons:
+def route(
+    tendons: Sequence[Tendon],
+    notches: Sequence[Notch],
+    outer_radius: float,
+    rods: Rod,
+    free: Motion,
+    body_length: Float[Array, " bodies"],
+    *,
+    turns_with_chord: bool,
+) -> RoutedTendons:
     """Group the tendons by the way they run and lay them through the chain."""
-    line = passages(
-        ground.notches,
-        ground.body_length,
-        [tendon.direction_deg for tendon in tendons],
-        ground.outer_radius,
-        [tendon.radius for tendon in tendons],
-    )
+    # `free` holds the relative poses of all flexures in the free robot.
+    directions, radii = zip(*((one.direction_deg, one.radius) for one in tendons), strict=True)
+    lines = passages(notches, body_length, directions, outer_radius, radii)
+    place = xp.stack([_on_tube(*pair) for pair in zip(radii, directions, strict=True)])
     groups: list[TendonGroup] = []
     for path in ("wall-arc", *_PULLS):
         numbers = tuple(i for i, tendon in enumerate(tendons) if tendon.path == path)
-        if numbers:
-            chosen = [tendons[i] for i in numbers]
-            some: Any = (values[..., np.array(numbers)] for values in line)
-            own = Passage(*some)
-            masks = _masks(numbers, chosen, own)
-            lay = _wall_arc if path == "wall-arc" else _straight
-            groups.append(lay(masks, chosen, own, ground, path))
-    return RoutedTendons(tuple(groups), _on_tube(tendons), constant(line.base_leaves))
+        if not numbers:
+            continue
+        columns = np.array(numbers)
+        line = Passage(*(values[..., columns] for values in lines))
+        masks = _masks(numbers, [tendons[i] for i in numbers], line)
+        if path == "wall-arc":
+            groups.append(_wall_arc(masks, place[columns], rods))
+        else:
+            groups.append(
+                _straight(
+                    masks,
+                    place[columns],
+                    line,
+                    free,
+                    pulls=_PULLS[path],
+                    turns_with_chord=turns_with_chord,
+                )
+            )
+    return RoutedTendons(tuple(groups), place, constant(lines.base_leaves))
 
 
 def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -> dict[str, Any]:
@@ -365,60 +374,39 @@ def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -
     }
 
 
-def _on_tube(tendons: Sequence[Tendon]) -> Float[Array, "t 3"]:
-    """Where the tendons cross a section of the tube, mm from its axis."""
-    radius = xp.array([tendon.radius for tendon in tendons], float)
-    direction = xp.deg2rad(xp.array([tendon.direction_deg for tendon in tendons], float))
-    return constant(
-        xp.stack([radius * xp.cos(direction), radius * xp.sin(direction), 0.0 * radius], axis=-1)
-    )
+def _on_tube(radius: float, direction_deg: float) -> Array:
+    """Where a tendon crosses a section of the tube, mm from its axis."""
+    direction = xp.deg2rad(direction_deg)
+    return constant(xp.stack([radius * xp.cos(direction), radius * xp.sin(direction), 0.0]))
 
 
-def _wall_arc(
-    masks: dict[str, Any],
-    tendons: Sequence[Tendon],
-    line: Passage,
-    ground: RoutingContext,
-    path: str,
-) -> WallArc:
-    del line, path
-    rods = ground.rods
-    across = (
-        xp.einsum("nab,tb->nta", rods.end_rotation, _on_tube(tendons)) + rods.end_offset[:, None]
-    )[..., :2]
-    return WallArc(
-        **masks,
-        natural_gap=xp.einsum(
-            "ntc,nic,ni->nt", fibre_stretch(across), rods.reference_strain, rods.length
-        ),
-        across=across,
-    )
+def _wall_arc(masks: dict[str, Any], place: Array, rods: Rod) -> WallArc:
+    across = xp.einsum("nab,tb->nta", rods.end_rotation, place) + rods.end_offset[:, None]
+    across = across[..., :2]
+    stretch = fibre_stretch(across)
+    gap = xp.einsum("ntc,nic,ni->nt", stretch, rods.reference_strain, rods.length)
+    return WallArc(**masks, natural_gap=gap, across=across)
 
 
 def _straight(
-    masks: dict[str, Any],
-    tendons: Sequence[Tendon],
-    line: Passage,
-    ground: RoutingContext,
-    path: str,
+    masks: dict[str, Any], place: Array, line: Passage, free: Motion, **options: Any
 ) -> Straight:
     along = xp.array([0.0, 0.0, 1.0])
-    place = xp.asarray(_on_tube(tendons))
     entry = place + line.enters[..., None] * along
     leave = place + line.leaves[..., None] * along
     # Every straight span in the free robot; 0 where a tendon passes by.
-    point, across = place + xp.asarray(line.base_leaves)[:, None] * along, list[Any]()
-    spans = zip(masks["visits"], entry, leave, *ground.free, strict=True)
-    for visits, enters, leaves, rotation, translation in spans:
+    point, across = place + line.base_leaves[:, None] * along, list[Any]()
+    for visits, enters, leaves, rotation, translation in zip(
+        masks["visits"], entry, leave, *free, strict=True
+    ):
         point = (point - translation) @ rotation
         across.append(enters - point)
         point = xp.where(visits[:, None] > 0.0, leaves, point)
     return Straight(
         **masks,
-        natural_gap=constant(masks["visits"] * xp.linalg.norm(xp.stack(across), axis=-1)),
-        leaves=constant(place + line.left[..., None] * along),
-        enters=constant(entry),
+        **options,
+        natural_gap=masks["visits"] * xp.linalg.norm(xp.stack(across), axis=-1),
+        leaves=place + line.left[..., None] * along,
+        enters=entry,
         along=constant(xp.broadcast_to(along, entry.shape)),
-        pulls=_PULLS[path],
-        turns_with_chord=ground.turns_with_chord,
     )

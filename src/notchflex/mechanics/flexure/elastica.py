@@ -113,17 +113,8 @@ def elastica(
     return Elastica(slope, tip_along, tip_across, np.arctan2(tip_across, tip_along))
 
 
-class _Shape(NamedTuple):
-    """Slope of the free end, ω(L), k, k', and the elliptic functions of λ with its amplitude."""
-
-    slope: np.ndarray
-    clamp: np.ndarray
-    modulus: np.ndarray
-    complement: np.ndarray
-    sn: np.ndarray
-    cn: np.ndarray
-    dn: np.ndarray
-    amplitude: np.ndarray
+# Slope of the free end, ω(L), k, k', and the elliptic functions of λ with its amplitude.
+_Shape = tuple[np.ndarray, ...]
 
 
 def _from_end_angle(scaled: np.ndarray, free: np.ndarray) -> _Shape:
@@ -135,7 +126,7 @@ def _from_end_angle(scaled: np.ndarray, free: np.ndarray) -> _Shape:
     # Sums of angles: sin((ω₀ - ω_L)/2) = k k' (1 - cn)/dn, its cosine (k² cn + k'²)/dn.
     vers = np.where(cn > 0.0, sn**2 / (1.0 + np.abs(cn)), 1.0 - cn)
     slope = 2.0 * np.arctan2(modulus * complement * vers, modulus**2 * cn + complement**2)
-    return _Shape(slope, free - slope, modulus, complement, sn, cn, dn, amplitude)
+    return slope, free - slope, modulus, complement, sn, cn, dn, amplitude
 
 
 def _from_clamp_angle(scaled: np.ndarray, clamp: np.ndarray) -> _Shape:
@@ -146,7 +137,7 @@ def _from_clamp_angle(scaled: np.ndarray, clamp: np.ndarray) -> _Shape:
     tangent = _tangent(slope, clamp, rest)
     sn, cn = tangent / np.hypot(1.0, tangent), 1.0 / np.hypot(1.0, tangent)
     dn = np.hypot(cn, complement * sn)
-    return _Shape(slope, clamp, modulus, complement, sn, cn, dn, np.arctan(tangent))
+    return slope, clamp, modulus, complement, sn, cn, dn, np.arctan(tangent)
 
 
 def _tangent(slope: np.ndarray, clamp: np.ndarray, rest: np.ndarray) -> np.ndarray:

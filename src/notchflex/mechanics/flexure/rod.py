@@ -34,6 +34,9 @@ from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FibresAt
 from notchflex.robot import Tube
 
+Modes = Float[Array, " modes"]
+"""Amplitude of each strain mode."""
+
 
 class Rod(Pytree):
     """One flexure, or with a leading axis all flexures of a chain. Units mm, rad.

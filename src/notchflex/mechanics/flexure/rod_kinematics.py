@@ -22,7 +22,7 @@ from notchflex._jax import (
     jax,
     jnp,
 )
-from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod import Modes, Rod
 from notchflex.mechanics.motion import (
     Motion,
     cross,
@@ -53,7 +53,7 @@ class RodConfiguration(NamedTuple):
         return Motion(self.rotation[-1], self.step.sum(axis=0))
 
 
-def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
+def integrate_rod(rod: Rod, modes: Modes) -> RodConfiguration:
     """Integrate the rotations and steps of a rod for given modes."""
     hat = xp.concatenate([xp.ones(1), modes])
     from_place = None
@@ -102,7 +102,7 @@ def _by_pair(rod: Rod, hat: Float[Array, " hat"]) -> Float[Array, "places 3 hat"
     return xp.einsum("kcab,b->kca", rod.turn_pair, hat)
 
 
-def rotation_error_estimate(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, ""]:
+def rotation_error_estimate(rod: Rod, modes: Modes) -> Float[Array, ""]:
     """Estimate the error of the rotation of a rod's end, rad; 0 in the plane."""
     # The Magnus series is truncated after its second term. The next term is of the size of the
     # rotations from place to place times their second terms; a twentieth of the sum of these was
@@ -125,7 +125,7 @@ def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places
     return xp.concatenate([xp.eye(3)[None], values[:-1]])
 
 
-def _small_motion(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
+def _small_motion(rod: Rod, modes: Modes) -> Motion:
     """Compute the end motion of small deflection: displacements proportional to the strains."""
     hat = xp.concatenate([xp.ones(1), modes])
     turn, moved = rod.turn[-1] @ hat, rod.step.sum(axis=0) @ hat
@@ -133,7 +133,7 @@ def _small_motion(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
     return Motion(rotation, end + cross(turn, end) + moved - rotation @ end)
 
 
-def _end_motion(rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration) -> Motion:
+def _end_motion(rod: Rod, modes: Modes, state: RodConfiguration) -> Motion:
     """Compute the motion from the end of the reference curve to that of the rod."""
     if rod.linear_kinematics is None:
         return state.end
@@ -142,7 +142,7 @@ def _end_motion(rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration
     return Motion(*(xp.where(is_small, small, large) for small, large in pairs))
 
 
-def rod_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
+def rod_end(rod: Rod, modes: Modes) -> Motion:
     """Return the pose of the rod's last section in the frame of its first."""
     return _end_motion(rod, modes, integrate_rod(rod, modes)).then(
         Motion(rod.curve_rotation, rod.curve_offset)
@@ -156,17 +156,13 @@ def tail_pose(rod: Rod) -> Motion:
     )
 
 
-def relative_pose(
-    rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration | None = None
-) -> Motion:
+def relative_pose(rod: Rod, modes: Modes, state: RodConfiguration | None = None) -> Motion:
     """Return the pose of the distal body in the proximal frame."""
     end_motion = _end_motion(rod, modes, integrate_rod(rod, modes) if state is None else state)
     return Motion(rod.start_rotation, rod.start_offset).then(end_motion).then(tail_pose(rod))
 
 
-def twist_slope(
-    rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration
-) -> Float[Array, "w modes"]:
+def twist_slope(rod: Rod, modes: Modes, state: RodConfiguration) -> Float[Array, "w modes"]:
     """Return the twist (angular, linear) of the distal body, in its own frame, per unit of mode."""
     end = state.rotation[-1]
     turn = state.turn[-1] if len(end) == 2 else end.T @ state.turn[-1]
@@ -181,7 +177,7 @@ def end_displacement(state: RodConfiguration) -> Float[Array, "d modes"]:
     return jnp.sum(state.stepped + jax.vmap(cross)(state.turn[:-1], state.step[..., None]), axis=0)
 
 
-def small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w modes"]:
+def small_twist(rod: Rod, modes: Modes) -> Float[Array, "w modes"]:
     """Return the twist of the end in its frame, per unit of mode, of a small deflection."""
     motion = _small_motion(rod, modes)
     slope: Motion = jax.jacfwd(lambda varied: _small_motion(rod, varied))(modes)
@@ -190,9 +186,7 @@ def small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w mode
     return jnp.concatenate([turn, motion.rotation.T @ slope.translation])
 
 
-def node_poses(
-    rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration | None = None
-) -> Motion:
+def node_poses(rod: Rod, modes: Modes, state: RodConfiguration | None = None) -> Motion:
     """Return the poses of the sections at the nodes of the strains, in the proximal frame."""
     # Between the nodes of the rotation the Magnus terms are omitted, and polynomials interpolate
     # the steps: accurate enough for error estimates, not for the solution.
@@ -215,7 +209,7 @@ def node_poses(
 
 
 def geometric_stiffness(
-    rod: Rod, modes: Float[Array, " modes"], state: RodConfiguration, wrench: Float[Array, " w"]
+    rod: Rod, modes: Modes, state: RodConfiguration, wrench: Float[Array, " w"]
 ) -> Float[Array, "modes modes"]:
     """Compute the change of the generalised forces of a wrench with the modes."""
     # It is the derivative of twist_slope^T wrench for a wrench that moves with the body; rows are

@@ -12,7 +12,7 @@ from notchflex._jax import (
     jax,
     jnp,
 )
-from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod import Modes, Rod
 from notchflex.mechanics.flexure.rod_kinematics import (
     RodConfiguration,
     integrate_rod,
@@ -40,7 +40,7 @@ class FlexureState(Pytree):
     # (`SectionResponse.slope`)
     slope: Float[Array, " nodes"] | None
     # Generalised internal force of each mode, N mm per unit of mode
-    internal: Float[Array, " modes"]
+    internal: Modes
     # Bending of the whole rod about x and y of its frame, of a plane about y, rad
     bend: Float[Array, " axes"]
     # Rotation, in the proximal body's frame, by which the chord from the rod's start to its end has
@@ -78,7 +78,7 @@ def flexure_state(
     rod: Rod,
     law: SectionLaw,
     memory: Any,
-    modes: Float[Array, " modes"],
+    modes: Modes,
     response: SectionResponse | None = None,
     *,
     with_pose: bool,
@@ -140,7 +140,7 @@ def material_tangent(
     return jnp.einsum("icm,ick->mk", weighted, slopes) + jnp.diag(rod.padding_mask)
 
 
-def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "d d"], Float[Array, ""]]:
+def chord(rod: Rod, modes: Modes) -> tuple[Float[Array, "d d"], Float[Array, ""]]:
     """Compute the rotation of the chord of a rod in its plane of bending (Liu 2022, eq. 19)."""
     # The chord is the straight line from the rod's start to its end; for a strip this is the angle
     # that the paper calls bending angle, about two thirds of the slope at the end.

@@ -29,8 +29,10 @@ from notchflex.mechanics.material.law import (
     Bending,
     Fibres,
     FibreSection,
+    Scalar,
     SectionLaw,
     SectionResponse,
+    Strain,
     section_law,
 )
 from notchflex.robot import Nitinol, StressStrain
@@ -222,13 +224,11 @@ class FibreLaw(SectionLaw):
         assert section.fibres is not None
         return constant(xp.zeros(xp.shape(section.fibres.arm))) if self.remembers else ()
 
-    def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
+    def moment(self, curvature: Scalar, section: FibreSection) -> Scalar:
         """Return the moment halfway between loading and unloading."""
         return self.bent(curvature, dataclasses.replace(section, ends=None), ()).moment
 
-    def respond_all(
-        self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
-    ) -> SectionResponse:
+    def respond_all(self, strain: Strain, section: FibreSection, memory: Any) -> SectionResponse:
         """Compute all sections at once: tracing them one by one takes three times as long."""
         return self.respond(strain, section, memory)
 
@@ -316,9 +316,7 @@ class FibreLaw(SectionLaw):
         """Return the mean curve of loading and unloading."""
         return _Curve(jnp.mean(self.low, axis=0), jnp.mean(self.high, axis=0), self.change)
 
-    def bending_energy(
-        self, curvature: Float[Array, ""], section: FibreSection, memory: Any
-    ) -> Float[Array, ""]:
+    def bending_energy(self, curvature: Scalar, section: FibreSection, memory: Any) -> Scalar:
         """Return the energy of fibres; with hysteresis that of the mean curve, plus elastic."""
         fibres, plain = section.fibres, dataclasses.replace(section, ends=None)
         assert fibres is not None

@@ -4,14 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from jaxtyping import Array, Float
-
 from notchflex._jax import constant
-from notchflex.mechanics.material.law import (
-    FibreSection,
-    SectionLaw,
-    section_law,
-)
+from notchflex.mechanics.material.law import FibreSection, Scalar, SectionLaw, section_law
 from notchflex.robot import Linear
 
 
@@ -20,13 +14,11 @@ class LinearLaw(SectionLaw):
 
     is_linear = True
 
-    def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
+    def moment(self, curvature: Scalar, section: FibreSection) -> Scalar:
         """Return the moment in proportion to the curvature."""
         return self.elastic_modulus * section.second_moment_weak * curvature
 
-    def bending_energy(
-        self, curvature: Float[Array, ""], section: FibreSection, memory: Any
-    ) -> Float[Array, ""]:
+    def bending_energy(self, curvature: Scalar, section: FibreSection, memory: Any) -> Scalar:
         """Return half the product of moment and curvature."""
         del memory
         return 0.5 * curvature * self.moment(curvature, section)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from notchflex._jax import (
     constant,
@@ -20,6 +20,7 @@ from notchflex.mechanics.material.law import (
     NODES,
     WEIGHTS,
     FibreSection,
+    Scalar,
     SectionLaw,
     section_law,
 )
@@ -33,19 +34,19 @@ class SuperelasticLaw(SectionLaw):
     # Weak-axis bending follows the curve; everything else (sideways bending, torsion, shear,
     # stretch) stays on the linear branch, of which the paper says nothing.
 
-    superelastic_modulus: Float[Array, ""]
-    transition_strain: Float[Array, ""]
-    plastic_strain: Float[Array, ""]
-    plastic_modulus: Float[Array, ""]
-    plastic_exponent: Float[Array, ""]
+    superelastic_modulus: Scalar
+    transition_strain: Scalar
+    plastic_strain: Scalar
+    plastic_modulus: Scalar
+    plastic_exponent: Scalar
 
-    def _branches(self, strain: Float[Array, ""]) -> tuple[Array, Array, Array]:
+    def _branches(self, strain: Scalar) -> tuple[Array, Array, Array]:
         """Split a strain into its parts on the three branches, each with the strain's sign."""
         linear = jnp.clip(strain, -self.transition_strain, self.transition_strain)
         before_plastic = jnp.clip(strain, -self.plastic_strain, self.plastic_strain)
         return linear, before_plastic - linear, strain - before_plastic
 
-    def stress(self, strain: Float[Array, ""]) -> Float[Array, ""]:
+    def stress(self, strain: Scalar) -> Scalar:
         """Return the stress of a fibre (MPa), Pacheco 2021 eq. 13, odd in strain."""
         linear, superelastic, plastic = self._branches(strain)
         # exp(b/x) with b < 0 vanishes with all its derivatives at x = 0
@@ -57,7 +58,7 @@ class SuperelasticLaw(SectionLaw):
             + self.plastic_modulus * hardening
         )
 
-    def energy_density(self, strain: Float[Array, ""]) -> Float[Array, ""]:
+    def energy_density(self, strain: Scalar) -> Scalar:
         """Return the area under the curve of `stress` up to a strain, N mm/mm^3."""
         linear, superelastic, plastic = (jnp.abs(part) for part in self._branches(strain))
         at_transition = self.elastic_modulus * linear
@@ -73,14 +74,12 @@ class SuperelasticLaw(SectionLaw):
             + jnp.where(plastic == 0.0, 0.0, self.plastic_modulus * hardening)
         )
 
-    def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
+    def moment(self, curvature: Scalar, section: FibreSection) -> Scalar:
         """Return the moment taken from the outer fibre on the spine."""
         stress = self.stress(curvature * section.edge_spine)
         return section.second_moment_weak / section.edge_spine * stress
 
-    def bending_energy(
-        self, curvature: Float[Array, ""], section: FibreSection, memory: Any
-    ) -> Float[Array, ""]:
+    def bending_energy(self, curvature: Scalar, section: FibreSection, memory: Any) -> Scalar:
         """Return the area under the moment over the curvature."""
         del memory
         density = self.energy_density(curvature * section.edge_spine)
