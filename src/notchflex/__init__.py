@@ -60,7 +60,7 @@ _HOME = {
             "elastica",
             "modulus_from_single_notch",
         ),
-        "notchflex.mechanics.flexure",
+        "notchflex.mechanics.flexure.elastica",
     ),
     **dict.fromkeys(
         (

@@ -81,9 +81,11 @@ from notchflex.loads import pull as pull
 from notchflex.loads import stroke_path as stroke_path
 from notchflex.mechanics.cuts import annular_sector as annular_sector
 from notchflex.mechanics.cuts import annular_segment as annular_segment
-from notchflex.mechanics.flexure import Elastica as Elastica
-from notchflex.mechanics.flexure import elastica as elastica
-from notchflex.mechanics.flexure import modulus_from_single_notch as modulus_from_single_notch
+from notchflex.mechanics.flexure.elastica import Elastica as Elastica
+from notchflex.mechanics.flexure.elastica import elastica as elastica
+from notchflex.mechanics.flexure.elastica import (
+    modulus_from_single_notch as modulus_from_single_notch,
+)
 from notchflex.mechanics.section import Section as Section
 from notchflex.photographs import Board as Board
 from notchflex.photographs import MeasuredCut as MeasuredCut

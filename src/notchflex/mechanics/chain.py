@@ -424,8 +424,8 @@ def assemble(
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
         free_length=routed.base_length + constant([tendon.free_length for tendon in tendons]),
         body_length=body_length,
-        body_mass=constant(body_mass),
-        body_centre=constant(body_centre),
+        body_mass=body_mass,
+        body_centre=body_centre,
         frame=None,
         notch_frame=template.notch_frame,
         tendon_entry=routed.place,
@@ -460,10 +460,10 @@ def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
     contact_stiffness = 1.0 / xp.sum(template.contact_motion / stiffness, axis=-1)
     return {
         "law": law,
-        "stiffness": constant(stiffness),
-        "elastic": constant(elastic) if linear else None,
-        "contact_stiffness": constant(contact_stiffness),
-        "contact_flexibility": None if stop is None else constant(stop / contact_stiffness),
+        "stiffness": stiffness,
+        "elastic": elastic if linear else None,
+        "contact_stiffness": contact_stiffness,
+        "contact_flexibility": None if stop is None else stop / contact_stiffness,
         "closing_force": constant(xp.mean(contact_stiffness * template.height)),
         "stroke_stiffness": constant(xp.mean(contact_stiffness) / len(contact_stiffness)),
     }
@@ -520,7 +520,7 @@ def _build_template(
     order = {key: index for index, key in enumerate(sited)}
     rod_index = xp.array([order[id(notch), id(site)] for notch, site in pairs])
     rods = jax.tree.map(lambda leaf: leaf[rod_index], distinct_rods)
-    body_length = constant(body_lengths(tube, notches))
+    body_length = body_lengths(tube, notches)
     lead = body_length[:-1, None] * _UP
     rods = replace(rods, start_offset=rods.start_offset + lead)
     free = jax.tree.map(lambda *leaves: xp.stack(leaves)[rod_index], *free_poses)
@@ -542,7 +542,7 @@ def _build_template(
         ),
         build_contacts(notches, tube, rods, body_length),
         body_length,
-        constant(xp.stack([turns[notch.direction_deg] for notch in notches])),
+        xp.stack([turns[notch.direction_deg] for notch in notches]),
         xp.sum(rods.length, axis=-1),
         _squared_contact_motion(rods, tube.outer_radius),
         factor,
@@ -567,7 +567,7 @@ def _flat(chain: Chain, frame: Float[Array, "3 3"]) -> Chain:
         rods=flattened(chain.rods, frame),
         groups=tuple(map(planar, chain.groups)),
         contact_pairs=tuple(map(planar, chain.contact_pairs)),
-        frame=constant(frame),
+        frame=frame,
     )
 
 

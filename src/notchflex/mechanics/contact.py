@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from notchflex._arrays import decide, xp
-from notchflex._jax import Pytree, constant, jax
+from notchflex._jax import Pytree, jax
 from notchflex.mechanics.flexure import (
     FlexureState,
     Rod,
@@ -79,12 +79,12 @@ class EdgeContact(ContactGroup):
         del rod, flexure
         assert anchors is not None  # acts_on_bodies asks for it
 
-        def one(anchor: Motion, leaves: Array, enters: Array, normal: Array) -> tuple[Array, Array]:
+        def press(anchor: Motion, leaves: Array, enters: Array, normal: Array) -> Any:
             along = normal @ anchor.rotation
             gap = (enters - anchor.point_inside(leaves)) @ along
             return gap, wrench_at(enters, along)
 
-        gap, wrench = jax.vmap(one)(anchors, self.leaves, self.enters, self.normal)
+        gap, wrench = jax.vmap(press)(anchors, self.leaves, self.enters, self.normal)
         return GapResponse(gap, wrench, slope=None)
 
 
@@ -114,7 +114,7 @@ def closing_angles(rods: Rod) -> Float[Array, " n"]:
     """Compute the elastic angle at which every notch closes, rad; infinite without a spine."""
     # It is the amplitude of the first mode at which the fibre between the edges has zero length:
     # for an arc h / (r_o + ybar) less the precurvature.
-    weights = of_rod(rods, fibre_stretch(constant(rods.closure)))
+    weights = of_rod(rods, fibre_stretch(xp.asarray(rods.closure)))
     free = xp.einsum("nc,nic,ni->n", weights, rods.reference_strain, rods.length)
     slope = xp.einsum("nc,nic,ni->n", weights, xp.asarray(rods.basis)[..., 0], rods.length)
     spine = xp.asarray(rods.has_closure) > 0.0
@@ -137,7 +137,7 @@ def build_contacts(
     groups: list[ContactGroup] = []
     if decide(xp.any(rods.has_closure)):
         has_contact = rods.has_closure[:, None]
-        groups.append(SpineContact(has_contact, cast("Array", xp.ones(has_contact.shape, int))))
+        groups.append(SpineContact(has_contact, xp.ones(has_contact.shape, int)))
     sides = _sides(notches)
     if sides:
         line = passages(notches, body_length, sides)
@@ -148,18 +148,18 @@ def build_contacts(
         count = int(line.on_side.sum(axis=1).max(initial=1.0))
         chosen = xp.argsort(-line.on_side, axis=1, kind="stable")[:, :count]
 
-        def own(values: Array) -> Array:
+        def closing(values: Array) -> Any:
             index = chosen.reshape(*chosen.shape, *(1,) * (values.ndim - 2))
             return xp.take_along_axis(values, index, axis=1)
 
-        has_contact = own(line.on_side)
+        has_contact = closing(line.on_side)
         groups.append(
             EdgeContact(
-                has_contact=constant(has_contact),
-                back=cast("Array", xp.where(has_contact > 0.0, own(line.back), 1)),
-                leaves=constant(own(across + line.left[..., None] * along)),
-                enters=constant(own(across + line.enters[..., None] * along)),
-                normal=constant(xp.broadcast_to(along, (*has_contact.shape, 3))),
+                has_contact=has_contact,
+                back=xp.where(has_contact > 0.0, closing(line.back), 1),
+                leaves=closing(across + line.left[..., None] * along),
+                enters=closing(across + line.enters[..., None] * along),
+                normal=xp.broadcast_to(along, (*has_contact.shape, 3)),
             )
         )
     return tuple(groups)

@@ -53,6 +53,10 @@ class Motion(NamedTuple):
             _times(self.rotation, inner.translation) + self.translation,
         )
 
+    def pick(self, index: Any) -> Motion:
+        """Select one of many motions, or some."""
+        return Motion(self.rotation[index], self.translation[index])
+
     def point(self, inside: Vector) -> Vector:
         """Transform a point of the inner frame to outer coordinates (mm)."""
         return _times(self.rotation, inside) + self.translation
@@ -218,10 +222,10 @@ def outer_twists(motion: Motion, twists: Float[Array, "*n 6 k"]) -> Float[Array,
 
 
 def rotation_about(vector: Float[Array, "*n a"]) -> Matrix:
-    """Return the rotation matrix of a rotation vector (rad); in space of many."""
+    """Return the rotation matrix of a rotation vector (rad), or of many."""
     if vector.shape[-1] == 1:
-        sine, cosine = sine_cosine(vector[0])
-        return xp.stack([cosine, sine, -sine, cosine]).reshape(2, 2)
+        sine, cosine = sine_cosine(vector[..., 0])
+        return xp.stack([cosine, sine, -sine, cosine], -1).reshape(*vector.shape[:-1], 2, 2)
     first, second, _ = _coefficients(_squared(vector))
     matrix = skew(vector)
     return constant(xp.eye(3)) + _each(first) * matrix + _each(second) * (matrix @ matrix)

@@ -122,9 +122,6 @@ def direction(vector: Vectors) -> Vectors:
 # the proximal or the distal body, on the same point, while the way and its turning stay as they
 # are. That is a reading of a paper; it is not a tendon whose work is tension times length.
 
-# Products of unit vectors that are parallel are off 0 by less.
-_ROUNDING = 1e-15
-
 
 class Straight(TendonGroup):
     """Tendons straight across the gaps."""
@@ -151,10 +148,10 @@ class Straight(TendonGroup):
         assert anchors is not None  # acts_on_bodies asks for it
         chord = rod.chord if self.turns_with_chord else None
 
-        def one(anchor: Motion, leaves: Array, enters: Array, channel: Array) -> tuple[Array, ...]:
-            span = enters - anchor.point_inside(leaves)
-            length = guarded_norm(span)
-            gap = span / jnp.where(length == 0.0, 1.0, length)
+        def span(anchor: Motion, leaves: Array, enters: Array, channel: Array) -> Any:
+            reach = enters - anchor.point_inside(leaves)
+            length = guarded_norm(reach)
+            gap = reach / jnp.where(length == 0.0, 1.0, length)
             before = channel @ anchor.rotation
             onward = channel
             if chord is not None:
@@ -165,8 +162,8 @@ class Straight(TendonGroup):
             turns = turning(before, gap, axis), turning(gap, onward, axis)
             return length, *turns, wrench_at(enters, pulled)
 
-        found = jax.vmap(one)(anchors, self.leaves, self.enters, self.along)
-        return Crossing(*found, slope=None)
+        spans = jax.vmap(span)(anchors, self.leaves, self.enters, self.along)
+        return Crossing(*spans, slope=None)
 
     def _onward(self, flexure: FlexureState, channel: Vectors) -> Vectors:
         """Direction in which the tendon goes on by the chord's turn, in the distal body's frame."""
@@ -184,7 +181,8 @@ def turning(before: Vectors, after: Vectors, axis: Float[Array, " a"]) -> Float[
     # without length has no direction (its vector is 0) and turns nothing, with slope 0.
     across, cosine = moment_of(before, after), jnp.sum(before * after)
     nowhere = jnp.all(across == 0.0) & (cosine == 0.0)
-    sine = guarded_norm(across, jnp.where(nowhere, 0.0, axis), _ROUNDING)
+    # Products of unit vectors that are parallel are off 0 by less than 1e-15.
+    sine = guarded_norm(across, jnp.where(nowhere, 0.0, axis), 1e-15)
     return jnp.atan2(sine, jnp.where(nowhere, 1.0, cosine))
 
 
@@ -321,7 +319,7 @@ def route(
 ) -> RoutedTendons:
     """Group the tendons by the way they run and lay them through the chain."""
     # `free` holds the relative poses of all flexures in the free robot.
-    directions, radii = zip(*((one.direction_deg, one.radius) for one in tendons), strict=True)
+    directions, radii = zip(*((each.direction_deg, each.radius) for each in tendons), strict=True)
     lines = passages(notches, body_length, directions, outer_radius, radii)
     place = xp.stack([_on_tube(*pair) for pair in zip(radii, directions, strict=True)])
     groups: list[TendonGroup] = []
@@ -345,7 +343,7 @@ def route(
                     turns_with_chord=turns_with_chord,
                 )
             )
-    return RoutedTendons(tuple(groups), place, constant(lines.base_leaves))
+    return RoutedTendons(tuple(groups), place, lines.base_leaves)
 
 
 def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -> dict[str, Any]:
@@ -377,7 +375,7 @@ def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -
 def _on_tube(radius: float, direction_deg: float) -> Array:
     """Where a tendon crosses a section of the tube, mm from its axis."""
     direction = xp.deg2rad(direction_deg)
-    return constant(xp.stack([radius * xp.cos(direction), radius * xp.sin(direction), 0.0]))
+    return xp.stack([radius * xp.cos(direction), radius * xp.sin(direction), 0.0])
 
 
 def _wall_arc(masks: dict[str, Any], place: Array, rods: Rod) -> WallArc:
@@ -408,5 +406,5 @@ def _straight(
         natural_gap=masks["visits"] * xp.linalg.norm(xp.stack(across), axis=-1),
         leaves=place + line.left[..., None] * along,
         enters=entry,
-        along=constant(xp.broadcast_to(along, entry.shape)),
+        along=xp.broadcast_to(along, entry.shape),
     )

@@ -1,7 +1,6 @@
 """Flexures: one notch becomes a short rod with a few strain modes."""
 
 from notchflex._packages import import_all
-from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
 from notchflex.mechanics.flexure.rod import (
     LEVELS,
     MAX_REFINEMENT,
@@ -19,7 +18,6 @@ from notchflex.mechanics.flexure.rod_kinematics import (
     free_pose,
     geometric_stiffness,
     relative_pose,
-    rod_end,
     rotation_error_estimate,
 )
 from notchflex.mechanics.flexure.state import (
@@ -37,11 +35,9 @@ import_all(__name__, __path__)
 __all__ = [
     "LEVELS",
     "MAX_REFINEMENT",
-    "Elastica",
     "FlexureState",
     "Rod",
     "Site",
-    "elastica",
     "fibre_slope",
     "fibre_stretch",
     "flattened",
@@ -50,12 +46,10 @@ __all__ = [
     "geometric_stiffness",
     "in_space",
     "material_tangent",
-    "modulus_from_single_notch",
     "of_rod",
     "relative_pose",
     "rod",
     "rod_at",
-    "rod_end",
     "rotation_error_estimate",
     "section_fibres",
     "stack",

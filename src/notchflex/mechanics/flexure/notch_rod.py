@@ -155,10 +155,10 @@ class RodQuadrature:
     ) -> dict[str, Any]:
         """Return the fields of a rod for its strains and its pose."""
         free = xp.zeros(basis.shape[:2]) if reference is None else reference
-        twists = constant(xp.concatenate([free[..., None], basis], axis=-1))
+        twists = xp.concatenate([free[..., None], basis], axis=-1)
         if curve is None:
             count = len(twists)
-            curve = Motion(constant([xp.eye(3)] * count), constant(xp.zeros((count, 3))))
+            curve = Motion(xp.stack([xp.eye(3)] * count), xp.zeros((count, 3)))
         else:
             twists = outer_twists(curve, twists)
         counts = [len(part[0]) for part in (self.at_nodes, self.at_poses, self.between)]
@@ -168,16 +168,16 @@ class RodQuadrature:
         unit = self.unit
         stop = np.searchsorted(unit._stops, unit.at_nodes[0]) - 1
         return {
-            "length": constant(self.at_nodes[1]),
-            "basis": constant(basis[at_node]),
-            "turn": constant(xp.cumsum(turns, axis=0)),
-            "turn_pair": constant(_pairs(between[:, :3], self.between[1])),
-            "step": constant(self.at_poses[1][:, None, None] * steps[:, 3:]),
-            "node_turn": constant(xp.cumsum(_grouped(before[:, :3], self.before[1]), axis=0)[stop]),
+            "length": self.at_nodes[1],
+            "basis": basis[at_node],
+            "turn": xp.cumsum(turns, axis=0),
+            "turn_pair": _pairs(between[:, :3], self.between[1]),
+            "step": self.at_poses[1][:, None, None] * steps[:, 3:],
+            "node_turn": xp.cumsum(_grouped(before[:, :3], self.before[1]), axis=0)[stop],
             "node_index": np.searchsorted(unit.at_poses[0], unit.at_nodes[0], side="right"),
-            "node_reach": constant(unit._reach),
-            "node_rotation": constant(curve.rotation[at_node]),
-            "node_offset": constant(curve.translation[at_node]),
+            "node_reach": unit._reach,
+            "node_rotation": curve.rotation[at_node],
+            "node_offset": curve.translation[at_node],
         }
 
     @cached_property
@@ -348,7 +348,7 @@ def build_rod(
     turned = xp.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     curve, curve_end, reference = None, shifted(), strain
     if axis.curve is not None:
-        curve, curve_end = (Motion(*(part[k] for part in axis.curve)) for k in (slice(-1), -1))
+        curve, curve_end = axis.curve.pick(slice(-1)), axis.curve.pick(-1)
         reference = None
 
     def at_nodes(values: Array, axes: int = 0) -> Array:
@@ -357,14 +357,14 @@ def build_rod(
         return xp.broadcast_to(values, (nodes, *values.shape)) if is_uniform else values[:nodes]
 
     return Rod(
-        start_rotation=constant(turned @ axis.start.rotation),
-        start_offset=constant(turned @ axis.start.translation),
-        curve_rotation=constant(curve_end.rotation),
-        curve_offset=constant(curve_end.translation),
-        end_rotation=constant(axis.end.rotation @ turned.T),
-        end_offset=constant(axis.end.translation),
+        start_rotation=turned @ axis.start.rotation,
+        start_offset=turned @ axis.start.translation,
+        curve_rotation=curve_end.rotation,
+        curve_offset=curve_end.translation,
+        end_rotation=axis.end.rotation @ turned.T,
+        end_offset=axis.end.translation,
         **points.fields(curve, modes.basis, reference),
-        reference_strain=constant(strain[:nodes]),
+        reference_strain=strain[:nodes],
         section=dataclasses.replace(
             jax.tree.map(at_nodes, dataclasses.replace(section, fibres=None)),
             fibres=jax.tree.map(partial(at_nodes, axes=1), section.fibres),
@@ -374,7 +374,7 @@ def build_rod(
         stop_flexibility=constant(stop_flexibility),
         linear_kinematics=constant(float(linear_kinematics)),
         chord=constant(float(has_chord)),
-        padding_mask=constant(xp.zeros(modes.basis.shape[-1])),
+        padding_mask=xp.zeros(modes.basis.shape[-1]),
         levels=modes.levels,
     )
 
@@ -413,7 +413,7 @@ def course_rod(
 ) -> Rod:
     """Build the rod of a strip from wall to wall; the distal frame is `distal` mm up the tube."""
     # The poses are those at all points, at the start and at the end.
-    along, start, end = (Motion(*(part[k] for part in poses)) for k in (slice(-2), -2, -1))
+    along, start, end = map(poses.pick, (slice(-2), -2, -1))
     basis = wrench_modes(points, along, section, middle, *mode_counts, poisson_ratio)
     to_end = Motion(*(xp.concatenate([part[:-2], part[-1:]]) for part in poses))
     curve, body = between(start, to_end), between(end, shifted(z=distal))

@@ -30,7 +30,6 @@ from notchflex.mechanics.motion import (
     left_slope_change,
     moment_of,
     rotation_about,
-    sine_cosine,
     unskew,
 )
 
@@ -58,7 +57,7 @@ def integrate_rod(rod: Rod, modes: Modes) -> RodConfiguration:
     hat = xp.concatenate([xp.ones(1), modes])
     from_place = None
     if rod.turn_pair is None:
-        rotation, turn = _in_plane(rod.turn[:, 0] @ hat), rod.turn[..., 1:]
+        rotation, turn = rotation_about(rod.turn @ hat), rod.turn[..., 1:]
     else:
         turns, slope = _turns(rod, hat)
         rotation = _products(rotation_about(turns))
@@ -81,11 +80,6 @@ def free_pose(rod: Rod) -> Motion:
 def _stepped(rod: Rod, rotation: Float[Array, "places d d"]) -> Float[Array, "gauss d hat"]:
     """Rotate the steps at the nodes, for (1, q)."""
     return (rotation[:-1, ..., None] * rod.step[:, None]).sum(axis=-2)
-
-
-def _in_plane(angle: Float[Array, " places"]) -> Float[Array, "places 2 2"]:
-    sine, cosine = sine_cosine(angle)
-    return xp.stack([xp.stack([cosine, sine], -1), xp.stack([-sine, cosine], -1)], -2)
 
 
 def _turns(

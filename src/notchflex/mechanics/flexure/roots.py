@@ -43,13 +43,15 @@ from notchflex.mechanics.flexure.notch_rod import (
     course_poses,
     course_rod,
 )
-from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod import Rod, section_fibres
 from notchflex.mechanics.material import FibreSection, NotchEnds
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import (
+    FibresAt,
     clamped_torsion_constant,
     rectangle_torsion_constant,
     two_walls,
+    two_walls_fibres,
 )
 from notchflex.robot import StripNotch, Tube, ULink
 
@@ -267,12 +269,17 @@ def rooted_strip_rod(
     poses = course_poses(along, above, heading, middle, strip.hand)
     on_wall = above[:-2] != 0.0
     section = strip_sections(strip, tube, along[:-2], on_wall, length, poisson_ratio)
-    inner = Motion(*(part[:-2] for part in poses))
-    plane = plane_compliance(inner, points.weight, section, middle, poisson_ratio)
+    plane = plane_compliance(poses.pick(slice(-2)), points.weight, section, middle, poisson_ratio)
     turned = turned_compliance(strip, tube, plane, poisson_ratio)
     section = with_sideways(section, points.weight, on_wall, turned, poisson_ratio)
     modes = 3 + 3 * refinement, 1 + 2 * refinement
     return course_rod(points, poses, section, middle, modes, distal, poisson_ratio, **options)
+
+
+@section_fibres.register
+def _(notch: StripNotch | ULink, tube: Tube) -> FibresAt:
+    del notch, tube
+    return two_walls_fibres
 
 
 STRIP_UNCHECKED = "the stiffness of the strip was not checked"

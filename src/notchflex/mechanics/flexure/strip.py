@@ -22,7 +22,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     build_rod,
     legendre_modes,
 )
-from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres, validity_warnings
+from notchflex.mechanics.flexure.rod import Rod, Site, rod, validity_warnings
 from notchflex.mechanics.flexure.roots import (
     STRIP_UNCHECKED,
     rooted_strip_rod,
@@ -31,10 +31,8 @@ from notchflex.mechanics.flexure.roots import (
 )
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import (
-    FibresAt,
     clamped_torsion_constant,
     two_walls,
-    two_walls_fibres,
 )
 from notchflex.robot import StripNotch, Tube
 
@@ -88,12 +86,6 @@ def strip_rod(
         linear_kinematics=notch.deflection == "small",
         has_chord=True,
     )
-
-
-@section_fibres.register
-def _(notch: StripNotch, tube: Tube) -> FibresAt:
-    del notch, tube
-    return two_walls_fibres
 
 
 @validity_warnings.register

@@ -32,7 +32,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     course_rod,
     rod_quadrature,
 )
-from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres, validity_warnings
+from notchflex.mechanics.flexure.rod import Rod, Site, rod, validity_warnings
 from notchflex.mechanics.flexure.roots import (
     STRIP_UNCHECKED,
     rooted_strip_rod,
@@ -40,11 +40,9 @@ from notchflex.mechanics.flexure.roots import (
     wall_ranges,
 )
 from notchflex.mechanics.section import (
-    FibresAt,
     clamped_torsion_constant,
     leggauss,
     two_walls,
-    two_walls_fibres,
 )
 from notchflex.robot import Tube, ULink
 
@@ -231,12 +229,6 @@ def u_link_rod(
     poses = course_poses(course.along, course.above, course.heading, middle, hand)
     options: dict[str, Any] = {"free": free, "direction_deg": notch.direction_deg}
     return course_rod(points, poses, section, middle, modes, distal, poisson_ratio, **options)
-
-
-@section_fibres.register
-def _(notch: ULink, tube: Tube) -> FibresAt:
-    del notch, tube
-    return two_walls_fibres
 
 
 @validity_warnings.register

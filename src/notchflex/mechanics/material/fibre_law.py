@@ -33,6 +33,7 @@ from notchflex.mechanics.material.law import (
     SectionLaw,
     SectionResponse,
     Strain,
+    moduli,
     section_law,
 )
 from notchflex.robot import Nitinol, StressStrain
@@ -381,9 +382,7 @@ def _(material: Nitinol) -> FibreLaw:
 
 
 def _law(material: Nitinol | StressStrain, low: Array, high: Array, change: Array) -> FibreLaw:
-    modulus = material.elastic_modulus
-    shear = modulus / (2.0 * (1.0 + material.poisson_ratio))
-    return FibreLaw(*map(constant, (modulus, shear, low, high, change)))
+    return FibreLaw(*moduli(material), *map(constant, (low, high, change)))
 
 
 # A curve of stress over strain: each of its points is a kink.

@@ -198,11 +198,6 @@ class Flattening(NamedTuple):
     by_transformation: Array  # H, N mm/mm
     energy: Array  # psi, N mm/mm
 
-    @classmethod
-    def none(cls, like: Array) -> Flattening:
-        """Return zero flattening."""
-        return cls(*(jnp.zeros_like(like) for _ in cls._fields))
-
 
 def flattening(law: SectionLaw, curvature: Array, section: FibreSection, memory: Any) -> Flattening:
     """Compute the flattening of a section at a curvature."""
@@ -384,7 +379,7 @@ class SectionLaw(Pytree, ABC):
             bending.curvature, section, memory
         )
         if section.ends is None:
-            return others + stored, Flattening.none(curvature)
+            return others + stored, Flattening(*[jnp.zeros_like(curvature)] * 4)
         rigidity = self.elastic_modulus * section.second_moment_weak
         stored += 0.5 * (1.0 - ends.material_share) * ends.weak * bending.moment**2 / rigidity
         flat = flattening(self, curvature, section, memory)
@@ -439,6 +434,12 @@ def _between_ends(law: SectionLaw, section: FibreSection, reduced: Array) -> Sca
     low, high = jnp.minimum(soft_limit, 0.0), jnp.maximum(soft_limit, 0.0)
     root = bracketed_root(with_slope, aim / (1.0 + ends.weak), low, high)
     return root - beyond(law, section, reduced, root) / with_slope(root)[1]
+
+
+def moduli(material: Any) -> tuple[Array, Array]:
+    """Return Young's modulus and the shear modulus of a material description, MPa."""
+    modulus = constant(material.elastic_modulus)
+    return modulus, modulus / (2.0 * (1.0 + material.poisson_ratio))
 
 
 @singledispatch

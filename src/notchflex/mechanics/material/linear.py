@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from notchflex._jax import constant
-from notchflex.mechanics.material.law import FibreSection, Scalar, SectionLaw, section_law
+from notchflex.mechanics.material.law import FibreSection, Scalar, SectionLaw, moduli, section_law
 from notchflex.robot import Linear
 
 
@@ -26,5 +25,4 @@ class LinearLaw(SectionLaw):
 
 @section_law.register
 def _(material: Linear) -> LinearLaw:
-    modulus = constant(material.elastic_modulus)
-    return LinearLaw(modulus, modulus / (2.0 * (1.0 + material.poisson_ratio)))
+    return LinearLaw(*moduli(material))

@@ -22,6 +22,7 @@ from notchflex.mechanics.material.law import (
     FibreSection,
     Scalar,
     SectionLaw,
+    moduli,
     section_law,
 )
 from notchflex.robot import Superelastic
@@ -88,13 +89,6 @@ class SuperelasticLaw(SectionLaw):
 
 @section_law.register
 def _(material: Superelastic) -> SuperelasticLaw:
-    modulus = constant(material.elastic_modulus)
-    return SuperelasticLaw(
-        elastic_modulus=modulus,
-        superelastic_modulus=constant(material.superelastic_modulus),
-        transition_strain=constant(material.transition_strain),
-        plastic_strain=constant(material.plastic_strain),
-        plastic_modulus=constant(material.plastic_modulus),
-        plastic_exponent=constant(material.plastic_exponent),
-        shear_modulus=modulus / (2.0 * (1.0 + material.poisson_ratio)),
-    )
+    names = ("superelastic_modulus", "transition_strain", "plastic_strain")
+    names += ("plastic_modulus", "plastic_exponent")
+    return SuperelasticLaw(*moduli(material), *(constant(getattr(material, k)) for k in names))
