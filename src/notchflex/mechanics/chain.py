@@ -492,11 +492,13 @@ def chain_template(
     """Build the template of a robot's chain; for the arguments see `assemble`."""
     chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
     sites = sites_of(robot)
-    build = _cached_template if flexures is None else partial(_build_template, flexures=flexures)
-    return build(robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord, fibres)
+    shape = robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord, fibres
+    return _template(*shape, flexures or flexure)
 
 
-def _build_template(
+# Fits of material or friction constants assemble one shape hundreds of times.
+@cached(64)
+def _template(
     tube: Tube,
     notches: tuple[Notch, ...],
     sites: tuple[Site | None, ...],
@@ -505,7 +507,7 @@ def _build_template(
     refinement: int,
     turns_with_chord: bool,
     by_fibres: bool,
-    flexures: Callable[..., Any] = flexure,
+    flexures: Callable[..., Any],
 ) -> ChainTemplate:
     # Notches that are equal but for their factor are built once.
     factor = xp.array([notch.stiffness_factor for notch in notches])
@@ -547,10 +549,6 @@ def _build_template(
         _squared_contact_motion(rods, tube.outer_radius),
         factor,
     )
-
-
-# Fits of material or friction constants assemble one shape hundreds of times.
-_cached_template = cached(64)(_build_template)
 
 
 def _flat(chain: Chain, frame: Float[Array, "3 3"]) -> Chain:

@@ -47,23 +47,20 @@ from notchflex.mechanics.section import (
 # a = arccos((g − r_o) / r_o) on either side of the spine (Pacheco 2021; physics of the sector
 # after York 2015). Every depth opens the tube, even one that leaves part of the inner wall.
 
-_SUMMED = 24  # terms added one by one; even, so that odd and even terms pair up
-_TAIL_NODES = 12
-
 
 def _series_nodes() -> tuple[Array, Array, Array]:
     """Return index, parity and weight of the terms; the tail is integrated, not summed."""
-    # Terms of one parity are smooth in n, and their sum beyond N is half of the integral from N
-    # (odd) or N + 1 (even) by the midpoint rule; the substitution n = N / u makes it a Gauss rule.
-    # With it slivers (a much less than the wall over the radius) keep their accuracy, where terms
-    # decay only as n⁻² up to n = L / a.
-    n = xp.arange(1, _SUMMED + 1)
-    x, weight = np.polynomial.legendre.leggauss(_TAIL_NODES)
+    # Terms of one parity are smooth in n, and their sum beyond N = 24 is half of the integral from
+    # N (odd) or N + 1 (even) by the midpoint rule; the substitution n = N / u makes it a Gauss
+    # rule. With it slivers (a much less than the wall over the radius) keep their accuracy,
+    # where terms decay only as n⁻² up to n = L / a.
+    n = xp.arange(1.0, 25.0)
+    x, weight = leggauss(12)
     u, weight = 0.5 * (1.0 + x), 0.5 * weight
-    index, parity, weights = [n.astype(float)], [(-1.0) ** n], [xp.ones(_SUMMED)]
-    for start, sign in ((_SUMMED, -1.0), (_SUMMED + 1, 1.0)):
+    index, parity, weights = [n], [(-1.0) ** n], [xp.ones(24)]
+    for start, sign in ((24.0, -1.0), (25.0, 1.0)):
         index.append(start / u)
-        parity.append(xp.full(_TAIL_NODES, sign))
+        parity.append(xp.full(12, sign))
         weights.append(0.5 * weight * start / u**2)
     return xp.concatenate(index), xp.concatenate(parity), xp.concatenate(weights)
 
@@ -71,31 +68,25 @@ def _series_nodes() -> tuple[Array, Array, Array]:
 _INDEX, _PARITY, _WEIGHT = _series_nodes()
 
 
-def sector_torsion_constant(outer: Array, inner: Array, angle: Array) -> Array:
-    """Compute the Saint-Venant torsion constant of an annular sector."""
-    n, parity, weight = (broadcast_terms(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
-    outer, inner, angle = outer[None], inner[None], angle[None]
-    length = xp.log(outer / inner)
-    rate = n * xp.pi / length
-    square = (inner**2 - parity * outer**2) ** 2 / (4.0 + rate**2) ** 2
-    terms = square * (angle - xp.tanh(rate * angle) / rate)
-    return xp.sum(16.0 * weight * terms / length, axis=0)
-
-
-def sector_shear_centre(
+def sector_torsion(
     outer: Array, inner: Array, angle: Array, bow: Array, strong: Array
-) -> Array:
-    """Compute the distance from the tube axis to the shear centre of an annular sector."""
+) -> tuple[Array, Array]:
+    """Compute the torsion constant (mm⁴) and the shear centre (mm) of an annular sector."""
+    # With its half angle a, sin a − a cos a without cancellation, and the second moment for bending
+    # sideways. At a = π the constant is that of the slit tube; the shear centre lies outside the
+    # material, up to two mean radii from the axis.
     n, parity, weight = (broadcast_terms(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
-    outer_, inner_, angle_ = outer[None], inner[None], angle[None]
-    length = xp.log(outer_ / inner_)
+    r_o, r_i, a = outer[None], inner[None], angle[None]
+    length = xp.log(r_o / r_i)
     rate = n * xp.pi / length
-    radial = (inner_**2 - parity * outer_**2) * (inner_**3 - parity * outer_**3)
-    radial = radial / ((4.0 + rate**2) * (9.0 + rate**2))
-    around = xp.sin(angle_) - xp.cos(angle_) * xp.tanh(rate * angle_) / rate
+    tangent, difference = xp.tanh(rate * a), r_i**2 - parity * r_o**2
+    square = difference**2 / (4.0 + rate**2) ** 2
+    torsion = xp.sum(16.0 * weight * (square * (a - tangent / rate)) / length, axis=0)
+    radial = difference * (r_i**3 - parity * r_o**3) / ((4.0 + rate**2) * (9.0 + rate**2))
+    around = xp.sin(a) - xp.cos(a) * tangent / rate
     terms = 24.0 * weight / length * radial * around / (1.0 + rate**2)
     even = (outer**2 - inner**2) * (outer**3 - inner**3) / (3.0 * xp.log(outer / inner)) * bow
-    return (even + xp.sum(terms, axis=0)) / strong
+    return torsion, (even + xp.sum(terms, axis=0)) / strong
 
 
 # a − sin a cos a
@@ -179,13 +170,14 @@ def annular_sector(outer_radius: Array, inner_radius: Array, depth: Array) -> Se
     outer_edge = centroid - outer * cosine
     edge_near = xp.where(cosine > 0.0, inner_edge, outer_edge)
     edge_spine = wall / 2.0 - wall**2 / (12.0 * mean) + radius_mean * _sag(a) / a
+    torsion_constant, shear_centre = sector_torsion(outer, inner, a, _bow(a), strong)
     return Section(
         area=area,
         centroid=centroid,
         second_moment_weak=weak,
         second_moment_strong=strong,
-        torsion_constant=sector_torsion_constant(outer, inner, a),
-        shear_centre=sector_shear_centre(outer, inner, a, _bow(a), strong),
+        torsion_constant=torsion_constant,
+        shear_centre=shear_centre,
         edge_near=edge_near,
         edge_spine=edge_spine,
         edge_across=xp.where(cosine > 0.0, inner, outer) * sine,
@@ -309,23 +301,22 @@ def segment_torsion(outer: Array, inner: Array, depth: Array, area: Array) -> tu
     through = xp.where(closed | solid, outer, depth)
     deep = xp.where(solid, depth, outer + inner)
 
-    estimates = {
-        "closed": closed_estimate(outer, inner, shallow),
-        "open": open_estimate(outer, inner, through, area),
-        # J = A h²/3 and the top of the circle: the cut passes beyond the bore
-        "solid": (area * (2.0 * outer - deep) ** 2 / 3.0, outer),
-    }
-    torsion, shear = {}, {}
-    for (shape, (first, second)), at in zip(
-        estimates.items(), (shallow, through, deep), strict=True
-    ):
-        on_torsion, on_shear = _factors(shape, outer, inner, at)
-        torsion[shape], shear[shape] = first * on_torsion, second * on_shear
+    cases = (
+        ("closed", shallow, closed_estimate(outer, inner, shallow)),
+        ("solid", deep, (area * (2.0 * outer - deep) ** 2 / 3.0, outer)),
+        ("open", through, open_estimate(outer, inner, through, area)),
+    )  # of a solid segment J = A h²/3, and the top of the circle
 
-    def choose(of: dict[str, Array]) -> Array:
-        return xp.where(closed, of["closed"], xp.where(solid, of["solid"], of["open"]))
+    def estimated(shape: str, cut: Array, estimates: tuple[Array, Array]) -> list[Array]:
+        factors = _factors(shape, outer, inner, cut)
+        return [value * factor for value, factor in zip(estimates, factors, strict=True)]
 
-    return choose(torsion), choose(shear)
+    both = zip(*(estimated(*case) for case in cases), strict=True)
+    torsion, shear = (
+        xp.where(closed, of_closed, xp.where(solid, of_solid, of_open))
+        for of_closed, of_solid, of_open in both
+    )
+    return torsion, shear
 
 
 # Moments of a segment of the unit circle beyond the chord at height cos α, w measured from the

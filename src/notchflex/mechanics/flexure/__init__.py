@@ -15,19 +15,17 @@ from notchflex.mechanics.flexure.rod import (
     with_level,
 )
 from notchflex.mechanics.flexure.rod_kinematics import (
-    free_pose,
-    geometric_stiffness,
-    relative_pose,
-    rotation_error_estimate,
-)
-from notchflex.mechanics.flexure.state import (
     FlexureState,
     fibre_slope,
     fibre_stretch,
     flexure_state,
+    free_pose,
+    geometric_stiffness,
     in_space,
     material_tangent,
     of_rod,
+    relative_pose,
+    rotation_error_estimate,
 )
 
 import_all(__name__, __path__)
