@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex import load_robot
+from notchflex import Equilibrium, load_robot
 from notchflex.loads.load import NOTHING
 from notchflex.mechanics.chain import assemble
 
@@ -49,6 +49,13 @@ class FakePath:
         modes[..., 0] = self.notch_angle
         unknowns = SimpleNamespace(modes=modes)
         return SimpleNamespace(solved=SimpleNamespace(point=SimpleNamespace(unknowns=unknowns)))
+
+    def __getitem__(self, step: int) -> Any:
+        return Equilibrium(self, step)
+
+    def quantity(self, name: str) -> Any:
+        """The values of every step, as `EquilibriumPath` has them."""
+        return self.columns[name]
 
     @property
     def front(self) -> Any:

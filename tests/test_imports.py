@@ -4,11 +4,15 @@ Imports inside functions and for types only count like any other.
 """
 
 import ast
+import importlib
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 import notchflex
+from notchflex import support
 
 SOURCE = Path(notchflex.__file__).parents[1]
 
@@ -40,7 +44,19 @@ ORDER = (
 )
 """Folders from the first to the last: a file imports from its own folder and from those before."""
 
-MOST_FILES = 15
+MOST_FILES = 17
+
+SATELLITES = ORDER[ORDER.index("pieces") :]
+
+INNER_NAMES = 132
+"""Names of the core that satellites import from elsewhere than `notchflex` and
+`notchflex.support`: this number only ever falls."""
+
+LAZY = {
+    "notchflex": vars(notchflex)["_HOME"],
+    "notchflex.support": vars(support)["_HOME"],
+}
+"""Modules whose names are loaded on first use, and where those names live."""
 
 _PICTURE = "pictures need matplotlib or plotly: they are imported when one is asked for"
 _SHOWN = "an object shows itself: what writes its summary is imported when it is shown"
@@ -55,6 +71,8 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("robot.notches.arc", "mechanics.cuts"): (
         "whether lips touch at rest depends on the centroid of the section; seldom asked for"
     ),
+    ("robot.robot", "analysis.geometry"): "`Robot.geometry`; seldom asked for",
+    ("results.equilibrium", "analysis.geometry"): "`Equilibrium.shape`; made when asked for",
     ("robot.robot", "robot.value_names"): "`Robot.with_values`; setting a value makes a robot",
     ("robot.problems", "robot.robot"): "for the type only: a robot checks itself by this file",
     ("robot.problems", "robot.value_names"): "a tolerance names a value; value names make robots",
@@ -97,7 +115,8 @@ def _imported(file: Path) -> Iterator[str]:
             assert module in FILES, f"{file}: there is no {module}"
             for alias in node.names:
                 inside = f"{module}.{alias.name}"
-                yield inside if inside in FILES else module
+                home = LAZY.get(module, {}).get(alias.name, module)
+                yield inside if inside in FILES else home
 
 
 def _short(module: str) -> str:
@@ -173,3 +192,37 @@ def test_folders_are_small():
 def test_every_folder_has_its_place():
     folders = {path.parent.name for path in (SOURCE / "notchflex").glob("*/__init__.py")}
     assert folders == set(ORDER) - {"lanewise", ""}
+
+
+def _names_of_the_core(file: Path) -> Iterator[str]:
+    """Yield what a file imports from the folders of the core, other than by a public door."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("notchflex."):
+            module = str(node.module)
+            if module not in LAZY and module.split(".")[1] not in SATELLITES:
+                yield from (f"{module}.{alias.name}" for alias in node.names)
+
+
+def test_satellites_import_public_names():
+    names = [
+        name
+        for module, file in FILES.items()
+        if _short(module).partition(".")[0] in SATELLITES
+        for name in _names_of_the_core(file)
+    ]
+    assert len(names) == INNER_NAMES, f"write {len(names)} if it is less; {sorted(names)}"
+
+
+def test_names_of_the_support_are_loaded_on_first_use():
+    code = "import notchflex.support as s, sys; s.need; print({'jax', 'numpy'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
+
+
+def test_type_checkers_see_the_names_of_the_support():
+    stub = ast.parse((SOURCE / "notchflex" / "support.pyi").read_text(encoding="utf-8"))
+    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+    named = {alias.asname: str(node.module) for node in imports for alias in node.names}
+    assert named == LAZY["notchflex.support"]
+    for name, module in named.items():
+        assert getattr(support, name) is getattr(importlib.import_module(module), name)

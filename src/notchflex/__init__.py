@@ -8,6 +8,8 @@ not import JAX.  It switches JAX to 64-bit floats, also for its other users in t
 import os as _os
 import sys as _sys
 
+from notchflex._lazy import loader as _loader
+
 __version__ = "0.1.0"
 
 # Here and not at the first use: a key of `jax.random` gives the same numbers before and after it.
@@ -17,8 +19,9 @@ if "jax" in _sys.modules:
 
 # Public name -> where it is exported. `__init__.pyi` lists the same names for type checkers.
 _HOME = {
-    **dict.fromkeys(
-        (
+    name: home
+    for home, names in {
+        "notchflex.errors": (
             "ConvergenceError",
             "ErrorCode",
             "Failure",
@@ -26,10 +29,7 @@ _HOME = {
             "InputWarning",
             "RobotFileError",
         ),
-        "notchflex.errors",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.robot": (
             "ArcNotch",
             "Capstan",
             "Corner",
@@ -49,32 +49,23 @@ _HOME = {
             "load_robot",
             "save_robot",
         ),
-        "notchflex.robot",
-    ),
-    "plot": "notchflex._plot",
-    "Section": "notchflex.mechanics.section",
-    **dict.fromkeys(("annular_sector", "annular_segment"), "notchflex.mechanics.cuts"),
-    **dict.fromkeys(
-        (
+        "notchflex._plot": ("plot",),
+        "notchflex.mechanics.section": ("Section",),
+        "notchflex.mechanics.cuts": ("annular_sector", "annular_segment"),
+        "notchflex.mechanics.flexure.elastica": (
             "Elastica",
             "elastica",
             "modulus_from_single_notch",
         ),
-        "notchflex.mechanics.flexure.elastica",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.loads": (
             "BodyForce",
             "Load",
             "LoadPath",
             "pull",
             "stroke_path",
         ),
-        "notchflex.loads",
-    ),
-    "Settings": "notchflex.solver.newton",
-    **dict.fromkeys(
-        (
+        "notchflex.solver.newton": ("Settings",),
+        "notchflex.results": (
             "Equilibrium",
             "EquilibriumPath",
             "State",
@@ -82,10 +73,7 @@ _HOME = {
             "read_table",
             "save_path",
         ),
-        "notchflex.results",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.analysis": (
             "Band",
             "Bands",
             "Batch",
@@ -111,10 +99,7 @@ _HOME = {
             "tip_response",
             "uncertain",
         ),
-        "notchflex.analysis",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.fit": (
             "Calibration",
             "Constant",
             "FrictionReadings",
@@ -137,35 +122,23 @@ _HOME = {
             "write_fitted",
             "write_measurements",
         ),
-        "notchflex.fit",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.designing": (
             "Design",
             "DesignFront",
             "DesignSpec",
             "design",
             "design_front",
         ),
-        "notchflex.designing",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.comparison": (
             "Comparison",
             "compare",
         ),
-        "notchflex.comparison",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.sensing": (
             "SensedForce",
             "SensorNoise",
             "sense",
         ),
-        "notchflex.sensing",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.photographs": (
             "Board",
             "MeasuredCut",
             "MeasuredPhotograph",
@@ -173,17 +146,11 @@ _HOME = {
             "measure",
             "measure_cut",
         ),
-        "notchflex.photographs",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.workspaces": (
             "Workspace",
             "workspace",
         ),
-        "notchflex.workspaces",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.control": (
             "ControlStatus",
             "Controller",
             "Following",
@@ -196,30 +163,21 @@ _HOME = {
             "reach",
             "read_targets",
         ),
-        "notchflex.control",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.tolerancing": (
             "AcceptanceLimit",
             "ToleranceAnalysis",
             "ToleranceSpec",
             "read_tolerance_spec",
             "tolerance_analysis",
         ),
-        "notchflex.tolerancing",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.sweeping": (
             "Sweep",
             "SweepPlan",
             "read_plan",
             "read_sweep",
             "sweep",
         ),
-        "notchflex.sweeping",
-    ),
-    **dict.fromkeys(
-        (
+        "notchflex.export": (
             "DeckOptions",
             "Exported",
             "PatternOptions",
@@ -227,8 +185,12 @@ _HOME = {
             "SolidOptions",
             "export_robot",
         ),
-        "notchflex.export",
-    ),
+        "notchflex.analysis.geometry": (
+            "Geometry",
+            "RobotShape",
+        ),
+    }.items()
+    for name in names
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.
@@ -237,21 +199,18 @@ _RENAMED = {"Path": "EquilibriumPath", "draw": "stroke_path"}
 __all__ = [*sorted(_HOME), "__version__"]  # pyright: ignore[reportUnsupportedDunderAll]
 
 
+_load = _loader(__name__, _HOME)
+
+
 def __getattr__(name: str) -> object:
     """Import the home of a public name on first use and keep the name here."""
-    from importlib import import_module
-
     if name in _RENAMED:
         from warnings import warn
 
         new = _RENAMED[name]
         warn(f"notchflex.{name} is now notchflex.{new}", DeprecationWarning, stacklevel=2)
         return __getattr__(new)
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value
+    return _load(name)
 
 
 def __dir__() -> list[str]:

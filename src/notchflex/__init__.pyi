@@ -23,6 +23,8 @@ from notchflex.analysis import solve_each as solve_each
 from notchflex.analysis import tip_from_angles as tip_from_angles
 from notchflex.analysis import tip_response as tip_response
 from notchflex.analysis import uncertain as uncertain
+from notchflex.analysis.geometry import Geometry as Geometry
+from notchflex.analysis.geometry import RobotShape as RobotShape
 from notchflex.comparison import Comparison as Comparison
 from notchflex.comparison import compare as compare
 from notchflex.control import Controller as Controller

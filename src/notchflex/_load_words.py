@@ -26,7 +26,7 @@ _DIGITS = 9
 """More digits than any number of a body has."""
 
 
-def number(word: str, form: str, *, least: float = -math.inf) -> float:
+def parse_number(word: str, form: str, *, least: float = -math.inf) -> float:
     """Read a finite number.
 
     Args:
@@ -46,11 +46,11 @@ def number(word: str, form: str, *, least: float = -math.inf) -> float:
     return value
 
 
-def whole(low: int, high: int | None = None) -> Callable[[str], int]:
+def parse_whole(low: int, high: int | None = None) -> Callable[[str], int]:
     """Return a reader of whole numbers from `low` to `high`.
 
     Example:
-        >>> whole(0, 3)("2")
+        >>> parse_whole(0, 3)("2")
         2
     """
     form = f", {low} or more" if high is None else f" from {low} to {high}"
@@ -67,20 +67,20 @@ def whole(low: int, high: int | None = None) -> Callable[[str], int]:
     return read
 
 
-def vector(what: str) -> Callable[[str], Vector]:
+def parse_vector(what: str) -> Callable[[str], Vector]:
     """Return a reader of `X,Y,Z`.
 
     Args:
         what: What the numbers are, with their unit.
 
     Example:
-        >>> vector("angles in deg")("90,0,-5")
+        >>> parse_vector("angles in deg")("90,0,-5")
         (90.0, 0.0, -5.0)
     """
     form = f"three finite {what} joined by commas: X,Y,Z"
 
     def read(text: str) -> Vector:
-        values = [number(word, form) for word in text.split(",")]
+        values = [parse_number(word, form) for word in text.split(",")]
         if len(values) != 3:
             raise InputError.BAD_SYNTAX(f"give {form}.")
         return values[0], values[1], values[2]
@@ -106,12 +106,12 @@ def parse_spec(text: str) -> list[float]:
 def _range(part: str) -> list[float]:
     words = part.split(":")
     if len(words) == 1:
-        return [number(part, SPEC)]
+        return [parse_number(part, SPEC)]
     if len(words) != 3:
         raise InputError.BAD_SYNTAX(f"{part!r} is not start:stop:count; give {SPEC}.")
-    start, stop = (number(word, SPEC) for word in words[:2])
+    start, stop = (parse_number(word, SPEC) for word in words[:2])
     try:
-        count = whole(1, MOST_STEPS)(words[2].strip())
+        count = parse_whole(1, MOST_STEPS)(words[2].strip())
     except InputError as problem:
         got = f"the count in {part!r} is {words[2]!r}"
         raise InputError(f"{got}; {problem}", problem.code) from None
@@ -220,7 +220,7 @@ def read_body_force(text: str) -> BodyForceOption:
 
     def read(words: str, what: str) -> Vector:
         try:
-            return vector(what)(words)
+            return parse_vector(what)(words)
         except InputError as problem:
             message = f"{words!r} is not three finite {what}; give {_BODY}."
             raise InputError(message, problem.code) from None

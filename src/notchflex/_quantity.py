@@ -33,6 +33,11 @@ _SIZES = {
 """The size of every axis that a quantity may have."""
 
 
+def axis_sizes(notches: int, tendons: int) -> dict[str, int]:
+    """Return the sizes of the axes that follow from the numbers of notches and tendons."""
+    return {"tendon": tendons, "notch": notches, "body": notches + 1, "row": 3, "axis": 3}
+
+
 @dataclass(eq=False)
 class Quantity:
     """One quantity of a solved state, and how it is written at the edges; decorates its formula.

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from notchflex._load_words import TendonCommand, load_columns, parse_spec, whole
+from notchflex._load_words import TendonCommand, load_columns, parse_spec, parse_whole
 from notchflex.errors import InputError
 
 NUMBERS = st.floats(-100.0, 100.0, allow_nan=False)
@@ -75,7 +75,7 @@ def test_commands_that_do_not_fit_are_refused(tension, tendons):
 @given(st.integers())
 def test_whole_numbers_read_back_within_their_range(value):
     if -5 <= value <= 7:
-        assert whole(-5, 7)(str(value)) == value
+        assert parse_whole(-5, 7)(str(value)) == value
     else:
         with pytest.raises(InputError):
-            whole(-5, 7)(str(value))
+            parse_whole(-5, 7)(str(value))

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex.mechanics.chain import assemble
 from notchflex.plotting.shapes.outline import outline
 from notchflex.plotting.shapes.panel import body_faces
-from notchflex.plotting.shapes.robot_shape import shape_from_angles
+from notchflex.plotting.shapes.robot_shape import shape_from_angles, tendon_line
 
 
 def shape_of(name, angle=0.0):
@@ -71,9 +72,9 @@ def test_strips_are_beams_between_slanted_bodies(strips):
 @pytest.mark.parametrize("angle", [0.0, 0.02])
 def test_tendons_go_through_their_true_points(angle):
     shape = shape_of("gao2017", angle)
-    line = shape.tendon(0)
+    line = tendon_line(shape, 0)
     assert len(line) == 2 * (1 + 14)  # the base and the 14 pieces on its side
-    group = shape.chain.groups[0]
+    group = assemble(shape.robot, flat=False).groups[0]
     own, following = np.flatnonzero(np.asarray(group.visits)[:, 0])[3:5]
     for point, place in ((line[8], group.enters[own, 0]), (line[9], group.leaves[following, 0])):
         np.testing.assert_allclose(point, shape.on_body(1 + int(own), place), atol=1e-12)
@@ -81,7 +82,7 @@ def test_tendons_go_through_their_true_points(angle):
 
 def test_a_bent_link_still_ends_at_its_bodies():
     shape = shape_of("liu2022", 0.2)
-    rods = shape.chain.rods
+    rods = assemble(shape.robot, flat=False).rods
     for j, strip in enumerate(shape.flexures):
         clamp = shape.on_body(j, np.asarray(rods.start_offset)[j])
         np.testing.assert_allclose(strip.position[0], clamp, atol=1e-12)

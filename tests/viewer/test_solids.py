@@ -136,5 +136,5 @@ def test_a_bent_flexure_joins_its_pieces_and_keeps_its_volume():
             (number + 1, bent.vertices[-corners:]),
         ):
             local = (own - shape.position[body]) @ shape.rotation[body]
-            face = rest.body_length[body] if body == number else 0.0
+            face = robot.geometry.body_length[body] if body == number else 0.0
             assert local[:, 2] == pytest.approx(np.full(corners, face), abs=1e-9)

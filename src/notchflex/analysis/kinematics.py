@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,11 +17,7 @@ from notchflex._jax import (
     jnp,
 )
 from notchflex.errors import InputError
-from notchflex.mechanics.chain import Chain, assemble, body_lengths
-from notchflex.mechanics.contact import (
-    closing_angles,
-    free_angle,
-)
+from notchflex.mechanics.chain import Chain, assemble
 from notchflex.mechanics.flexure import relative_pose
 from notchflex.mechanics.motion import Motion
 from notchflex.robot import Robot
@@ -162,8 +157,7 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
             f"which it bends; that of {robot.name} does not"
         )
     share = drawn[:, None] / chain.flexures
-    free = free_angle(chain.rods)
-    closing = free + closing_angles(chain.rods)
+    free, closing = robot.geometry.free_angle, robot.geometry.closing_angle
     angle = np.clip(free + share / arm, free, closing)
     lost = np.maximum(share - arm * (angle - free), 0.0)
     # A share that is taken up completely loses nothing, whatever rounding says.
@@ -220,7 +214,7 @@ def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
         [0.5, -1.0]
     """
     at = np.atleast_1d(np.asarray(axis_at, float))
-    start, length = _straight(robot)
+    start, length = robot.geometry.body_start, robot.geometry.body_length
     tip = float(start[-1] + length[-1])
     wrong = at[~((at >= -_BEYOND * tip) & (at <= (1.0 + _BEYOND) * tip))]
     if len(wrong):
@@ -240,15 +234,6 @@ def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
     return AxisPlaces(body, along, after, length[body], fraction)
 
 
-@lru_cache(maxsize=8)
-def _straight(
-    robot: Robot,
-) -> tuple[Float[np.ndarray, " bodies"], Float[np.ndarray, " bodies"]]:
-    """Return start and length of the bodies of the straight robot, mm."""
-    straight, _ = bodies_from_angles(robot, np.zeros((1, robot.number_of_notches)))
-    return straight[0, :, 2], body_lengths(robot.tube, robot.notches)
-
-
 def points_on_axis(
     positions: AxisPlaces,
     body_position: Float[Array, "*s bodies 3"],
@@ -265,7 +250,7 @@ def points_on_axis(
         The points, mm, in the frame in which the bodies are given.
 
     Example:
-        >>> from notchflex import load_robot
+        >>> from notchflex import bodies_from_angles, load_robot
         >>> robot = load_robot("pacheco2021-a")
         >>> bodies = bodies_from_angles(robot, np.zeros((1, 5)))
         >>> points_on_axis(axis_places(robot, [0.4, 9.0]), *bodies)[0, :, 2].round(9).tolist()
@@ -314,7 +299,7 @@ def axis_point_changes(
         The changes of the points.
 
     Example:
-        >>> from notchflex import load_robot
+        >>> from notchflex import bodies_from_angles, load_robot
         >>> robot = load_robot("pacheco2021-a")
         >>> bodies = [pose[0] for pose in bodies_from_angles(robot, np.zeros((1, 5)))]
         >>> along_z = np.tile([0.0, 0.0, 1.0], (1, 6, 1)), np.zeros((1, 6, 3, 3))

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import notchflex as nf
+from notchflex import InputError
 from notchflex._jax import jax
-from notchflex.errors import InputError
 from notchflex.solver.programs.store import VARIABLE
 
 Run = Callable[[], object]

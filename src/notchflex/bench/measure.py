@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from notchflex import __version__
+from notchflex import InputError, __version__
 from notchflex._jax import jax
 from notchflex.bench.cases import CASES, Case, Run
-from notchflex.errors import InputError
 
 # Time that repeats of one case may take, s, and their least number.
 _LONGEST, _FEWEST = 1.5, 5

@@ -17,11 +17,10 @@ from typing import Any
 
 from cyclopts import App, CycloptsError, MissingArgumentError, RepeatArgumentError
 
-from notchflex import __version__
+from notchflex import InputError, InputWarning, __version__
 from notchflex.cli import terminal
 from notchflex.cli.terminal import BAD_INPUT, DONE, INTERNAL_ERROR, INTERRUPTED
-from notchflex.errors import InputError, InputWarning
-from notchflex.results.writing import let_go
+from notchflex.support import let_go
 
 ABOUT = """Statics of tendon-driven notched-tube robots.
 

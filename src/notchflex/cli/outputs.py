@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from notchflex._extras import need
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import flag
-from notchflex.errors import InputError
-from notchflex.results.writing import (
+from notchflex.support import (
     BROWSER,
     PAPER,
     STANDARD_OUTPUT,
     check_distinct,
     check_output,
     check_picture,
+    need,
 )
 
 if TYPE_CHECKING:
@@ -101,14 +101,14 @@ class Outputs:
     def write_json(self, document: Callable[[], Any]) -> None:
         """Write the document of `--json`, if it was given."""
         if target := self.targets.get("json"):
-            from notchflex.results.writing import write_json
+            from notchflex.support import write_json
 
             write_json(target, document())
 
     def write_csv(self, columns: Callable[[], Mapping[str, Any]]) -> None:
         """Write the columns of `--csv`, if it was given."""
         if target := self.targets.get("csv"):
-            from notchflex.results.writing import write_columns
+            from notchflex.support import write_columns
 
             write_columns(target, columns())
 

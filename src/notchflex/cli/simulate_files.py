@@ -7,14 +7,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from notchflex._replacing import replacing
 from notchflex.cli import terminal
 from notchflex.cli.outputs import Outputs
-from notchflex.results.writing import MOVING
+from notchflex.support import MOVING, replacing
 
 if TYPE_CHECKING:
-    from notchflex.analysis import Bands
-    from notchflex.results import EquilibriumPath
+    from notchflex import Bands, EquilibriumPath
 
 
 def write(
@@ -24,8 +22,7 @@ def write(
 
     Bands of tolerances go to JSON, CSV and the picture.
     """
-    from notchflex.results.io import write_netcdf, write_parquet
-    from notchflex.results.writing import write_path_csv
+    from notchflex.support import write_netcdf, write_parquet, write_path_csv
 
     path = next(iter(paths.values()))
     outputs.write_json(lambda: _document(paths, bands))
@@ -56,7 +53,7 @@ def is_animation(target: str) -> bool:
 
 
 def _document(paths: Mapping[str, EquilibriumPath], bands: Bands | None) -> dict[str, Any]:
-    from notchflex.results.io import whole_document
+    from notchflex.support import whole_document
 
     (_, first), *others = paths.items()
     beside = {label: whole_document(other) for label, other in others}

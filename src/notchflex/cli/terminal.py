@@ -14,7 +14,7 @@ from datetime import timedelta
 from functools import partial
 from typing import TYPE_CHECKING, TextIO
 
-from notchflex.results.writing import let_go
+from notchflex.support import let_go
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -10,16 +10,15 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import NDArray
 
-from notchflex.analysis import axis_points, equal_stroke, tip_from_angles
-from notchflex.errors import InputError
+from notchflex import InputError, Robot, equal_stroke, tip_from_angles
+from notchflex.analysis import axis_points
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.fit.measurements.simulated import solved_rows
 from notchflex.fit.model.residuals import OUTPUTS, Predicted, branch_words, misfit
-from notchflex.results.quantities import QUANTITIES
-from notchflex.robot import Robot
+from notchflex.support import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.results import EquilibriumPath
+    from notchflex import EquilibriumPath
 
 _COLUMNS = ("tension", "stroke", "notch_angle", "total_angle", "tip_position", "converged")
 # Quantities without a column of their own in a comparison: only their errors are kept.

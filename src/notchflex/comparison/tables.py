@@ -8,12 +8,7 @@ import numpy as np
 
 from notchflex.comparison.comparison import Comparison
 from notchflex.fit.assessment.errors_of_parts import edge
-from notchflex.results.quantities import (
-    AXES,
-    DEGREES,
-    QUANTITIES,
-)
-from notchflex.results.writing import document_head
+from notchflex.support import AXES, DEGREES, QUANTITIES, document_head
 
 
 def comparison_document(comparison: Comparison) -> dict[str, Any]:

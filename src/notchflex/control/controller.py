@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from notchflex import Failure, InputError, Load, Robot, State
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.observer import Observer
 from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
@@ -17,18 +18,7 @@ from notchflex.control.search.iterative_search import search_iteratively, solve_
 from notchflex.control.search.problem import TargetSearch
 from notchflex.control.search.rate import cross_dead_bands, limit_rate
 from notchflex.control.targets import DIRECTION, LARGEST_TARGET, Targets, target_shapes
-from notchflex.errors import Failure, InputError
-from notchflex.loads import Load
-from notchflex.loads.load import (
-    check_is_robot,
-    check_number,
-    short_repr,
-)
-from notchflex.results.state import (
-    SavedState,
-    State,
-)
-from notchflex.robot import Robot
+from notchflex.support import SavedState, check_is_robot, check_number, short_repr
 
 
 class ControlStatus(NamedTuple):

@@ -10,23 +10,20 @@ from typing import Any, overload
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from notchflex._quantity import DEGREES
-from notchflex._summary import Displayed, Summary, short, vector
-from notchflex.analysis.solve import simulate
+from notchflex import Equilibrium, EquilibriumPath, Failure, Load, LoadPath, Robot, State, simulate
+from notchflex._summary import vector
 from notchflex.control.search.branches import KEPT
 from notchflex.control.search.problem import Attempt
 from notchflex.control.targets import DIRECTION, Targets, unit_hint
-from notchflex.errors import Failure
-from notchflex.loads import Load, LoadPath
-from notchflex.results.io import whole_document
-from notchflex.results.path import EquilibriumPath
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.state import (
-    Equilibrium,
+from notchflex.support import (
+    DEGREES,
+    QUANTITIES,
+    Displayed,
     SavedState,
-    State,
+    Summary,
+    short,
+    whole_document,
 )
-from notchflex.robot import Robot
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -7,6 +7,7 @@ from typing import Any, get_args
 
 import numpy as np
 
+from notchflex import InputError, Load, LoadPath, Robot, State
 from notchflex.control.following import Following, Reach
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
@@ -14,17 +15,7 @@ from notchflex.control.search.branches import Approach, approach_target
 from notchflex.control.search.problem import Attempt, Problem, TargetSearch
 from notchflex.control.search.rate import cross_dead_bands, limit_rate
 from notchflex.control.targets import Targets, make_targets, units_of
-from notchflex.errors import InputError
-from notchflex.loads import Load, LoadPath
-from notchflex.loads.load import (
-    check_is_robot,
-    short_repr,
-)
-from notchflex.results.state import (
-    SavedState,
-    State,
-)
-from notchflex.robot import Robot
+from notchflex.support import SavedState, check_is_robot, short_repr
 
 
 def reach(

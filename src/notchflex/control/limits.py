@@ -9,11 +9,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.errors import InputError
-from notchflex.loads.load import (
-    check_number,
-    short_repr,
-)
+from notchflex import InputError
+from notchflex.support import check_number, short_repr
 
 Drive = Literal["tension", "stroke"]
 

@@ -13,17 +13,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from notchflex import InputError, Load, Robot
 from notchflex.control.program.drive_model import DriveModel
 from notchflex.control.search.problem import Problem
-from notchflex.errors import InputError
-from notchflex.loads import Load
-from notchflex.loads.load import (
-    check_is_robot,
-    check_number,
-)
-from notchflex.loads.load_path import load_path
-from notchflex.robot import Robot
-from notchflex.robot.value_names import number_at
+from notchflex.support import check_is_robot, check_number, load_path, number_at
 
 FRICTION = "friction.coefficient"
 

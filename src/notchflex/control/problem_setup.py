@@ -7,20 +7,13 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
+from notchflex import InputError, Load, LoadPath, Robot, State
 from notchflex.control.limits import Drive, Limits, bounds_of_robot
 from notchflex.control.program.drive_model import DriveModel
 from notchflex.control.search.problem import Problem, TargetSearch
 from notchflex.control.targets import Aim, Targets, aim_at
-from notchflex.errors import InputError
-from notchflex.loads import Load, LoadPath
-from notchflex.loads.load import short_repr
-from notchflex.loads.load_path import load_path
-from notchflex.results.state import (
-    SavedState,
-    State,
-    check_robot,
-)
-from notchflex.robot import Robot
+from notchflex.results.state import check_robot
+from notchflex.support import SavedState, load_path, short_repr
 
 # Default limit of drives, as a multiple of about the closing value of a notch.
 _MAX_FACTOR = {"tension": 4.0, "stroke": 2.0}

@@ -10,21 +10,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex._quantity import DEGREES, REGISTERED
-from notchflex.analysis.kinematics import tip_from_angles
-from notchflex.errors import InputError
-from notchflex.loads.load import (
+from notchflex import InputError, Robot
+from notchflex.support import (
+    AXES,
+    DEGREES,
+    QUANTITIES,
+    REGISTERED,
+    axis_sizes,
     check_is_robot,
     check_number,
+    nearest,
+    read_data_table,
     short_repr,
 )
-from notchflex.results.quantities import (
-    AXES,
-    QUANTITIES,
-)
-from notchflex.results.reading import read_data_table
-from notchflex.robot import Robot
-from notchflex.robot.part import nearest
 
 DIRECTION = "tip_direction"
 """Unit vector along the tube at the tip, in the world: the last column of `tip_rotation`."""
@@ -136,15 +134,9 @@ def _check_weights(weights: Mapping[str, float] | None, targets: Targets) -> dic
     return checked
 
 
-def sizes_of(robot: Robot) -> dict[str, int]:
-    """Return the sizes of the axes that quantities of a robot may have."""
-    notches, tendons = robot.number_of_notches, robot.number_of_tendons
-    return {"tendon": tendons, "notch": notches, "body": notches + 1, "row": 3, "axis": 3}
-
-
 def target_shapes(robot: Robot) -> dict[str, tuple[int, ...]]:
     """Return what may be a target, and its shape: what the solver reports as numbers."""
-    sizes = sizes_of(robot)
+    sizes = axis_sizes(robot.number_of_notches, robot.number_of_tendons)
     shapes = {
         name: tuple(sizes[axis] for axis in one.per)
         for name, one in REGISTERED.items()
@@ -311,7 +303,7 @@ def read_targets(
 
 def _columns(robot: Robot) -> Iterator[tuple[str, tuple[str, tuple[int, ...]]]]:
     """Yield every column, and the quantity and entry that it is."""
-    sizes = sizes_of(robot)
+    sizes = axis_sizes(robot.number_of_notches, robot.number_of_tendons)
     for name in target_shapes(robot):
         if name == DIRECTION:
             yield from ((f"{DIRECTION}_{axis}", (name, (i,))) for i, axis in enumerate(AXES))
@@ -355,8 +347,7 @@ def unit_hint(robot: Robot, position: Float[np.ndarray, " 3"] | None) -> str:
     """
     if position is None:
         return ""
-    length = float(np.linalg.norm(tip_from_angles(robot, np.zeros(robot.number_of_notches))[0]))
-    size = float(np.sqrt(np.nansum(position**2))) / length
+    size = float(np.sqrt(np.nansum(position**2))) / robot.geometry.length
     low, high = _LENGTH_RATIOS
     for unit, scale in _UNITS.items():
         if low <= size * scale <= high:

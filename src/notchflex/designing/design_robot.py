@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from notchflex import InputError, Robot, load_robot
 from notchflex.analysis.draws import tolerances_of
 from notchflex.designing.explanation import chosen_form, curves_missed, explain, yield_sentences
 from notchflex.designing.model.point import Solver
@@ -35,18 +36,16 @@ from notchflex.designing.specification import (
     read_design,
     spec_from_table,
 )
-from notchflex.errors import InputError
-from notchflex.loads.load import (
+from notchflex.support import (
+    Tolerance,
     check_number,
-    short_repr,
-)
-from notchflex.robot import Robot, from_table, load_robot, to_table
-from notchflex.robot.problems import Tolerance
-from notchflex.robot.robot import (
+    from_table,
+    numbers_at,
     remember_source,
+    short_repr,
     source_of,
+    to_table,
 )
-from notchflex.robot.value_names import numbers_at
 
 MAX_FORMS = 200
 

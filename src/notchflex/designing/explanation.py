@@ -6,15 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from notchflex._summary import round_number, short
+from notchflex import Robot
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.optimality import ActiveLimit, multipliers
 from notchflex.designing.search.problem import TOLERANCE, DesignProblem, Row
 from notchflex.designing.search.robust import YieldOf
 from notchflex.designing.search.search import SearchResult
 from notchflex.designing.specification import DesignObjective, DesignSpec
-from notchflex.robot import Robot
-from notchflex.robot.value_names import numbers_at
+from notchflex.support import numbers_at, round_number, short
 
 # The most sentences about limits, the dearest first.
 _MAX_SENTENCES = 12

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from notchflex._extras import need
-from notchflex._summary import Displayed, Summary, short
+from notchflex import InputError, Robot
 from notchflex.designing.design_robot import given, made_of, problems_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.result import Design
@@ -31,8 +30,7 @@ from notchflex.designing.search.problem import (
 )
 from notchflex.designing.search.search import Searches, SearchResult, draw, evaluate_all, smooth
 from notchflex.designing.specification import DesignSpec
-from notchflex.errors import InputError
-from notchflex.robot import Robot
+from notchflex.support import Displayed, Summary, need, short
 
 _MAX_OBJECTIVES = 3
 _UNSOLVED = 1e6

@@ -10,25 +10,25 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from notchflex._replacing import unwritable
-from notchflex._summary import Displayed, Summary, short
+from notchflex import ConvergenceError, EquilibriumPath, Robot
 from notchflex.designing.explanation import yield_sentences
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.problem import DesignProblem
 from notchflex.designing.search.robust import YieldOf
 from notchflex.designing.search.search import SearchResult
 from notchflex.designing.specification import DesignConstraint, DesignObjective, DesignSpec
-from notchflex.errors import ConvergenceError
-from notchflex.results.path import EquilibriumPath
-from notchflex.results.writing import (
+from notchflex.support import (
+    Displayed,
+    Summary,
     check_folder,
     document_head,
+    robot_text,
+    short,
+    unwritable,
     write_csv,
     write_json,
     write_text,
 )
-from notchflex.robot import Robot
-from notchflex.robot.writing import robot_text
 
 if TYPE_CHECKING:
     from notchflex.designing.front import DesignFront
@@ -294,7 +294,7 @@ def write_design(
     write_csv(files[1], HEADS, wish_rows(made))
     write_json(files[2], design_document(made))
     if PICTURE in names:
-        from notchflex._plot import plot
+        from notchflex import plot
 
         plot(made).save(files[3])
     return files
@@ -321,7 +321,7 @@ def write_front(
     )
     write_csv(files[len(robots)], ["robot", *front.titles, *names], rows)
     if drawn:
-        from notchflex._plot import plot
+        from notchflex import plot
 
         plot(front).save(files[-1])
     return files

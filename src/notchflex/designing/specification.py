@@ -11,22 +11,20 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from notchflex.errors import InputError
-from notchflex.results.reading import (
-    read_specification,
-    robot_named,
-    validated,
-)
-from notchflex.robot.part import (
+from notchflex import InputError, Robot
+from notchflex.support import (
     Float,
     FloatOrInf,
     Int,
     ProblemError,
+    Tolerances,
     part,
     quantity,
+    read_specification,
+    robot_named,
+    schema_of,
+    validated,
 )
-from notchflex.robot.problems import Tolerances
-from notchflex.robot.robot import Robot, schema_of
 
 REFUSE = InputError.INVALID_SPECIFICATION
 

@@ -10,17 +10,21 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 from contextlib import contextmanager
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from notchflex._jax import constant
-from notchflex.errors import InputError
-from notchflex.mechanics.chain import body_lengths
-from notchflex.mechanics.tendon import passage
-from notchflex.robot import Robot, Tube
-from notchflex.robot.cuts import NotchCut, shrunk
+from notchflex import (
+    InputError,
+    Robot,
+    Tube,
+)
+from notchflex.support import (
+    NotchCut,
+    shrunk,
+)
 
 
 class PlacedCut(NamedTuple):
@@ -80,26 +84,17 @@ def cuts_of(robot: Robot, shank: float = 0.0, polishing: float = 0.0) -> RobotCu
         InputError: A kind of notch does not know its cuts, or polishing fills a cut or the bore.
 
     Example:
-        >>> from notchflex.robot import load_robot
+        >>> from notchflex import load_robot
         >>> cuts = cuts_of(load_robot("pacheco2021-a"))
         >>> len(cuts.cuts), round(cuts.cuts[-1].start, 9), round(cuts.end, 9)
         (5, 8.0, 10.0)
     """
-    at = robot.tube.base_length
     diameters = robot.tube.outer_diameter, robot.tube.inner_diameter
     with naming("the tube before polishing"):
         stock = Tube(diameters[0] + 2.0 * polishing, diameters[1] - 2.0 * polishing)
-    cuts: list[PlacedCut] = []
-    neighbours = (None, *robot.notches, None)
-    for number, notch in enumerate(robot.notches, start=1):
-        layout = notch.cut_layout(robot.tube, neighbours[number - 1], neighbours[number + 1])
-        if layout is None:
-            raise InputError.UNSUPPORTED(
-                f'a notch of kind = "{notch.kind}" has no definition of its cuts, so there is no '
-                "drawing, pattern or solid of it; give its class a method `cut_layout`."
-            )
-        cuts += [PlacedCut(number, cut.moved(at)) for cut in layout.cuts]
-        at += layout.length
+    layouts = robot.geometry.cuts
+    cuts = [PlacedCut(number, cut) for number, one in enumerate(layouts, 1) for cut in one.cuts]
+    *_, at = accumulate((one.length for one in layouts), initial=robot.tube.base_length)
     last, wall = max(one.end for one in cuts), robot.tube.outer_radius - robot.tube.inner_radius
     warnings: tuple[str, ...] = ()
     if at <= last:
@@ -167,8 +162,7 @@ def tendon_holes(robot: Robot, tendon: int) -> list[Hole]:
         tendon: Which tendon, from 0.
     """
     one = robot.tendon[tendon]
-    lengths = constant(body_lengths(robot.tube, robot.notches))
-    line = passage(robot.notches, lengths, one.direction_deg, robot.tube.outer_radius, one.radius)
+    base, *walls = robot.geometry.walls(one.direction_deg, one.radius)
     side = np.radians(one.direction_deg)
     position = one.radius * np.array([np.cos(side), np.sin(side), 0.0])
 
@@ -177,10 +171,9 @@ def tendon_holes(robot: Robot, tendon: int) -> list[Hole]:
 
     last = one.end_body or robot.number_of_notches
     holes = [hole(0, 0.0)]
-    if line.base_leaves > 0.0:
-        holes.append(hole(0, float(line.base_leaves)))
-    for j in np.flatnonzero(line.visits[:last]):
-        holes.append(hole(int(j) + 1, float(line.enters[j])))
-        if j + 1 < last:
-            holes.append(hole(int(j) + 1, float(line.leaves[j])))
+    if base is not None and base[1] > 0.0:
+        holes.append(hole(0, base[1]))
+    for body, wall in enumerate(walls[:last], start=1):
+        if wall is not None:
+            holes += [hole(body, along) for along in (wall if body < last else wall[:1])]
     return holes

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from notchflex._replacing import replacing
-from notchflex.errors import InputError
+from notchflex import InputError, Robot
 from notchflex.export.formats import FORMATS, Document, Subject, format_of
-from notchflex.results.writing import check_output
-from notchflex.robot import Robot
+from notchflex.support import check_output, replacing
 
 if TYPE_CHECKING:
-    from notchflex.results import Equilibrium, EquilibriumPath
+    from notchflex import Equilibrium, EquilibriumPath
 
 
 class Exported(NamedTuple):
@@ -102,7 +100,7 @@ def write(documents: Mapping[str, Document]) -> list[Exported]:
 def _subject(robot: object) -> Subject:
     if isinstance(robot, Robot):
         return Subject(robot)
-    from notchflex.results import Equilibrium, EquilibriumPath  # they import JAX
+    from notchflex import Equilibrium, EquilibriumPath  # they import JAX
 
     if isinstance(robot, EquilibriumPath):
         return Subject(robot.robot, robot, len(robot) - 1)

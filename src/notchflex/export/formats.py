@@ -13,18 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from notchflex._extras import need
-from notchflex.errors import InputError
-from notchflex.robot.part import (
-    Float,
-    Int,
-    part,
-    quantity,
-)
+from notchflex import InputError
+from notchflex.support import Float, Int, need, part, quantity
 
 if TYPE_CHECKING:
-    from notchflex.results import EquilibriumPath
-    from notchflex.robot import Robot
+    from notchflex import EquilibriumPath, Robot
 
 
 Seam = Literal["past", "split"]

@@ -15,9 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex import __version__
-from notchflex._replacing import unwritable
-from notchflex.errors import InputError
+from notchflex import InputError, __version__
 from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose, with_unit
 from notchflex.fit.assessment.errors_of_parts import edge, errors_of_parts
 from notchflex.fit.assessment.folds import Fold, LeftOut
@@ -28,16 +26,15 @@ from notchflex.fit.estimation.intervals import Interval
 from notchflex.fit.estimation.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
 from notchflex.fit.model.constants import Unknown
 from notchflex.fit.model.residuals import SENSOR
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.writing import (
+from notchflex.support import (
+    QUANTITIES,
     check_folder,
     plain,
-    write_text,
-)
-from notchflex.robot import robot_text
-from notchflex.robot.robot import (
+    robot_text,
     source_of,
     to_table,
+    unwritable,
+    write_text,
 )
 
 HEAD = {"program": "notchflex", "version": __version__}

@@ -5,7 +5,7 @@ imports it by itself where the identifier begins with its name:
 `gymnasium.make("notchflex.learning:notchflex/Follow-v0")`.
 """
 
-from notchflex._extras import need
+from notchflex.support import need
 
 need("gymnasium", "learn", "notchflex.learning")
 

@@ -11,12 +11,9 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.learning.episode import EpisodeRows, EpisodeSettings, frame
-from notchflex.loads.load import (
-    check_integer,
-    short_repr,
-)
+from notchflex.support import check_integer, short_repr
 
 RENDER_MODES = ["rgb_array"]
 _ROW = np.zeros(1, int)

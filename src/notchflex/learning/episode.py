@@ -11,16 +11,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from notchflex._extras import need
-from notchflex.analysis.kinematics import tip_from_angles
-from notchflex.analysis.stepping import Stepper
-from notchflex.errors import InputError
-from notchflex.loads.load import (
+from notchflex import (
+    InputError,
+    Robot,
+    Stepper,
+    load_robot,
+    tip_from_angles,
+)
+from notchflex.support import (
     check_integer,
     check_number,
+    need,
     short_repr,
 )
-from notchflex.robot import Robot, load_robot
 from notchflex.workspaces.rays import largest_tensions
 
 # So many steps from a slack tendon to the largest tension, where no rate is given.

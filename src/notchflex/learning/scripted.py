@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from notchflex import Frictionless, InputError
 from notchflex.control import Controller, Limits, TargetSearch
-from notchflex.errors import InputError
 from notchflex.learning.environments import RobotEnv
-from notchflex.loads.load import short_repr
-from notchflex.robot import Frictionless
+from notchflex.support import short_repr
 
 _TOLERANCE, _SOLVES = 1e-4, 20  # mm; loads solved in a step
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from notchflex.photographs.cut.measure_cut import MeasuredCut
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
-from notchflex.results.writing import document_head
+from notchflex.support import document_head
 
 
 def measured_document(measured: MeasuredPhotographs) -> dict[str, Any]:

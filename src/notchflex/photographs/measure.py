@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from notchflex.analysis import tip_from_angles
-from notchflex.errors import InputError
+from notchflex import InputError, Robot, tip_from_angles
 from notchflex.photographs.board.layout import Board
 from notchflex.photographs.board.sighting import NO_RULER, Ruler
 from notchflex.photographs.chain.camera import NUMBERS
@@ -26,7 +25,6 @@ from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotograp
 from notchflex.photographs.missing import MAX_RESIDUAL
 from notchflex.photographs.reading import read_photograph
 from notchflex.photographs.taken import loads_of
-from notchflex.robot import Robot
 
 NO_TUBE = "no tube of the proportions of the robot is seen"
 WORKED_ON = 8.0e6

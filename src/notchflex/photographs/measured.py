@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex import Robot
 from notchflex.fit.measurements.columns import measured_columns
-from notchflex.results.writing import write_columns
-from notchflex.robot import Robot
+from notchflex.support import write_columns
 
 PHOTOGRAPH = "photograph"
 """Column with the name of the file; `calibrate` passes over it."""

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex._replacing import replacing
 from notchflex.photographs.cut.measure_cut import MeasuredCut
 from notchflex.photographs.measured import MeasuredPhotograph
+from notchflex.support import replacing
 
 LONGEST = 1800
 """Longer side of an overlay, px."""

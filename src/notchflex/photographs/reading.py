@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex._extras import need
-from notchflex.errors import InputError
-from notchflex.robot.reading import bounded_bytes
+from notchflex import InputError
+from notchflex.support import bounded_bytes, need
 
 MOST_PIXELS = 120e6
 """A picture of more pixels is not decoded."""

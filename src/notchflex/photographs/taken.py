@@ -7,11 +7,10 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from notchflex.errors import InputError
+from notchflex import InputError, Robot
 from notchflex.photographs.measured import PHOTOGRAPH
 from notchflex.photographs.reading import head_of, photograph_bytes
-from notchflex.results.reading import read_data_table
-from notchflex.robot import Robot
+from notchflex.support import read_data_table
 
 _DESCRIPTION, _COMMENT = 0x010E, 0x9286
 _CODES = {b"ASCII\0\0\0": "latin-1", b"UNICODE\0": "utf-16", b"\0\0\0\0\0\0\0\0": "utf-8"}

@@ -18,17 +18,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from notchflex import __version__
-from notchflex._replacing import replacing, unwritable
-from notchflex.errors import InputError
+from notchflex import InputError, __version__
 from notchflex.pieces import checksum
 from notchflex.pieces.checksum import is_whole
-from notchflex.results.writing import (
-    check_folder,
-    write_text,
-)
-from notchflex.robot.reading import read_text
 from notchflex.solver.programs.compiled import backend
+from notchflex.support import check_folder, read_text, replacing, unwritable, write_text
 
 if TYPE_CHECKING:
     from polars import DataFrame

@@ -11,12 +11,7 @@ from typing import Self
 
 from threadpoolctl import threadpool_limits
 
-from notchflex._extras import need
-from notchflex.errors import ErrorCode, InputError
-from notchflex.loads.load import (
-    check_integer,
-    short_repr,
-)
+from notchflex import ErrorCode, InputError
 from notchflex.pieces.folder import (
     Done,
     Manifest,
@@ -33,6 +28,7 @@ from notchflex.pieces.running import (
     on_cluster,
     scheduler_at,
 )
+from notchflex.support import check_integer, need, short_repr
 
 Progress = Callable[[int, int, int, int], None]
 """Called with rows done, rows in all, rows without a result, and rows done by earlier calls."""

@@ -23,13 +23,9 @@ from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from notchflex._extras import need
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.pieces.folder import Done, PieceTask, Recipe, make_piece, task_of
-from notchflex.solver.programs.compiled import (
-    number_of_cores,
-    on_cores,
-)
+from notchflex.support import need, number_of_cores, on_cores
 
 T = TypeVar("T")
 

@@ -10,22 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from notchflex._replacing import replacing
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.plotting.curves import abscissa, notches_panel, total_panel
 from notchflex.plotting.output import Picture
 from notchflex.plotting.renderers.with_matplotlib import draw_panel, figure_of
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import Area, Faces, Panel, stack
 from notchflex.plotting.style import BLACK, BLUE, house_style
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.writing import (
-    MOVING,
-    check_picture,
-)
+from notchflex.support import MOVING, QUANTITIES, check_picture, replacing
 
 if TYPE_CHECKING:
-    from notchflex.results import EquilibriumPath
+    from notchflex import EquilibriumPath
 
 MAX_FRAMES = 48
 """Steps of a long path that are shown."""

@@ -10,8 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from notchflex._quantity import Quantity
-from notchflex.errors import InputError
+from notchflex import InputError, Robot
 from notchflex.plotting.curves import (
     LINE,
     LOADING,
@@ -26,16 +25,10 @@ from notchflex.plotting.path import robot_shape, state_shape
 from notchflex.plotting.renderers.with_matplotlib import draw_panel
 from notchflex.plotting.sheet import BESIDE, INSIDE, Curve, Mark, Panel
 from notchflex.plotting.style import house_style, sequence_colours
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.writing import (
-    entries_of,
-    is_listed,
-)
-from notchflex.robot import Robot
-from notchflex.robot.part import nearest
+from notchflex.support import QUANTITIES, Quantity, entries_of, is_listed, nearest
 
 if TYPE_CHECKING:
-    from notchflex.results import EquilibriumPath
+    from notchflex import EquilibriumPath
 
 STEP = "step"
 """Name of the number of the step, from 1."""
@@ -60,7 +53,7 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
     Raises:
         InputError: It can't be drawn on one pair of axes, or the quantity is unknown.
     """
-    from notchflex.results import Equilibrium, EquilibriumPath
+    from notchflex import Equilibrium, EquilibriumPath
 
     if isinstance(thing, EquilibriumPath):
         if x is None or y is None:

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.plotting.curves import TIP_LABELS
 from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.results.quantities import QUANTITIES
+from notchflex.support import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.analysis import Batch
+    from notchflex import Batch
 
 MAX_COLUMNS = 12
 """Entries of a quantity, such as notches, that are drawn; of more, an even selection."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.plotting.curves import (
     LINE,
     LOADING,
@@ -27,10 +27,10 @@ from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import BELOW, Cell, Colour, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import GREY, rgb
-from notchflex.results.quantities import QUANTITIES
+from notchflex.support import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.results import EquilibriumPath
+    from notchflex import EquilibriumPath
 
 MAX_ROBOTS = len(MODEL_COLOURS)
 """The number of robots that colours can distinguish."""

@@ -24,14 +24,10 @@ from notchflex.plotting.sheet import (
     dots,
 )
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.results.quantities import (
-    QUANTITIES,
-    spans_of,
-)
+from notchflex.support import QUANTITIES, spans_of
 
 if TYPE_CHECKING:
-    from notchflex.analysis.bands import Band
-    from notchflex.results import EquilibriumPath
+    from notchflex import Band, EquilibriumPath
 
 
 LOADING, UNLOADING = "loading", "unloading"

@@ -24,8 +24,8 @@ from notchflex.plotting.sheet import (
 from notchflex.plotting.style import BLACK, BLUE, GREY, SKY, VERMILLION
 
 if TYPE_CHECKING:
+    from notchflex import EquilibriumPath
     from notchflex.designing import Design, DesignFront, WishResult
-    from notchflex.results import EquilibriumPath
 
 
 BEFORE, AFTER = GREY, BLUE

@@ -21,10 +21,7 @@ from notchflex.plotting.sheet import (
     stack,
 )
 from notchflex.plotting.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, sequence_colours
-from notchflex.results.quantities import (
-    AXES,
-    QUANTITIES,
-)
+from notchflex.support import AXES, QUANTITIES
 
 if TYPE_CHECKING:
     from notchflex.control import Following

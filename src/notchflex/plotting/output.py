@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from notchflex.plotting.sheet import Sheet
-from notchflex.results.writing import check_picture
+from notchflex.support import check_picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

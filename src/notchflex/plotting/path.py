@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from notchflex import Robot
 from notchflex.plotting.curves import (
     LOADING,
     NOTCH_LABEL,
@@ -30,14 +31,12 @@ from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.results.quantities import QUANTITIES
-from notchflex.robot import Robot
+from notchflex.support import QUANTITIES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from notchflex.analysis.bands import Band
-    from notchflex.results import EquilibriumPath
+    from notchflex import Band, EquilibriumPath
 
 MAX_PROFILES = 2
 """Tendons whose tension is drawn over the stroke, and from span to span."""
@@ -137,8 +136,7 @@ def robot_picture(robot: Robot) -> Picture:
 
 def robot_shape(robot: Robot) -> Panel:
     """Return the shape of a robot without loads."""
-    from notchflex.analysis import solve
-    from notchflex.loads import Load
+    from notchflex import Load, solve
 
     free = solve(robot, Load())
     return replace(state_shape(free.path, free.step), legend="")

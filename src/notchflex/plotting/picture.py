@@ -7,14 +7,13 @@ from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.plotting.beside import beside_picture
 from notchflex.plotting.output import Picture
 from notchflex.plotting.path import path_picture, state_picture
 
 if TYPE_CHECKING:
-    from notchflex.analysis import Bands
-    from notchflex.results import Equilibrium, EquilibriumPath
+    from notchflex import Bands, Equilibrium, EquilibriumPath
 
 # The class of a result, and what describes its picture: module in this folder, and function.
 _KINDS = {

@@ -21,12 +21,7 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from notchflex._replacing import replacing
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.writing import (
-    PAPER,
-    check_picture,
-)
+from notchflex.support import PAPER, QUANTITIES, check_picture, replacing
 
 # notation: the eight colours of Okabe and Ito (2008), made for all kinds of colour vision.
 BLACK = "#000000"

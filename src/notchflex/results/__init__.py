@@ -3,9 +3,9 @@
 What computes, reads or writes is loaded on first use: `notchflex --help` passes by here.
 """
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
+from notchflex._lazy import loader
 from notchflex._quantity import Quantity
 
 if TYPE_CHECKING:
@@ -35,17 +35,15 @@ __all__ = [
     "save_path",
 ]
 
-_HOME = {
-    **dict.fromkeys(("EquilibriumPath", "Recorded"), "path"),
-    **dict.fromkeys(("Equilibrium", "SavedState", "State"), "state"),
-    **dict.fromkeys(("read_path", "save_path"), "io"),
-    "read_table": "reading",
-    "QUANTITIES": "quantities",
-}
-
-
-def __getattr__(name: str) -> object:
-    """Import the home of a name on first use."""
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+__getattr__ = loader(
+    __name__,
+    {
+        "Equilibrium": "notchflex.results.state",
+        "EquilibriumPath": "notchflex.results.path",
+        "Recorded": "notchflex.results.path",
+        **dict.fromkeys(("SavedState", "State"), "notchflex.results.state"),
+        **dict.fromkeys(("read_path", "save_path"), "notchflex.results.io"),
+        "read_table": "notchflex.results.reading",
+        "QUANTITIES": "notchflex.results.quantities",
+    },
+)

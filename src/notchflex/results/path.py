@@ -400,9 +400,7 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
         if quantity.source in ("path", "derived"):
             values = quantity.formula(self)
         else:  # vectors and rotations of the solver are in the frame of the base
-            values = self.solver_quantity(name)
-            if quantity.in_world:
-                values = quantity.turned(values, self.load.base_to_world)
+            values = quantity.turned(self.solver_quantity(name), self.load.base_to_world)
         kept[name] = frozen(values)
         return kept[name]
 

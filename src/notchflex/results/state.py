@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from notchflex._plot import Picture
+    from notchflex.analysis.geometry import RobotShape
     from notchflex.results.path import EquilibriumPath
 
 
@@ -446,6 +447,13 @@ class Equilibrium(EquilibriumQuantities, Displayed):
     def state(self) -> State:
         """This state, to save or continue from."""
         return self._path.state_at(self._step)
+
+    @property
+    def shape(self) -> RobotShape:
+        """Where bodies, flexures, tendons and points of the axis are, in the world."""
+        from notchflex.analysis.geometry import shape_of
+
+        return shape_of(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return this state as plain values: a step of the JSON document of its path.

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from notchflex._plot import Picture
+    from notchflex.analysis.geometry import Geometry
 
     AnyNotch: TypeAlias = Notch
     AnyMaterial: TypeAlias = Material
@@ -114,8 +115,8 @@ class Robot:
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state without the hash, which differs between processes, and the warnings."""
-        left_out = "_hash", "warnings"
+        """Return the state without what is derived; a hash differs between processes."""
+        left_out = "_hash", "geometry", "warnings"
         return {name: value for name, value in vars(self).items() if name not in left_out}
 
     def __repr__(self) -> str:
@@ -150,6 +151,13 @@ class Robot:
     def notches(self) -> tuple[Notch, ...]:
         """Every notch from base to tip, each with `repeat` 1."""
         return tuple(single for notch in self.notch for single in notch.expanded())
+
+    @functools.cached_property
+    def geometry(self) -> "Geometry":
+        """Its bodies, cuts, walls, closing angles and masses, without loads."""
+        from notchflex.analysis.geometry import Geometry
+
+        return Geometry(self)
 
     @functools.cached_property
     def warnings(self) -> tuple[InputWarning, ...]:

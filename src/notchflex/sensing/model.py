@@ -9,29 +9,19 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from notchflex import BodyForce, EquilibriumPath, InputError, LoadPath, Robot, Settings
 from notchflex._jax import constant
 from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.tangent import (
     Change,
     PathTangents,
 )
-from notchflex.errors import InputError
-from notchflex.loads import LoadPath
 from notchflex.loads.command import make_commands
-from notchflex.loads.load import (
-    NO_VECTOR,
-    BodyForce,
-    ExternalLoad,
-    check_integer,
-    short_repr,
-)
+from notchflex.loads.load import NO_VECTOR
 from notchflex.mechanics.chain import bending_normal
-from notchflex.results.path import EquilibriumPath
-from notchflex.results.quantities import AXES
-from notchflex.robot import Robot
 from notchflex.sensing.readings import Readings
-from notchflex.solver.newton import Settings
 from notchflex.solver.residual import SolverState
+from notchflex.support import AXES, ExternalLoad, check_integer, short_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,14 +16,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from notchflex.errors import InputError
-from notchflex.loads.load import (
-    check_number,
-    check_pulls,
-    short_repr,
-)
-from notchflex.results.quantities import AXES
-from notchflex.robot import Robot
+from notchflex import InputError, Robot
+from notchflex.support import AXES, check_number, check_pulls, short_repr
 
 MAX_READINGS = 2000
 """More readings than this are refused: the time grows with the square of their number."""

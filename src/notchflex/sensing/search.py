@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.results.path import EquilibriumPath
+from notchflex import EquilibriumPath
 from notchflex.sensing.model import SensingModel, SensingStep
 from notchflex.solver.programs.run import SolverRun
 from notchflex.solver.residual import SolverState

@@ -9,13 +9,7 @@ import numpy as np
 from jaxtyping import Int
 from numpy.typing import ArrayLike
 
-from notchflex.errors import InputError
-from notchflex.loads.load import (
-    ExternalLoad,
-    check_is_robot,
-    check_number,
-)
-from notchflex.robot import Robot
+from notchflex import InputError, Robot
 from notchflex.sensing.bounds import Bounds, bounds
 from notchflex.sensing.history import estimate, with_noise
 from notchflex.sensing.model import SensingModel, unknown_force
@@ -24,6 +18,7 @@ from notchflex.sensing.readings import Readings, SensorNoise, merged, readings_o
 from notchflex.sensing.search import Candidate
 from notchflex.sensing.sensed import LeftOpen, SensedForce
 from notchflex.solver.newton import DEFAULT
+from notchflex.support import ExternalLoad, check_is_robot, check_number
 
 Stage = Callable[[str, int, int], None]
 
@@ -114,12 +109,9 @@ def _largest(robot: Robot, readings: Readings, largest: float | None) -> float:
                 f"largest is the largest force looked for, above 0 N; got {value:g}"
             )
         return value
-    from notchflex.analysis.kinematics import tip_from_angles
-
-    length = float(np.linalg.norm(tip_from_angles(robot, np.zeros(robot.number_of_notches))[0]))
     lever = max(tendon.radius for tendon in robot.tendon)
     tension = float(np.nanmax(readings.tension, initial=0.0))
-    return _RANGE * max(tension, 1.0) * lever / length
+    return _RANGE * max(tension, 1.0) * lever / robot.geometry.length
 
 
 def _stage(progress: Stage | None, name: str) -> Callable[[int, int], None] | None:

@@ -10,15 +10,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.stats import chi2
 
-from notchflex._summary import Displayed, Summary
-from notchflex.errors import ConvergenceError
-from notchflex.results.path import EquilibriumPath
-from notchflex.robot import Robot
+from notchflex import ConvergenceError, EquilibriumPath, Robot
 from notchflex.sensing.bounds import Bounds
 from notchflex.sensing.history import LINEAR
 from notchflex.sensing.model import SensingModel
 from notchflex.sensing.own_reading import OwnReading
 from notchflex.sensing.search import BAD_FIT
+from notchflex.support import Displayed, Summary
 
 # An interval this much wider than that of the noise alone is one that stuck friction leaves.
 _STUCK = 1.5

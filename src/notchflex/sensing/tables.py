@@ -7,21 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from notchflex._quantity import DEGREES
-from notchflex.errors import InputError
-from notchflex.results.quantities import (
+from notchflex import InputError, Robot
+from notchflex.sensing.sensed import SensedForce
+from notchflex.support import (
     AXES,
+    DEGREES,
     QUANTITIES,
-)
-from notchflex.results.reading import (
     Table,
+    document_head,
     no_tendon_column,
     read_data_table,
     tendon_columns,
 )
-from notchflex.results.writing import document_head
-from notchflex.robot import Robot
-from notchflex.sensing.sensed import SensedForce
 
 BESIDE = ("tip", "angles")
 """Optional readings beside tensions and strokes."""

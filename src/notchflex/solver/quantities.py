@@ -15,7 +15,7 @@ from notchflex._jax import (
     jax,
     jnp,
 )
-from notchflex._quantity import REGISTERED, Quantity
+from notchflex._quantity import REGISTERED, Quantity, axis_sizes
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import in_space, rotation_error_estimate
 from notchflex.mechanics.material import peak_strain as peak_strain_of_section
@@ -366,7 +366,7 @@ class Shape(namedtuple("Shape", reported("solve"))):  # pyright: ignore[reportUn
     @staticmethod
     def form(flexures: int, tendons: int) -> PytreeLayout:
         """Return its layout for a number of flexures and tendons."""
-        sizes = {"tendon": tendons, "notch": flexures, "body": flexures + 1, "row": 3, "axis": 3}
+        sizes = axis_sizes(flexures, tendons)
         own = (REGISTERED[name] for name in Shape._fields)
         return PytreeLayout.of(
             Shape(*(np.zeros([sizes[axis] for axis in q.per], q.kind) for q in own))

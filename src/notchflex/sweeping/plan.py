@@ -10,19 +10,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter, model_validator
 
-from notchflex.errors import InputError
-from notchflex.results.reading import (
-    read_specification,
-    robot_named,
-    validated,
-)
-from notchflex.robot.part import (
+from notchflex import InputError, Robot
+from notchflex.support import (
     Float,
     Int,
     ProblemError,
     part,
+    read_specification,
+    robot_named,
+    schema_of,
+    validated,
 )
-from notchflex.robot.robot import Robot, schema_of
 from notchflex.tolerancing.spec import LOAD_KEYS
 
 _REFUSE = InputError.INVALID_SPECIFICATION

@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from jaxtyping import Int
 
-from notchflex._extras import need
-from notchflex._summary import Displayed, Summary, short
-from notchflex.errors import InputError
+from notchflex import InputError, Robot
 from notchflex.pieces.folder import CODES, Manifest, check_own, head_of, manifest_in, piece_file
 from notchflex.pieces.sketch import Scale, Sketch
-from notchflex.results.writing import write_json
-from notchflex.robot import Robot
-from notchflex.robot.part import nearest
-from notchflex.robot.robot import (
+from notchflex.support import (
+    Displayed,
+    Summary,
     from_table,
+    nearest,
+    need,
+    short,
     to_table,
+    write_json,
 )
 from notchflex.sweeping.plan import SweepPlan, plan_from_table, plan_table
 from notchflex.sweeping.rows import SweepModel, axis_values

@@ -14,13 +14,9 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.stats import qmc
 
-from notchflex._quantity import REGISTERED
-from notchflex.analysis.solve import simulate
-from notchflex.errors import ErrorCode, InputError
+from notchflex import ErrorCode, InputError, Robot, simulate
 from notchflex.pieces.sobol import SobolPart
-from notchflex.robot import Robot
-from notchflex.robot.part import nearest
-from notchflex.robot.value_names import number_at
+from notchflex.support import REGISTERED, nearest, number_at
 from notchflex.sweeping.plan import KeptQuantity, Sampling, SweepPlan, SweepVariable
 from notchflex.tolerancing.spec import (
     AXES,

@@ -11,16 +11,10 @@ from typing import Any, NamedTuple
 
 from threadpoolctl import threadpool_limits
 
-from notchflex._extras import need
-from notchflex.errors import InputError
-from notchflex.loads.load import (
-    check_integer,
-    short_repr,
-)
+from notchflex import InputError, Robot, load_robot
 from notchflex.pieces.folder import FAILED, check_target, encoded
 from notchflex.pieces.run import Progress, check_workers, open_folder, run_pieces
-from notchflex.robot import Robot, load_robot
-from notchflex.solver.programs.compiled import number_of_cores
+from notchflex.support import check_integer, need, number_of_cores, short_repr
 from notchflex.sweeping.plan import SweepPlan, plan_from_table, read_plan
 from notchflex.sweeping.result import KIND, Sweep, SweepManifest, read_sweep, write_summary
 from notchflex.sweeping.rows import model_of

@@ -14,20 +14,19 @@ from jaxtyping import Float, Int
 from scipy.optimize import brentq
 from scipy.stats import qmc, sobol_indices
 
-from notchflex._summary import Displayed, Summary, short
+from notchflex import EquilibriumPath, InputError, Robot, Settings
 from notchflex.analysis.draws import tolerances_of
-from notchflex.errors import InputError
-from notchflex.loads.load import (
-    check_integer,
-    check_is_robot,
-    short_repr,
-)
 from notchflex.pieces.folder import ACCEPTED, CODES, FAILED, INVALID
 from notchflex.pieces.run import PieceFolder
-from notchflex.results.path import EquilibriumPath
-from notchflex.robot import Robot
-from notchflex.robot.problems import Tolerance
-from notchflex.solver.newton import Settings
+from notchflex.support import (
+    Displayed,
+    Summary,
+    Tolerance,
+    check_integer,
+    check_is_robot,
+    short,
+    short_repr,
+)
 from notchflex.tolerancing.linear import LinearEffects, linear_effects
 from notchflex.tolerancing.spec import Criterion, ToleranceSpec, read_tolerance_spec
 from notchflex.tolerancing.study import (

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.pieces.folder import CODES
-from notchflex.results.writing import document_head
+from notchflex.support import document_head
 from notchflex.tolerancing.analysis import ToleranceAnalysis
 from notchflex.tolerancing.linear import WORST_SD
 from notchflex.tolerancing.study import DrawnPieces

@@ -16,8 +16,8 @@ from notchflex.analysis.draws import (
 )
 from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.tangent import PathTangents
-from notchflex.robot.problems import Tolerance
 from notchflex.solver.newton import DEFAULT
+from notchflex.support import Tolerance
 from notchflex.tolerancing.study import Study
 
 WORST_SD = 3.0

@@ -11,26 +11,24 @@ from typing import Any, Literal, Protocol, cast
 import numpy as np
 from jaxtyping import Float
 
-from notchflex._load_words import TendonCommand, load_columns, read_body_force, read_command, vector
-from notchflex._quantity import REGISTERED, Quantity
+from notchflex import BodyForce, EquilibriumPath, InputError, Load, LoadPath, Robot
 from notchflex.analysis.outputs import OUTPUTS
-from notchflex.errors import InputError
-from notchflex.loads import BodyForce, Load, LoadPath
-from notchflex.loads.load import (
+from notchflex.robot.part import unknown_key
+from notchflex.support import (
+    REGISTERED,
+    Quantity,
+    TendonCommand,
     check_integer,
     check_number,
-    short_repr,
-)
-from notchflex.results.path import EquilibriumPath
-from notchflex.results.quantities import holds
-from notchflex.robot import Robot
-from notchflex.robot.part import (
+    holds,
+    load_columns,
     nearest,
-    unknown_key,
-)
-from notchflex.robot.reading import (
     parse_toml,
+    parse_vector,
+    read_body_force,
+    read_command,
     read_text,
+    short_repr,
 )
 
 INDICES = ("tendon", "notch", "body", "axis", "span", "contact")
@@ -337,7 +335,7 @@ def _vector(given: Any, what: str) -> tuple[float, float, float]:
     """Read three numbers, or the text `X,Y,Z`."""
     if isinstance(given, list | tuple):
         given = ",".join(repr(one) for one in cast("list[Any]", given))
-    return vector(what)(str(given))
+    return parse_vector(what)(str(given))
 
 
 def _loaded(path: LoadPath, table: Mapping[str, Any]) -> LoadPath:

@@ -18,15 +18,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from notchflex.analysis.batch import batch
+from notchflex import (
+    EquilibriumPath,
+    ErrorCode,
+    InputError,
+    LoadPath,
+    Robot,
+    Settings,
+    batch,
+    simulate,
+)
 from notchflex.analysis.draws import (
     ToleranceSource,
     sources_of,
     values_at,
 )
-from notchflex.analysis.solve import simulate
-from notchflex.errors import ErrorCode, InputError
-from notchflex.loads import LoadPath
 from notchflex.pieces.folder import (
     ACCEPTED,
     CODES,
@@ -42,11 +48,7 @@ from notchflex.pieces.folder import (
 from notchflex.pieces.run import PieceFolder, Progress
 from notchflex.pieces.sketch import Scale, Sketch
 from notchflex.pieces.sobol import SobolPart
-from notchflex.results.path import EquilibriumPath
-from notchflex.robot import Robot
-from notchflex.robot.problems import Tolerance
-from notchflex.robot.robot import to_table
-from notchflex.solver.newton import Settings
+from notchflex.support import Tolerance, to_table
 from notchflex.tolerancing.spec import Criterion, ToleranceSpec, criteria_of
 from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicate
 

@@ -12,9 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from notchflex.analysis import solve
-from notchflex.loads import Load
-from notchflex.robot import Robot
+from notchflex import Load, Robot, solve
 
 TENSION, STROKE = "tension", "stroke"
 

@@ -27,7 +27,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from notchflex.errors import InputError
+from notchflex import InputError
 
 if TYPE_CHECKING:
     import viser

@@ -9,17 +9,26 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.analysis import simulate
+from notchflex import (
+    Equilibrium,
+    EquilibriumPath,
+    InputError,
+    Load,
+    Robot,
+    list_robots,
+    load_robot,
+    simulate,
+)
 from notchflex.control import Limits, TargetSearch, reach
 from notchflex.control.limits import Drive
-from notchflex.errors import InputError
-from notchflex.loads import Load
-from notchflex.results import Equilibrium, EquilibriumPath
-from notchflex.robot import Friction, Material, Robot, kinds_of, list_robots, load_robot, to_table
-from notchflex.robot.part import (
+from notchflex.robot.part import unit_of
+from notchflex.support import (
+    Friction,
+    Material,
     fields_of,
     is_list,
-    unit_of,
+    kinds_of,
+    to_table,
 )
 from notchflex.viewer.controls import POINTING, STROKE, TENSION, ControlRanges, Controls
 

@@ -21,7 +21,7 @@ from threading import Condition, Event, RLock
 
 import numpy as np
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.viewer.controls import Controls
 
 Task = Callable[[], None]

@@ -8,8 +8,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from notchflex.errors import InputError
-from notchflex.robot import Robot
+from notchflex import InputError, Robot
 from notchflex.viewer.controls import STRETCH, Controls, reach_of
 from notchflex.viewer.overlays.overlays import Overlays
 from notchflex.viewer.page.page import Page

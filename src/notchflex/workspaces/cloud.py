@@ -12,15 +12,19 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import ConvexHull, Delaunay, QhullError
 
-from notchflex._extras import need
-from notchflex._quantity import DEGREES
-from notchflex._summary import Displayed, Summary, short
-from notchflex.errors import InputError
-from notchflex.loads.load import ExternalLoad, check_number
-from notchflex.results.io import write_groups
-from notchflex.results.quantities import AXES
-from notchflex.results.writing import document_head
-from notchflex.robot import Robot
+from notchflex import InputError, Robot
+from notchflex.support import (
+    AXES,
+    DEGREES,
+    Displayed,
+    ExternalLoad,
+    Summary,
+    check_number,
+    document_head,
+    need,
+    short,
+    write_groups,
+)
 from notchflex.workspaces.limits import Limit
 
 if TYPE_CHECKING:

@@ -18,19 +18,17 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
-from notchflex.analysis.forward_model import tip_response
-from notchflex.errors import InputError
-from notchflex.loads import ExternalLoad
-from notchflex.loads.load import (
+from notchflex import InputError, Robot, tip_response
+from notchflex.pieces.folder import Manifest, Piece, Recipe, finished_head, piece_file, plain
+from notchflex.pieces.run import PieceFolder
+from notchflex.support import (
+    ExternalLoad,
     check_integer,
     check_is_robot,
     check_number,
     short_repr,
+    to_table,
 )
-from notchflex.pieces.folder import Manifest, Piece, Recipe, finished_head, piece_file, plain
-from notchflex.pieces.run import PieceFolder
-from notchflex.robot import Robot
-from notchflex.robot.robot import to_table
 from notchflex.workspaces.cloud import Workspace, hull_of, nearest_directions
 from notchflex.workspaces.limits import limits_of
 from notchflex.workspaces.rays import (

@@ -9,13 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from notchflex import InputError
 from notchflex.analysis.outputs import OUTPUTS
-from notchflex.errors import InputError
-from notchflex.loads.load import (
-    check_number,
-    short_repr,
-)
-from notchflex.results.quantities import QUANTITIES
+from notchflex.support import QUANTITIES, check_number, short_repr
 
 ALIASES = {"strain": "peak_strain", "angle": "total_angle", "force": "contact_force"}
 """Short names of quantities that are often limited."""

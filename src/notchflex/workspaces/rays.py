@@ -14,14 +14,10 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from notchflex.analysis.batch import simulate_batch
-from notchflex.analysis.closing_loads import closing
-from notchflex.errors import InputError
-from notchflex.loads import ExternalLoad, LoadPath
-from notchflex.loads.load import NO_VECTOR, short_repr
+from notchflex import InputError, LoadPath, Robot, Settings, closing, simulate_batch
+from notchflex.loads.load import NO_VECTOR
 from notchflex.pieces.sobol import SobolPart
-from notchflex.robot import Robot
-from notchflex.solver.newton import Settings
+from notchflex.support import ExternalLoad, short_repr
 from notchflex.workspaces.cloud import Workspace
 from notchflex.workspaces.limits import Limit, all_hold
 

@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 
 from cyclopts import Parameter, Token
 
-from notchflex._load_words import number
-from notchflex.errors import InputError
+from notchflex import InputError
+from notchflex.support import parse_number
 
 Values = TypeVar("Values")
 
@@ -85,7 +85,7 @@ def low_high(
         raise InputError.BAD_SYNTAX(f"give {form}.")
     if not (low.strip() or high.strip()):
         raise InputError.BAD_SYNTAX(f"a number is missing; give {form}.")
-    lower, upper = (number(word, form) if word.strip() else None for word in (low, high))
+    lower, upper = (parse_number(word, form) if word.strip() else None for word in (low, high))
     return lower, upper
 
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from cyclopts import Parameter
 
+from notchflex import InputError
 from notchflex.cli.arguments.conversion import converted
 from notchflex.cli.arguments.robots import chosen_robot, robot_files, robot_label
-from notchflex.errors import InputError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from notchflex.robot import Robot
+    from notchflex import Robot
 
 
 PAIR = "ROBOT=DATA.csv or LABEL=ROBOT=DATA.csv"

@@ -9,15 +9,15 @@ from typing import Annotated, Any, get_type_hints
 
 from cyclopts import Group, Parameter
 
-from notchflex._load_words import number
 from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.outputs import output_file
 from notchflex.export.formats import FORMATS, PatternOptions
+from notchflex.support import parse_number
 
 PATTERN = Group("Flat pattern (--dxf, --svg, --pdf)", sort_key=1)
 SOLIDS = Group("Solids (--stl, --step)", sort_key=2)
 FINITE_ELEMENTS = Group("Finite elements (--inp)", sort_key=3)
-_LENGTH = partial(number, form="a length in mm, 0 or more", least=0.0)
+_LENGTH = partial(parse_number, form="a length in mm, 0 or more", least=0.0)
 
 
 def length(text: str, **options: Any) -> Parameter:
@@ -47,7 +47,7 @@ _PATTERN = {
     ),
     "seam": Parameter(help="Whether cuts that cross the seam run `past` it or are `split` in two."),
     "seam_deg": converted(
-        partial(number, form="an angle in deg"),
+        partial(parse_number, form="an angle in deg"),
         "DEG",
         name="--seam-at",
         help="Side of the tube on which it is unrolled [deg].",

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 from cyclopts import Group, Parameter
 
-from notchflex._extras import need
-from notchflex._load_words import TendonCommand, number, whole
+from notchflex import InputError
 from notchflex.cli.arguments.conversion import converted, low_high, named
 from notchflex.cli.arguments.loads import tendon_command
-from notchflex.errors import InputError
+from notchflex.support import TendonCommand, need, parse_number, parse_whole
 
 if TYPE_CHECKING:
     from notchflex.fit.estimation.objective import FitObjective
@@ -41,7 +40,7 @@ def _read_prior(values: str) -> tuple[float, float]:
     words = re.split(r"\+-|±", values)
     if len(words) != 2:
         raise InputError.BAD_SYNTAX(f"give {_PRIOR}.")
-    return number(words[0], _PRIOR), number(words[1], _PRIOR)
+    return parse_number(words[0], _PRIOR), parse_number(words[1], _PRIOR)
 
 
 @Parameter(name="*")
@@ -88,14 +87,14 @@ class FitOptions:
     ] = "least-squares"
     huber: Annotated[
         float | None,
-        converted(partial(number, form="a number of standard deviations"), "SD"),
+        converted(partial(parse_number, form="a number of standard deviations"), "SD"),
         Parameter(help="Outliers beyond so many standard deviations count less; about 1.5."),
     ] = None
     starts: Annotated[
-        int, converted(whole(1), "N"), Parameter(help="Number of starting points.")
+        int, converted(parse_whole(1), "N"), Parameter(help="Number of starting points.")
     ] = 4
     seed: Annotated[
-        int, converted(whole(0), "N"), Parameter(help="Seed of the starting points.")
+        int, converted(parse_whole(0), "N"), Parameter(help="Seed of the starting points.")
     ] = 0
 
     def __post_init__(self) -> None:
@@ -178,7 +177,7 @@ class BeyondFit:
     ] = False
     draws: Annotated[
         int,
-        converted(whole(4), "N"),
+        converted(parse_whole(4), "N"),
         Parameter(help="Draws of each of the two chains of `--posterior`."),
     ] = 500
 

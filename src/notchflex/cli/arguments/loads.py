@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from notchflex._load_words import (
+from notchflex import InputError
+from notchflex.cli.arguments.conversion import converted, flag
+from notchflex.support import (
     BodyForceOption,
     Vector,
-    number,
+    parse_number,
+    parse_vector,
     read_body_force,
     read_command,
-    vector,
 )
-from notchflex.cli.arguments.conversion import converted, flag
-from notchflex.errors import InputError
 
 if TYPE_CHECKING:
-    from notchflex.loads import LoadPath
+    from notchflex import LoadPath
 
 LOADS = Group(
     "External loads", sort_key=8, help="They act before the first step and stay as they are."
@@ -33,7 +33,7 @@ def tendon_command(option: str, *, negative: bool = False) -> Parameter:
 
 
 def _xyz(what: str, text: str) -> Parameter:
-    return converted(vector(what), "X,Y,Z", help=text)
+    return converted(parse_vector(what), "X,Y,Z", help=text)
 
 
 @Parameter(name="*", group=LOADS)
@@ -66,7 +66,9 @@ class ExternalLoads:
     ] = ()
     tip_mass: Annotated[
         float | None,
-        converted(partial(number, form="a finite number of grams, 0 or more", least=0.0), "G"),
+        converted(
+            partial(parse_number, form="a finite number of grams, 0 or more", least=0.0), "G"
+        ),
         Parameter(help="Mass that hangs at the tip [g]; along 0,0,-9.81 without --gravity."),
     ] = None
     gravity: Annotated[
@@ -100,7 +102,7 @@ class ExternalLoads:
 
     def on(self, path: LoadPath) -> LoadPath:
         """Return the path with these loads on all its steps."""
-        from notchflex.loads import BodyForce
+        from notchflex import BodyForce
 
         of_tip = {
             name: value

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from notchflex._load_words import whole
+from notchflex import InputError
 from notchflex.cli.arguments.conversion import converted
-from notchflex.errors import InputError
+from notchflex.support import parse_whole
 
 if TYPE_CHECKING:
     from notchflex.pieces.run import PieceFolder
@@ -20,7 +20,7 @@ PIECES = Group("In pieces", sort_key=7)
 
 Workers = Annotated[
     int | None,
-    converted(whole(1, 1024), "N"),
+    converted(parse_whole(1, 1024), "N"),
     Parameter(help="Work in this number of processes of this machine; by default in one process."),
 ]
 Scheduler = Annotated[

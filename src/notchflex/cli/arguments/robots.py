@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import named, texts
-from notchflex.errors import InputError
 
 if TYPE_CHECKING:
+    from notchflex import Robot
     from notchflex.fit import Measurements
-    from notchflex.robot import Robot
 
 MAX_BESIDE = 4
 """Robots beside the first: five can be distinguished by colour."""
@@ -79,8 +79,7 @@ def named_columns(options: Sequence[str]) -> dict[str, str]:
 
 def chosen_robot(name: str, settings: Sequence[str]) -> Robot:
     """Load a robot with the values of `--set`; note the keys that a new kind drops."""
-    from notchflex.robot import parse_assignment
-    from notchflex.robot.reading import load_changed
+    from notchflex.support import load_changed, parse_assignment
 
     robot, dropped = load_changed(name, [parse_assignment(text) for text in settings])
     if dropped:
@@ -105,11 +104,11 @@ def changed_title(robot: Robot, settings: Sequence[str]) -> str:
     """Return the name of a robot with what `--set` changed, for heads of tables and pictures.
 
     Example:
-        >>> from notchflex.robot import load_robot
+        >>> from notchflex import load_robot
         >>> changed_title(load_robot("pacheco2021-a"), ["notch.depth=1.38"])
         'Pacheco 2021, wrist A with notch.depth = 1.38'
     """
-    from notchflex.robot import parse_assignment
+    from notchflex.support import parse_assignment
 
     pairs = map(parse_assignment, settings)
     changes = [f"{path} = {value}" for path, value in pairs if path != "name"]
@@ -130,7 +129,7 @@ def variant(text: str, other: str = "") -> tuple[str, list[tuple[str, object]]]:
         >>> variant("slick: friction.coefficient=0")
         ('slick', [('friction.coefficient', 0)])
     """
-    from notchflex.robot import parse_assignment
+    from notchflex.support import parse_assignment
 
     label, colon, values = text.partition(":")
     if not colon or not label.strip():

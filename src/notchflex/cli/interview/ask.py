@@ -13,7 +13,7 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.robot.value_names import parse_value
 
 BACK = ("<", "back")

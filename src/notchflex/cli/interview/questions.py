@@ -9,6 +9,7 @@ from collections.abc import Callable, Container, Iterable, Set
 from itertools import groupby
 from typing import Any, NamedTuple, TypeVar
 
+from notchflex import InputError, Nitinol, Robot, Superelastic, Tendon, Tube
 from notchflex.cli.interview.ask import (
     Interview,
     Question,
@@ -18,21 +19,17 @@ from notchflex.cli.interview.ask import (
     separated,
     whole,
 )
-from notchflex.errors import InputError
-from notchflex.robot import Nitinol, Robot, Superelastic, Tendon, Tube
-from notchflex.robot.kinds import (
+from notchflex.robot.part import unit_of
+from notchflex.robot.problems import MOST_NOTCHES
+from notchflex.support import (
     Friction,
     Material,
     Notch,
-    kinds_of,
-)
-from notchflex.robot.part import (
     fields_of,
     is_list,
     kind_of,
-    unit_of,
+    kinds_of,
 )
-from notchflex.robot.problems import MOST_NOTCHES
 
 
 class Wording(NamedTuple):

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from notchflex._quantity import DEGREES
 from notchflex.cli import terminal
 from notchflex.cli.tables.notch_tables import shown_numbers
 from notchflex.fit.assessment.errors_of_parts import edge
+from notchflex.support import DEGREES
 
 if TYPE_CHECKING:
     from notchflex.comparison import Comparison

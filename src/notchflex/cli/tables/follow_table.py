@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from notchflex._quantity import DEGREES
 from notchflex.cli import terminal
 from notchflex.cli.tables.path_table import MAX_ROWS
+from notchflex.support import DEGREES
 
 if TYPE_CHECKING:
     from notchflex.control import Following

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from notchflex import Robot
 from notchflex.cli import terminal
-from notchflex.robot import Robot
-from notchflex.robot.part import (
+from notchflex.robot.part import unit_of
+from notchflex.support import (
     fields_of,
     is_unsaid,
-    unit_of,
+    to_table,
 )
-from notchflex.robot.robot import to_table
 
 if TYPE_CHECKING:
     from rich.table import Table

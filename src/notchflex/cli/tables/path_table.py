@@ -10,25 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from notchflex._quantity import Quantity
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.tables.tolerance_tables import tolerance_lines
-from notchflex.errors import InputError
 from notchflex.loads.load_path import external_words
-from notchflex.results.quantities import (
-    AXES,
-    CONTACT_STATES,
-    QUANTITIES,
-    holds,
-)
-from notchflex.robot.part import nearest
+from notchflex.support import AXES, CONTACT_STATES, QUANTITIES, Quantity, holds, nearest
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from notchflex.analysis import Bands
-    from notchflex.loads.load import ExternalLoad
-    from notchflex.results import EquilibriumPath
+    from notchflex import Bands, EquilibriumPath
+    from notchflex.support import ExternalLoad
 
 
 NO_NUMBER = "–"

@@ -8,17 +8,12 @@ from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING
 
 from notchflex.cli import terminal
-from notchflex.results.quantities import DEGREES
-from notchflex.robot.value_names import described_at
+from notchflex.support import DEGREES, described_at
 
 if TYPE_CHECKING:
-    from notchflex.analysis.bands import (
-        Band,
-        Bands,
-        ClosingBands,
-    )
-    from notchflex.robot import Robot
-    from notchflex.robot.problems import Tolerance
+    from notchflex import Band, Bands, Robot
+    from notchflex.analysis.bands import ClosingBands
+    from notchflex.support import Tolerance
     from notchflex.tolerancing import ToleranceAnalysis
 
 

@@ -6,11 +6,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.outputs import output_file
 from notchflex.cli.terminal import DONE
-from notchflex.errors import InputError
-from notchflex.results.writing import check_output
+from notchflex.support import check_output
 
 
 def board(

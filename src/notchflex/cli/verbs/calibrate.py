@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from notchflex._load_words import load_columns
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.data_sources import DataSources, Sources
 from notchflex.cli.arguments.fit import BeyondFit, FitOptions, ParameterSpec
@@ -15,8 +15,7 @@ from notchflex.cli.arguments.pieces import InPieces
 from notchflex.cli.arguments.robots import Columns, MeasuredAs, OnePath, Settings, read_data
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile
 from notchflex.cli.terminal import BAD_INPUT, DONE, NOT_CONVERGED
-from notchflex.errors import InputError
-from notchflex.results.writing import check_folder
+from notchflex.support import check_folder, load_columns
 
 if TYPE_CHECKING:
     from notchflex.fit import Calibration
@@ -127,7 +126,7 @@ def _analyse(
         The results by their options, and what failed.
     """
     import notchflex.fit as fitting
-    from notchflex.loads import LoadPath
+    from notchflex import LoadPath
 
     results: dict[str, Any] = {}
     problems: list[str] = []

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from notchflex._load_words import number
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
-from notchflex.errors import InputError
-from notchflex.results.writing import check_folder
+from notchflex.support import check_folder, parse_number
 
 if TYPE_CHECKING:
     from notchflex.designing import Design
@@ -46,7 +45,7 @@ def design(
     grid: Annotated[
         float,
         converted(
-            partial(number, form="a step in mm, 0 or more", least=0.0),
+            partial(parse_number, form="a step in mm, 0 or more", least=0.0),
             "MM",
             help="Step of all lengths that are chosen [mm], such as 0.005; the numbers are those "
             "of the robot on this grid.",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from notchflex._load_words import TendonCommand, load_columns
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import flag
 from notchflex.cli.arguments.export import (
@@ -21,7 +21,6 @@ from notchflex.cli.arguments.loads import tendon_command
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
-from notchflex.errors import InputError
 from notchflex.export.export import Exported, build, write
 from notchflex.export.formats import (
     FORMATS,
@@ -34,9 +33,10 @@ from notchflex.export.formats import (
     Subject,
     check_suffix,
 )
+from notchflex.support import TendonCommand, load_columns
 
 if TYPE_CHECKING:
-    from notchflex.robot import Robot
+    from notchflex import Robot
 
 
 def export(
@@ -133,8 +133,7 @@ def _subject(
     if not (tension or stroke):
         return Subject(robot)
     terminal.use_compile_cache()
-    from notchflex.analysis import simulate
-    from notchflex.loads import LoadPath
+    from notchflex import LoadPath, simulate
 
     path = simulate(robot, LoadPath(*load_columns(tension, stroke, robot.number_of_tendons)))
     return Subject(robot, path, len(path) - 1)
@@ -144,8 +143,7 @@ def _report(robot: Robot, written: list[Exported], outputs: Outputs) -> int:
     """Write the document of `--json`, warnings, and what was written."""
 
     def document() -> dict[str, Any]:
-        from notchflex.results.state import robot_digest
-        from notchflex.results.writing import document_head
+        from notchflex.support import document_head, robot_digest
 
         files = [{"file": one.file, "warnings": list(one.warnings), **one.facts} for one in written]
         return {**document_head(robot), "robot_hash": robot_digest(robot), "files": files}

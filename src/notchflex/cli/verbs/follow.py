@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from notchflex._load_words import number
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted
 from notchflex.cli.arguments.loads import ExternalLoads
@@ -23,6 +22,7 @@ from notchflex.cli.arguments.robots import (
 )
 from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet, output_file
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.support import parse_number
 
 if TYPE_CHECKING:
     from notchflex.control import Following
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 def _at_least(what: str, least: float = 0.0) -> Parameter:
     form = f"a finite number of {what}, {'greater than 0' if least else '0 or more'}"
-    return converted(partial(number, form=form, least=least), "X")
+    return converted(partial(parse_number, form=form, least=least), "X")
 
 
 _ABOVE_ZERO = math.ulp(0.0)
@@ -124,9 +124,7 @@ def follow(
         save_state=save_state,
     )
     chosen = chosen_robot(robot, settings)
-    from notchflex import control
-    from notchflex.loads import Load, LoadPath
-    from notchflex.results import State
+    from notchflex import Load, LoadPath, State, control
 
     limits = control.Limits(
         tension=(least_tension, most_tension),
@@ -164,9 +162,8 @@ def follow(
 
 
 def _write(following: Following, outputs: Outputs, title: str) -> None:
-    from notchflex._replacing import replacing
     from notchflex.control.following import following_columns, following_document
-    from notchflex.results.writing import write_path_csv
+    from notchflex.support import replacing, write_path_csv
 
     def picture() -> Any:
         from notchflex.plotting import following_picture

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from notchflex._load_words import number, whole
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.arguments.robots import (
@@ -20,11 +20,7 @@ from notchflex.cli.arguments.robots import (
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, Quiet, output_file
 from notchflex.cli.tables.measured_cut import write_cut
 from notchflex.cli.terminal import DONE, INTERRUPTED, NOT_CONVERGED
-from notchflex.errors import InputError
-from notchflex.results.writing import (
-    check_folder,
-    check_output,
-)
+from notchflex.support import check_folder, check_output, parse_number, parse_whole
 from notchflex.viewer import HOST, PORT, check_host, check_installed
 
 if TYPE_CHECKING:
@@ -32,11 +28,11 @@ if TYPE_CHECKING:
 
 
 def _angle(text: str) -> float:
-    return number(text, "an angle in deg, such as 20")
+    return parse_number(text, "an angle in deg, such as 20")
 
 
 def _scale(text: str) -> float:
-    return number(text, "a scale in px/mm, such as 75.3")
+    return parse_number(text, "a scale in px/mm, such as 75.3")
 
 
 def measure(
@@ -115,7 +111,7 @@ def measure(
     ] = False,
     port: Annotated[
         int | None,
-        converted(whole(1, 65535), "N"),
+        converted(parse_whole(1, 65535), "N"),
         Parameter(
             help="With `--correct`: port of the page, or the next one that is free; "
             f"{PORT} by default."

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from notchflex._load_words import number
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted
 from notchflex.cli.arguments.loads import ExternalLoads
@@ -21,7 +21,7 @@ from notchflex.cli.arguments.robots import (
 )
 from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
-from notchflex.errors import InputError
+from notchflex.support import parse_number
 
 if TYPE_CHECKING:
     from notchflex.sensing import SensedForce
@@ -32,7 +32,7 @@ _MOST_ROWS = 60
 def _deviation(option: str, what: str) -> Any:
     form = "a finite standard deviation, 0 or more"
     return (
-        converted(partial(number, form=form, least=0.0), "SD", name=option),
+        converted(partial(parse_number, form=form, least=0.0), "SD", name=option),
         Parameter(help=f"Standard deviation of {what}."),
     )
 
@@ -88,7 +88,7 @@ def sense(
     angle_noise: Annotated[float, *_deviation("--angle-noise", "the notch angles [deg]")] = 0.5,
     largest: Annotated[
         float | None,
-        converted(partial(number, form="a force in N, above 0"), "N"),
+        converted(partial(parse_number, form="a force in N, above 0"), "N"),
         Parameter(
             help="Largest component of the force that is looked for [N]; by default three times "
             "the force at the tip that balances the largest tension at the base."
@@ -116,8 +116,7 @@ def sense(
         terminal.use_compile_cache()
         import math
 
-        from notchflex import sensing
-        from notchflex.loads import pull
+        from notchflex import pull, sensing
 
         known = external.on(pull(0.0, 0.0, steps=1)).external[0]
         noise = sensing.SensorNoise(

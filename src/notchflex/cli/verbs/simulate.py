@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from notchflex._load_words import TendonCommand, Vector, load_columns, vector, whole
+from notchflex import InputError
 from notchflex.cli import simulate_files, terminal
 from notchflex.cli.arguments.conversion import converted, flag, texts
 from notchflex.cli.arguments.loads import ExternalLoads, tendon_command
@@ -31,18 +31,20 @@ from notchflex.cli.outputs import (
     output_file,
 )
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
-from notchflex.errors import InputError
-from notchflex.results.writing import (
+from notchflex.support import (
     BROWSER,
     MOVING,
     PAPER,
+    TendonCommand,
+    Vector,
+    load_columns,
+    parse_vector,
+    parse_whole,
 )
 
 if TYPE_CHECKING:
-    from notchflex.analysis import Bands
-    from notchflex.loads import LoadPath
-    from notchflex.results import EquilibriumPath, SavedState
-    from notchflex.robot import Robot
+    from notchflex import Bands, EquilibriumPath, LoadPath, Robot
+    from notchflex.support import SavedState
 
 SPEC = (
     "Values or `start:stop:count` ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. "
@@ -69,13 +71,13 @@ def simulate(
     ] = (),
     base_rotation: Annotated[
         Vector | None,
-        converted(vector("angles in deg"), "RX,RY,RZ"),
+        converted(parse_vector("angles in deg"), "RX,RY,RZ"),
         Parameter(help="Turn the base by a rotation vector RX,RY,RZ [deg], for example `90,0,0`."),
     ] = None,
     external: ExternalLoads = ExternalLoads(),  # noqa: B008 - frozen
     refinement: Annotated[
         int,
-        converted(whole(0, 3), "N"),
+        converted(parse_whole(0, 3), "N"),
         Parameter(help="0 to 3: more strain modes and fibres, to check the accuracy."),
     ] = 0,
     settings: Settings = (),
@@ -88,7 +90,7 @@ def simulate(
     ] = False,
     draws: Annotated[
         int | None,
-        converted(whole(2, 100_000), "N"),
+        converted(parse_whole(2, 100_000), "N"),
         Parameter(
             help="How many robots `--uncertain` draws within the tolerances; 256 if not given."
         ),
@@ -159,8 +161,8 @@ def simulate(
     """
     import numpy as np
 
+    from notchflex import LoadPath
     from notchflex.cli.tables.path_table import parse_columns
-    from notchflex.loads import LoadPath
 
     terminal.be_quiet(quiet)
     shown = () if columns is None else parse_columns(columns)
@@ -269,7 +271,7 @@ def _solve(
 
 def _start(file: str) -> SavedState:
     """Read the state to continue from; warn where nothing shows which robot it belongs to."""
-    from notchflex.results import State
+    from notchflex import State
 
     state = State.load(file)
     if state.description is None:

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from notchflex._load_words import whole
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.arguments.pieces import Scheduler, Workers
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
-from notchflex.errors import InputError
-from notchflex.results.writing import check_picture
+from notchflex.support import check_picture, parse_whole
 
 if TYPE_CHECKING:
     from notchflex.sweeping import Sweep
@@ -28,7 +27,7 @@ def _part(text: str) -> tuple[int, int]:
     first, slash, count = text.partition("/")
     if not slash:
         raise InputError.BAD_SYNTAX(f"give {_PART}.")
-    read = whole(1)
+    read = parse_whole(1)
     numbers = read(first.strip()), read(count.strip())
     if not numbers[0] <= numbers[1] <= 10**9:
         raise InputError.OUT_OF_RANGE(f"there is no part {text}; give {_PART}.")

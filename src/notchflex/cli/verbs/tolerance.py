@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from notchflex._load_words import whole
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted
 from notchflex.cli.arguments.pieces import InPieces
@@ -18,7 +18,7 @@ from notchflex.cli.arguments.robots import (
     robot_files,
 )
 from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet
-from notchflex.errors import InputError
+from notchflex.support import parse_whole
 
 if TYPE_CHECKING:
     from notchflex.tolerancing import ToleranceAnalysis
@@ -40,16 +40,16 @@ def tolerance(
     *,
     draws: Annotated[
         int,
-        converted(whole(50, 10_000_000_000), "N"),
+        converted(parse_whole(50, 10_000_000_000), "N"),
         Parameter(
             help="About how many robots are drawn: 25 independent sets of scrambled Sobol points, "
             "each as large as the nearest power of two. More than 10 000 000 need `--folder`."
         ),
     ] = 100_000,
-    seed: Annotated[int, converted(whole(0), "N"), Parameter(help="Seed of the draws.")] = 0,
+    seed: Annotated[int, converted(parse_whole(0), "N"), Parameter(help="Seed of the draws.")] = 0,
     refinement: Annotated[
         int,
-        converted(whole(0, 3), "N"),
+        converted(parse_whole(0, 3), "N"),
         Parameter(help="0 to 3: more strain modes and fibres, to check the accuracy."),
     ] = 0,
     settings: Settings = (),

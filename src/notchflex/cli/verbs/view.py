@@ -8,10 +8,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from notchflex._load_words import whole
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
+from notchflex.support import parse_whole
 from notchflex.viewer import HOST, PORT, check_host, check_installed, exposed
 
 
@@ -31,7 +31,7 @@ def view(
     ] = HOST,
     port: Annotated[
         int,
-        converted(whole(1, 65535), "N"),
+        converted(parse_whole(1, 65535), "N"),
         Parameter(help="Port to serve on, or the next one that is free."),
     ] = PORT,
     open_browser: Annotated[bool, flag("Open a browser there.", name="--open")] = False,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from notchflex._load_words import number, whole
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, low_high, named, texts
 from notchflex.cli.arguments.loads import ExternalLoads
@@ -23,7 +23,7 @@ from notchflex.cli.arguments.robots import (
 )
 from notchflex.cli.outputs import JsonFile, Outputs, PlotFile, Quiet, output_file
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
-from notchflex.errors import InputError
+from notchflex.support import parse_number, parse_whole
 
 if TYPE_CHECKING:
     from notchflex.workspaces import Workspace
@@ -33,7 +33,7 @@ _LIMIT = "NAME=LARGEST or NAME=SMALLEST:LARGEST, such as strain=0.04 or gap=0.05
 
 def _tensions(text: str) -> list[float]:
     form = "tensions of 0 N or more, one or one per tendon joined by commas"
-    return [number(word, form, least=0.0) for word in text.split(",")]
+    return [parse_number(word, form, least=0.0) for word in text.split(",")]
 
 
 def workspace(
@@ -64,7 +64,7 @@ def workspace(
     ] = None,
     states: Annotated[
         int,
-        converted(whole(32, 20_000_000_000), "N"),
+        converted(parse_whole(32, 20_000_000_000), "N"),
         Parameter(
             help="How many states are solved, half of them while the tendons are let go. More than "
             "20 000 000 need `--folder`, which keeps one state of each small voxel and direction."
@@ -72,12 +72,12 @@ def workspace(
     ] = 100_000,
     pretension: Annotated[
         float,
-        converted(partial(number, form="a tension in N, 0 or more", least=0.0), "N"),
+        converted(partial(parse_number, form="a tension in N, 0 or more", least=0.0), "N"),
         Parameter(help="Tension that every tendon has at least [N]."),
     ] = 0.0,
     stiffness: Annotated[
         int,
-        converted(whole(0, 5000), "N"),
+        converted(parse_whole(0, 5000), "N"),
         Parameter(help="Compute the stiffness of the tip at so many states."),
     ] = 0,
     beside: Annotated[
@@ -125,8 +125,8 @@ def workspace(
     found: dict[str, Workspace] = {}
     with terminal.bars("exploring") as show:
         terminal.use_compile_cache()
+        from notchflex import pull
         from notchflex import workspaces as exploring
-        from notchflex.loads import pull
         from notchflex.workspaces.limits import in_python
 
         load = external.on(pull(0.0, 0.0, steps=1))[0]

@@ -17,11 +17,11 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
+from notchflex import Settings
 from notchflex._jax import (
     jax,
     jnp,
 )
-from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import report_quantities
 from notchflex.analysis.stepping import dead_band
 from notchflex.control.program.drive_step import (
@@ -39,7 +39,7 @@ from notchflex.solver.block_elimination import (
     tension_is_bounded,
 )
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
-from notchflex.solver.newton import Settings, limit_slack
+from notchflex.solver.newton import limit_slack
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
 from notchflex.solver.quantities import believable
@@ -52,6 +52,7 @@ from notchflex.solver.residual import (
     state_at,
 )
 from notchflex.solver.solved_state import SolvedState
+from notchflex.support import REGISTERED
 
 
 class SearchState(NamedTuple):

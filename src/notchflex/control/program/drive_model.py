@@ -14,18 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.analysis import Stepper
+from notchflex import LoadPath, Robot, State, Stepper
 from notchflex.analysis.outputs import reported_shapes
 from notchflex.control.program.compiled_search import SearchLayouts, Task, blank_task, search_drives
-from notchflex.loads import LoadPath
 from notchflex.loads.command import make_commands
-from notchflex.results.state import (
-    SavedState,
-    State,
-)
-from notchflex.robot import Robot
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import PytreeLayout, pad_rows, padded_indices
+from notchflex.support import SavedState
 
 
 class Response(NamedTuple):

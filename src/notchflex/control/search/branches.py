@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from notchflex import Failure
 from notchflex.control.program.drive_model import Response
 from notchflex.control.search.iterative_search import (
     largest_violation,
@@ -23,7 +24,6 @@ from notchflex.control.search.iterative_search import (
 from notchflex.control.search.problem import Attempt, Problem
 from notchflex.control.search.smaller import smaller_tensions
 from notchflex.control.search.starts import corners, other_starts, taut_tendons_suffice
-from notchflex.errors import Failure
 
 Approach = Literal["direct", "loading", "unloading", "least"]
 

@@ -13,10 +13,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.optimize import nnls
 
+from notchflex import Failure
 from notchflex.control.program.drive_model import DriveAim, Response
 from notchflex.control.program.drive_step import FIRST_PART, GROWTH, MIN_DRIVES
 from notchflex.control.search.problem import Attempt, Problem, size_of
-from notchflex.errors import Failure
 
 # Weight of limits that cannot all be met, relative to the target.
 _VIOLATION = 1e6

@@ -9,13 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from notchflex import Failure, InputError
 from notchflex.control.limits import Bound
 from notchflex.control.program.drive_model import DriveModel, Response
-from notchflex.errors import Failure, InputError
-from notchflex.loads.load import (
-    check_integer,
-    check_number,
-)
+from notchflex.support import check_integer, check_number
 
 
 def size_of(vector: Float[np.ndarray, " k"]) -> float:

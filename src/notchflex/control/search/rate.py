@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from notchflex import Failure
 from notchflex.control.program.drive_model import Response
 from notchflex.control.search.iterative_search import search_iteratively, within_limits
 from notchflex.control.search.problem import Attempt, Problem, size_of
-from notchflex.errors import Failure
 
 # A drive that changes by less than this part of the largest counts as unchanged.
 _STAYS = 1e-9

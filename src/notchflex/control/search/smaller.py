@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
+from notchflex import Failure
 from notchflex.control.search.iterative_search import solve_directly, within_limits
 from notchflex.control.search.problem import Attempt, Problem, size_of
 from notchflex.control.search.starts import corners
-from notchflex.errors import Failure
 
 # Relative accuracy of the lower end of a range of tensions.
 _EXACT = 5e-7

@@ -10,11 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from notchflex._quantity import REGISTERED
-from notchflex.analysis.closing_loads import (
-    Closing,
-    closing,
-)
+from notchflex import Closing, EquilibriumPath, InputError, LoadPath, Robot, closing
 from notchflex.analysis.forward_model import ForwardModel, slope
 from notchflex.analysis.tangent import Change
 from notchflex.designing.model.quantities import (
@@ -38,12 +34,7 @@ from notchflex.designing.model.variables import (
     deviations_of,
 )
 from notchflex.designing.specification import TargetCurve
-from notchflex.errors import InputError
-from notchflex.loads import LoadPath
-from notchflex.mechanics.chain import body_lengths
-from notchflex.results.path import EquilibriumPath
-from notchflex.robot import Robot
-from notchflex.robot.value_names import numbers_at
+from notchflex.support import REGISTERED, numbers_at
 
 CLOSINGS = "closing tensions"
 """Under what a `Point` keeps closing tensions (N) that are known without it, for values only."""
@@ -166,7 +157,7 @@ class Point:
         poses = [self.arrays[name][step] for name in ("body_position", "body_rotation")]
         if self.slopes_of is None:
             return offsets(self.robot, Bodies(*poses), points, None)
-        lengths = self._of_robot(lambda one: body_lengths(one.tube, one.notches)).slopes
+        lengths = self._of_robot(lambda one: one.geometry.body_length).slopes
         assert lengths is not None
         changes = [self.slopes_of(name)[:, step] for name in ("body_position", "body_rotation")]
         return offsets(self.robot, Bodies(*poses, *changes), points, lengths.T)

@@ -14,29 +14,21 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
+from notchflex import Closing, LoadPath, Robot
 from notchflex._jax import constant
-from notchflex.analysis.closing_loads import Closing
 from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.kinematics import (
     AxisPlaces,
     axis_places,
     axis_point_changes,
-    bodies_from_angles,
     points_on_axis,
 )
 from notchflex.analysis.tangent import Change
 from notchflex.designing.specification import TargetCurve
-from notchflex.loads import LoadPath
-from notchflex.mechanics.chain import assemble, body_lengths
-from notchflex.mechanics.contact import (
-    closing_angles,
-    free_angle,
-)
-from notchflex.results.quantities import (
+from notchflex.support import (
     DEGREES,
     QUANTITIES,
 )
-from notchflex.robot import Robot
 
 OF_STATES = {
     name: one
@@ -68,21 +60,11 @@ class OfRobot:
     by_notch: bool = False
 
 
-def _length(robot: Robot) -> np.ndarray:
-    straight, _ = bodies_from_angles(robot, np.zeros((1, robot.number_of_notches)))
-    return np.array([straight[0, -1, 2] + body_lengths(robot.tube, robot.notches)[-1]])
-
-
-def _closing_angle(robot: Robot) -> np.ndarray:
-    rods = assemble(robot, flat=False).rods
-    return DEGREES * np.asarray(closing_angles(rods) + free_angle(rods))
-
-
 def _closed_length(robot: Robot) -> np.ndarray:
     # A closed notch bends about its lips on the outer surface, at the outer radius from the axis.
-    travel = np.asarray(closing_angles(assemble(robot, flat=False).rods))
-    bodies = body_lengths(robot.tube, robot.notches)
-    return np.array([bodies.sum() + robot.tube.outer_radius * travel.sum()])
+    geometry = robot.geometry
+    travel = geometry.closing_angle - geometry.free_angle
+    return np.array([geometry.body_length.sum() + robot.tube.outer_radius * travel.sum()])
 
 
 def _spine(robot: Robot) -> np.ndarray:
@@ -91,8 +73,15 @@ def _spine(robot: Robot) -> np.ndarray:
 
 
 OF_ROBOTS: dict[str, OfRobot] = {
-    "length": OfRobot("mm", "length of the straight robot", _length),
-    "closing_angle": OfRobot("deg", "angle at which a notch closes", _closing_angle, True),
+    "length": OfRobot(
+        "mm", "length of the straight robot", lambda robot: np.array([robot.geometry.length])
+    ),
+    "closing_angle": OfRobot(
+        "deg",
+        "angle at which a notch closes",
+        lambda robot: DEGREES * robot.geometry.closing_angle,
+        True,
+    ),
     "closed_length": OfRobot(
         "mm", "length of the tube axis with all notches closed", _closed_length
     ),
@@ -100,7 +89,7 @@ OF_ROBOTS: dict[str, OfRobot] = {
     "web": OfRobot(
         "mm",
         "length of the rigid piece behind a notch",
-        lambda robot: body_lengths(robot.tube, robot.notches)[1:],
+        lambda robot: robot.geometry.body_length[1:],
         True,
     ),
     "free_bore": OfRobot(
@@ -322,7 +311,7 @@ def _nearest(
     robot: Robot, bodies: Bodies, points: Float[np.ndarray, "m 3"]
 ) -> Float[np.ndarray, " m"]:
     """Return how far from the base, along the straight robot, the nearest points lie."""
-    total = float(OF_ROBOTS["length"].formula(robot)[0])
+    total = robot.geometry.length
     low, high = np.zeros(len(points)), np.full(len(points), total)
     for number in range(_ROUNDS):
         count = _STATIONS if number == 0 else 21

@@ -13,21 +13,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
+from notchflex import InputError, LoadPath, Robot
 from notchflex.analysis.draws import (
     moments,
     sources_of,
 )
 from notchflex.designing.specification import DesignState, DesignVariable
-from notchflex.errors import InputError
-from notchflex.loads import LoadPath
-from notchflex.loads.load import ExternalLoad
-from notchflex.robot import Robot
-from notchflex.robot.part import nearest
-from notchflex.robot.problems import Tolerance
-from notchflex.robot.value_names import (
-    described_at,
-    numbers_at,
-)
+from notchflex.support import ExternalLoad, Tolerance, described_at, nearest, numbers_at
 
 _LOAD = re.compile(r"state\.([\w-]+)\.(tension|stroke)(?:\[([1-9]\d{0,3})\])?")
 _UNITS = {"tension": "N", "stroke": "mm"}

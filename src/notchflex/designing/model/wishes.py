@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from notchflex import InputError, Robot
 from notchflex.designing.model.quantities import (
     CLOSING,
     COMPLIANCE,
@@ -27,13 +28,7 @@ from notchflex.designing.specification import (
     Measured,
     TargetCurve,
 )
-from notchflex.errors import InputError
-from notchflex.robot import Robot
-from notchflex.robot.part import nearest
-from notchflex.robot.value_names import (
-    described_at,
-    numbers_at,
-)
+from notchflex.support import described_at, nearest, numbers_at
 from notchflex.tolerancing.spec import check_percent
 
 

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from notchflex import InputError
 from notchflex.designing.model.point import Point, Solver
 from notchflex.designing.model.quantities import Reading, pairs, taken
 from notchflex.designing.model.wishes import Source, Wish
 from notchflex.designing.specification import DesignConstraint, DesignObjective
-from notchflex.errors import InputError
 
 # A number is at its limit, or within it, up to this part of its size.
 TOLERANCE = 1e-6

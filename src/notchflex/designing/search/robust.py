@@ -19,6 +19,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.special import log_ndtr, ndtri
 
+from notchflex import (
+    ErrorCode,
+    InputError,
+    Robot,
+)
 from notchflex.analysis.closing_loads import closing_tensions_of
 from notchflex.analysis.draws import (
     sources_of,
@@ -43,9 +48,7 @@ from notchflex.designing.search.problem import (
 )
 from notchflex.designing.search.search import Searches, SearchResult, solved
 from notchflex.designing.specification import DesignConstraint, DesignSpec, RobustOptions
-from notchflex.errors import ErrorCode, InputError
-from notchflex.robot import Robot
-from notchflex.robot.problems import Tolerance
+from notchflex.support import Tolerance
 from notchflex.tolerancing.study import TAIL
 from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicates, yield_interval
 

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from notchflex.analysis.batch import batch
+from notchflex import InputError, LoadPath, Robot, batch
 from notchflex.designing.model.point import Point, Solver
 from notchflex.designing.search.local import LocalOptimum, is_followed, search_from, search_on
 from notchflex.designing.search.problem import (
@@ -23,9 +23,6 @@ from notchflex.designing.search.problem import (
     Vector,
 )
 from notchflex.designing.specification import SearchOptions
-from notchflex.errors import InputError
-from notchflex.loads import LoadPath
-from notchflex.robot import Robot
 
 _NUMBER = re.compile(r"\[\d+\]")
 # Penalty on a violation of one size, relative to the spread of the sums.

@@ -9,19 +9,25 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex import __version__
-from notchflex.analysis import closing, simulate
-from notchflex.errors import InputError
+from notchflex import (
+    ArcNotch,
+    EquilibriumPath,
+    InputError,
+    Linear,
+    Nitinol,
+    Robot,
+    StressStrain,
+    Superelastic,
+    __version__,
+    closing,
+    pull,
+    simulate,
+)
 from notchflex.export.cuts import tendon_holes
 from notchflex.export.finite_elements.meshes import TubeMesh, check_shape, mesh_of
 from notchflex.export.formats import DeckOptions, Document, Subject
-from notchflex.loads import pull
 from notchflex.loads.load import NOTHING
-from notchflex.mechanics.chain import body_lengths, unchecked_dimensions
-from notchflex.results import EquilibriumPath
-from notchflex.results.state import robot_digest
-from notchflex.robot import ArcNotch, Linear, Nitinol, Robot, StressStrain, Superelastic
-from notchflex.robot.kinds import Material
+from notchflex.support import Material, robot_digest, unchecked_dimensions
 
 _MAX_STRAIN = 0.2  # strain up to which a curve is continued
 
@@ -126,7 +132,8 @@ def tendon_spans(
     """
     one = robot.tendon[tendon]
     side = np.radians(one.direction_deg - mesh.x_deg)
-    starts = _origins(robot)
+    check_shape(robot)
+    starts = robot.geometry.body_start
     holes = [starts[hole.body] + hole.place[2] for hole in tendon_holes(robot, tendon)]
     points = [_point(mesh, one.radius, side, height) for height in holes]
     for point in points[1:]:
@@ -161,13 +168,6 @@ def _point(mesh: TubeMesh, radius: float, side: float, height: float) -> TendonP
         conditions, wanted = conditions[:2], wanted[:2]
     weights = np.linalg.lstsq(conditions, wanted)[0]
     return TendonPoint(place, tuple(zip(numbers[near].tolist(), weights.tolist(), strict=True)))
-
-
-def _origins(robot: Robot) -> Float[np.ndarray, " bodies"]:
-    """Start of each body on the straight tube, mm."""
-    lengths = body_lengths(robot.tube, robot.notches)
-    heights = [notch.height for notch in check_shape(robot)]
-    return np.concatenate([[0.0], np.cumsum(lengths[:-1] + heights)])
 
 
 # A contact this many times stiffer (N/mm³) than the modulus over 1 mm lets faces overlap little.

@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex.errors import InputError
+from notchflex import ArcNotch, InputError, Robot
 from notchflex.export.formats import DeckOptions
-from notchflex.robot import ArcNotch, Robot
 
 # Corners and middle nodes of an element in steps of half an element, as CalculiX counts them: first
 # along the angle, then along the radius (which makes a right-handed frame with z).

@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 from xml.sax.saxutils import escape, quoteattr
 
-from notchflex import __version__
+from notchflex import Robot, __version__
 from notchflex.export.flat.pattern import FlatPattern, flat_pattern
 from notchflex.export.formats import Document, PatternOptions, Subject
-from notchflex.results.state import robot_digest
-from notchflex.robot import Robot
-from notchflex.robot.cuts import Point
+from notchflex.support import Point, robot_digest
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

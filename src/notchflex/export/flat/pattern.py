@@ -19,18 +19,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.errors import InputError
+from notchflex import InputError, Robot, Tube
 from notchflex.export.cuts import PlacedCut, angle_at, cuts_of, naming
 from notchflex.export.formats import PatternOptions, Subject
-from notchflex.results.state import robot_digest
-from notchflex.robot import Robot, Tube
-from notchflex.robot.cuts import (
-    Arc,
-    Line,
-    NotchCut,
-    Point,
-    pieces,
-)
+from notchflex.support import Arc, Line, NotchCut, Point, pieces, robot_digest
 
 _DEEPEST = 14
 """Halvings of a piece at most: 16384 chords."""

@@ -26,7 +26,7 @@ from notchflex.plotting.drawings.dimensioned import (
     usual_scale,
 )
 from notchflex.plotting.style import house_style
-from notchflex.results.state import robot_digest
+from notchflex.support import robot_digest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,8 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 from jaxtyping import Float
 
-from notchflex import __version__
-from notchflex._extras import install_command
+from notchflex import Robot, __version__
 from notchflex.export.formats import Document, SimulatorOptions, Subject
 from notchflex.export.simulators.joint_model import JointModel, joint_model, tendon_levers
 from notchflex.export.simulators.mjcf import mjcf
@@ -29,9 +28,7 @@ from notchflex.export.simulators.text import (
     printable,
     roll_pitch_yaw,
 )
-from notchflex.results.state import robot_digest
-from notchflex.results.writing import csv_text
-from notchflex.robot import Robot
+from notchflex.support import csv_text, install_command, robot_digest
 
 _ANGLES = 11
 

@@ -20,14 +20,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
-from notchflex.analysis import closing, simulate
-from notchflex.errors import InputError
+from notchflex import InputError, Robot, closing, pull, simulate
 from notchflex.export.cuts import Hole, tendon_holes
-from notchflex.loads import pull
-from notchflex.loads.load import check_number
-from notchflex.mechanics.chain import assemble, body_lengths
-from notchflex.mechanics.contact import closing_angles
-from notchflex.robot import Robot
+from notchflex.support import check_number
 
 _POWERS = np.array([1, 2, 3])
 _KNOT_POWERS = np.array([1, 2])
@@ -447,17 +442,17 @@ def joint_model(robot: Robot, largest_tension: float | None = None) -> JointMode
     pulls = tuple(pull_samples(robot, k, top) for k in range(len(robot.tendon)))
     hinges = fit_hinges(robot, pulls)
     holes = tuple(tendon_holes(robot, k) for k in range(len(robot.tendon)))
-    chain = assemble(robot, flat=False)
+    geometry = robot.geometry
     return JointModel(
         robot=robot,
         top=top,
         hinges=hinges,
-        springs=_springs(hinges, pulls, holes, np.asarray(chain.stiffness)[:, 0]),
-        limit=np.asarray(closing_angles(chain.rods)),
+        springs=_springs(hinges, pulls, holes, geometry.notch_stiffness),
+        limit=geometry.closing_angle - geometry.free_angle,
         holes=holes,
-        body_length=body_lengths(robot.tube, robot.notches),
-        body_mass=np.asarray(chain.body_mass),
-        body_centre=np.asarray(chain.body_centre),
+        body_length=geometry.body_length,
+        body_mass=geometry.body_mass,
+        body_centre=geometry.body_centre,
         pulls=pulls,
     )
 

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex import __version__
-from notchflex.errors import InputError
+from notchflex import InputError, Robot, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.flat.drawing import plain_name
 from notchflex.export.formats import Document, SolidOptions, Subject
@@ -26,13 +25,7 @@ from notchflex.export.solids.straight import (
     is_bent,
     sector,
 )
-from notchflex.results.state import robot_digest
-from notchflex.robot import Robot
-from notchflex.robot.cuts import (
-    Line,
-    NotchCut,
-    pieces,
-)
+from notchflex.support import Line, NotchCut, pieces, robot_digest
 
 _RADIUS_FACTOR = 2.0
 """How far a cutting solid reaches, in outer radii."""

@@ -20,15 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from notchflex import __version__
-from notchflex.errors import InputError
+from notchflex import InputError, Robot, RobotShape, Tube, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject
 from notchflex.plotting.shapes.outline import fair_growth, prism, tube_wall
-from notchflex.plotting.shapes.robot_shape import RobotShape, shape_at, shape_from_angles
-from notchflex.results.state import robot_digest
-from notchflex.robot import Robot, Tube
-from notchflex.robot.cuts import NotchCut, outline
+from notchflex.plotting.shapes.robot_shape import shape_at, shape_from_angles
+from notchflex.support import NotchCut, outline, robot_digest
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -260,9 +257,8 @@ class DeformationMap:
         level = "tendons" if subject.path is None else subject.path.chain.level
         straight = np.zeros(robot.number_of_notches)
         rest = shape_from_angles(robot, straight, PIECES, level)
-        free = np.radians([notch.precurvature_deg for notch in robot.notches])
         shape = (
-            shape_from_angles(robot, free, PIECES)
+            shape_from_angles(robot, robot.geometry.free_angle, PIECES)
             if subject.path is None
             else shape_at(subject.path, subject.step, PIECES)
         )
@@ -328,7 +324,7 @@ def _zone(rest: RobotShape, shape: RobotShape, cuts: RobotCuts, notch: int) -> Z
     turns = bent.rotation @ np.swapaxes(line.rotation, 1, 2)
     moves = bent.position - _turned(turns, line.position)
     first = next(number for number, one in enumerate(cuts.cuts) if one.notch == notch + 1)
-    if float(np.asarray(rest.chain.rods.has_closure)[notch]) > 0.0:  # a spine along the tube
+    if robot.geometry.has_spine[notch]:  # a spine along the tube
         direction = np.array([0.0, 0.0, 1.0])
         ends = cuts.cuts[first].start, cuts.cuts[first].end
         return _without_legs(ends, direction, line.position @ direction, turns, moves, 0.0)

@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.measurements.repeats import repeats_of_each
-from notchflex.results.quantities import (
-    DEGREES,
-    QUANTITIES,
-)
+from notchflex.support import DEGREES, QUANTITIES
 
 # Quantities that are not registered as results: title, unit, and the factor to it.
 _MEASURED_ONLY = {

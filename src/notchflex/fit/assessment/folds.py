@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.stats import norm
 
-from notchflex.errors import InputError
+from notchflex import InputError, Robot
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.fit import by_label, check_search, fitted
 from notchflex.fit.estimation.objective import LeastSquares
@@ -20,7 +20,6 @@ from notchflex.fit.model.constants import Constant, RobotNumber, Unknown, unknow
 from notchflex.fit.model.drawing import deviated
 from notchflex.fit.model.residuals import ANGLES, Residuals
 from notchflex.fit.model.samples import Samples
-from notchflex.robot import Robot
 
 _ANGLES = [OBSERVED.index(name) for name in ANGLES]
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from notchflex.analysis import solve_each
-from notchflex.errors import InputError
+from notchflex import InputError, Load, LoadPath, solve_each
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.measurements.measurements import (
     OBSERVED,
@@ -23,8 +22,7 @@ from notchflex.fit.measurements.measurements import (
 from notchflex.fit.measurements.simulated import modelled
 from notchflex.fit.model.residuals import Residuals
 from notchflex.fit.model.samples import Samples
-from notchflex.loads import Load, LoadPath
-from notchflex.loads.load_path import load_path
+from notchflex.support import load_path
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,17 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from notchflex._extras import need
+from notchflex import InputError
 from notchflex._jax import (
     jax,
     jnp,
 )
-from notchflex._summary import Displayed, Summary, short
-from notchflex.errors import InputError
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.intervals import LEVEL
 from notchflex.fit.estimation.problem import Progress
-from notchflex.results.io import frame
+from notchflex.support import Displayed, Summary, frame, need, short
 
 if TYPE_CHECKING:
     from xarray import Dataset

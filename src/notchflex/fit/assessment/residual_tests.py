@@ -16,13 +16,14 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import f, norm
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.measurements.measurements import OBSERVED
 from notchflex.fit.model.constants import Unknown, unknowns
 from notchflex.fit.model.drawing import numbers_set
 from notchflex.fit.model.residuals import SENSOR
-from notchflex.robot.part import fields_of, unit_of
+from notchflex.robot.part import unit_of
+from notchflex.support import fields_of
 
 # Probability below which noise does not make a pattern; of constants for all of them together.
 _UNLIKELY = 0.01

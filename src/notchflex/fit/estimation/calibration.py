@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.stats import chi2, t
 
-from notchflex.errors import InputError
+from notchflex import InputError, Robot, Settings
 from notchflex.fit.estimation.intervals import (
     LEVEL,
     Cost,
@@ -30,9 +30,7 @@ from notchflex.fit.estimation.problem import FitProblem
 from notchflex.fit.model.constants import Unknown
 from notchflex.fit.model.drawing import deviated
 from notchflex.fit.model.residuals import Residuals
-from notchflex.results.io import frame
-from notchflex.robot import Robot
-from notchflex.solver.newton import Settings
+from notchflex.support import frame
 
 if TYPE_CHECKING:
     from notchflex.fit.assessment.residual_tests import ResidualTests

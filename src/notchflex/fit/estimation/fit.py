@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.errors import InputError
+from notchflex import InputError, Robot, Settings
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.intervals import Cost, Interval, Minimum
 from notchflex.fit.estimation.objective import FitObjective, LeastSquares, noise_left
@@ -27,9 +27,7 @@ from notchflex.fit.model.drawing import deviations_of
 from notchflex.fit.model.samples import Samples
 from notchflex.pieces.folder import Manifest, Piece, Recipe, finished_head, plain
 from notchflex.pieces.run import PieceFolder
-from notchflex.robot import Robot
-from notchflex.robot.robot import to_table
-from notchflex.solver.newton import Settings
+from notchflex.support import to_table
 
 KIND = "calibration"
 

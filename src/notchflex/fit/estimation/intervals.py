@@ -19,7 +19,7 @@ from jaxtyping import Float
 from scipy.optimize import least_squares
 from scipy.stats import chi2, f
 
-from notchflex._summary import Displayed, Summary, short
+from notchflex.support import Displayed, Summary, short
 
 _EVALUATIONS = 200
 # Part of the objective that a full step may still promise to gain at the end: at a kink, such as

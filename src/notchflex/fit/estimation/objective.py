@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.stats import norm
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.fit.estimation.intervals import Cost
 from notchflex.fit.measurements.measurements import OBSERVED
 from notchflex.fit.measurements.repeats import repeats

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.fit.estimation.intervals import Cost, Minimum, Vector, minimise, unit_free
 from notchflex.fit.estimation.objective import FitObjective, Noise, first_noise
 from notchflex.fit.model.constants import Unknown

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.fit.friction_rig.two_weights import (
     LAWS,
     Law,
@@ -19,7 +19,7 @@ from notchflex.fit.friction_rig.two_weights import (
     slopes_of_coefficient,
 )
 from notchflex.fit.measurements.csv import check_deviation
-from notchflex.results.reading import read_data_table
+from notchflex.support import read_data_table
 
 COLUMNS = {
     "weight_1": ("weight_1_g", "weight_1_sd_g"),

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex import __version__
-from notchflex.errors import InputError
+from notchflex import InputError, __version__
 from notchflex.fit.friction_rig.readings import COLUMNS, FrictionReadings
 from notchflex.fit.friction_rig.scattered import (
     Constancy,
@@ -20,7 +19,7 @@ from notchflex.fit.friction_rig.scattered import (
     outliers,
 )
 from notchflex.fit.friction_rig.two_weights import LAWS
-from notchflex.results.quantities import DEGREES
+from notchflex.support import DEGREES
 
 # A larger coefficient of a tendon is more likely a wrong unit.
 _RARE = 1.0

@@ -20,8 +20,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from notchflex import InputError
 from notchflex._jax import constant
-from notchflex.errors import InputError
 from notchflex.mechanics.friction import CornerLaw
 
 Readings = Float[np.ndarray, "*n"]

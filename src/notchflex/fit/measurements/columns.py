@@ -8,10 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from notchflex.results.quantities import (
-    AXES,
-    QUANTITIES,
-)
+from notchflex.support import AXES, QUANTITIES
 
 PULL = ("pull", "trial")
 FROM_REST = "from_rest"

@@ -12,29 +12,24 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex import BodyForce, InputError, LoadPath, Robot
 from notchflex.analysis import axis_places
-from notchflex.errors import InputError
 from notchflex.fit.measurements import columns
 from notchflex.fit.measurements import columns as layout
 from notchflex.fit.measurements.loading_order import Order, commands_of, loading_order
 from notchflex.fit.measurements.measurements import Measurements
-from notchflex.loads import BodyForce, ExternalLoad, LoadPath
-from notchflex.loads.load import (
-    check_is_robot,
-    check_pulls,
-)
-from notchflex.results.quantities import (
+from notchflex.support import (
     AXES,
     QUANTITIES,
-)
-from notchflex.results.reading import (
+    ExternalLoad,
     Table,
+    check_is_robot,
+    check_pulls,
     no_tendon_column,
     read_data_table,
     tendon_columns,
+    write_columns,
 )
-from notchflex.results.writing import write_columns
-from notchflex.robot import Robot
 
 _YES_OR_NO = {"0": False, "1": True, "false": False, "true": True}
 

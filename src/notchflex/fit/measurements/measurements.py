@@ -10,9 +10,8 @@ import numpy as np
 from jaxtyping import Int
 from numpy.typing import ArrayLike, NDArray
 
-from notchflex.errors import InputError
+from notchflex import InputError, LoadPath
 from notchflex.fit.measurements.loading_order import branches, commands_of
-from notchflex.loads import LoadPath
 
 OBSERVED = (
     "notch_angle",

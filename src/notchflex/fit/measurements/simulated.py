@@ -9,20 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from notchflex.analysis import axis_points, simulate, solve_each
-from notchflex.errors import InputError
+from notchflex import InputError, Load, LoadPath, Robot, simulate, solve_each
+from notchflex.analysis import axis_points
 from notchflex.fit.measurements.measurements import (
     Measurements,
     check_labels,
     check_quantities,
 )
-from notchflex.loads import Load, LoadPath
-from notchflex.loads.load_path import load_path
-from notchflex.results.quantities import spans_of
-from notchflex.robot import Robot
+from notchflex.support import load_path, spans_of
 
 if TYPE_CHECKING:
-    from notchflex.results import EquilibriumPath
+    from notchflex import EquilibriumPath
 
 _ANGLES = ("notch_angle", "total_angle", "edge_angle", "total_edge_angle", "tip_rotation")
 

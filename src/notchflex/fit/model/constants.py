@@ -9,13 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from notchflex.errors import InputError
-from notchflex.robot import Robot
-from notchflex.robot.value_names import (
-    described_at,
-    number_at,
-    numbers_at,
-)
+from notchflex import InputError, Robot
+from notchflex.support import described_at, number_at, numbers_at
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from notchflex import Robot
 from notchflex.analysis.draws import (
     moments,
     sources_of,
@@ -12,8 +13,7 @@ from notchflex.analysis.draws import (
 )
 from notchflex.fit.model.constants import RobotNumber, Unknown
 from notchflex.fit.model.residuals import SENSOR
-from notchflex.robot import Robot
-from notchflex.robot.value_names import numbers_at
+from notchflex.support import numbers_at
 
 # Robots of one fit are of one tube and tendon: these deviate in all of them alike.
 _SHARED = ("material.", "friction.")

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import mannwhitneyu
 from scipy.stats import t as student
 
+from notchflex import EquilibriumPath, LoadPath, Robot, Settings
 from notchflex._jax import constant
 from notchflex.analysis.forward_model import (
     Change,
@@ -25,12 +26,8 @@ from notchflex.analysis.kinematics import (
 )
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.constants import RobotNumber
-from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.motion import left_slope
-from notchflex.results.path import EquilibriumPath
-from notchflex.results.quantities import DEGREES
-from notchflex.robot import Robot
-from notchflex.solver.newton import Settings
+from notchflex.support import DEGREES
 
 # Probability below which means of branches differ by more than chance; the least rows of a branch.
 _UNLIKELY, _ROWS = 0.01, 3

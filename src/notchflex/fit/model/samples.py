@@ -9,16 +9,12 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.errors import InputError
+from notchflex import InputError, Robot, Settings
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.constants import Unknown
 from notchflex.fit.model.drawing import deviated
 from notchflex.fit.model.residuals import Residuals, Sample, misfit
-from notchflex.robot import Robot
-from notchflex.solver.newton import (
-    DEFAULT,
-    Settings,
-)
+from notchflex.solver.newton import DEFAULT
 
 
 @dataclass(eq=False)

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex._extras import need
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.photographs.chain.chain_table import Numbers
-from notchflex.results.writing import write_text
+from notchflex.support import need, write_text
 
 DICTIONARIES = (
     *(f"{bits}x{bits}_{count}" for bits in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),

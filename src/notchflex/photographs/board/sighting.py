@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.photographs.board.layout import Board
 from notchflex.photographs.chain.camera import NO_PRIOR, ViewPrior
 from notchflex.photographs.chain.chain_table import Numbers

@@ -13,9 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from notchflex.analysis import bodies_from_angles
-from notchflex.errors import InputError
-from notchflex.robot import ArcNotch, Robot
+from notchflex import ArcNotch, InputError, Robot, bodies_from_angles
 
 Numbers = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.photographs.chain.camera import NO_PRIOR, NUMBERS, Frame, View, ViewPrior, dot
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 

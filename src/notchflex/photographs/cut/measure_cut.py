@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
-from notchflex.errors import InputError
+from notchflex import ArcNotch, InputError, Robot
 from notchflex.photographs.board.layout import Board
 from notchflex.photographs.board.sighting import NO_RULER, Ruler
 from notchflex.photographs.chain.camera import NUMBERS
@@ -32,8 +32,7 @@ from notchflex.photographs.measure import NO_TUBE, judged_photograph, refused_ph
 from notchflex.photographs.measured import MeasuredPhotograph
 from notchflex.photographs.missing import MAX_RESIDUAL
 from notchflex.photographs.reading import read_photograph
-from notchflex.results.writing import write_columns, write_text
-from notchflex.robot import ArcNotch, Robot, robot_text
+from notchflex.support import robot_text, write_columns, write_text
 
 LENGTHS = ("height", "depth", "uncut_length")
 """The measured lengths, by their names in a robot file."""

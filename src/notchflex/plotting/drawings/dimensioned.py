@@ -12,14 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle, Wedge
 
-from notchflex._summary import round_number
+from notchflex import Robot
 from notchflex.plotting.drawings import dimension_lines as draw
 from notchflex.plotting.drawings.notch_views import NotchView, notch_view
 from notchflex.plotting.style import BLUE, VERMILLION, house_style
-from notchflex.robot import Robot
-from notchflex.robot.kinds import Notch
-from notchflex.robot.problems import with_limits
-from notchflex.robot.value_names import number_at
+from notchflex.support import Notch, number_at, round_number, with_limits
 
 Centre = tuple[float, float]
 

@@ -26,7 +26,7 @@ from notchflex.plotting.sheet import (
     grid,
 )
 from notchflex.plotting.style import BLUE, GREY, VERMILLION, sequence_colours
-from notchflex.results.quantities import QUANTITIES
+from notchflex.support import QUANTITIES
 
 if TYPE_CHECKING:
     from notchflex.fit import Calibration

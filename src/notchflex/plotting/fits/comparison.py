@@ -29,10 +29,7 @@ from notchflex.plotting.sheet import (
     grid,
 )
 from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, sequence_colours
-from notchflex.results.quantities import (
-    DEGREES,
-    QUANTITIES,
-)
+from notchflex.support import DEGREES, QUANTITIES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

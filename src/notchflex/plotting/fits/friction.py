@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex._quantity import DEGREES
 from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Panel, Span, dots, grid
 from notchflex.plotting.style import BLUE, GREY, ORANGE, VERMILLION
+from notchflex.support import DEGREES
 
 if TYPE_CHECKING:
     from notchflex.fit import FrictionRig

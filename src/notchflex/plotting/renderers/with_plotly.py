@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from notchflex._extras import need
 from notchflex.plotting.renderers.with_matplotlib import figure_of
 from notchflex.plotting.sheet import (
     Area,
@@ -28,7 +27,7 @@ from notchflex.plotting.sheet import (
     Span,
 )
 from notchflex.plotting.style import diverging_colours, for_browser, heading_lines, rgb
-from notchflex.results.writing import write_text
+from notchflex.support import need, write_text
 
 Layout = dict[str, Any]
 """A trace, a layout or a part of it, as plotly takes it."""

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.robot_shape import HELD, UP, RobotShape
-from notchflex.robot import Robot
+from notchflex import Robot
+from notchflex.plotting.shapes.robot_shape import HELD, UP, lips, tendon_line, walls
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-    from notchflex.robot import Tube
+    from notchflex import RobotShape, Tube
 
 
 Wall = tuple[float, float] | None
@@ -85,8 +85,10 @@ def outline(shape: RobotShape, view: float) -> ShapeOutline:
         bodies=bodies,
         bores=bores,
         flexures=flexures,
-        tendons=[project(shape.tendon(number), view) for number in range(len(shape.robot.tendon))],
-        lips=[project(shape.lips(notch), view) for notch in range(len(shape.flexures))],
+        tendons=[
+            project(tendon_line(shape, number), view) for number in range(len(shape.robot.tendon))
+        ],
+        lips=[project(lips(shape, notch), view) for notch in range(len(shape.flexures))],
         centre_line=project(_centre_line(shape), view),
         held=project(shape.on_body(0, [*clamp, clamp[1] + below, clamp[0] + below]), view),
     )
@@ -102,18 +104,18 @@ def body_corners(shape: RobotShape, body: int, view: float) -> list[tuple[float,
 
 def _sides(shape: RobotShape, body: int, view: float) -> list[Wall]:
     """Return the ends of the wall of a body on the right and the left; None if no wall."""
-    return [shape.walls(np.degrees(view) + turn)[body] for turn in (0.0, 180.0)]
+    return [walls(shape.robot, np.degrees(view) + turn)[body] for turn in (0.0, 180.0)]
 
 
 def _centre_line(shape: RobotShape) -> NDArray[np.float64]:
     """Return the tube axis along the bodies, and along notches with a spine beside it."""
-    rods = shape.chain.rods
+    geometry = shape.robot.geometry
     points: list[NDArray[np.float64]] = []
-    for body, length in enumerate(shape.body_length):
-        if body and float(rods.has_closure[body - 1]) > 0.0:
-            points.append(
-                shape.flexures[body - 1].fibre(*np.asarray(rods.end_offset)[body - 1, :2])
-            )
+    for body, length in enumerate(geometry.body_length):
+        if body and geometry.has_spine[body - 1]:
+            flexure = shape.flexures[body - 1]
+            end = (shape.position[body] - flexure.position[-1]) @ flexure.rotation[-1]
+            points.append(flexure.fibre(*end[:2]))
         points.append(shape.on_body(body, [[0.0, 0.0, 0.0], [0.0, 0.0, length]]))
     return np.concatenate(points)
 

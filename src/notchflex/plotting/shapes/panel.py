@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from notchflex.plotting.curves import by_stroke, driven_by_stroke
 from notchflex.plotting.shapes.outline import bending_plane, outline, project
-from notchflex.plotting.shapes.robot_shape import FlexureShape, RobotShape, shape_at
+from notchflex.plotting.shapes.robot_shape import lips, shape_at, tendon_line, walls
 from notchflex.plotting.sheet import (
     BESIDE,
     FINE,
@@ -27,7 +27,8 @@ from notchflex.plotting.sheet import (
 from notchflex.plotting.style import GREY, ORANGE, PURPLE, SKY, VERMILLION, rgb, sequence_colours
 
 if TYPE_CHECKING:
-    from notchflex.results import EquilibriumPath
+    from notchflex import EquilibriumPath, RobotShape
+    from notchflex.support import FlexureShape
 
 
 DEAD, FOLLOWING, WEIGHT = "", ", following", ", weight"
@@ -67,7 +68,9 @@ def applied_loads(path: EquilibriumPath, step: int, shape: RobotShape) -> list[A
         return shape.rotation[body] @ stated if following else stated @ world
 
     kind = FOLLOWING if load.following else DEAD
-    point = shape.on_body(-1, np.array([0.0, 0.0, shape.body_length[-1]]) + load.tip_point)
+    point = shape.on_body(
+        -1, np.array([0.0, 0.0, path.robot.geometry.body_length[-1]]) + load.tip_point
+    )
     weight = np.asarray(load.weight(load.tip_mass), float)
     loads = [
         AppliedLoad("force", kind, point, carried(load.tip_force, -1, load.following)),
@@ -174,7 +177,7 @@ def shape_panel(
             items += _in_space(shape, colour, label, first=not order)
         else:
             items += _from_the_side(shape, view, colour, label, order)
-        closed += [shape.lips(int(notch)) for notch in np.flatnonzero(path.closed[step])]
+        closed += [lips(shape, int(notch)) for notch in np.flatnonzero(path.closed[step])]
         loads += applied_loads(path, step, shape)
     top, bodies = 3 * len(steps) + 5, np.diff(path.body_position[0], axis=0)
     extent = float(np.linalg.norm(bodies, axis=1).sum() + path.robot.tube.outer_diameter)
@@ -234,7 +237,7 @@ def _in_space(shape: RobotShape, colour: Colour, label: str, first: bool) -> Ite
     faces = np.concatenate([*bodies, *flexure_faces(shape)])
     yield Faces(faces, shaded(faces, colour), colour, name=label, group=label)
     for number in range(len(shape.robot.tendon)):
-        yield Curve(shape.tendon(number), ORANGE, width=0.9, group=label, layer=5)
+        yield Curve(tendon_line(shape, number), ORANGE, width=0.9, group=label, layer=5)
 
 
 def _load_arrows(
@@ -272,7 +275,7 @@ def body_faces(shape: RobotShape) -> Iterator[Quads]:
     outer = shape.robot.tube.outer_radius
     edges = 2.0 * np.pi * np.arange(ROUND + 1) / ROUND
     rim = outer * np.stack([np.cos(edges), np.sin(edges)], axis=1)
-    sides = [shape.walls(float(np.degrees(angle))) for angle in edges[:-1] + np.pi / ROUND]
+    sides = [walls(shape.robot, float(np.degrees(angle))) for angle in edges[:-1] + np.pi / ROUND]
     for body in range(len(shape.position)):
         corners = [
             np.column_stack([rim[[i, i + 1, i + 1, i]], np.repeat(wall, 2)])
@@ -286,8 +289,7 @@ def body_faces(shape: RobotShape) -> Iterator[Quads]:
 def flexure_faces(shape: RobotShape) -> Iterator[Quads]:
     """Yield every flexure: the wall at its spine, or a band with its thickness and area."""
     outer = shape.robot.tube.outer_radius
-    closes = np.asarray(shape.chain.rods.has_closure) > 0.0
-    for one, spine in zip(shape.flexures, closes, strict=True):
+    for one, spine in zip(shape.flexures, shape.robot.geometry.has_spine, strict=True):
         half = 0.5 * one.area / (one.spine + one.near)
         band = [(-one.spine, -half), (-one.spine, half), (one.near, half), (one.near, -half)]
         lines = _spine(one, outer) if spine else [*band, band[0]]

@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from notchflex._quantity import REGISTERED
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.plotting.axes_of_quantities import entry_label
 from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BESIDE, Area, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, ORANGE, VERMILLION
-from notchflex.robot.part import nearest
-from notchflex.robot.value_names import described_at
+from notchflex.support import REGISTERED, described_at, nearest
 
 if TYPE_CHECKING:
     from notchflex.sweeping import Sweep

@@ -11,7 +11,7 @@ from html import escape
 
 import numpy as np
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.photographs.board.layout import Board
 from notchflex.photographs.board.sighting import Ruler
 from notchflex.photographs.chain.chain_table import chain_table

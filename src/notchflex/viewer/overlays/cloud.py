@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.errors import InputError
-from notchflex.loads import Load
+from notchflex import InputError, Load, Robot
 from notchflex.plotting.style import BLUE, ORANGE
-from notchflex.robot import Robot
 from notchflex.viewer.controls import POINTING, ControlRanges, Controls
 from notchflex.viewer.overlays.background import Background
 from notchflex.viewer.scene.marks import rgb

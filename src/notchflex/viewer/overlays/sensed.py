@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex.loads import Load
+from notchflex import Load, Robot
 from notchflex.plotting.style import GREEN
-from notchflex.robot import Robot
 from notchflex.sensing import SensedForce, SensorNoise, sense
 from notchflex.viewer.controls import POINTING
 from notchflex.viewer.overlays.background import Background

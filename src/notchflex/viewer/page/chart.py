@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from notchflex.plotting.curves import COLOUR, branches
 from notchflex.plotting.sheet import Curve, Mark, Panel, dots
-from notchflex.results.quantities import QUANTITIES
+from notchflex.support import QUANTITIES
 from notchflex.viewer.scene.marks import TENDON, contact_colours, css
 from notchflex.viewer.session import Session
 

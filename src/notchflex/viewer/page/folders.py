@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from notchflex.errors import InputError
-from notchflex.robot import Robot, list_robots, load_robot, robot_from_text
+from notchflex import InputError, Robot, list_robots, load_robot
+from notchflex.support import robot_from_text
 from notchflex.viewer.controls import POINTING, STROKE, TENSION, Controls
 from notchflex.viewer.page import saving
 from notchflex.viewer.session import kinds, numbers

@@ -7,13 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from notchflex import Robot
 from notchflex.plotting.curves import COLOUR
 from notchflex.plotting.style import BLUE, VERMILLION
-from notchflex.results.quantities import (
-    CONTACT_STATES,
-    QUANTITIES,
-)
-from notchflex.robot import Robot
+from notchflex.support import CONTACT_STATES, QUANTITIES
 from notchflex.viewer.page.chart import axis
 from notchflex.viewer.scene.marks import (
     BEYOND,

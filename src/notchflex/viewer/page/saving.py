@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.errors import InputError
+from notchflex import InputError
 from notchflex.plotting.renderers.with_matplotlib import draw_panel
 from notchflex.plotting.shapes.panel import applied_loads
 from notchflex.plotting.shapes.robot_shape import shape_at
 from notchflex.plotting.style import house_style
-from notchflex.results.writing import write_path_csv
-from notchflex.robot import robot_text
+from notchflex.support import robot_text, write_path_csv
 from notchflex.viewer.page.chart import loop
 from notchflex.viewer.page.readout import BALL, entries, rows, strain_scale
 from notchflex.viewer.scene.scene import quaternions

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.robot_shape import RobotShape
+from notchflex import Equilibrium, EquilibriumPath, RobotShape
+from notchflex.plotting.shapes.robot_shape import lips, tendon_line
 from notchflex.plotting.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
-from notchflex.results import Equilibrium, EquilibriumPath
 
 Colour = tuple[int, int, int]
 
@@ -158,10 +158,10 @@ class Marks:
         for notch, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
             ball.visible = bool(closed)
             if closed:
-                ball.position = shape.lips(notch, _LIPS_AT * self._outer)
+                ball.position = lips(shape, notch, _LIPS_AT * self._outer)
 
 
 def _segments(shape: RobotShape, tendon: int) -> NDArray[np.float32]:
     """Return the straight pieces of a tendon (from 0), (pieces, 2, 3)."""
-    points = shape.tendon(tendon).astype(np.float32)
+    points = tendon_line(shape, tendon).astype(np.float32)
     return np.stack([points[:-1], points[1:]], axis=1)

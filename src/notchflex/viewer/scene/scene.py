@@ -15,18 +15,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex import EquilibriumPath, Robot, RobotShape
 from notchflex.plotting.shapes.outline import body_corners, prism, tube_wall
 from notchflex.plotting.shapes.panel import AppliedLoad, applied_loads
 from notchflex.plotting.shapes.robot_shape import (
     HELD,
-    FlexureShape,
-    RobotShape,
     rotation_of,
     shape_at,
     shape_from_angles,
 )
-from notchflex.results import EquilibriumPath
-from notchflex.robot import Robot
+from notchflex.support import FlexureShape
 from notchflex.viewer.controls import GRAVITY, POINTING, ControlRanges, Controls, round_up
 from notchflex.viewer.scene.marks import LOAD, METAL, Marks, Shown, linear, strain_colour
 
@@ -61,7 +59,7 @@ def _body(rest: RobotShape, body: int) -> tuple[Points, Triangles]:
     along = corners[:, 1]
     ends = float(along.min()) - _END_MARGIN, float(along.max()) + _END_MARGIN
     solid = _through(corners, view, rest) ^ tube_wall(rest.robot.tube, ends, ROUND)
-    spine = np.asarray(rest.chain.rods.has_closure) > 0.0
+    spine = rest.robot.geometry.has_spine
     for flexure in (body - 1, body):
         # A flexure on a spine lies between the bodies; one across the tube overlaps with them.
         if 0 <= flexure < len(rest.flexures) and not spine[flexure]:
@@ -106,13 +104,12 @@ class FlexureSurface:
 
 def at_rest(robot: Robot, level: str = "tendons") -> RobotShape:
     """Return the shape of a robot without loads, with `PIECES`; `level` is that of its chain."""
-    free = np.radians([notch.precurvature_deg for notch in robot.notches])
-    return shape_from_angles(robot, free, PIECES, level)
+    return shape_from_angles(robot, robot.geometry.free_angle, PIECES, level)
 
 
 def skins(rest: RobotShape) -> list[FlexureSurface]:
     """Return the surfaces of all flexures, base to tip, of the shape from `at_rest`."""
-    spine = np.asarray(rest.chain.rods.has_closure) > 0.0
+    spine = rest.robot.geometry.has_spine
     return [
         _spine(rest, notch) if spine[notch] else _strip(rest, notch)
         for notch in range(len(rest.flexures))
@@ -284,7 +281,7 @@ class Scene:
         self.server, self.robot, self.reach, self.shown = server, robot, reach, shown
         self.rest = at_rest(robot)
         self.length = float(np.linalg.norm(np.diff(self.rest.position, axis=0), axis=1).sum())
-        self.length += float(self.rest.body_length[-1])
+        self.length += float(robot.geometry.body_length[-1])
         with server.atomic():
             self._build()
 

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import flag
-from notchflex.errors import InputError
-from notchflex.results.writing import write_document
+from notchflex.support import write_document
 
 Shell = Literal["bash", "zsh", "fish", "powershell"]
 

@@ -12,10 +12,10 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from notchflex import __version__
-from notchflex._extras import install_command
 from notchflex.cli import terminal
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet
 from notchflex.cli.terminal import DONE
+from notchflex.support import install_command
 
 WRONG_SUMS = 1
 """Exit code where JAX computes wrong numbers."""

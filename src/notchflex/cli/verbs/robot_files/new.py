@@ -11,17 +11,12 @@ from typing import Annotated, NamedTuple
 
 from cyclopts import Group, Parameter
 
+from notchflex import InputError, InputWarning
 from notchflex.cli.arguments.conversion import flag
 from notchflex.cli.arguments.robots import warn_unlikely
 from notchflex.cli.interview.ask import Interview
 from notchflex.cli.interview.questions import commented, interviewed
-from notchflex.errors import InputError, InputWarning
-from notchflex.results.writing import (
-    check_output,
-    write_text,
-)
-from notchflex.robot.reading import read_text
-from notchflex.robot.writing import robot_text
+from notchflex.support import check_output, read_text, robot_text, write_text
 
 TUBE = Group("Tube", sort_key=1)
 NOTCHES = Group("Notches (one value for all, or one for each, base to tip)", sort_key=2)

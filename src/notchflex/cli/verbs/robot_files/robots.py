@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from notchflex import list_robots
 from notchflex.cli import terminal
-from notchflex.robot.reading import list_robots
 
 
 def robots() -> None:

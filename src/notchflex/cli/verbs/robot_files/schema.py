@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from typing import Annotated
 
+from notchflex import InputError, json_schema
 from notchflex.cli.arguments.conversion import flag
-from notchflex.errors import InputError
-from notchflex.results.writing import write_document
-from notchflex.robot import json_schema
+from notchflex.support import write_document
 
 
 def schema(

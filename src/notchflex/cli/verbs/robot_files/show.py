@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from notchflex import InputError
 from notchflex.cli import terminal
 from notchflex.cli.arguments.robots import (
     RobotName,
@@ -13,8 +14,7 @@ from notchflex.cli.arguments.robots import (
     robot_files,
 )
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
-from notchflex.errors import InputError
-from notchflex.results.writing import PAPER
+from notchflex.support import PAPER
 
 DrawingFile = Annotated[
     str | None,
@@ -42,22 +42,18 @@ def show(
     outputs = Outputs(robot_files(robot), quiet=quiet, pictures=PAPER, json=json, plot=plot)
     chosen = chosen_robot(robot, settings)
     with terminal.working(f"solving {chosen.name}"):
-        import numpy as np
-
         terminal.use_compile_cache()
-        from notchflex.analysis import closing, tip_from_angles
+        from notchflex import closing
         from notchflex.analysis.bands import (
             closing_bands,
             closing_document,
         )
         from notchflex.analysis.closing_loads import notch_table
-        from notchflex.mechanics.chain import unchecked_dimensions
-        from notchflex.results.writing import document_head
+        from notchflex.support import document_head, unchecked_dimensions
 
         table = closing(chosen)
         notches = notch_table(chosen, table)
-        straight = np.zeros((1, chosen.number_of_notches))
-        length = float(tip_from_angles(chosen, straight)[0][0, 2])
+        length = chosen.geometry.length
     for sentence in unchecked_dimensions(chosen):
         terminal.warn(sentence)
     if plot is not None:

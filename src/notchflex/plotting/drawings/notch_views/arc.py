@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from notchflex import ArcNotch, Robot
 from notchflex.plotting.drawings.notch_views.view import (
     Cut,
     Dimension,
@@ -12,8 +13,7 @@ from notchflex.plotting.drawings.notch_views.view import (
     drawn,
     notch_view,
 )
-from notchflex.robot import ArcNotch, Robot
-from notchflex.robot.kinds import Notch
+from notchflex.support import Notch
 
 
 @notch_view.register

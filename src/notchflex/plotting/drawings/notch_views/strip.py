@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from notchflex import Robot, StripNotch
 from notchflex.plotting.drawings.notch_views.view import (
     Cut,
     Dimension,
@@ -10,8 +11,7 @@ from notchflex.plotting.drawings.notch_views.view import (
     drawn,
     notch_view,
 )
-from notchflex.robot import Robot, StripNotch
-from notchflex.robot.kinds import Notch
+from notchflex.support import Notch
 
 
 @notch_view.register

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from notchflex import Robot, ULink
 from notchflex.plotting.drawings.notch_views.view import (
     STUB,
     Cut,
@@ -11,8 +12,7 @@ from notchflex.plotting.drawings.notch_views.view import (
     drawn,
     notch_view,
 )
-from notchflex.robot import Robot, ULink
-from notchflex.robot.kinds import Notch
+from notchflex.support import Notch
 
 
 @notch_view.register

@@ -15,11 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.errors import InputError
-from notchflex.robot import Robot
-from notchflex.robot.cuts import NotchCut, outline
-from notchflex.robot.kinds import Notch
-from notchflex.robot.problems import with_limits
+from notchflex import InputError, Robot
+from notchflex.support import Notch, NotchCut, outline, with_limits
 
 Points = NDArray[np.float64]
 
