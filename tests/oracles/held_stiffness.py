@@ -11,12 +11,12 @@ from notchflex._jax import (
 )
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.block_elimination import command_residual
 from notchflex.solver.residual import (
     Iterate,
     Memory,
     SolverState,
     bound_side,
+    command_residual,
     evaluate,
 )
 

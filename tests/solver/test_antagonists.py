@@ -8,11 +8,11 @@ import pytest
 import notchflex as nf
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import assemble
-from notchflex.solver.block_elimination import (
+from notchflex.solver.residual import (
+    BaseReaction,
     closing_stroke,
     command_residual,
 )
-from notchflex.solver.residual import BaseReaction
 
 STIFF = 4000.0  # N, E A of the elastic cables
 

@@ -35,7 +35,6 @@ from notchflex.results.state import (
     state_of,
 )
 from notchflex.robot import Robot
-from notchflex.solver.block_elimination import closing_stroke
 from notchflex.solver.newton import (
     DEFAULT,
     Settings,
@@ -46,7 +45,10 @@ from notchflex.solver.quantities import (
     Shape,
     reported,
 )
-from notchflex.solver.residual import SolverState
+from notchflex.solver.residual import (
+    SolverState,
+    closing_stroke,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

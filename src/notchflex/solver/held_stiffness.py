@@ -21,7 +21,6 @@ from jaxtyping import Array, Bool, Float
 from notchflex._jax import jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.block_elimination import command_slopes
 from notchflex.solver.linear_step import (
     LinearisedRows,
     UnitRows,
@@ -40,6 +39,7 @@ from notchflex.solver.residual import (
     Memory,
     SolverState,
     bound_side,
+    command_slopes,
     evaluate,
 )
 

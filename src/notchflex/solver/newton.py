@@ -19,23 +19,23 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.flexure import in_space
 from notchflex.solver.block_elimination import (
-    command_residual,
     linear_step,
-    stroke,
-    tension_is_bounded,
-    without_slack,
 )
 from notchflex.solver.residual import (
     Evaluation,
     Iterate,
     Memory,
     Unknowns,
+    command_residual,
     evaluate,
     is_active,
     notch_heights,
     of_group,
     rounding_growth,
     slip_mask,
+    stroke,
+    tension_is_bounded,
+    without_slack,
 )
 
 # A limited step goes slightly beyond the gap, so that the contact counts as closed: by these parts

@@ -34,9 +34,7 @@ from notchflex.control.program.drive_step import (
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.block_elimination import (
-    command_residual,
     linear_step,
-    tension_is_bounded,
 )
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
 from notchflex.solver.newton import limit_slack
@@ -48,8 +46,10 @@ from notchflex.solver.residual import (
     Iterate,
     Memory,
     SolverState,
+    command_residual,
     evaluate,
     state_at,
+    tension_is_bounded,
 )
 from notchflex.solver.solved_state import SolvedState
 from notchflex.support import REGISTERED
