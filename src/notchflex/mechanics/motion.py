@@ -228,14 +228,16 @@ def rotation_about(vector: Float[Array, "*n a"]) -> Matrix:
         return xp.stack([cosine, sine, -sine, cosine], -1).reshape(*vector.shape[:-1], 2, 2)
     first, second, _ = _coefficients(_squared(vector))
     matrix = skew(vector)
-    return constant(xp.eye(3)) + _each(first) * matrix + _each(second) * (matrix @ matrix)
+    unturned = xp.broadcast_to(xp.eye(3), matrix.shape)
+    return unturned + _each(first) * matrix + _each(second) * (matrix @ matrix)
 
 
 def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
     """Return the left Jacobian of SO(3): rotation in the outer frame per change of its vector."""
     _, second, third = _coefficients(_squared(vector))
     matrix = skew(vector)
-    return constant(xp.eye(3)) + _each(second) * matrix + _each(third) * (matrix @ matrix)
+    unturned = xp.broadcast_to(xp.eye(3), matrix.shape)
+    return unturned + _each(second) * matrix + _each(third) * (matrix @ matrix)
 
 
 def left_slope_change(
