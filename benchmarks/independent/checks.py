@@ -155,7 +155,7 @@ def check_friction(robot: Table, path: Any, step: int) -> Iterator[Finding]:
             moved = path.contact_slid[step, t] - path.contact_slid[step - 1, t]
             moved = moved[: count - 1] / reach
             # The library tells stuck contacts of one piece apart as if an inextensible tendon had
-            # E A = 4e5 closing forces (MEMORY_STIFFNESS): they slide by that stretch.
+            # E A = 4e5 closing forces (`Chain.memory_stiffness`): they slide by that stretch.
             change = np.abs(along - path.span_tension[step - 1, t, :count]).max()
             give = 1e-7 + 1.5 * change / (4e5 * tension_scale(robot))
             if robot["friction"].get("coefficient"):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Array
+from numpy.typing import ArrayLike
 
 from notchflex._arrays import cached, decide, xp
 from notchflex._jax import constant
@@ -107,7 +108,7 @@ _sag = cancelling_sum([(1, 1, "cos", 0), (-1, 0, "sin", 1)])
 
 
 @of_any_shape
-def annular_sector(outer_radius: Array, inner_radius: Array, depth: Array) -> Section:
+def annular_sector(outer_radius: ArrayLike, inner_radius: ArrayLike, depth: ArrayLike) -> Section:
     r"""Compute the section that an on-axis cut leaves of a tube.
 
     With the half-angle $a = \arccos((g - r_o)/r_o)$, the mean radius $m$, the wall $t$,
@@ -145,7 +146,7 @@ def annular_sector(outer_radius: Array, inner_radius: Array, depth: Array) -> Se
         >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
         0.125376 mm², 0.686533 mm
     """
-    outer, inner = outer_radius, inner_radius
+    outer, inner, depth = map(constant, (outer_radius, inner_radius, depth))
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     a = half_angle(outer, left, depth)
     # Sine and cosine from the lengths: exact to rounding also near a = π.
@@ -301,11 +302,13 @@ def segment_torsion(outer: Array, inner: Array, depth: Array, area: Array) -> tu
     through = xp.where(closed | solid, outer, depth)
     deep = xp.where(solid, depth, outer + inner)
 
+    # Of a solid segment J = A h²/3, and the top of the circle.
+    solid_estimate = area * (2.0 * outer - deep) ** 2 / 3.0, outer
     cases = (
         ("closed", shallow, closed_estimate(outer, inner, shallow)),
-        ("solid", deep, (area * (2.0 * outer - deep) ** 2 / 3.0, outer)),
+        ("solid", deep, solid_estimate),
         ("open", through, open_estimate(outer, inner, through, area)),
-    )  # of a solid segment J = A h²/3, and the top of the circle
+    )
 
     def estimated(shape: str, cut: Array, estimates: tuple[Array, Array]) -> list[Array]:
         factors = _factors(shape, outer, inner, cut)
@@ -340,7 +343,7 @@ _sideways = cancelling_sum(
 
 
 @of_any_shape
-def annular_segment(outer_radius: Array, inner_radius: Array, depth: Array) -> Section:
+def annular_segment(outer_radius: ArrayLike, inner_radius: ArrayLike, depth: ArrayLike) -> Section:
     r"""Compute the section that an off-axis cut leaves of a tube.
 
     The section is a segment of the outer circle less a segment of the inner one. With the
@@ -382,7 +385,7 @@ def annular_segment(outer_radius: Array, inner_radius: Array, depth: Array) -> S
         >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
         0.111621 mm², 0.701661 mm
     """
-    outer, inner = outer_radius, inner_radius
+    outer, inner, depth = map(constant, (outer_radius, inner_radius, depth))
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     plane = depth - outer  # d
     alpha = half_angle(outer, left, depth)

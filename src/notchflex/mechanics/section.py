@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache, wraps
 from math import factorial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -133,7 +133,10 @@ class Section(NamedTuple):
     half_angle: Array
 
 
-def of_any_shape(properties: Callable[[Array, Array, Array], Section]) -> Callable[..., Section]:
+Formula = TypeVar("Formula", bound=Callable[..., Section])
+
+
+def of_any_shape(properties: Formula) -> Formula:
     """Let a formula for arrays of one shape take radii and depth in any form, and be cached."""
 
     @cached(1024)  # notches of a tube, and their sites, share sections
@@ -145,7 +148,7 @@ def of_any_shape(properties: Callable[[Array, Array, Array], Section]) -> Callab
     def section(outer_radius: ArrayLike, inner_radius: ArrayLike, depth: ArrayLike) -> Section:
         return known(outer_radius, inner_radius, depth)
 
-    return section
+    return cast("Formula", section)
 
 
 # Two parallel rectangular walls: the section of a strip that two opposite cuts leave of a tube.

@@ -43,7 +43,7 @@ def part(row: Mapping[str, Any]) -> tuple[Any, nf.Tube]:
 
 
 def site(nu: float = 0.33) -> Site:
-    side = nf.mechanics.ends.Side("between", 1.0)
+    side = nf.mechanics.ring.Side("between", 1.0)
     return Site(side, side, nu)
 
 
