@@ -85,6 +85,10 @@ def test_problems_count_notches_from_the_base(robot: nf.Robot):
     deep = dataclasses.replace(NOTCH, depth=1.7)
     with refused("INVALID_ROBOT", "`notch[3].depth`", "1.7 mm"):
         robot.replace(notch=(NOTCH, deep))
+    with refused("INVALID_ROBOT", "`notch[3]`", "[[notch]] table number 2"):
+        robot.replace(notch=(NOTCH, 5))
+    with refused("INVALID_ROBOT", "`notch[2]` is 5;"):
+        dataclasses.replace(robot, notch=(dataclasses.replace(NOTCH, repeat=1), 5))
 
 
 @pytest.mark.parametrize("number", [np.array([1.0, 2.0]), np.array(1.5), np.array([1, 2]), 2.0])

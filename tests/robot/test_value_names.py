@@ -155,5 +155,5 @@ def test_no_assignment(text: str):
 
 
 def test_a_number_of_thousands_of_digits_is_told():
-    with refused("OUT_OF_RANGE"):
+    with refused("OUT_OF_RANGE", "the robot has 5 notches"):
         nf.load_robot("pacheco2021-a").with_value(f"notch[{'9' * 5000}].depth", 1.0)

@@ -82,15 +82,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
 def load_changed(
     name_or_path: str | os.PathLike[str], values: Sequence[tuple[str, object]]
 ) -> Changed:
-    """Read a robot and set values of it, which may repair its file; nothing warns.
-
-    Args:
-        name_or_path: As for `load_robot`.
-        values: As for `set_values`.
-
-    Raises:
-        InputError: As `load_robot` and `set_values`.
-    """
+    """Read a robot and set values of it, which may repair its file; nothing warns."""
     path = _find(name_or_path)
     shown = path.stem if path.parent == READY else str(path)
     text = read_text(path, "robot file", shown, RobotFileError)
@@ -119,15 +111,7 @@ def _in_file(shown: str, error: InputError) -> RobotFileError:
 
 
 def robot_from_text(text: str, shown: str = "robot file") -> Robot:
-    """Make a robot from the text of a robot file.
-
-    Args:
-        text: TOML in mm, N, MPa and deg.
-        shown: What messages call the text.
-
-    Raises:
-        InputError: The text is not TOML, or a value in it is not allowed.
-    """
+    """Make a robot from the text of a robot file, which messages call `shown`."""
     return remember_source(from_table(parse_toml(text, shown)), text)
 
 
@@ -158,11 +142,7 @@ def _find(name_or_path: str | os.PathLike[str]) -> Path:
 
 
 def bounded_bytes(path: str | os.PathLike[str], most: int = _LARGEST) -> bytes:
-    """Read a file; a device may have no end, and a pipe nobody who writes into it.
-
-    Raises:
-        OSError: It cannot be read, has more than `most` bytes, or is a pipe without a writer.
-    """
+    """Read a file of at most so many bytes; a pipe without a writer raises `OSError` too."""
     with open(path, "rb", buffering=0, opener=_at_once) as file:
         pipe = stat.S_ISFIFO(os.fstat(file.fileno()).st_mode)
         ready = not pipe or select.select([file], [], [], _WRITER_COMES)[0]
@@ -193,17 +173,7 @@ def read_text(
     shown: str | None = None,
     error_class: type[InputError] = InputError,
 ) -> str:
-    """Read a text file in UTF-8, without the byte-order mark that spreadsheets put before it.
-
-    Args:
-        source: Path of the file.
-        kind: What kind of file it is, for messages.
-        shown: What messages call it; its path if not given.
-        error_class: The class of the error.
-
-    Raises:
-        InputError: It is missing, a folder, no text or cannot be read.
-    """
+    """Read a text file in UTF-8, without the byte-order mark that spreadsheets put before it."""
     shown = shown or str(source)
     try:
         return io.TextIOWrapper(io.BytesIO(bounded_bytes(source)), "utf-8-sig").read()
@@ -227,17 +197,7 @@ def parse_toml(
     kind: str = "robot file",
     error_class: type[InputError] = RobotFileError,
 ) -> dict[str, Any]:
-    """Read the text of a TOML file.
-
-    Args:
-        text: The text.
-        shown: What messages call it.
-        kind: What kind of file it is, for messages.
-        error_class: The class of the error.
-
-    Raises:
-        InputError: The text is not TOML; the message names the line.
-    """
+    """Read the text of a TOML file; an error names the file, its kind and the line."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -247,9 +207,9 @@ def parse_toml(
         what, line, column = match.groups() if match else (str(error), None, None)
         # "end of document" is the last line that has something on it
         line = line or len(text.rstrip().splitlines())
-        at = f", column {column}" if column else ""
+        where = f", column {column}" if column else ""
         raise error_class.FILE_UNREADABLE(
-            f"{shown}, line {line}{at}: this is not TOML ({what[:1].lower()}{what[1:]}); "
+            f"{shown}, line {line}{where}: this is not TOML ({what[:1].lower()}{what[1:]}); "
             "write one `key = value` a line, text in quotes."
         ) from None
     except ValueError as error:  # a whole number of thousands of digits

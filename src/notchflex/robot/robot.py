@@ -1,6 +1,5 @@
 """Description of a robot."""
 
-import dataclasses
 import functools
 import math
 import warnings
@@ -108,7 +107,7 @@ class Robot:
 
     @functools.cached_property
     def _hash(self) -> int:
-        return hash(tuple(getattr(self, field.name) for field in dataclasses.fields(self)))
+        return hash(tuple(getattr(self, name) for name in fields_of(Robot)))
 
     def __hash__(self) -> int:
         """Return the hash of all values, cached: robots are keys at every solve."""
@@ -196,7 +195,7 @@ class Robot:
         Raises:
             InputError: A value is not allowed, or there is no such part.
         """
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        values = {name: getattr(self, name) for name in fields_of(Robot)}
         return remember_source(from_table(values | parts), source_of(self))
 
     def with_value(self, path: str, value: object) -> "Robot":
@@ -242,11 +241,7 @@ class Changed(NamedTuple):
 def set_values(
     robot: Robot, values: Mapping[str, object] | Iterable[tuple[str, object]]
 ) -> Changed:
-    """Set values of a robot by their names (see `Robot.with_value`); all are set, then checked.
-
-    Kinds are changed first, then the values of all notches or tendons, then those of single ones,
-    so that the order of `values` does not matter.
-    """
+    """Set values of a robot by their names (see `Robot.with_value`); all are set, then checked."""
     table = to_table(robot)
     dropped = change_table(table, values)
     return Changed(remember_source(from_table(table), source_of(robot)), dropped)

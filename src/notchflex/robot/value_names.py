@@ -160,6 +160,7 @@ def change_table(
     table: dict[str, Any], values: Mapping[str, object] | Iterable[tuple[str, object]]
 ) -> tuple[str, ...]:
     """Set values in the plain table of a robot; return the paths that a change of kind dropped."""
+    # Kinds first, then values of all notches or tendons, then of single ones: in any order alike.
     targets: list[tuple[ValuePath, object]] = []
     for name, value in cast("Any", values.items() if isinstance(values, Mapping) else values):
         path = str(name)
