@@ -31,7 +31,6 @@ from notchflex.robot.reading import (
     robot_from_text,
 )
 from notchflex.robot.robot import (
-    Changed,
     Drawing,
     Robot,
     from_table,
@@ -50,7 +49,6 @@ if TYPE_CHECKING:
 __all__ = [
     "ArcNotch",
     "Capstan",
-    "Changed",
     "Corner",
     "Drawing",
     "Friction",

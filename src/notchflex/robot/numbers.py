@@ -73,7 +73,9 @@ def parts_of(robot: Robot) -> tuple[Any, ...]:
 
 
 def _parts_of_arrays(robot: Robot) -> list[NamedPart]:
-    return [named for named in named_parts(robot) if named.section != "drawing"]
+    """List those parts, single ones first: notches have the numbers that come after these."""
+    named = sorted(named_parts(robot), key=lambda each: each.first > 0)
+    return [each for each in named if each.section != "drawing"]
 
 
 def robot_of(parts: Sequence[Any]) -> Robot:

@@ -222,13 +222,13 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
     """Say what is allowed instead."""
     kind, got, unit = record["type"], record["input"], f" {place.unit}" if place.unit else ""
     if kind in _BOUNDS:
-        words, limit = _BOUNDS[kind][0], record["ctx"][_BOUNDS[kind][1]]
+        (limit,) = record["ctx"].values()
         if got != got:  # only NaN differs from itself
             return "it must be a number"
         if kind == "greater_than_equal" and got <= 0.0 < limit < 1.0:
             return f"it must be greater than 0{unit}"  # a negative length is not a small length
         percent = "; 0.04 is 4 %" if kind == "less_than_equal" and "strain" in place.name else ""
-        return f"it must be {words} {limit:g}{unit}{percent}"
+        return f"it must be {_BOUNDS[kind]} {limit:g}{unit}{percent}"
     if kind == "number_wanted":
         return f"it must be a number{' in' if unit else ''}{unit}, without quotes"
     if kind == "literal_error":
@@ -251,10 +251,10 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
 
 
 _BOUNDS = {
-    "greater_than": ("greater than", "gt"),
-    "greater_than_equal": ("at least", "ge"),
-    "less_than": ("less than", "lt"),
-    "less_than_equal": ("at most", "le"),
+    "greater_than": "greater than",
+    "greater_than_equal": "at least",
+    "less_than": "less than",
+    "less_than_equal": "at most",
 }
 _RULES = {
     "finite_number": "it must be a finite number",

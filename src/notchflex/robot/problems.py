@@ -109,7 +109,7 @@ def read_tolerances(table: Any) -> Any:
         value = name.replace("[*]", "")
         if value in tolerances:
             problems.append((name, "is given twice; give it once."))
-        keys = cast("dict[str, Any]", entry if isinstance(entry, dict) else {"sd": entry})
+        keys: dict[str, Any] = dict(entry) if isinstance(entry, Mapping) else {"sd": entry}
         problems += [(name, text) for text in _entry_problems(name, keys)]
         tolerances[value] = Tolerance(value, **{key: keys[key] for key in _KEYS if key in keys})
     if problems:
@@ -117,14 +117,14 @@ def read_tolerances(table: Any) -> Any:
     return tuple(tolerances.values())
 
 
-def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the names of values and what is given for them: TOML reads `a.b` as nested tables."""
-    for key, entry in table.items():
-        name = f"{before}{key}"
+def _flat(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the names of values with their entries: TOML reads `a.b` as a table in a table."""
+    for name, entry in table.items():
         if isinstance(entry, Mapping) and "." not in name:
-            yield from _flat(cast("Mapping[str, Any]", entry), f"{name}.")
+            for key, value in cast("Mapping[str, Any]", entry).items():
+                yield f"{name}.{key}", value
         else:
-            yield name, dict(cast("Any", entry)) if isinstance(entry, Mapping) else entry
+            yield name, entry
 
 
 def _entry_problems(name: str, entry: dict[str, Any]) -> Iterator[str]:
