@@ -48,7 +48,7 @@ MOST_FILES = 17
 
 SATELLITES = ORDER[ORDER.index("pieces") :]
 
-INNER_NAMES = 132
+INNER_NAMES = 129
 """Names of the core that satellites import from elsewhere than `notchflex` and
 `notchflex.support`: this number only ever falls."""
 
@@ -72,11 +72,11 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
         "whether lips touch at rest depends on the centroid of the section; seldom asked for"
     ),
     ("robot.robot", "analysis.geometry"): "`Robot.geometry`; seldom asked for",
-    ("results.equilibrium", "analysis.geometry"): "`Equilibrium.shape`; made when asked for",
+    ("results.state", "analysis.geometry"): "`Equilibrium.shape`; made when asked for",
     ("robot.robot", "robot.value_names"): "`Robot.with_values`; setting a value makes a robot",
     ("robot.problems", "robot.robot"): "for the type only: a robot checks itself by this file",
     ("robot.problems", "robot.value_names"): "a tolerance names a value; value names make robots",
-    ("results.state", "results.writing"): _FILES,
+    ("results.state", "results.tables"): _FILES,
     ("results.path", "results.io"): _FILES,
     ("results.state", "results.path"): _TYPE,
     ("results.quantities", "results.path"): _TYPE,

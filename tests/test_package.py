@@ -25,7 +25,7 @@ NAMES = [
     "InputWarning", "RobotFileError",
     "plot", "stroke_path", "solve_each", "Batch", "solve_batch", "simulate_batch",
     "uncertain", "Bands", "Band",
-    "Differentiable", "differentiable", "TipResponse", "tip_response", "Step", "Stepper",
+    "Differentiable", "differentiable", "TipResponse", "tip_response", "Step", "Stepper", "batch",
     "bodies_from_angles", "SharedStroke", "Closing", "ClosingStatus", "Kink",
     "ConvergenceError", "ErrorCode", "Failure", "Settings",
     "Board",

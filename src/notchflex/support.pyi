@@ -47,6 +47,33 @@ from notchflex.results.reading import tendon_columns as tendon_columns
 from notchflex.results.reading import validated as validated
 from notchflex.results.state import SavedState as SavedState
 from notchflex.results.state import robot_digest as robot_digest
+from notchflex.results.tables import (
+    csv_text as csv_text,
+)
+from notchflex.results.tables import (
+    document_head as document_head,
+)
+from notchflex.results.tables import (
+    entries_of as entries_of,
+)
+from notchflex.results.tables import (
+    is_listed as is_listed,
+)
+from notchflex.results.tables import (
+    plain as plain,
+)
+from notchflex.results.tables import (
+    write_columns as write_columns,
+)
+from notchflex.results.tables import (
+    write_csv as write_csv,
+)
+from notchflex.results.tables import (
+    write_json as write_json,
+)
+from notchflex.results.tables import (
+    write_path_csv as write_path_csv,
+)
 from notchflex.results.writing import BROWSER as BROWSER
 from notchflex.results.writing import MOVING as MOVING
 from notchflex.results.writing import PAPER as PAPER
@@ -55,17 +82,8 @@ from notchflex.results.writing import check_distinct as check_distinct
 from notchflex.results.writing import check_folder as check_folder
 from notchflex.results.writing import check_output as check_output
 from notchflex.results.writing import check_picture as check_picture
-from notchflex.results.writing import csv_text as csv_text
-from notchflex.results.writing import document_head as document_head
-from notchflex.results.writing import entries_of as entries_of
-from notchflex.results.writing import is_listed as is_listed
 from notchflex.results.writing import let_go as let_go
-from notchflex.results.writing import plain as plain
-from notchflex.results.writing import write_columns as write_columns
-from notchflex.results.writing import write_csv as write_csv
 from notchflex.results.writing import write_document as write_document
-from notchflex.results.writing import write_json as write_json
-from notchflex.results.writing import write_path_csv as write_path_csv
 from notchflex.results.writing import write_text as write_text
 from notchflex.robot import Friction as Friction
 from notchflex.robot import Material as Material

@@ -24,7 +24,9 @@ from notchflex.fit import (
     posterior_document,
     repeats_of_each,
 )
-from notchflex.results.writing import json_text
+from notchflex.results.tables import (
+    json_text,
+)
 from refusals import refused
 
 

@@ -29,7 +29,7 @@ from notchflex.results.quantities import (
     QUANTITIES,
     holds,
 )
-from notchflex.results.writing import (
+from notchflex.results.tables import (
     entries_of,
     is_listed,
 )

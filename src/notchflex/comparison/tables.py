@@ -12,7 +12,7 @@ from notchflex.support import AXES, DEGREES, QUANTITIES, document_head
 
 
 def comparison_document(comparison: Comparison) -> dict[str, Any]:
-    """Return a comparison as a document for `notchflex.results.writing.write_json`.
+    """Return a comparison as a document for `notchflex.support.write_json`.
 
     Args:
         comparison: The comparison.

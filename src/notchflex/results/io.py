@@ -25,7 +25,7 @@ from notchflex.results.quantities import (
     CONTACT_STATES,
     QUANTITIES,
 )
-from notchflex.results.writing import (
+from notchflex.results.tables import (
     path_columns,
     path_document,
     plain,

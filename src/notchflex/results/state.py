@@ -467,7 +467,9 @@ class Equilibrium(EquilibriumQuantities, Displayed):
             >>> step["load"], round(step["total_angle_deg"], 1)
             ({'tension_N': [1.0], 'stroke_mm': [None]}, 51.5)
         """
-        from notchflex.results.writing import step_document
+        from notchflex.results.tables import (
+            step_document,
+        )
 
         return step_document(self._path, self._step)
 

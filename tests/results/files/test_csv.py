@@ -5,7 +5,7 @@ import csv
 import numpy as np
 
 from fake_path import fake_path
-from notchflex.results.writing import (
+from notchflex.results.tables import (
     path_columns,
     write_csv,
     write_path_csv,

@@ -12,7 +12,7 @@ from notchflex.loads.load import (
     BodyForce,
     ExternalLoad,
 )
-from notchflex.results.writing import (
+from notchflex.results.tables import (
     json_text,
     path_document,
     write_json,

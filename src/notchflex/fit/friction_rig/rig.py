@@ -172,7 +172,7 @@ def friction_rig(readings: FrictionReadings) -> FrictionRig:
 
 
 def friction_document(rig: FrictionRig) -> dict[str, Any]:
-    """Return an estimate as a document for `notchflex.results.writing.write_json`.
+    """Return an estimate as a document for `notchflex.support.write_json`.
 
     Args:
         rig: The estimate.

@@ -1,0 +1,319 @@
+"""Results as a CSV table, one row a step, and as one JSON document; units from the registry.
+
+The columns of tensions, strokes and angles have the names that measured data have
+(`tendon_force_N`, `tendon_displacement_mm`, `notch_j_deg`, `total_deg`), so that a computed table
+can be compared as if it had been measured.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from notchflex import __version__
+from notchflex._quantity import Quantity
+from notchflex.results.quantities import (
+    AXES,
+    CONTACT_STATES,
+    QUANTITIES,
+    holds,
+    span_names,
+    spans_of,
+    units,
+)
+from notchflex.robot import Robot
+from notchflex.robot.robot import to_table
+
+if TYPE_CHECKING:
+    from pathlib import Path as FilePath
+
+    from notchflex.results.path import EquilibriumPath
+from notchflex.results.writing import write_text
+
+
+def path_columns(path: EquilibriumPath) -> dict[str, Sequence[Any]]:
+    """Return the columns of a path: header to the values of its S steps, at the edge units."""
+    columns: dict[str, Sequence[Any]] = {"step": range(1, len(path) + 1)}
+    for quantity in QUANTITIES.values():
+        if quantity.column and holds(path, quantity):
+            columns.update({one.header: one.values for one in entries_of(path, quantity)})
+    return columns
+
+
+def write_path_csv(
+    target: str | FilePath, path: EquilibriumPath, more: Mapping[str, Sequence[Any]] | None = None
+) -> None:
+    """Write a path as CSV to a file, whole or not at all, or to standard output for `-`.
+
+    Args:
+        target: Path, or `-` for standard output.
+        path: The path.
+        more: Further columns behind those of the path, a value per step.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    write_columns(target, {**path_columns(path), **(more or {})})
+
+
+def write_columns(target: str | FilePath, columns: Mapping[str, Iterable[Any]]) -> None:
+    """Write columns as CSV, as `write_csv` does its rows.
+
+    Args:
+        target: Path, or `-` for standard output.
+        columns: As many values under every header.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    write_csv(target, list(columns), zip(*columns.values(), strict=True))
+
+
+def write_csv(target: str | FilePath, header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
+    """Write rows as CSV (UTF-8, comma, header first); NaN and None become empty fields.
+
+    Args:
+        target: Path, or `-` for standard output.
+        header: Names of the columns.
+        rows: Rows of as many values.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    write_text(target, csv_text(header, rows))
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
+    """Return what `write_csv` writes."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow([_field(value) for value in row])
+    return text.getvalue()
+
+
+@dataclass(frozen=True)
+class CsvEntry:
+    """One entry of a quantity along a path, such as the angle of one notch.
+
+    Attributes:
+        header: The CSV column; "" where the quantity has none.
+        name: Which entry it is, such as "notch 3"; "" for a quantity with one number.
+        values: A value per step, at the edge units.
+    """
+
+    header: str
+    name: str
+    values: Any
+
+
+def is_listed(quantity: Quantity) -> bool:
+    """Tell whether `entries_of` lists the entries of a quantity one by one."""
+    return quantity.per in ((), ("notch",), ("axis",), ("tendon",), ("tendon", "span"))
+
+
+def entries_of(path: EquilibriumPath, quantity: Quantity) -> Iterator[CsvEntry]:
+    """Yield every entry of a quantity, in the order of the CSV columns."""
+    values: Any = getattr(path, quantity.name)
+    if quantity.scale != 1.0:
+        values = np.asarray(values) * quantity.scale
+    several = path.tension.shape[1] > 1
+    tendons = [(i, i + 1 if several else "") for i in range(path.tension.shape[1])]
+    match quantity.per:
+        case ():
+            yield CsvEntry(quantity.header(), "", values)
+        case ("notch",):
+            for notch in range(values.shape[1]):
+                header = quantity.header(notch=notch + 1)
+                yield CsvEntry(header, f"notch {notch + 1}", values[:, notch])
+        case ("axis",):
+            for index, axis in enumerate(AXES):
+                yield CsvEntry(quantity.header(axis=axis), axis, values[:, index])
+        case ("tendon",):
+            for index, number in tendons:
+                name = f"tendon {number}" if several else ""
+                yield CsvEntry(quantity.header(tendon=number), name, values[:, index])
+        case ("tendon", "span"):
+            for index, number in tendons:
+                for span, name in enumerate(span_names(spans_of(path, index))):
+                    header = quantity.header(tendon=number, span=name)
+                    words = f"tendon {number}, " if several else ""
+                    words += name.replace("_", " ")
+                    yield CsvEntry(header, words, values[:, index, span])
+        case other:
+            raise NotImplementedError(f"no CSV columns for a quantity per {other}")
+
+
+def _field(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, bool):
+        return int(value)
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return ""
+    return value
+
+
+# Results as one JSON document: keys and units from the table of quantities, never a NaN.
+
+# Quantities of contacts are gathered contact by contact.
+CONTACTS = tuple(q for q in QUANTITIES.values() if q.key and q.per == ("tendon", "contact"))
+PLAIN = tuple(q for q in QUANTITIES.values() if q.key and q not in CONTACTS)
+
+# External loads are input, not results: they are not registered as quantities.
+_LOAD_KEYS = {
+    "tip_force": ("tip_force_N", "N"),
+    "tip_moment": ("tip_moment_Nmm", "N mm"),
+    "tip_point": ("tip_point_mm", "mm"),
+    "tip_mass": ("tip_mass_g", "g"),
+    "gravity": ("gravity_m_s2", "m/s^2"),
+    "force": ("body_forces.force_N", "N"),
+    "moment": ("body_forces.moment_Nmm", "N mm"),
+    "point": ("body_forces.point_mm", "mm"),
+}
+LOAD_UNITS = {f"load.{key}": unit for key, unit in _LOAD_KEYS.values()}
+
+
+def path_document(path: EquilibriumPath) -> dict[str, Any]:
+    """Return a path as a document of plain lists, numbers, strings and None.
+
+    Args:
+        path: Solved path, S steps.
+
+    Returns:
+        `name`, `version`, `robot` (its whole description), `units` (JSON key to unit),
+        `converged`, `reason`, `reason_code` (name of a `Failure`) and `steps`, a list of S
+        objects. None stands where there is no number. Angles in deg, lengths in mm, forces in N.
+        Where external loads act in any step, `load` holds those of every step.
+    """
+    external = _external(path)
+    failed = next((step for step, good in enumerate(path.converged) if not good), None)
+    steps = [_step(path, index, external) for index in range(len(path))]
+    return {
+        **document_head(path.robot),
+        "units": units() | (LOAD_UNITS if external else {}),
+        "converged": failed is None,
+        "reason": "" if failed is None else str(path.reason[failed]),
+        "reason_code": "" if failed is None else str(path.reason_code[failed]),
+        "steps": steps,
+    }
+
+
+def step_document(path: EquilibriumPath, index: int) -> dict[str, Any]:
+    """Return one step (from 0) of the document of a path, of plain values."""
+    return plain(_step(path, index, _external(path)))
+
+
+def document_head(robot: Robot) -> dict[str, Any]:
+    """Return the head that every document has: the robot's name and description, the version."""
+    return {
+        "name": robot.name,
+        "program": "notchflex",
+        "version": __version__,
+        "robot": plain(to_table(robot)),
+    }
+
+
+def json_text(document: Any) -> str:
+    r"""Return a document as JSON text that ends with a newline.
+
+    Args:
+        document: Nested dicts and lists; numpy arrays and numbers are allowed.
+
+    Returns:
+        Strict JSON: NaN becomes null.
+
+    Example:
+        >>> json_text({"angle_deg": [1.5, float("nan")]})
+        '{"angle_deg": [1.5, null]}\n'
+    """
+    return json.dumps(plain(document), ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_json(target: str | FilePath, document: Any) -> None:
+    """Write a document to a file, whole or not at all, or to standard output for `-`.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    write_text(target, json_text(document))
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON knows it: arrays as lists, NaN as None, infinity as "inf".
+
+    Infinity only stands in robot descriptions (an inextensible tendon); as a string it is read
+    back as a number by the robot models.
+    """
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        if math.isnan(value):
+            return None
+        if math.isinf(value):
+            return "inf" if value > 0 else "-inf"
+    return value
+
+
+def _step(path: EquilibriumPath, index: int, external: list[dict[str, Any]]) -> dict[str, Any]:
+    step: dict[str, Any] = {"step": index + 1}
+    for quantity in PLAIN:
+        if holds(path, quantity):
+            holder = step
+            *outer, last = quantity.key.split(".")
+            for key in outer:
+                holder = holder.setdefault(key, {})
+            holder[last] = _value(path, quantity, index)
+    if external:
+        step.setdefault("load", {}).update(external[index])
+    step["contacts"] = [_contacts(path, tendon, index) for tendon in range(path.tension.shape[1])]
+    return step
+
+
+def _external(path: EquilibriumPath) -> list[dict[str, Any]]:
+    """External loads of every step; nothing at all where no step has any."""
+    if all(one.is_nothing for one in path.load.external):
+        return []
+    return [_with_units(asdict(one)) for one in path.load.external]
+
+
+def _with_units(values: dict[str, Any]) -> dict[str, Any]:
+    forces = values.pop("body_forces", None)
+    named = {
+        _LOAD_KEYS.get(name, (name,))[0].rpartition(".")[2]: value for name, value in values.items()
+    }
+    if forces is not None:
+        named["body_forces"] = [_with_units(one) for one in forces]
+    return named
+
+
+def _value(path: EquilibriumPath, quantity: Quantity, index: int) -> Any:
+    value = getattr(path, quantity.name)[index]
+    if quantity.per == ("tendon", "span"):
+        return [row[: spans_of(path, tendon)] for tendon, row in enumerate(value)]
+    if quantity.scale != 1.0:
+        return np.asarray(value) * quantity.scale
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _contacts(path: EquilibriumPath, tendon: int, index: int) -> list[dict[str, Any]]:
+    count = spans_of(path, tendon) - 1
+    columns = {
+        q.key.split(".")[1]: getattr(path, q.name)[index, tendon, :count] * q.scale
+        for q in CONTACTS
+        if holds(path, q)
+    }
+    columns["state"] = [CONTACT_STATES[int(state)] for state in columns["state"]]
+    return [{key: column[contact] for key, column in columns.items()} for contact in range(count)]
