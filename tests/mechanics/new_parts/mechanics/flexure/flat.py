@@ -1,11 +1,7 @@
 """The rod of a flat strip."""
 
 from notchflex.mechanics.flexure import notch_rod as nr
-from notchflex.mechanics.flexure.rod import (
-    Rod,
-    rod,
-    section_fibres,
-)
+from notchflex.mechanics.flexure.rod import Rod, rod, section_fibres
 from notchflex.mechanics.section import two_walls, two_walls_fibres
 from notchflex.robot import Tube
 from notchflex.robot.notches.flat import FlatNotch

@@ -1,9 +1,6 @@
 """The law of a sheath."""
 
-from notchflex._jax import (
-    constant,
-    jnp,
-)
+from notchflex._jax import constant, jnp
 from notchflex.mechanics.friction.registry import FrictionLaw, friction_law
 from notchflex.robot.friction.sheath import Sheath
 
