@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis import batch as varied
+from notchflex.analysis import varied
 from notchflex.analysis.draws import (
     sources_of,
     tolerances_of,
@@ -49,14 +49,21 @@ def same_as_single_rows(found, robots, loads, exactness=1e-11):
 @pytest.fixture
 def compiled(monkeypatch):
     """Which batches of robots were assembled by programs."""
-    made, packed = [], varied.CompiledChains.packed
+    made, chains_of = [], varied.RobotForm.chains
 
-    def told(self, numbers):
-        chains, alike = packed(self, numbers)
-        made.append(alike)
-        return chains, alike
+    def told(self, *arguments):
+        chains = chains_of(self, *arguments)
+        if chains is None:
+            return None
 
-    monkeypatch.setattr(varied.CompiledChains, "packed", told)
+        def packed(numbers):
+            rows, alike = chains.packed(numbers)
+            made.append(alike)
+            return rows, alike
+
+        return replace(chains, packed=packed)
+
+    monkeypatch.setattr(varied.RobotForm, "chains", told)
     return made
 
 

@@ -249,7 +249,7 @@ def closing(robot: Robot) -> Closing:
     """
     chain = assemble(robot, flat=False)
     rods = chain.rods
-    closing_angle, free = closing_angles(rods), free_angle(rods)
+    closing_angle, free = np.asarray(closing_angles(rods)), free_angle(rods)
     height = np.asarray(rods.length.sum(-1))
     section = rods.section
     arm = moment_arms(chain)
