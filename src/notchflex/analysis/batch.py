@@ -170,13 +170,15 @@ class Batch(ByValue, Displayed, Mapping[str, np.ndarray]):
 
 
 def range_of(name: str, array: np.ndarray) -> str:
-    """Describe an array by its shape, and what its values lie between."""
+    """Describe an array by its shape, and what its values lie between; a number by itself."""
+    unit = QUANTITIES[name].python_unit if name in QUANTITIES else ""
+    if array.ndim == 0:
+        return f"{array if array.dtype == bool else short(float(array))} {unit}".rstrip()
     shape = "×".join(map(str, array.shape))
     if array.dtype == bool:
         return f"{shape}, {int(array.sum())} of {array.size} true"
     if not np.isfinite(array).any():
         return f"{shape}, no number"
-    unit = QUANTITIES[name].python_unit if name in QUANTITIES else ""
     ends = f"{short(float(np.nanmin(array)))} to {short(float(np.nanmax(array)))} {unit}"
     return f"{shape}, {ends}".rstrip()
 
