@@ -17,6 +17,7 @@ from notchflex.analysis.closing_loads import (
     ClosingStatus,
     closing,
 )
+from notchflex.analysis.derivatives.slopes import PathGradient
 from notchflex.analysis.differentiable import (
     Differentiable,
     differentiable,
@@ -48,6 +49,7 @@ __all__ = [
     "ClosingStatus",
     "Differentiable",
     "Kink",
+    "PathGradient",
     "SharedStroke",
     "Step",
     "Stepper",
