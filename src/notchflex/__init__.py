@@ -81,7 +81,6 @@ _HOME = {
             "ClosingStatus",
             "Differentiable",
             "Kink",
-            "PathGradient",
             "SharedStroke",
             "Step",
             "Stepper",

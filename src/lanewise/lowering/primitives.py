@@ -7,7 +7,6 @@ of numbers (as dtypes) of its operands and results.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -209,7 +208,9 @@ def _scatter(op: str | None) -> Callable[..., References]:
         if known is None:
             raise UnsupportedPrimitiveError("computed indices", "scatter")
 
-        combine = None if op is None else partial(arrays.elementwise, op)
+        def combine(old: References, new: References) -> References:
+            return new if op is None else arrays.elementwise(op, old, new)
+
         return scatter_static(refs, known, updates, params, combine)
 
     return lower

@@ -17,7 +17,6 @@ from notchflex.analysis.closing_loads import (
     ClosingStatus,
     closing,
 )
-from notchflex.analysis.derivatives.slopes import PathGradient
 from notchflex.analysis.differentiable import (
     Differentiable,
     differentiable,
@@ -49,7 +48,6 @@ __all__ = [
     "ClosingStatus",
     "Differentiable",
     "Kink",
-    "PathGradient",
     "SharedStroke",
     "Step",
     "Stepper",

@@ -47,7 +47,7 @@ class PartsForm:
                 value, place = getattr(part, key), (number, key)
                 # Directions decide which notches and tendons share a plane.
                 varies = (value != 0.0 or place in varied) and key != "direction_deg"
-                if is_number(value) and varies:
+                if type(value) is float and math.isfinite(value) and varies:
                     places.append(place)
                 else:
                     words[key] = value
@@ -57,41 +57,6 @@ class PartsForm:
     def numbers_of(self, parts: Sequence[Any]) -> Float[np.ndarray, " numbers"]:
         """Return the numbers of parts of this form."""
         return np.array([getattr(parts[number], key) for number, key in self.places])
-
-    def matched(
-        self, parts: Sequence[Any], varied: Collection[Place]
-    ) -> Float[np.ndarray, " numbers"] | None:
-        """Return the numbers of parts of as many and the same kinds; None where the form differs.
-
-        Args:
-            parts: The parts.
-            varied: Places that must have numbers; others that are 0 are of another form.
-        """
-        if not set(varied) <= set(self.places):
-            return None
-        numbers = np.empty(len(self.places))
-        for number, (keys, part, other) in enumerate(
-            zip(self._keys, self.parts, parts, strict=True)
-        ):
-            for key, column in keys:
-                value = getattr(other, key)
-                if column is None:
-                    if value != getattr(part, key):
-                        return None
-                elif type(value) is float and (value != 0.0 or (number, key) in varied):
-                    numbers[column] = value
-                else:
-                    return None
-        return numbers if np.isfinite(numbers).all() else None
-
-    @cached_property
-    def _keys(self) -> list[list[tuple[str, int | None]]]:
-        """Of each part the keys, and which number each is; None for what is no number."""
-        columns = {place: column for column, place in enumerate(self.places)}
-        return [
-            [(field.name, columns.get((number, field.name))) for field in dataclasses.fields(part)]
-            for number, part in enumerate(self.parts)
-        ]
 
     def with_numbers(self, numbers: Any) -> tuple[Any, ...]:
         """Return parts with other numbers, which nothing checks: plain or traced ones."""
@@ -125,59 +90,10 @@ def robot_of(parts: Sequence[Any]) -> Robot:
 
 
 def places_of(robot: Robot, name: str) -> list[Place]:
-    """Return where a value stands among the parts of a robot.
-
-    Args:
-        robot: The robot; a notch that is named alone is not repeated.
-        name: Such as `notch[2].depth`; see `Robot.with_value`. Several notches or tendons may have
-            the value, where the name means them all.
-    """
-    return _places_of(tuple(notch.repeat for notch in robot.notch), len(robot.tendon), name)
-
-
-def _places_of(repeats: tuple[int, ...], tendons: int, name: str) -> list[Place]:
-    path = parse_path(name)
-    first = {"tube": 0, "material": 1, "friction": 2, "notch": 3, "tendon": 3 + len(repeats)}
-    if path.section not in first:  # no part of the arrays
-        return []
-    counts = {"notch": repeats, "tendon": (1,) * tendons}.get(path.section, (1,))
-    numbers = range(len(counts))
-    if path.number is not None:
-        numbers = [int(np.searchsorted(np.cumsum(counts), path.number))]
-    return [(first[path.section] + number, path.key) for number in numbers]
-
-
-def places_by_name(robot: Robot, names: Sequence[str]) -> tuple[Robot, list[list[Place]]]:
-    """Return the places of values by their names; a number of one notch is not that of all.
-
-    Args:
-        robot: The robot.
-        names: As for `places_of`; what has a name of its own does not belong to others.
-
-    Returns:
-        The robot, with notches of their own where a name is of one, and the places in it.
-    """
-    robot = apart(robot, names)
-    repeats = tuple(notch.repeat for notch in robot.notch)
-    parts = parts_of(robot)
-    return robot, [  # parts of some kinds have no such number
-        [(part, key) for part, key in own if hasattr(parts[part], key)]
-        for own in _places(repeats, len(robot.tendon), tuple(names))
-    ]
-
-
-@lru_cache(maxsize=64)
-def _places(repeats: tuple[int, ...], tendons: int, names: tuple[str, ...]) -> list[list[Place]]:
-    places = {name: _places_of(repeats, tendons, name) for name in names}
-    taken = {place for name in filter(is_of_one, names) for place in places[name]}
-    return [
-        [place for place in places[name] if is_of_one(name) or place not in taken] for name in names
-    ]
-
-
-def is_of_one(name: str) -> bool:
-    """Return whether a number is of one notch or tendon."""
-    return parse_path(name).number is not None
+    """Return where the values of a name stand among the parts of a robot."""
+    target = parse_path(name)
+    parts = enumerate(_parts_of_arrays(robot))
+    return [(number, target.key) for number, named in parts if named.is_meant(target)]
 
 
 def differing(parts: Sequence[Any], others: Sequence[Any]) -> list[Place] | None:
@@ -186,21 +102,9 @@ def differing(parts: Sequence[Any], others: Sequence[Any]) -> list[Place] | None
     if list(map(type, parts)) != list(map(type, others)):
         return None
     for number, (part, other) in enumerate(zip(parts, others, strict=True)):
-        if part is other:
-            continue
-        for key in (field.name for field in dataclasses.fields(part)):
-            values = getattr(part, key), getattr(other, key)
-            if values[0] == values[1]:
-                continue
-            if key == "direction_deg" or not all(map(is_number, values)):
-                return None
-            places.append((number, key))
-    return places
-
-
-def is_number(value: Any) -> bool:
-    """Return whether a value is a number that programs take, if it is no direction."""
-    return type(value) is float and math.isfinite(value)
+        keys = (field.name for field in dataclasses.fields(part))
+        places += [(number, key) for key in keys if getattr(part, key) != getattr(other, key)]
+    return places if set(places) <= set(PartsForm.of(parts, places).places) else None
 
 
 def apart(robot: Robot, names: Iterable[str]) -> Robot:

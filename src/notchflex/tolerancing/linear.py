@@ -14,7 +14,10 @@ from notchflex.analysis.draws import (
     deviation,
     moments,
 )
-from notchflex.robot.problems import Tolerance
+from notchflex.analysis.forward_model import ForwardModel
+from notchflex.analysis.tangent import PathTangents
+from notchflex.solver.newton import DEFAULT
+from notchflex.support import Tolerance
 from notchflex.tolerancing.study import Study
 
 WORST_SD = 3.0
@@ -73,13 +76,17 @@ def linear_effects(study: Study) -> LinearEffects:
     names = list(dict.fromkeys(name for one in study.sources for name in one.nominal))
     slopes = np.empty((len(study.criteria), len(names)))
     for load, path in study.loads.items():
+        model = ForwardModel(study.exact, path, study.settings or DEFAULT, study.refinement)
+        solved = model.solve(study.exact, path)
+        changes = model.changes(study.exact, path, names)
         own = [index for index, one in enumerate(study.criteria) if one.load == load]
         outputs = tuple(dict.fromkeys(study.criteria[index].quantity.name for index in own))
-        effects = study.paths[load][: len(path)].jacobian(names, outputs)
+        tangents = PathTangents(solved, outputs)
+        columns = [tangents.along(change) for change in changes]
+        effects = {name: np.stack([one[name] for one in columns]) for name in outputs}
         for index in own:
             criterion = study.criteria[index]
-            by_name = np.moveaxis(effects[criterion.quantity.name], -1, 0)
-            slopes[index] = criterion.of(by_name)
+            slopes[index] = criterion.of(effects[criterion.quantity.name])
     columns_of = {name: index for index, name in enumerate(names)}
     own_slopes = [slopes[:, [columns_of[name] for name in one.nominal]] for one in study.sources]
     shift, spread, one_end, other = (

@@ -6,7 +6,7 @@ dT/dx = -(dgap/dx) / (dgap/dT), on the side where the notch is still open.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,20 +16,16 @@ from scipy.interpolate import CubicSpline
 
 from notchflex import Closing, LoadPath, Robot
 from notchflex._jax import constant
+from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.kinematics import (
     AxisPlaces,
     axis_places,
     axis_point_changes,
     points_on_axis,
 )
+from notchflex.analysis.tangent import Change
 from notchflex.designing.specification import TargetCurve
-from notchflex.mechanics.chain import assemble
-from notchflex.mechanics.chain.assembly import body_lengths
-from notchflex.mechanics.contact import (
-    closing_angles,
-    free_angle,
-)
-from notchflex.results.quantities import (
+from notchflex.support import (
     DEGREES,
     QUANTITIES,
 )
@@ -192,6 +188,38 @@ def taken(reading: Reading, take: str) -> Reading:
         row[0, low] -= 1.0
         return reading.map(row)
     return reading.pick(np.array([high if take == "largest" else low]))
+
+
+# So much below its closing tension a notch is taken to be open, relative.
+_BELOW = 1e-7
+
+
+def closing_slopes(
+    robot: Robot, table: Closing, changes: Callable[[ForwardModel, LoadPath], Sequence[Change]]
+) -> Float[np.ndarray, "n v"]:
+    """Differentiate the closing tension of every notch.
+
+    Args:
+        robot: The robot.
+        table: Its closing; every notch closes.
+        changes: Gives the direction of every variable for a model and its loads.
+
+    Returns:
+        Derivatives, N per unit of the variable.
+    """
+    count = len(table.tension)
+    rows = np.arange(count)
+    unit = np.zeros((count, robot.number_of_tendons))
+    unit[rows, table.tendon - 1] = 1.0
+    load = LoadPath((1.0 - _BELOW) * table.tension[:, None] * unit)
+    model = ForwardModel(robot, load, from_rest=True)
+    path = model.solve(robot, load)
+    more = LoadPath(load.tension + unit)
+    directions = list(changes(model, load))
+    still = np.zeros(model.ready.long.chain_layout.size)
+    directions.append(Change(model.load_change(path, more), still))
+    by = model.derivatives(path, directions, ("gap",))["gap"][:, rows, rows]
+    return -(by[:-1] / by[-1]).T
 
 
 # Points of the axis among which the nearest is searched, and how often the search narrows.
