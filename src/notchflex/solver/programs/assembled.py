@@ -437,7 +437,8 @@ class AssembledRobots:
         """
         count, size = len(numbers), sum(one.size for one in self.joined.flexures)
         robot = robot_of(self.form.with_numbers(numbers.T))
-        rings = body_lengths(robot.tube, robot.notches), robot.material.poisson_ratio
+        lengths = np.asarray(body_lengths(robot.tube, robot.notches))
+        rings = lengths, robot.material.poisson_ratio
         made: dict[str, Any] = {"alike": np.ones(count, bool)}
         for form in dict.fromkeys(one.form for one in self.notches):
             own = [one for one in self.notches if one.form == form]
