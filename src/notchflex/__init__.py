@@ -45,11 +45,11 @@ _HOME = {
             "Tube",
             "ULink",
             "json_schema",
-            "list_robots",
             "load_robot",
             "save_robot",
         ),
         "notchflex._plot": ("plot",),
+        "notchflex._ready": ("list_robots",),
         "notchflex.mechanics.section": ("Section",),
         "notchflex.mechanics.cuts": ("annular_sector", "annular_segment"),
         "notchflex.mechanics.flexure.elastica": (

@@ -195,7 +195,7 @@ def _sideways(
     # Only directions matter here, not the mass or its position on the tube axis.
     forces = list(_forces(external, 0, at_tip))
     if external.gravity is not None:
-        forces.append((0, external.weight(1.0), _NONE, _NONE, False, False))
+        forces.append((0, external.weight(1.0), NO_VECTOR, NO_VECTOR, False, False))
     leaves = False
     normal = normal.tolist()
     for _, force, moment, point, following, _ in forces:
@@ -346,7 +346,6 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
         )
 
 
-_NONE = (0.0, 0.0, 0.0)
 _AXIS = (0.0, 0.0, 1.0)  # of the tube, to the tip
 _Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool, bool]
 
@@ -365,7 +364,7 @@ def _forces(external: ExternalLoad, last: int, at_tip: Sequence[Any] = ()) -> It
     if any(external.tip_force) or any(external.tip_moment):
         yield last, external.tip_force, external.tip_moment, point, external.following, True
     if external.tip_mass:
-        yield last, external.weight(external.tip_mass), _NONE, point, False, True
+        yield last, external.weight(external.tip_mass), NO_VECTOR, point, False, True
 
 
 # Axes of force and moment components in the frame of the bodies, then in the world; as plain

@@ -25,6 +25,10 @@ from notchflex.mechanics.section import (
 
 # Annular sector: what an on-axis cut leaves, with radial cut edges.
 #
+# A laser that points at the tube axis while the tube turns leaves the wall within an angle
+# a = arccos((g − r_o) / r_o) on either side of the spine (Pacheco 2021; physics of the sector
+# after York 2015). Every depth opens the tube, even one that leaves part of the inner wall.
+#
 # The logarithm of the radius, $\xi = \ln(r/r_i)$ from 0 to $L = \ln(r_o/r_i)$, turns the sector
 # into a rectangle and leaves Laplace's equation as it is, so Saint-Venant's problem has a series
 # solution for every wall thickness and angle; the thin wall with corrected ends,
@@ -43,10 +47,6 @@ from notchflex.mechanics.section import (
 #
 # Series derived for this program after the textbook case of the circular sector (Timoshenko and
 # Goodier, Theory of Elasticity, §109); checked against `sectionproperties` in the tests.
-#
-# A laser that points at the tube axis while the tube turns leaves the wall within an angle
-# a = arccos((g − r_o) / r_o) on either side of the spine (Pacheco 2021; physics of the sector
-# after York 2015). Every depth opens the tube, even one that leaves part of the inner wall.
 
 
 def _series_nodes() -> tuple[Array, Array, Array]:
@@ -189,23 +189,21 @@ def annular_sector(outer_radius: ArrayLike, inner_radius: ArrayLike, depth: Arra
 
 # Annular segment: what an off-axis cut leaves, with one flat cut plane.
 #
-# They have the right form (Bredt's closed tube, the thin open arc, the flat solid), so that the
-# factors which correct them, see `segment_torsion`, are smooth and of the order of one.
+# A saw or wire across the tube leaves everything beyond the plane at y = d = g − r_o from the
+# tube axis (York 2015, Swaney 2017). Three shapes follow, as d passes the inner wall at −r_i and
+# at r_i: a closed tube with a flat, an open arc with bevelled ends, a solid segment of the wall.
 #
-# There is no closed form, so a simple estimate for each of the three shapes is multiplied by a
-# factor that `benchmarks/segment_table.py` computed once with `sectionproperties` (warping
-# analysis) and fitted with Chebyshev polynomials in two coordinates that make it smooth:
-# √(1 − r_i/r_o), and the angle of the chord that the cut plane makes.
+# There is no closed form of the torsion. A simple estimate for each of the three shapes has the
+# right form (Bredt's closed tube, the thin open arc, the flat solid), so that the factor on it is
+# smooth and of the order of one (`segment_torsion`). `benchmarks/segment_table.py` computed it once
+# with `sectionproperties` (warping analysis) and fitted it with Chebyshev polynomials in two
+# coordinates: √(1 − r_i/r_o), and the angle of the chord that the cut plane makes.
 #
 # The table covers 0.2 ≤ r_i/r_o ≤ 0.98 for every depth of the open arc, the solid segment down to
 # a height of 0.005 r_o, and the closed tube as long as 1 % of the wall is left under the flat;
 # beyond, the factors keep their value at its edge (right for slivers, not checked for the rest).
 # Measured against other meshes of `sectionproperties`: torsion constant within 0.2 %; shear centre
 # within 0.1 % open or solid and 1 % closed, where a barely cut tube has it nearly on the axis.
-#
-# A saw or wire across the tube leaves everything beyond the plane at y = d = g − r_o from the
-# tube axis (York 2015, Swaney 2017). Three shapes follow, as d passes the inner wall at −r_i and
-# at r_i: a closed tube with a flat, an open arc with bevelled ends, a solid segment of the wall.
 
 
 def closed_estimate(outer: Array, inner: Array, depth: Array) -> tuple[Array, Array]:

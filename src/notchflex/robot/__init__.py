@@ -5,6 +5,7 @@ Robot files are TOML in mm, N, MPa and degrees.  Nothing here imports JAX.
 
 from typing import TYPE_CHECKING, Any
 
+from notchflex._ready import list_robots
 from notchflex.robot.cuts import Opening
 from notchflex.robot.friction.capstan import Capstan
 from notchflex.robot.friction.corner import Corner
@@ -26,7 +27,6 @@ from notchflex.robot.notches.arc import ArcNotch
 from notchflex.robot.notches.strip import StripNotch
 from notchflex.robot.notches.u_link import ULink
 from notchflex.robot.reading import (
-    list_robots,
     load_robot,
     robot_from_text,
 )

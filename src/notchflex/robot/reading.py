@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from notchflex._ready import READY, ready_names
 from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.part import nearest
 from notchflex.robot.robot import (
@@ -22,31 +23,6 @@ from notchflex.robot.robot import (
     warn_unlikely,
 )
 from notchflex.robot.value_names import change_table
-
-# The robots that come with the program, by name; imports little, so that listing them is quick.
-
-READY = Path(__file__).parent / "ready"
-
-
-def ready_names() -> list[str]:
-    """Return the names of the ready robots, sorted."""
-    return sorted(path.stem for path in READY.glob("*.toml"))
-
-
-def list_robots() -> dict[str, str]:
-    """List the ready robots.
-
-    Returns:
-        The title of every ready robot by the name that `load_robot` takes, sorted by name.
-
-    Example:
-        >>> list_robots()["pacheco2021-a"]
-        'Pacheco 2021, wrist A'
-    """
-    return {
-        name: str(tomllib.loads((READY / f"{name}.toml").read_text(encoding="utf-8"))["name"])
-        for name in ready_names()
-    }
 
 
 _LARGEST = 50_000_000

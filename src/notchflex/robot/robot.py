@@ -123,7 +123,6 @@ class Robot:
         return robot_summary(self).text
 
     def _repr_html_(self) -> str:
-
         return robot_summary(self).html
 
     @overload
