@@ -1,4 +1,5 @@
 from notchflex._plot import plot as plot
+from notchflex._ready import list_robots as list_robots
 from notchflex.analysis import Band as Band
 from notchflex.analysis import Bands as Bands
 from notchflex.analysis import Batch as Batch
@@ -116,7 +117,6 @@ from notchflex.robot import Tendon as Tendon
 from notchflex.robot import Tube as Tube
 from notchflex.robot import ULink as ULink
 from notchflex.robot import json_schema as json_schema
-from notchflex._ready import list_robots as list_robots
 from notchflex.robot import load_robot as load_robot
 from notchflex.robot import save_robot as save_robot
 from notchflex.sensing import SensedForce as SensedForce

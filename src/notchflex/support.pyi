@@ -47,33 +47,15 @@ from notchflex.results.reading import tendon_columns as tendon_columns
 from notchflex.results.reading import validated as validated
 from notchflex.results.state import SavedState as SavedState
 from notchflex.results.state import robot_digest as robot_digest
-from notchflex.results.tables import (
-    csv_text as csv_text,
-)
-from notchflex.results.tables import (
-    document_head as document_head,
-)
-from notchflex.results.tables import (
-    entries_of as entries_of,
-)
-from notchflex.results.tables import (
-    is_listed as is_listed,
-)
-from notchflex.results.tables import (
-    plain as plain,
-)
-from notchflex.results.tables import (
-    write_columns as write_columns,
-)
-from notchflex.results.tables import (
-    write_csv as write_csv,
-)
-from notchflex.results.tables import (
-    write_json as write_json,
-)
-from notchflex.results.tables import (
-    write_path_csv as write_path_csv,
-)
+from notchflex.results.tables import csv_text as csv_text
+from notchflex.results.tables import document_head as document_head
+from notchflex.results.tables import entries_of as entries_of
+from notchflex.results.tables import is_listed as is_listed
+from notchflex.results.tables import plain as plain
+from notchflex.results.tables import write_columns as write_columns
+from notchflex.results.tables import write_csv as write_csv
+from notchflex.results.tables import write_json as write_json
+from notchflex.results.tables import write_path_csv as write_path_csv
 from notchflex.results.writing import BROWSER as BROWSER
 from notchflex.results.writing import MOVING as MOVING
 from notchflex.results.writing import PAPER as PAPER

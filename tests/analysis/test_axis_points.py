@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.analysis import axis_places, axis_points, bodies_from_angles, points_on_axis
 from notchflex.analysis.kinematics import axis_point_changes
 from notchflex.errors import ErrorCode

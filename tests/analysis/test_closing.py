@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.closing_loads import (
-    closing_tensions,
-    closing_tensions_of,
-)
+from notchflex.analysis.closing_loads import closing_tensions, closing_tensions_of
 
 YORK = nf.load_robot("york2015")
 

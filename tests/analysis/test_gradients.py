@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.analysis.forward_model import slope
 from notchflex.errors import ErrorCode
 from refusals import refused

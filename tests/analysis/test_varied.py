@@ -10,11 +10,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.analysis import varied
-from notchflex.analysis.draws import (
-    sources_of,
-    tolerances_of,
-    values_at,
-)
+from notchflex.analysis.draws import sources_of, tolerances_of, values_at
 from notchflex.analysis.varied import VariedRobots
 from notchflex.errors import ErrorCode
 from notchflex.solver.programs import assembled

@@ -1,11 +1,7 @@
 """External loads in the head of the table."""
 
 from notchflex.cli.tables.path_table import load_sentences
-from notchflex.loads.load import (
-    NOTHING,
-    BodyForce,
-    ExternalLoad,
-)
+from notchflex.loads.load import NOTHING, BodyForce, ExternalLoad
 from notchflex.loads.load_path import external_words
 
 PUSH = ExternalLoad(tip_force=(0.0, 0.0, -0.2), tip_point=(0.0, 0.0, 1.5))

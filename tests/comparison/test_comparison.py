@@ -10,9 +10,7 @@ import pytest
 import notchflex as nf
 from notchflex.comparison import comparison_document, errors_document
 from notchflex.comparison.comparison import compare_kinematics
-from notchflex.results.tables import (
-    json_text,
-)
+from notchflex.results.tables import json_text
 from refusals import refused
 
 WRIST = nf.load_robot("pacheco2021-a")

@@ -12,10 +12,7 @@ import pytest
 
 import notchflex as nf
 from design_wishes import tip_first, wide_wrist
-from notchflex.analysis.draws import (
-    sources_of,
-    values_at,
-)
+from notchflex.analysis.draws import sources_of, values_at
 from notchflex.designing.design_robot import problems_of
 from notchflex.designing.search.robust import Hold, RobustProblem
 from notchflex.designing.specification import spec_from_table

@@ -13,9 +13,7 @@ from typing import Any
 import pytest
 
 import notchflex as nf
-from notchflex.results.tables import (
-    path_columns,
-)
+from notchflex.results.tables import path_columns
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

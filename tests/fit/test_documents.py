@@ -24,9 +24,7 @@ from notchflex.fit import (
     posterior_document,
     repeats_of_each,
 )
-from notchflex.results.tables import (
-    json_text,
-)
+from notchflex.results.tables import json_text
 from refusals import refused
 
 

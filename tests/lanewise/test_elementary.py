@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 
 from lanewise.elementary import ELEMENTARY
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 
 Wide = np.longdouble
 COUNT = 20_000

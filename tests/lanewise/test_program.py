@@ -8,10 +8,7 @@ from jax.extend.core import Primitive
 
 from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code
 from lanewise.ir import graph
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 
 # Fewer than a vector's lanes, as many, more, and several vectors.
 SIZES = (1, 2, 3, 8, 13, 27, 40)

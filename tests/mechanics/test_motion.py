@@ -11,10 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.mechanics.motion import (
     Motion,
     identity,

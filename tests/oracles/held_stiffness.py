@@ -5,10 +5,7 @@ from __future__ import annotations
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.residual import (

@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 
 from fake_path import CLOSING, fake_path
-from notchflex.loads.load import (
-    BodyForce,
-    ExternalLoad,
-)
+from notchflex.loads.load import BodyForce, ExternalLoad
 from notchflex.plotting import path_figure, path_picture, save
 from notchflex.plotting.curves import abscissa, branches, steps_by_branch
 from notchflex.plotting.shapes.outline import bending_plane, outline

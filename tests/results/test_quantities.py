@@ -2,11 +2,7 @@
 
 import pytest
 
-from notchflex.results.quantities import (
-    QUANTITIES,
-    span_names,
-    units,
-)
+from notchflex.results.quantities import QUANTITIES, span_names, units
 
 
 @pytest.mark.parametrize("part", ["key", "column"])

@@ -7,11 +7,7 @@ import pytest
 import notchflex as nf
 from fake_path import fake_path
 from notchflex.mechanics.chain import assemble
-from notchflex.results.quantities import (
-    QUANTITIES,
-    holds,
-    spans_of,
-)
+from notchflex.results.quantities import QUANTITIES, holds, spans_of
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,7 @@ from typing import Annotated
 import pytest
 
 import notchflex as nf
-from notchflex.robot.part import (
-    Float,
-    part,
-    quantity,
-)
+from notchflex.robot.part import Float, part, quantity
 
 
 @pytest.mark.parametrize("kind", [nf.Tube, nf.Tendon, nf.ArcNotch, nf.Capstan, nf.Robot])

@@ -5,12 +5,7 @@ import json
 import pytest
 
 import notchflex as nf
-from notchflex.robot.kinds import (
-    Friction,
-    Material,
-    Notch,
-    kinds_of,
-)
+from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 
 
 def test_it_is_json():

@@ -8,11 +8,7 @@ import pytest
 import notchflex as nf
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import assemble
-from notchflex.solver.residual import (
-    BaseReaction,
-    closing_stroke,
-    command_residual,
-)
+from notchflex.solver.residual import BaseReaction, closing_stroke, command_residual
 
 STIFF = 4000.0  # N, E A of the elastic cables
 

@@ -10,11 +10,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.analysis.forward_model import ForwardModel
-from notchflex.analysis.tangent import (
-    Change,
-    PathTangents,
-    gradient,
-)
+from notchflex.analysis.tangent import Change, PathTangents, gradient
 from notchflex.mechanics.chain import assemble
 from notchflex.solver.programs.prepare import PreparedChain
 

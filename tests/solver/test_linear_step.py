@@ -11,14 +11,8 @@ from notchflex._jax import jax
 from notchflex.analysis.solve import prepare_for
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import load_path
-from notchflex.solver.block_elimination import (
-    linear_step,
-)
-from notchflex.solver.residual import (
-    Iterate,
-    command_residual,
-    evaluate,
-)
+from notchflex.solver.block_elimination import linear_step
+from notchflex.solver.residual import Iterate, command_residual, evaluate
 
 TIP = {"tip_force": (0.02, 0.0, -0.01), "tip_moment": (0.0, 0.05, 0.0)}
 SIDE = {"tip_force": (0.02, 0.01, -0.01), "following": True, "gravity": (1.0, 2.0, 3.0)}

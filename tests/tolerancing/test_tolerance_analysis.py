@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.analysis.draws import (
-    deviation,
-    moments,
-)
+from notchflex.analysis.draws import deviation, moments
 from notchflex.pieces.folder import CODES
 from notchflex.robot.problems import Tolerance
 from notchflex.tolerancing.analysis import tolerances_for

@@ -17,10 +17,7 @@ from jaxtyping import Array
 from scipy.optimize import least_squares
 
 import notchflex as nf
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.mechanics.material import Fibres, FibreSection, SectionLaw, section_law
 from notchflex.mechanics.section import two_walls_fibres
 from shared_data import measured, numbers

@@ -200,9 +200,7 @@ def test_a_robot_whose_notches_never_close_needs_a_tension():
 
 def test_files_hold_all_states(found, tmp_path):
     xarray = pytest.importorskip("xarray")
-    from notchflex.results.tables import (
-        json_text,
-    )
+    from notchflex.results.tables import json_text
     from notchflex.workspaces.cloud import save_netcdf, workspace_document
 
     save_netcdf({"a": found, "b/c": found}, str(tmp_path / "both.nc"))

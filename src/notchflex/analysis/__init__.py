@@ -1,30 +1,10 @@
 """Analyses of a robot: equilibria along a path, batches, closing loads, derivatives, kinematics."""
 
-from notchflex.analysis.bands import (
-    Band,
-    Bands,
-    band_names,
-    uncertain,
-)
-from notchflex.analysis.batch import (
-    Batch,
-    batch,
-    simulate_batch,
-    solve_batch,
-)
-from notchflex.analysis.closing_loads import (
-    Closing,
-    ClosingStatus,
-    closing,
-)
-from notchflex.analysis.differentiable import (
-    Differentiable,
-    differentiable,
-)
-from notchflex.analysis.forward_model import (
-    TipResponse,
-    tip_response,
-)
+from notchflex.analysis.bands import Band, Bands, band_names, uncertain
+from notchflex.analysis.batch import Batch, batch, simulate_batch, solve_batch
+from notchflex.analysis.closing_loads import Closing, ClosingStatus, closing
+from notchflex.analysis.differentiable import Differentiable, differentiable
+from notchflex.analysis.forward_model import TipResponse, tip_response
 from notchflex.analysis.kinematics import (
     AxisPlaces,
     SharedStroke,

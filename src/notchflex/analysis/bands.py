@@ -19,20 +19,10 @@ from notchflex.analysis.outputs import OUTPUTS, check_outputs
 from notchflex.analysis.solve import simulate
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.load import (
-    check_integer,
-    check_is_robot,
-)
+from notchflex.loads.load import check_integer, check_is_robot
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.quantities import (
-    DEGREES,
-    QUANTITIES,
-    holds,
-)
-from notchflex.results.tables import (
-    entries_of,
-    is_listed,
-)
+from notchflex.results.quantities import DEGREES, QUANTITIES, holds
+from notchflex.results.tables import entries_of, is_listed
 from notchflex.robot import Robot
 from notchflex.robot.problems import Tolerance
 from notchflex.robot.value_names import numbers_at

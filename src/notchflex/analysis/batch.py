@@ -36,34 +36,14 @@ from notchflex.analysis.solve import check_refinement, follow_path
 from notchflex.analysis.varied import FEW, Chains, VariedRobots, prepare_kind, single_chains
 from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.command import (
-    DRAWN,
-    acting,
-    row_commands,
-)
-from notchflex.loads.load import (
-    NO_VECTOR,
-    check_integer,
-    one_or_several,
-    short_repr,
-)
-from notchflex.loads.load_path import (
-    TENDONS,
-    TIP,
-    join_paths,
-    load_path,
-)
+from notchflex.loads.command import DRAWN, acting, row_commands
+from notchflex.loads.load import NO_VECTOR, check_integer, one_or_several, short_repr
+from notchflex.loads.load_path import TENDONS, TIP, join_paths, load_path
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities import QUANTITIES, work_of_steps
 from notchflex.robot import Robot
-from notchflex.solver.newton import (
-    DEFAULT,
-    Settings,
-)
-from notchflex.solver.programs.compiled import (
-    number_of_cores,
-    on_cores,
-)
+from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.programs.compiled import number_of_cores, on_cores
 from notchflex.solver.programs.prepare import PreparedChain
 
 # Largest number of rows of a piece, by the number of rows.

@@ -16,35 +16,21 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from notchflex._jax import (
-    jax,
-    jit,
-    jnp,
-)
+from notchflex._jax import jax, jit, jnp
 from notchflex._summary import Displayed, Summary, short
-from notchflex.analysis.batch import (
-    BatchRows,
-    BatchTable,
-    LoadRows,
-)
+from notchflex.analysis.batch import BatchRows, BatchTable, LoadRows
 from notchflex.analysis.varied import VariedRobots
 from notchflex.loads import LoadPath
 from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import Chain, assemble, sites_of
-from notchflex.mechanics.contact import (
-    closing_angles,
-    free_angle,
-)
+from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.mechanics.flexure import Site, rod_at
 from notchflex.mechanics.material import FibreSection, SectionLaw, peak_strain, section_strain
 from notchflex.results.quantities import DEGREES, QUANTITIES
 from notchflex.robot import Robot, Tube
 from notchflex.robot.kinds import Notch
 from notchflex.robot.part import fields_of, unit_of
-from notchflex.solver.newton import (
-    DEFAULT,
-    Settings,
-)
+from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import number_of_cores
 from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run, solve_contacts

@@ -14,39 +14,20 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex._summary import Displayed, Summary
-from notchflex.analysis.forward_model import (
-    Change,
-    ForwardModel,
-)
+from notchflex.analysis.forward_model import Change, ForwardModel
 from notchflex.analysis.outputs import OutputTable, check_outputs
 from notchflex.analysis.solve import check_refinement
-from notchflex.analysis.tangent import (
-    Kink,
-    kinks,
-)
+from notchflex.analysis.tangent import Kink, kinks
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.load import (
-    check_is_robot,
-    short_repr,
-)
-from notchflex.loads.load_path import (
-    TENDONS,
-    TIP,
-    load_path,
-)
+from notchflex.loads.load import check_is_robot, short_repr
+from notchflex.loads.load_path import TENDONS, TIP, load_path
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
-from notchflex.solver.newton import (
-    DEFAULT,
-    Settings,
-)
+from notchflex.solver.newton import DEFAULT, Settings
 
 # Largest change of a parameter in one-sided differences.
 _ASIDE = 1e-5

@@ -13,14 +13,8 @@ from notchflex.analysis.varied import VariedRobots
 from notchflex.errors import InputError
 from notchflex.robot import Nitinol, Robot
 from notchflex.robot.part import fields_of, unit_of
-from notchflex.robot.problems import (
-    Tolerance,
-    amount,
-)
-from notchflex.robot.value_names import (
-    number_at,
-    numbers_at,
-)
+from notchflex.robot.problems import Tolerance, amount
+from notchflex.robot.value_names import number_at, numbers_at
 
 _TRIES = 100
 """How often a draw that makes no valid robot is drawn again."""

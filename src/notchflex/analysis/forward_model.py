@@ -18,39 +18,18 @@ from notchflex._jax import constant
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.solve import check_refinement, prepare_for
-from notchflex.analysis.tangent import (
-    Change,
-    Kink,
-    PathTangents,
-    gradient,
-    kinks,
-)
+from notchflex.analysis.tangent import Change, Kink, PathTangents, gradient, kinks
 from notchflex.errors import InputError
 from notchflex.loads import Load
-from notchflex.loads.command import (
-    BodyLoads,
-    Command,
-    load_slopes,
-    make_commands,
-)
+from notchflex.loads.command import BodyLoads, Command, load_slopes, make_commands
 from notchflex.loads.load import check_is_robot
 from notchflex.loads.load_path import LoadPath, load_path
 from notchflex.mechanics.chain import ChainTemplate, chain_template, laws
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.robot.numbers import (
-    PartsForm,
-    Place,
-    apart,
-    differing,
-    parts_of,
-    places_of,
-)
+from notchflex.robot.numbers import PartsForm, Place, apart, differing, parts_of, places_of
 from notchflex.robot.value_names import number_at, parse_path
-from notchflex.solver.newton import (
-    DEFAULT,
-    Settings,
-)
+from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.assembled import assembled_chain, chain_slopes
 from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run

@@ -10,23 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from notchflex._jax import (
-    constant,
-    jax,
-    jit,
-)
+from notchflex._jax import constant, jax, jit
 from notchflex._values import read_only
-from notchflex.analysis.kinematics import (
-    axis_places,
-    bodies_from_angles,
-    points_on_axis,
-)
+from notchflex.analysis.kinematics import axis_places, bodies_from_angles, points_on_axis
 from notchflex.errors import InputError
 from notchflex.mechanics.chain import Chain, assemble, body_lengths
-from notchflex.mechanics.contact import (
-    closing_angles,
-    free_angle,
-)
+from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.mechanics.flexure.rod_kinematics import node_poses
 from notchflex.mechanics.tendon import passage
 from notchflex.results.state import Equilibrium

@@ -10,12 +10,7 @@ from jaxtyping import Array, Float, Int
 from numpy.typing import ArrayLike, NDArray
 
 from notchflex._arrays import xp
-from notchflex._jax import (
-    constant,
-    jax,
-    jit,
-    jnp,
-)
+from notchflex._jax import constant, jax, jit, jnp
 from notchflex.errors import InputError
 from notchflex.mechanics.chain import Chain, assemble
 from notchflex.mechanics.flexure import relative_pose

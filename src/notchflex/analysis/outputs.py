@@ -9,11 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from notchflex._jax import (
-    choose,
-    jax,
-    jnp,
-)
+from notchflex._jax import choose, jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.load import short_repr
@@ -23,14 +19,8 @@ from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
-from notchflex.solver.quantities import (
-    believable,
-    unpad_quantity,
-)
-from notchflex.solver.residual import (
-    SolverState,
-    at_rest,
-)
+from notchflex.solver.quantities import believable, unpad_quantity
+from notchflex.solver.residual import SolverState, at_rest
 from notchflex.solver.solved_state import SolvedState
 
 OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]

@@ -7,30 +7,15 @@ from collections.abc import Iterable
 
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.command import (
-    follows,
-    is_planar,
-    is_unloaded,
-    make_commands,
-    unlikely_loads,
-)
+from notchflex.loads.command import follows, is_planar, is_unloaded, make_commands, unlikely_loads
 from notchflex.loads.load import check_is_robot
 from notchflex.loads.load_path import load_path
 from notchflex.mechanics.chain import tendons_in_plane
 from notchflex.mechanics.flexure import LEVELS, MAX_REFINEMENT
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.state import (
-    Equilibrium,
-    SavedState,
-    State,
-    check_robot,
-    fitted,
-)
+from notchflex.results.state import Equilibrium, SavedState, State, check_robot, fitted
 from notchflex.robot import Robot
-from notchflex.solver.newton import (
-    DEFAULT,
-    Settings,
-)
+from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run
 

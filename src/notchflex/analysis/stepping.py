@@ -17,27 +17,15 @@ from jaxtyping import Array, Bool, Float, Int
 
 from lanewise import WIDTH, FixedVector
 from notchflex._arrays import xp
-from notchflex._jax import (
-    choose,
-    jax,
-    jnp,
-)
+from notchflex._jax import choose, jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.batch import number_of_threads, range_of
-from notchflex.analysis.outputs import (
-    OF_STATE,
-    check_outputs,
-    own_entries,
-    report_quantities,
-)
+from notchflex.analysis.outputs import OF_STATE, check_outputs, own_entries, report_quantities
 from notchflex.analysis.solve import prepare_for, simulate
 from notchflex.errors import Failure, InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.command import (
-    Command,
-    make_commands,
-)
+from notchflex.loads.command import Command, make_commands
 from notchflex.loads.load import (
     check_bool,
     check_integer,
@@ -48,19 +36,10 @@ from notchflex.loads.load import (
 )
 from notchflex.loads.load_path import load_path
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.state import (
-    SavedState,
-    State,
-    check_robot,
-    fitted,
-    state_of,
-)
+from notchflex.results.state import SavedState, State, check_robot, fitted, state_of
 from notchflex.robot import Robot
 from notchflex.solver.continuation import before_tendons, solve_load_step
-from notchflex.solver.newton import (
-    DEFAULT,
-    Settings,
-)
+from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import native, on_cores
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import (

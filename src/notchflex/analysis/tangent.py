@@ -23,10 +23,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import own_entries, report_quantities, reported_shapes
 from notchflex.mechanics.chain import Chain

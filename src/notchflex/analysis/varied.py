@@ -15,20 +15,10 @@ from jaxtyping import Bool, Float, Int
 from notchflex._jax import jax
 from notchflex.analysis.solve import level_of
 from notchflex.errors import ErrorCode, InputError
-from notchflex.loads.command import (
-    FOLLOWING,
-    LOADED,
-    SIDEWAYS,
-)
+from notchflex.loads.command import FOLLOWING, LOADED, SIDEWAYS
 from notchflex.mechanics.chain import Chain
 from notchflex.robot import Robot
-from notchflex.robot.numbers import (
-    PartsForm,
-    Place,
-    apart,
-    parts_of,
-    places_of,
-)
+from notchflex.robot.numbers import PartsForm, Place, apart, parts_of, places_of
 from notchflex.robot.value_names import parse_path
 from notchflex.solver.programs.assembled import AssembledRobots
 from notchflex.solver.programs.prepare import PreparedChain, prepare

@@ -16,15 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex import (
-    InputError,
-    Robot,
-    Tube,
-)
-from notchflex.support import (
-    NotchCut,
-    shrunk,
-)
+from notchflex import InputError, Robot, Tube
+from notchflex.support import NotchCut, shrunk
 
 
 class PlacedCut(NamedTuple):

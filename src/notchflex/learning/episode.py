@@ -11,19 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from notchflex import (
-    InputError,
-    Robot,
-    Stepper,
-    load_robot,
-    tip_from_angles,
-)
-from notchflex.support import (
-    check_integer,
-    check_number,
-    need,
-    short_repr,
-)
+from notchflex import InputError, Robot, Stepper, load_robot, tip_from_angles
+from notchflex.support import check_integer, check_number, need, short_repr
 from notchflex.workspaces.rays import largest_tensions
 
 # So many steps from a slack tendon to the largest tension, where no rate is given.

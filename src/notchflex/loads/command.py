@@ -17,18 +17,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._arrays import xp
-from notchflex._jax import (
-    constant,
-    jnp,
-)
+from notchflex._jax import constant, jnp
 from notchflex.errors import InputError, InputWarning
-from notchflex.loads.load import (
-    HANGING,
-    NO_VECTOR,
-    NOTHING,
-    ExternalLoad,
-    rotation_of,
-)
+from notchflex.loads.load import HANGING, NO_VECTOR, NOTHING, ExternalLoad, rotation_of
 from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.chain import Chain, bending_normal
 from notchflex.mechanics.motion import IN_PLANE, turned, unskew

@@ -16,17 +16,8 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from notchflex._arrays import cached, plain_number, xp
-from notchflex._jax import (
-    Pytree,
-    constant,
-    jax,
-    jnp,
-    static,
-)
-from notchflex.mechanics.contact import (
-    ContactGroup,
-    build_contacts,
-)
+from notchflex._jax import Pytree, constant, jax, jnp, static
+from notchflex.mechanics.contact import ContactGroup, build_contacts
 from notchflex.mechanics.flexure import (
     FlexureState,
     Rod,
@@ -47,17 +38,9 @@ from notchflex.mechanics.material import Fibres, SectionLaw, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
-from notchflex.mechanics.tendon import (
-    RoutedTendons,
-    TendonGroup,
-    route,
-)
+from notchflex.mechanics.tendon import RoutedTendons, TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
-from notchflex.robot.kinds import (
-    Friction,
-    Material,
-    Notch,
-)
+from notchflex.robot.kinds import Friction, Material, Notch
 from notchflex.robot.part import unchecked
 
 

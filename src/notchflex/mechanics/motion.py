@@ -20,11 +20,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._arrays import is_traced, xp
-from notchflex._jax import (
-    constant,
-    jax,
-    jnp,
-)
+from notchflex._jax import constant, jax, jnp
 
 PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 

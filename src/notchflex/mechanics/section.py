@@ -14,11 +14,7 @@ from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
 from notchflex._arrays import cached, is_traced, xp
-from notchflex._jax import (
-    constant,
-    jax,
-    scan,
-)
+from notchflex._jax import constant, jax, scan
 from notchflex._values import read_only
 from notchflex.mechanics.motion import polynomial
 

@@ -10,21 +10,12 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from notchflex._arrays import xp
-from notchflex._jax import (
-    Pytree,
-    constant,
-    jax,
-    jnp,
-    static,
-)
+from notchflex._jax import Pytree, constant, jax, jnp, static
 from notchflex.errors import InputError
 from notchflex.mechanics.flexure import FlexureState, Rod, fibre_slope, fibre_stretch, of_rod
 from notchflex.mechanics.motion import Motion, moment_of, wrench_at
 from notchflex.robot import Tendon
-from notchflex.robot.kinds import (
-    Notch,
-    openings_along,
-)
+from notchflex.robot.kinds import Notch, openings_along
 
 # How a group of tendons crosses one gap: its way as a function of where the two bodies are.
 #

@@ -9,18 +9,11 @@ from notchflex._lazy import loader
 from notchflex._quantity import Quantity
 
 if TYPE_CHECKING:
-    from notchflex.results.io import (
-        read_path,
-        save_path,
-    )
+    from notchflex.results.io import read_path, save_path
     from notchflex.results.path import EquilibriumPath, Recorded
     from notchflex.results.quantities import QUANTITIES
     from notchflex.results.reading import read_table
-    from notchflex.results.state import (
-        Equilibrium,
-        SavedState,
-        State,
-    )
+    from notchflex.results.state import Equilibrium, SavedState, State
 
 __all__ = [
     "QUANTITIES",

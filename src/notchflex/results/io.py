@@ -20,18 +20,8 @@ from notchflex._extras import need
 from notchflex._quantity import REGISTERED, Quantity
 from notchflex._replacing import replacing
 from notchflex.errors import InputError
-from notchflex.results.quantities import (
-    AXES,
-    CONTACT_STATES,
-    QUANTITIES,
-)
-from notchflex.results.tables import (
-    path_columns,
-    path_document,
-    plain,
-    write_json,
-    write_path_csv,
-)
+from notchflex.results.quantities import AXES, CONTACT_STATES, QUANTITIES
+from notchflex.results.tables import path_columns, path_document, plain, write_json, write_path_csv
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -303,12 +293,7 @@ def _loads_from(text: str) -> tuple[Any, ...]:
 def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
     import jax.tree_util as tree_util
 
-    from notchflex.results.path import (
-        BEFORE,
-        FLATTENING,
-        MATERIAL,
-        REPORTED,
-    )
+    from notchflex.results.path import BEFORE, FLATTENING, MATERIAL, REPORTED
     from notchflex.results.state import leaf_name
 
     run = path.run
@@ -367,11 +352,7 @@ def _recorded(
     """Return what the solver found, of the shapes that robot and loads ask for."""
     import jax.tree_util as tree_util
 
-    from notchflex.results.path import (
-        FLATTENING,
-        REPORTED,
-        Recorded,
-    )
+    from notchflex.results.path import FLATTENING, REPORTED, Recorded
     from notchflex.results.state import leaf_name
 
     leaves, structure = tree_util.tree_flatten_with_path(ready.rest)
@@ -412,11 +393,7 @@ def _before_the_first(
     arrays: Mapping[str, NDArray[Any]], ready: PreparedChain, flattening: tuple[int, ...]
 ) -> dict[str, NDArray[Any]]:
     """Return quantities of the state before the first step; older files lack those of materials."""
-    from notchflex.results.path import (
-        BEFORE,
-        FLATTENING,
-        MATERIAL,
-    )
+    from notchflex.results.path import BEFORE, FLATTENING, MATERIAL
 
     first = {name: arrays[_START + name] for name in BEFORE}
     at_rest = ready.rest.memory.material

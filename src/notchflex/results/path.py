@@ -18,37 +18,17 @@ from notchflex._summary import Displayed, Summary
 from notchflex._values import ByValue, frozen, read_only
 from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import LoadPath
-from notchflex.loads.command import (
-    Command,
-    make_commands,
-)
+from notchflex.loads.command import Command, make_commands
 from notchflex.mechanics.chain import Chain, unchecked_dimensions
 from notchflex.mechanics.tendon import Straight
-from notchflex.results.quantities import (
-    QUANTITIES,
-    PathQuantities,
-    friction_front,
-)
-from notchflex.results.state import (
-    Equilibrium,
-    State,
-    state_of,
-)
+from notchflex.results.quantities import QUANTITIES, PathQuantities, friction_front
+from notchflex.results.state import Equilibrium, State, state_of
 from notchflex.robot import Robot
-from notchflex.solver.newton import (
-    DEFAULT,
-    Settings,
-)
+from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import SolverRun
-from notchflex.solver.quantities import (
-    Shape,
-    reported,
-)
-from notchflex.solver.residual import (
-    SolverState,
-    closing_stroke,
-)
+from notchflex.solver.quantities import Shape, reported
+from notchflex.solver.residual import SolverState, closing_stroke
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -25,16 +25,9 @@ from pydantic import TypeAdapter, ValidationError
 from notchflex._quantity import Quantity
 from notchflex.errors import InputError
 from notchflex.results.io import read_columns
-from notchflex.results.quantities import (
-    AXES,
-    QUANTITIES,
-)
+from notchflex.results.quantities import AXES, QUANTITIES
 from notchflex.robot.part import sentences
-from notchflex.robot.reading import (
-    load_robot,
-    parse_toml,
-    read_text,
-)
+from notchflex.robot.reading import load_robot, parse_toml, read_text
 from notchflex.robot.robot import Robot
 
 TOLD_COLUMNS = (

@@ -18,27 +18,16 @@ from notchflex._summary import Displayed, Summary, course, short, vector
 from notchflex._values import ByValue
 from notchflex.errors import ConvergenceError, InputError
 from notchflex.loads import Load
-from notchflex.loads.command import (
-    in_frame,
-    out_of_frame,
-)
+from notchflex.loads.command import in_frame, out_of_frame
 from notchflex.loads.load import short_repr
-from notchflex.loads.load_path import (
-    MOST,
-    external_rows,
-    load_words,
-    tendon_rows,
-)
+from notchflex.loads.load_path import MOST, external_rows, load_words, tendon_rows
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
 from notchflex.results.quantities import QUANTITIES, EquilibriumQuantities
 from notchflex.robot import Robot
 from notchflex.robot.reading import read_text
 from notchflex.robot.robot import to_table
-from notchflex.solver.residual import (
-    SolverState,
-    at_rest,
-)
+from notchflex.solver.residual import SolverState, at_rest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -467,9 +456,7 @@ class Equilibrium(EquilibriumQuantities, Displayed):
             >>> step["load"], round(step["total_angle_deg"], 1)
             ({'tension_N': [1.0], 'stroke_mm': [None]}, 51.5)
         """
-        from notchflex.results.tables import (
-            step_document,
-        )
+        from notchflex.results.tables import step_document
 
         return step_document(self._path, self._step)
 

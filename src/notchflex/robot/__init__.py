@@ -10,15 +10,7 @@ from notchflex.robot.cuts import Opening
 from notchflex.robot.friction.capstan import Capstan
 from notchflex.robot.friction.corner import Corner
 from notchflex.robot.friction.frictionless import Frictionless
-from notchflex.robot.kinds import (
-    Friction,
-    Material,
-    Notch,
-    Tendon,
-    Tube,
-    kinds_of,
-    openings_along,
-)
+from notchflex.robot.kinds import Friction, Material, Notch, Tendon, Tube, kinds_of, openings_along
 from notchflex.robot.materials.linear import Linear
 from notchflex.robot.materials.nitinol import Nitinol
 from notchflex.robot.materials.stress_strain import StressStrain
@@ -26,25 +18,12 @@ from notchflex.robot.materials.superelastic import Superelastic
 from notchflex.robot.notches.arc import ArcNotch
 from notchflex.robot.notches.strip import StripNotch
 from notchflex.robot.notches.u_link import ULink
-from notchflex.robot.reading import (
-    load_robot,
-    robot_from_text,
-)
-from notchflex.robot.robot import (
-    Drawing,
-    Robot,
-    from_table,
-    json_schema,
-    set_values,
-    to_table,
-)
+from notchflex.robot.reading import load_robot, robot_from_text
+from notchflex.robot.robot import Drawing, Robot, from_table, json_schema, set_values, to_table
 from notchflex.robot.value_names import parse_assignment
 
 if TYPE_CHECKING:
-    from notchflex.robot.writing import (
-        robot_text,
-        save_robot,
-    )
+    from notchflex.robot.writing import robot_text, save_robot
 
 __all__ = [
     "ArcNotch",

@@ -12,12 +12,7 @@ from jaxtyping import Float
 
 from notchflex.robot.part import unchecked
 from notchflex.robot.robot import Robot
-from notchflex.robot.value_names import (
-    SECTIONS,
-    NamedPart,
-    named_parts,
-    parse_path,
-)
+from notchflex.robot.value_names import SECTIONS, NamedPart, named_parts, parse_path
 
 Place = tuple[int, str]
 """Where a number stands: its part, counted from 0, and its key."""

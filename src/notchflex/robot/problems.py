@@ -11,11 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, cast
 from pydantic import BeforeValidator, WithJsonSchema
 
 from notchflex.errors import InputError, InputWarning
-from notchflex.robot.kinds import (
-    Notch,
-    Tendon,
-    openings_along,
-)
+from notchflex.robot.kinds import Notch, Tendon, openings_along
 from notchflex.robot.part import ProblemError, Problems, fields_of, unknown_key
 from notchflex.robot.value_names import described_at, named_parts, numbers_at
 

@@ -24,7 +24,6 @@ from notchflex.robot.robot import (
 )
 from notchflex.robot.value_names import change_table
 
-
 _LARGEST = 50_000_000
 """Bytes of the largest text file that is read."""
 _PART, _WRITER_COMES = 2**16, 3.0

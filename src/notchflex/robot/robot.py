@@ -22,19 +22,8 @@ from notchflex.robot.kinds import (
     Tube,
     any_kind_of,
 )
-from notchflex.robot.part import (
-    Problems,
-    fields_of,
-    is_unsaid,
-    part,
-    sentences,
-    unit_of,
-)
-from notchflex.robot.problems import (
-    Tolerances,
-    robot_problems,
-    robot_warnings,
-)
+from notchflex.robot.part import Problems, fields_of, is_unsaid, part, sentences, unit_of
+from notchflex.robot.problems import Tolerances, robot_problems, robot_warnings
 from notchflex.robot.value_names import change_table
 
 if TYPE_CHECKING:

@@ -10,21 +10,8 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from notchflex.errors import InputError
-from notchflex.robot.kinds import (
-    Drawing,
-    Friction,
-    Material,
-    Notch,
-    Tendon,
-    Tube,
-    kinds_of,
-)
-from notchflex.robot.part import (
-    fields_of,
-    nearest,
-    unit_of,
-    unknown_key,
-)
+from notchflex.robot.kinds import Drawing, Friction, Material, Notch, Tendon, Tube, kinds_of
+from notchflex.robot.part import fields_of, nearest, unit_of, unknown_key
 
 if TYPE_CHECKING:
     from notchflex.robot.robot import Robot

@@ -12,10 +12,7 @@ from jaxtyping import Float
 from notchflex import BodyForce, EquilibriumPath, InputError, LoadPath, Robot, Settings
 from notchflex._jax import constant
 from notchflex.analysis.forward_model import ForwardModel
-from notchflex.analysis.tangent import (
-    Change,
-    PathTangents,
-)
+from notchflex.analysis.tangent import Change, PathTangents
 from notchflex.loads.command import make_commands
 from notchflex.loads.load import NO_VECTOR
 from notchflex.mechanics.chain import bending_normal

@@ -20,25 +20,11 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
-from notchflex._jax import (
-    constant,
-    jax,
-    jnp,
-)
+from notchflex._jax import constant, jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.linear_step import (
-    UnitRows,
-    linearise,
-    unit_rows,
-)
-from notchflex.solver.residual import (
-    Evaluation,
-    Iterate,
-    Memory,
-    command_residual,
-    command_slopes,
-)
+from notchflex.solver.linear_step import UnitRows, linearise, unit_rows
+from notchflex.solver.residual import Evaluation, Iterate, Memory, command_residual, command_slopes
 
 # Slopes of a stroke below the second count as zero; the first is added to their pivots.
 _PIVOT_SHIFT, _ZERO_SLOPE = 1e-9, 1e-7

@@ -9,11 +9,7 @@ from typing import NamedTuple
 
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import (
-    choose,
-    jax,
-    jnp,
-)
+from notchflex._jax import choose, jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.newton import (
@@ -23,11 +19,7 @@ from notchflex.solver.newton import (
     newton,
     predict_log_ratios,
 )
-from notchflex.solver.residual import (
-    Iterate,
-    Memory,
-    SolverState,
-)
+from notchflex.solver.residual import Iterate, Memory, SolverState
 
 
 class LoadStepResult(NamedTuple):

@@ -21,12 +21,7 @@ from jaxtyping import Array, Bool, Float
 from notchflex._jax import jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.linear_step import (
-    LinearisedRows,
-    UnitRows,
-    linearise,
-    unit_rows,
-)
+from notchflex.solver.linear_step import LinearisedRows, UnitRows, linearise, unit_rows
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import (
@@ -35,13 +30,7 @@ from notchflex.solver.programs.static_structure import (
     lane_sizes,
     pad_rows,
 )
-from notchflex.solver.residual import (
-    Memory,
-    SolverState,
-    bound_side,
-    command_slopes,
-    evaluate,
-)
+from notchflex.solver.residual import Memory, SolverState, bound_side, command_slopes, evaluate
 
 # Springs this much stiffer than the notches hold closed contacts and tendons driven by stroke;
 # otherwise their forces would be multipliers and the stiffness undefined.

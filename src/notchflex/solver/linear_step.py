@@ -10,15 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import (
-    constant,
-    jax,
-    jnp,
-)
-from notchflex.loads.command import (
-    BodyLoads,
-    body_wrench,
-)
+from notchflex._jax import constant, jax, jnp
+from notchflex.loads.command import BodyLoads, body_wrench
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.contact import ContactGroup
 from notchflex.mechanics.flexure import flexure_state, geometric_stiffness, material_tangent

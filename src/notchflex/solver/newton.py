@@ -9,18 +9,11 @@ from typing import Any, NamedTuple, cast
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import (
-    Pytree,
-    choose,
-    jax,
-    jnp,
-)
+from notchflex._jax import Pytree, choose, jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.flexure import in_space
-from notchflex.solver.block_elimination import (
-    linear_step,
-)
+from notchflex.solver.block_elimination import linear_step
 from notchflex.solver.residual import (
     Evaluation,
     Iterate,

@@ -10,11 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._arrays import xp
-from notchflex._jax import (
-    constant,
-    jax,
-    jnp,
-)
+from notchflex._jax import constant, jax, jnp
 from notchflex._quantity import REGISTERED, Quantity, axis_sizes
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import in_space, rotation_error_estimate

@@ -13,24 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Array, Bool, Float, Shaped
 
-from notchflex._jax import (
-    constant,
-    jax,
-    jnp,
-)
-from notchflex.loads.command import (
-    BodyLoads,
-    Command,
-    body_wrench,
-)
+from notchflex._jax import constant, jax, jnp
+from notchflex.loads.command import BodyLoads, Command, body_wrench
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.contact import ContactGroup, GapResponse, closing_angles
 from notchflex.mechanics.flexure import FlexureState, fibre_stretch, of_rod
 from notchflex.mechanics.motion import Motion, identity
-from notchflex.mechanics.tendon import (
-    Crossing,
-    TendonGroup,
-)
+from notchflex.mechanics.tendon import Crossing, TendonGroup
 
 # Poses of bodies: against the base, and against those before.
 

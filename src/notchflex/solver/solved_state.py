@@ -11,11 +11,7 @@ from functools import cached_property, partial
 
 from jaxtyping import Array, Float
 
-from notchflex._jax import (
-    choose,
-    jax,
-    jnp,
-)
+from notchflex._jax import choose, jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex.loads.command import body_wrench
 from notchflex.mechanics.chain import Chain
@@ -27,10 +23,7 @@ from notchflex.mechanics.flexure import (
     of_rod,
     relative_pose,
 )
-from notchflex.mechanics.flexure.rod_kinematics import (
-    node_poses,
-    rod_end,
-)
+from notchflex.mechanics.flexure.rod_kinematics import node_poses, rod_end
 from notchflex.mechanics.material import Flattening, SectionStrain, section_strain
 from notchflex.mechanics.motion import IN_PLANE, Motion, wrench_at
 from notchflex.solver.residual import (

@@ -9,11 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.analysis.draws import (
-    ToleranceSource,
-    deviation,
-    moments,
-)
+from notchflex.analysis.draws import ToleranceSource, deviation, moments
 from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.tangent import PathTangents
 from notchflex.solver.newton import DEFAULT

@@ -28,11 +28,7 @@ from notchflex import (
     batch,
     simulate,
 )
-from notchflex.analysis.draws import (
-    ToleranceSource,
-    sources_of,
-    values_at,
-)
+from notchflex.analysis.draws import ToleranceSource, sources_of, values_at
 from notchflex.pieces.folder import (
     ACCEPTED,
     CODES,

@@ -22,14 +22,7 @@ from notchflex import (
 from notchflex.control import Limits, TargetSearch, reach
 from notchflex.control.limits import Drive
 from notchflex.robot.part import unit_of
-from notchflex.support import (
-    Friction,
-    Material,
-    fields_of,
-    is_list,
-    kinds_of,
-    to_table,
-)
+from notchflex.support import Friction, Material, fields_of, is_list, kinds_of, to_table
 from notchflex.viewer.controls import POINTING, STROKE, TENSION, ControlRanges, Controls
 
 

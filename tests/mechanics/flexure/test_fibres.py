@@ -7,10 +7,7 @@ import pytest
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.mechanics.chain import (
-    flexure,
-    with_fibres,
-)
+from notchflex.mechanics.chain import flexure, with_fibres
 from notchflex.mechanics.flexure import rod
 from notchflex.mechanics.material import section_law
 

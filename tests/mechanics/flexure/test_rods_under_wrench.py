@@ -13,10 +13,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.mechanics.flexure import Rod, flexure_state, relative_pose, rod, with_level
 from notchflex.mechanics.flexure.strip import strip_rod
 from notchflex.mechanics.flexure.u_link import CurvedEnd, u_link_rod

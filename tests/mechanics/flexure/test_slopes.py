@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.mechanics.chain import assemble
 from notchflex.mechanics.flexure import Rod, geometric_stiffness, relative_pose
-from notchflex.mechanics.flexure.rod_kinematics import (
-    integrate_rod,
-    twist_slope,
-)
+from notchflex.mechanics.flexure.rod_kinematics import integrate_rod, twist_slope
 from notchflex.mechanics.motion import unskew
 
 SMALL = nf.StripNotch(3.5, 1.5, 6.9, deflection="small", repeat=7)

@@ -10,10 +10,7 @@ import pytest
 
 import notchflex as nf
 from margins import Margin
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.mechanics.flexure import Site, flexure_state, relative_pose, rod, validity_warnings
 from notchflex.mechanics.material import section_law
 from reference_data import named_rows

@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._jax import (
-    constant,
-    jax,
-    jnp,
-)
+from notchflex._jax import constant, jax, jnp
 from notchflex.mechanics.friction import friction_law
 
 LOSS, MU = 0.05, 0.13

@@ -8,10 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import notchflex as nf
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.mechanics.friction import friction_law
 
 TURNING = np.array([0.0, 1e-6, 0.1, 0.7, 1.5])

@@ -13,10 +13,7 @@ import pytest
 import notchflex as nf
 from fibre_sections import ENDS, bending, energy, respond, section
 from margins import Margin
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.mechanics.material import section_law
 from notchflex.mechanics.material.law import Flattening
 

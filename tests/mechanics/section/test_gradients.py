@@ -7,10 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.mechanics.cuts import annular_sector, annular_segment
 from notchflex.mechanics.section import Section
 

@@ -5,11 +5,7 @@ import csv
 import numpy as np
 
 from fake_path import fake_path
-from notchflex.results.tables import (
-    path_columns,
-    write_csv,
-    write_path_csv,
-)
+from notchflex.results.tables import path_columns, write_csv, write_path_csv
 
 
 def test_table_has_a_row_for_every_step(tmp_path):

@@ -9,10 +9,7 @@ import xarray
 
 import notchflex as nf
 from notchflex.errors import ErrorCode
-from notchflex.results.io import (
-    dataset_of,
-    record_dataset,
-)
+from notchflex.results.io import dataset_of, record_dataset
 from notchflex.results.quantities import QUANTITIES
 from refusals import refused
 

@@ -14,10 +14,7 @@ import pytest
 
 import notchflex as nf
 from notchflex import _replacing
-from notchflex.robot import (
-    reading,
-    robot_text,
-)
+from notchflex.robot import reading, robot_text
 from refusals import refused
 
 WRITE = """

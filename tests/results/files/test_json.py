@@ -7,16 +7,8 @@ import numpy as np
 import pytest
 
 from fake_path import fake_path
-from notchflex.loads.load import (
-    NOTHING,
-    BodyForce,
-    ExternalLoad,
-)
-from notchflex.results.tables import (
-    json_text,
-    path_document,
-    write_json,
-)
+from notchflex.loads.load import NOTHING, BodyForce, ExternalLoad
+from notchflex.results.tables import json_text, path_document, write_json
 
 
 def test_document_is_strict_json_and_holds_every_step():

@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.solver.programs import compiled as backend
 from notchflex.solver.programs import store
 from notchflex.solver.programs.compiled import Native

@@ -21,15 +21,7 @@ from notchflex.cli.interview.ask import (
 )
 from notchflex.robot.part import unit_of
 from notchflex.robot.problems import MOST_NOTCHES
-from notchflex.support import (
-    Friction,
-    Material,
-    Notch,
-    fields_of,
-    is_list,
-    kind_of,
-    kinds_of,
-)
+from notchflex.support import Friction, Material, Notch, fields_of, is_list, kind_of, kinds_of
 
 
 class Wording(NamedTuple):

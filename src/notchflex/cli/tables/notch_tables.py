@@ -12,11 +12,7 @@ import numpy as np
 from notchflex import Robot
 from notchflex.cli import terminal
 from notchflex.robot.part import unit_of
-from notchflex.support import (
-    fields_of,
-    is_unsaid,
-    to_table,
-)
+from notchflex.support import fields_of, is_unsaid, to_table
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -18,24 +18,13 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex import Settings
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.analysis.outputs import report_quantities
 from notchflex.analysis.stepping import dead_band
-from notchflex.control.program.drive_step import (
-    FIRST_PART,
-    GROWTH,
-    NO_SLOPE,
-    SLACK,
-    drive_step,
-)
+from notchflex.control.program.drive_step import FIRST_PART, GROWTH, NO_SLOPE, SLACK, drive_step
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.block_elimination import (
-    linear_step,
-)
+from notchflex.solver.block_elimination import linear_step
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
 from notchflex.solver.newton import limit_slack
 from notchflex.solver.programs.compiled import native

@@ -25,10 +25,7 @@ from notchflex.analysis.kinematics import (
 )
 from notchflex.analysis.tangent import Change
 from notchflex.designing.specification import TargetCurve
-from notchflex.support import (
-    DEGREES,
-    QUANTITIES,
-)
+from notchflex.support import DEGREES, QUANTITIES
 
 OF_STATES = {
     name: one

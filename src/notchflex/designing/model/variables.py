@@ -14,10 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from notchflex import InputError, LoadPath, Robot
-from notchflex.analysis.draws import (
-    moments,
-    sources_of,
-)
+from notchflex.analysis.draws import moments, sources_of
 from notchflex.designing.specification import DesignState, DesignVariable
 from notchflex.support import ExternalLoad, Tolerance, described_at, nearest, numbers_at
 

@@ -19,16 +19,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.special import log_ndtr, ndtri
 
-from notchflex import (
-    ErrorCode,
-    InputError,
-    Robot,
-)
+from notchflex import ErrorCode, InputError, Robot
 from notchflex.analysis.closing_loads import closing_tensions_of
-from notchflex.analysis.draws import (
-    sources_of,
-    values_at,
-)
+from notchflex.analysis.draws import sources_of, values_at
 from notchflex.designing.model.point import CLOSINGS, Point
 from notchflex.designing.model.quantities import CLOSING, Reading
 from notchflex.designing.model.variables import deviations_of

@@ -14,11 +14,7 @@ from jaxtyping import Bool, Float
 
 from notchflex import InputError, Load, LoadPath, solve_each
 from notchflex.fit.estimation.calibration import Calibration
-from notchflex.fit.measurements.measurements import (
-    OBSERVED,
-    Measurements,
-    check_quantities,
-)
+from notchflex.fit.measurements.measurements import OBSERVED, Measurements, check_quantities
 from notchflex.fit.measurements.simulated import modelled
 from notchflex.fit.model.residuals import Residuals
 from notchflex.fit.model.samples import Samples

@@ -14,10 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex import InputError
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.intervals import LEVEL
 from notchflex.fit.estimation.problem import Progress

@@ -11,11 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from notchflex import InputError, Load, LoadPath, Robot, simulate, solve_each
 from notchflex.analysis import axis_points
-from notchflex.fit.measurements.measurements import (
-    Measurements,
-    check_labels,
-    check_quantities,
-)
+from notchflex.fit.measurements.measurements import Measurements, check_labels, check_quantities
 from notchflex.support import load_path, spans_of
 
 if TYPE_CHECKING:

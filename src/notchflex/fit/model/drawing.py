@@ -6,11 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from notchflex import Robot
-from notchflex.analysis.draws import (
-    moments,
-    sources_of,
-    tolerances_of,
-)
+from notchflex.analysis.draws import moments, sources_of, tolerances_of
 from notchflex.fit.model.constants import RobotNumber, Unknown
 from notchflex.fit.model.residuals import SENSOR
 from notchflex.support import numbers_at

@@ -14,10 +14,7 @@ from scipy.stats import t as student
 
 from notchflex import EquilibriumPath, LoadPath, Robot, Settings
 from notchflex._jax import constant
-from notchflex.analysis.forward_model import (
-    Change,
-    ForwardModel,
-)
+from notchflex.analysis.forward_model import Change, ForwardModel
 from notchflex.analysis.kinematics import (
     AxisPlaces,
     axis_places,

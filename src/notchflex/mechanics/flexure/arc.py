@@ -30,13 +30,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     rod_quadrature,
     shifted,
 )
-from notchflex.mechanics.flexure.rod import (
-    Rod,
-    Site,
-    rod,
-    section_fibres,
-    validity_warnings,
-)
+from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres, validity_warnings
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.section import FibresAt, Section
 from notchflex.robot import ArcNotch, Tube

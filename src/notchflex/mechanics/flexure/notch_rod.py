@@ -17,10 +17,7 @@ from jaxtyping import Array, Float
 from numpy.typing import ArrayLike
 
 from notchflex._arrays import cached, xp
-from notchflex._jax import (
-    constant,
-    jax,
-)
+from notchflex._jax import constant, jax
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import FibreSection
 from notchflex.mechanics.motion import Motion, outer_twists, rotation_about

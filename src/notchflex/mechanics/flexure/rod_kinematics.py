@@ -18,11 +18,7 @@ from typing import Any, NamedTuple
 from jaxtyping import Array, Float
 
 from notchflex._arrays import xp
-from notchflex._jax import (
-    Pytree,
-    jax,
-    jnp,
-)
+from notchflex._jax import Pytree, jax, jnp
 from notchflex.mechanics.flexure.rod import Modes, Rod
 from notchflex.mechanics.material import SectionLaw, SectionResponse
 from notchflex.mechanics.motion import (

@@ -30,10 +30,7 @@ from notchflex.mechanics.flexure.roots import (
     wall_ranges,
 )
 from notchflex.mechanics.motion import Motion
-from notchflex.mechanics.section import (
-    clamped_torsion_constant,
-    two_walls,
-)
+from notchflex.mechanics.section import clamped_torsion_constant, two_walls
 from notchflex.robot import StripNotch, Tube
 
 # Rod frame in the notch's frame: z along the strip toward the bend, x toward the base, same y.

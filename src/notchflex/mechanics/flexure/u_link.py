@@ -39,11 +39,7 @@ from notchflex.mechanics.flexure.roots import (
     round_strip,
     wall_ranges,
 )
-from notchflex.mechanics.section import (
-    clamped_torsion_constant,
-    leggauss,
-    two_walls,
-)
+from notchflex.mechanics.section import clamped_torsion_constant, leggauss, two_walls
 from notchflex.robot import Tube, ULink
 
 

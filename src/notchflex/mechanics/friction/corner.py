@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from jaxtyping import Array, Bool, Float
 
-from notchflex._jax import (
-    constant,
-    jnp,
-)
+from notchflex._jax import constant, jnp
 from notchflex.mechanics.friction.registry import Edges, FrictionLaw, Turning, friction_law
 from notchflex.robot import Corner
 

@@ -20,11 +20,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._arrays import xp
-from notchflex._jax import (
-    constant,
-    jax,
-    jnp,
-)
+from notchflex._jax import constant, jax, jnp
 from notchflex.mechanics.material.law import (
     Bending,
     Fibres,

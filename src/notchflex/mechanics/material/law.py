@@ -24,12 +24,7 @@ from typing import Any, ClassVar, NamedTuple, cast
 from jaxtyping import Array, Float
 
 from notchflex._arrays import decide, xp
-from notchflex._jax import (
-    Pytree,
-    constant,
-    jax,
-    jnp,
-)
+from notchflex._jax import Pytree, constant, jax, jnp
 from notchflex._packages import unregistered
 from notchflex.mechanics.section import leggauss
 

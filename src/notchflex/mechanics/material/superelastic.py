@@ -12,10 +12,7 @@ from typing import Any
 
 from jaxtyping import Array
 
-from notchflex._jax import (
-    constant,
-    jnp,
-)
+from notchflex._jax import constant, jnp
 from notchflex.mechanics.material.law import (
     NODES,
     WEIGHTS,

@@ -8,17 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.plotting.output import Picture
-from notchflex.plotting.sheet import (
-    DASHED,
-    Area,
-    Bars,
-    Curve,
-    Mark,
-    Note,
-    Panel,
-    Span,
-    grid,
-)
+from notchflex.plotting.sheet import DASHED, Area, Bars, Curve, Mark, Note, Panel, Span, grid
 from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
 
 if TYPE_CHECKING:

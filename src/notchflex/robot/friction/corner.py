@@ -5,16 +5,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from notchflex.robot.kinds import (
-    GAO,
-    LIU,
-    Friction,
-)
-from notchflex.robot.part import (
-    Float,
-    part,
-    quantity,
-)
+from notchflex.robot.kinds import GAO, LIU, Friction
+from notchflex.robot.part import Float, part, quantity
 
 
 @part

@@ -4,11 +4,7 @@ from dataclasses import KW_ONLY
 from typing import Annotated, Literal
 
 from notchflex.robot.kinds import Material
-from notchflex.robot.part import (
-    Float,
-    part,
-    quantity,
-)
+from notchflex.robot.part import Float, part, quantity
 
 
 @part

@@ -7,13 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from notchflex.robot.kinds import Material
-from notchflex.robot.part import (
-    MOST_STRAIN,
-    Float,
-    Problems,
-    part,
-    quantity,
-)
+from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, quantity
 
 _MIN_POINTS, _MAX_POINTS = 2, 10_000
 

@@ -3,17 +3,8 @@
 from dataclasses import KW_ONLY
 from typing import Annotated, ClassVar, Literal
 
-from notchflex.robot.kinds import (
-    PACHECO,
-    Material,
-)
-from notchflex.robot.part import (
-    MOST_STRAIN,
-    Float,
-    Problems,
-    part,
-    quantity,
-)
+from notchflex.robot.kinds import PACHECO, Material
+from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, quantity
 
 
 @part

@@ -6,22 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from notchflex.robot.cuts import (
-    CutLayout,
-    slot,
-)
-from notchflex.robot.kinds import (
-    PACHECO,
-    YORK,
-    Notch,
-    Tube,
-)
-from notchflex.robot.part import (
-    Float,
-    Problems,
-    part,
-    quantity,
-)
+from notchflex.robot.cuts import CutLayout, slot
+from notchflex.robot.kinds import PACHECO, YORK, Notch, Tube
+from notchflex.robot.part import Float, Problems, part, quantity
 
 
 @part

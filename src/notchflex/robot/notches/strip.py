@@ -5,24 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from notchflex.robot.cuts import (
-    CutLayout,
-    NotchCut,
-    Opening,
-    cosine_of,
-)
-from notchflex.robot.kinds import (
-    LIU,
-    Notch,
-    Tendon,
-    Tube,
-)
-from notchflex.robot.part import (
-    Float,
-    Problems,
-    part,
-    quantity,
-)
+from notchflex.robot.cuts import CutLayout, NotchCut, Opening, cosine_of
+from notchflex.robot.kinds import LIU, Notch, Tendon, Tube
+from notchflex.robot.part import Float, Problems, part, quantity
 
 LEAST_COSINE = 0.5  # a cable farther round the tube than 60 deg would twist the strip
 

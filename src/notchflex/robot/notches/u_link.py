@@ -7,25 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from notchflex.robot.cuts import (
-    CutLayout,
-    Opening,
-    cosine_of,
-    slot,
-)
-from notchflex.robot.kinds import (
-    GAO,
-    Notch,
-    Tendon,
-    Tube,
-)
-from notchflex.robot.part import (
-    Float,
-    Problems,
-    part,
-    quantity,
-    unchecked,
-)
+from notchflex.robot.cuts import CutLayout, Opening, cosine_of, slot
+from notchflex.robot.kinds import GAO, Notch, Tendon, Tube
+from notchflex.robot.part import Float, Problems, part, quantity, unchecked
 
 OTHER = {"away": "toward", "toward": "away"}
 

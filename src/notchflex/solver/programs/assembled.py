@@ -18,21 +18,13 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._arrays import Decisions
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.mechanics.chain import Chain, assemble, body_lengths, flexure, sites_of
 from notchflex.mechanics.flexure import Site
 from notchflex.mechanics.ring import Side
 from notchflex.robot import Robot, Tube
 from notchflex.robot.kinds import Notch
-from notchflex.robot.numbers import (
-    PartsForm,
-    Place,
-    parts_of,
-    robot_of,
-)
+from notchflex.robot.numbers import PartsForm, Place, parts_of, robot_of
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,

@@ -19,11 +19,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code, target
-from notchflex._jax import (
-    jax,
-    jit,
-    jnp,
-)
+from notchflex._jax import jax, jit, jnp
 from notchflex.errors import InputError
 from notchflex.solver.programs import shipped, store
 

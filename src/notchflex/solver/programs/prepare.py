@@ -23,11 +23,7 @@ from notchflex.solver.programs.static_structure import (
     pad_rows,
 )
 from notchflex.solver.quantities import Shape
-from notchflex.solver.residual import (
-    SolverState,
-    at_rest,
-    unloaded,
-)
+from notchflex.solver.residual import SolverState, at_rest, unloaded
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,19 +15,13 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from lanewise import FixedVector
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
 from notchflex.solver.held_stiffness import stability, stable
 from notchflex.solver.newton import Settings
-from notchflex.solver.programs.compiled import (
-    native,
-    runs_uncompiled,
-)
+from notchflex.solver.programs.compiled import native, runs_uncompiled
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,
@@ -36,13 +30,7 @@ from notchflex.solver.programs.static_structure import (
     pad_rows,
     padded_indices,
 )
-from notchflex.solver.quantities import (
-    Shape,
-    quantities,
-    shape,
-    snapped_notches,
-    unpad_quantity,
-)
+from notchflex.solver.quantities import Shape, quantities, shape, snapped_notches, unpad_quantity
 from notchflex.solver.residual import SolverState, evaluate
 from notchflex.solver.solved_state import notch_contact
 

@@ -17,11 +17,7 @@ from notchflex.photographs.board.sighting import Ruler
 from notchflex.photographs.chain.chain_table import chain_table
 from notchflex.photographs.chain.outline import straight_chain
 from notchflex.photographs.judging import UNCERTAINTY
-from notchflex.photographs.measure import (
-    checked_uncertainty,
-    measure_picture,
-    refused_photograph,
-)
+from notchflex.photographs.measure import checked_uncertainty, measure_picture, refused_photograph
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.photographs.reading import read_photograph
 from notchflex.viewer.correction.picture_plane import PicturePlane

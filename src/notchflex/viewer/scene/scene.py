@@ -18,12 +18,7 @@ from numpy.typing import NDArray
 from notchflex import EquilibriumPath, Robot, RobotShape
 from notchflex.plotting.shapes.outline import body_corners, prism, tube_wall
 from notchflex.plotting.shapes.panel import AppliedLoad, applied_loads
-from notchflex.plotting.shapes.robot_shape import (
-    HELD,
-    rotation_of,
-    shape_at,
-    shape_from_angles,
-)
+from notchflex.plotting.shapes.robot_shape import HELD, rotation_of, shape_at, shape_from_angles
 from notchflex.support import FlexureShape
 from notchflex.viewer.controls import GRAVITY, POINTING, ControlRanges, Controls, round_up
 from notchflex.viewer.scene.marks import LOAD, METAL, Marks, Shown, linear, strain_colour

@@ -5,10 +5,7 @@ jax-ml/jax#39103: compiled by 0.10.2 and 0.11.0, the last of many squared norms 
 
 from typing import NamedTuple
 
-from notchflex._jax import (
-    jax,
-    jnp,
-)
+from notchflex._jax import jax, jnp
 
 
 class Canary(NamedTuple):

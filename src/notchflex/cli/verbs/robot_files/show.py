@@ -44,10 +44,7 @@ def show(
     with terminal.working(f"solving {chosen.name}"):
         terminal.use_compile_cache()
         from notchflex import closing
-        from notchflex.analysis.bands import (
-            closing_bands,
-            closing_document,
-        )
+        from notchflex.analysis.bands import closing_bands, closing_document
         from notchflex.analysis.closing_loads import notch_table
         from notchflex.support import document_head, unchecked_dimensions
 
