@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.robot.numbers import VariedRobots
 
 WRIST, LINKS, STRIPS = map(nf.load_robot, ("pacheco2021-a", "gao2017", "liu2022"))
 SIDEWAYS = {"tip_force": (0.0, 0.1, 0.0)}
@@ -28,7 +27,7 @@ def gradient() -> None:
 
 def many_robots() -> None:
     """Robots that differ by a dimension."""
-    nf.solve_batch(VariedRobots(WRIST, {"notch.depth": [1.4] * 256}), nf.Load(tension=1.0))
+    nf.batch(WRIST, {"notch.depth": [1.4] * 256}, nf.Load(tension=1.0))
 
 
 # In an order in which the two parts, every other call each, take about as long as each other.

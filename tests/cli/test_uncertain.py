@@ -6,6 +6,7 @@ import json
 import pytest
 
 import notchflex as nf
+from notchflex.support import DEGREES
 
 LOOP = ["simulate", "pacheco2021-a", "--tension", "0:1:3,0.5", "--uncertain", "--draws", "16"]
 
@@ -25,7 +26,7 @@ def test_table_files_and_picture_have_the_bands(call, tmp_path, bands: nf.Bands)
     ends = {"low": one.low, "median": one.median, "high": one.high}
     (line,) = (line.split() for line in out.splitlines() if line.startswith("   3 "))
     degrees = {
-        name: float(end[2]) * nf.results.quantities.registry.DEGREES for name, end in ends.items()
+        name: float(end[2]) * DEGREES for name, end in ends.items()
     }
     assert line[2:5] == [f"{value:.2f}" for value in degrees.values()]
     assert "Tolerances assumed: notch.depth 0.01 mm (SD)" in out

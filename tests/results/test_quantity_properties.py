@@ -122,7 +122,7 @@ def test_a_new_quantity_is_one_registration(tmp_path):
     """In a copy of the package, with nothing but the formula added and the script run."""
     shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(ROOT / "docs" / "make", tmp_path / "docs" / "make")
-    file = tmp_path / "src" / "notchflex" / "solver" / "derived" / "quantities.py"
+    file = tmp_path / "src" / "notchflex" / "solver" / "quantities.py"
     text = file.read_text(encoding="utf-8")
     file.write_text(f"{text}\n\n{TIP_HEIGHT}", encoding="utf-8")
     environment = dict(os.environ, PYTHONPATH=str(tmp_path / "src"))

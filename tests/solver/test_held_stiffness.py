@@ -103,7 +103,8 @@ def test_strokes_that_depend_on_each_other_fix_no_tensions(strokes):
     robot = nf.load_robot("two-axis-wrist")
     path = nf.simulate(robot, nf.Load(stroke=strokes))
     if not path.converged[0]:  # the singular system may also find none of the many answers
-        assert path.reason_code == [nf.Failure.STROKES_CONTRADICT.name]
+        allowed = {nf.Failure.STROKES_CONTRADICT.name, nf.Failure.NO_EQUILIBRIUM.name}
+        assert set(path.reason_code) <= allowed
         return
     assert not path.stable.any()
     (warning,) = path_warnings(path)
