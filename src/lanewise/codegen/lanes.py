@@ -61,7 +61,7 @@ class LaneLoops:
         outside: dict[int, str] = {}
         for node in members:
             for one in self.graph.args[node]:
-                if one in inside or one in outside or int(self.graph.length[one]) > 1:
+                if one in inside or one in outside or self.graph.lanes[one] > 1:
                     continue
                 has_rows = self.storage.batched and self.schedule.varies(one)
                 of_vector = vector and not has_rows
@@ -86,7 +86,7 @@ class LaneLoops:
         address, batched = storage.address_of(row), storage.batched
         wide = address.batched or not batched
         total = self._accumulator(start, kind, wide)
-        length = int(self.graph.length[row])
+        length = self.graph.lanes[row]
 
         def iteration(index: str | int) -> None:
             at = builder.assign(f"add i64 {index}, {first}") if batched else str(index)
@@ -140,7 +140,7 @@ class LaneLoops:
     def prefix(self, node: int) -> None:
         """Write the running combination of the lanes of a row."""
         op, row, reverse = self.graph.args[node]
-        kind, length = self.graph.kind[node], int(self.graph.length[node])
+        kind, length = self.graph.kind[node], self.graph.lanes[node]
         builder, storage = self.builder, self.storage
         if not self.schedule.is_looped(node):
             source, value, total = self.values.as_vector(row), "poison", None

@@ -60,6 +60,7 @@ class Schedule:
         for node in sorted(self.needed):
             self._members.setdefault(id(self.graph.owner[node]), []).append(node)
         self._region_uses: dict[int, set[int]] = {}
+        self._before: dict[int, list[int]] = {}
         self.kept: set[int] = set()
         self._stages: dict[int, list[Stage]] = {}
         self.stage: dict[int, tuple[int, Any]] = {}
@@ -78,7 +79,7 @@ class Schedule:
 
     def is_looped(self, node: int) -> bool:
         """Return whether a node is computed in a loop over its lanes, or is as long as one."""
-        return int(self.graph.length[node]) > (1 if self.function.batched else WIDTH)
+        return self.graph.lanes[node] > (1 if self.function.batched else WIDTH)
 
     def combines_lanes(self, node: int) -> bool:
         """Return whether a node reads other lanes than its own and so can't be in a loop."""
@@ -170,10 +171,12 @@ class Schedule:
 
     def _direct_dependencies(self, node: int) -> list[int]:
         """Return what must run before a node, with writers in place of their buffers."""
-        found: list[int] = []
-        for one in self._dependencies(node):
-            found += self._dependencies(one) if self.graph.op[one] == "buffer" else [one]
-        return found
+        before = self._before.get(node)
+        if before is None:
+            before = self._before[node] = []
+            for other in self._dependencies(node):
+                before += self._dependencies(other) if self.graph.op[other] == "buffer" else [other]
+        return before
 
     # Order
 
@@ -207,7 +210,7 @@ class Schedule:
 
     def _earliest(self, node: int) -> tuple[int, Any]:
         """Return the earliest stage of a node and its loop over lanes."""
-        loop = (int(self.graph.length[node]), self.varies(node))
+        loop = (self.graph.lanes[node], self.varies(node))
         loop = loop if self.is_looped(node) and not self.combines_lanes(node) else None
         stage = 0
         for one in self._dependencies(node):

@@ -92,7 +92,7 @@ class Storage:
         else:
             batched = self.schedule.varies(node)
             unit = self.unit(batched)
-            size = int(self.graph.length[node]) * unit
+            size = self.graph.lanes[node] * unit
             first = self.arena.allocate(size)
             self.rooms[node] = (first, size)
             address = Address("%arena", first, unit, batched)

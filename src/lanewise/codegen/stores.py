@@ -57,7 +57,7 @@ class StoreWriter:
                 of = address.first + (store.refs[own] & LANE_MASK) * address.stride
                 if (to == of).all():
                     continue
-            length = int(storage.graph.length[node]) or address.buffer.size
+            length = storage.graph.lanes[node] or address.buffer.size
             unit = storage.unit(address.batched)
             saved = Address(
                 "%arena", storage.arena.allocate((length + WIDTH) * unit), unit, address.batched

@@ -32,7 +32,7 @@ class Values:
         """Return whether the value of a node is a vector."""
         if self.storage.batched:
             return self.schedule.varies(node)
-        return int(self.graph.length[node]) > 1
+        return self.graph.lanes[node] > 1
 
     def has_rows(self, node: int) -> bool:
         """Return whether an entry of a node is a vector over rows of a batch."""
@@ -56,7 +56,7 @@ class Values:
 
     def as_vector(self, node: int) -> str:
         """Return a value as a vector."""
-        known = self.graph.constant_value(node)
+        known = self.graph.number[node]
         if known is not None:
             return self.builder.splat("", self.graph.kind[node], known)
         if self.is_vector(node):
@@ -66,7 +66,7 @@ class Values:
     def entry(self, ref: int) -> str:
         """Return an entry; a vector over rows if rows of a batch differ in it."""
         node, lane = ref >> LANE_BITS, ref & LANE_MASK
-        if int(self.graph.length[node]) == 1:
+        if self.graph.lanes[node] == 1:
             return self.value(node)
         if self.storage.in_memory(node):
             return self.storage.load(self.storage.address_of(node), lane, self.graph.kind[node])
@@ -76,7 +76,7 @@ class Values:
         """Return an entry in the form that memory has it: a vector over rows if batched."""
         value, node = self.entry(ref), ref >> LANE_BITS
         if batched and not self.has_rows(node):
-            return self.builder.splat(value, self.graph.kind[node], self.graph.constant_value(node))
+            return self.builder.splat(value, self.graph.kind[node], self.graph.number[node])
         return value
 
     # Nodes
@@ -133,7 +133,7 @@ class Values:
             if self._is_contiguous(node):
                 piece = source_lane // WIDTH
                 pieces.setdefault((node, piece), {})[lane] = source_lane % WIDTH
-            elif int(self.graph.length[node]) > 1 and not self.schedule.is_looped(node):
+            elif self.graph.lanes[node] > 1 and not self.schedule.is_looped(node):
                 pieces.setdefault((node, 0), {})[lane] = source_lane
             else:
                 single.append((lane, one))

@@ -94,6 +94,8 @@ class Graph:
             lane by lane.
         args: Operands: numbers of nodes, for some operations other data.
         kind: "f" floats, "i" integers, "b" booleans.
+        lanes: Number of lanes; 0 for buffers and regions.
+        number: Value of a known number; None for others.
         owner: The block of every node.
         block: The block that nodes are added for at present.
     """
@@ -105,13 +107,15 @@ class Graph:
         self.op: list[str] = []
         self.args: list[tuple[Any, ...]] = []
         self.kind: list[str] = []
+        self.lanes: list[int] = []
+        self.number: list[Any] = []
         self.owner: list[Block] = []
         self._length = np.zeros(4096, np.int64)
         self._interned: dict[Any, int] = {}
 
     @property
     def length(self) -> np.ndarray:
-        """Number of lanes of every node; 0 for buffers and regions."""
+        """Number of lanes of every node, as an array."""
         return self._length
 
     def add(self, op: str, args: tuple[Any, ...], length: int, kind: str, owner: Block) -> int:
@@ -125,6 +129,8 @@ class Graph:
         self.op.append(op)
         self.args.append(args)
         self.kind.append(kind)
+        self.lanes.append(length)
+        self.number.append(args[0] if op == "const" else None)
         self.owner.append(owner)
         return number
 
@@ -150,10 +156,6 @@ class Graph:
         number = float(value) if kind == "f" else bool(value) if kind == "b" else int(value)
         key = float(number).hex() if kind == "f" else number
         return self.intern("const", (number,), 1, kind, self.top, key=key)
-
-    def constant_value(self, node: int) -> Any:
-        """Return the number of a constant node; None for others."""
-        return self.args[node][0] if self.op[node] == "const" else None
 
     def placement(self, operands: Any) -> Block:
         """Return the block for a node with these operands.

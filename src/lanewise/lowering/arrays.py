@@ -53,7 +53,7 @@ class ArrayLowering:
         node = ref >> LANE_BITS
         if self.graph.op[node] == "constants":
             return self.graph.args[node][0][ref & LANE_MASK]
-        return self.graph.constant_value(node)
+        return self.graph.number[node]
 
     def _constant_row(self, row: np.ndarray, kind: str) -> int:
         if (row == row[0]).all():  # signs of known zeros do not count
@@ -113,30 +113,25 @@ class ArrayLowering:
         if 0 in shape:
             return _empty(shape)
         flat = [np.broadcast_to(self.loaded(refs), shape).reshape(-1) for refs in arrays]
-        columns = self._matching(flat)
+        every = np.array(flat)
+        columns = self._matching(every)
         if columns is None:
             operands = [refs.reshape(shape) for refs in flat]
             axis = self._best_axis(operands)
-            flat = [self.rows(refs, axis).reshape(-1) for refs in operands]
-            columns = _distinct_columns(np.stack(flat) >> LANE_BITS)
-        if len(flat[0]) == 1:  # most often; this is quicker
-            single = [int(refs[0]) for refs in flat]
-            node = self.nodes.make(op, tuple(one >> LANE_BITS for one in single))
-            lane = max(one & LANE_MASK for one in single) if self.graph.length[node] > 1 else 0
-            return np.array(reference(node, lane)).reshape(shape)
-        every, (first, where) = np.stack(flat), columns
+            every = np.array([self.rows(refs, axis).reshape(-1) for refs in operands])
+            columns = _distinct_columns(every >> LANE_BITS)
+        first, where = columns
         nodes = (every[:, first] >> LANE_BITS).T.tolist()
         results = np.array([self.nodes.make(op, tuple(column)) for column in nodes], np.int64)
         wide = (self.graph.length[results] > 1)[where]
         lanes = np.where(wide, (every & LANE_MASK).max(axis=0), 0)
         return ((results[where] << LANE_BITS) + lanes).reshape(shape)
 
-    def _matching(self, flat: list[References]) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return the sets of rows that meet, as `_distinct_columns`.
+    def _matching(self, every: References) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the sets of rows of operands that meet, as `_distinct_columns`.
 
         None where they do not meet in the same lanes or most of their lanes are not used.
         """
-        every = np.stack(flat)
         nodes, lanes = every >> LANE_BITS, every & LANE_MASK
         lengths = self.graph.length[nodes]
         longest = lengths.max(axis=0)
@@ -192,10 +187,10 @@ class ArrayLowering:
         if (refs == refs[0]).all():
             return [reference(self.shuffle((int(refs[0]),)))] * size
         node = int(refs[0]) >> LANE_BITS
-        if self.graph.length[node] == size and (np.diff(refs) == 1).all():
+        if self.graph.lanes[node] == size and (np.diff(refs) == 1).all():
             return refs.tolist()
         shuffled = self.shuffle(tuple(refs.tolist()))
-        if self.graph.length[shuffled] == 1:
+        if self.graph.lanes[shuffled] == 1:
             return [reference(shuffled)] * size
         return [reference(shuffled, lane) for lane in range(size)]
 
@@ -204,7 +199,7 @@ class ArrayLowering:
         graph = self.graph
         nodes = [one >> LANE_BITS for one in refs]
         if len(refs) == 1:
-            if graph.length[nodes[0]] == 1:
+            if graph.lanes[nodes[0]] == 1:
                 return nodes[0]
             return self.extract(nodes[0], refs[0] & LANE_MASK)
         kind = graph.kind[nodes[0]]

@@ -111,16 +111,16 @@ class NodeBuilder:
     def make(self, op: str, args: tuple[int, ...]) -> int:
         """Return a node that computes an operation lane by lane; lengths are equal, or 1."""
         graph = self.graph
-        known = [graph.constant_value(one) for one in args]
-        kind = result_kind(op, [graph.kind[one] for one in args])
-        if all(value is not None for value in known):
+        known = [graph.number[node] for node in args]
+        kind = result_kind(op, [graph.kind[node] for node in args])
+        if None not in known:
             return graph.constant(_wrap(FOLD[op](*known)), kind)
         simple = self._simplify(op, args, known)
         if simple is not None:
             return simple
         if op in _COMMUTATIVE and args[0] > args[1]:
             args = (args[1], args[0])
-        length = max(int(graph.length[one]) for one in args)
+        length = max([graph.lanes[node] for node in args])
         return graph.intern(op, args, length, kind, graph.placement(args))
 
     def _simplify(self, op: str, args: tuple[int, ...], known: list[Any]) -> int | None:

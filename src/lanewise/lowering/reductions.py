@@ -64,18 +64,18 @@ def _reduce_row(arrays: ArrayLowering, op: str, row: References) -> int:
     single: list[int] = []
     for node in dict.fromkeys(nodes.tolist()):
         used = lanes[nodes == node].tolist()
-        if graph.length[node] == 1:
+        if graph.lanes[node] == 1:
             single += [node] * len(used)
         elif len(set(used)) < len(used):
             single += [arrays.extract(node, lane) for lane in used]
         else:
-            by_lanes.setdefault((int(graph.length[node]), *sorted(used)), []).append(node)
+            by_lanes.setdefault((graph.lanes[node], *sorted(used)), []).append(node)
     for (length, *used), rows in by_lanes.items():
         if len(used) * 2 < length:
             single += [arrays.extract(node, lane) for node in rows for lane in used]
             continue
         combined = reduce(lambda a, b: make(op, (a, b)), rows)
-        if graph.length[combined] == 1:  # folded to a known number
+        if graph.lanes[combined] == 1:  # folded to a known number
             single += [combined] * (len(used) if op in ("add", "mul") else 1)
             continue
         first, count = used[0], len(used)
@@ -114,7 +114,7 @@ def _prefix_row(arrays: ArrayLowering, op: str, row: References, reverse: bool) 
     backward = bool((np.diff(row) == -1).all())
     node = arrays.row(row[::-1] if backward else row)[0] >> LANE_BITS
     owner = graph.placement((node,))
-    if graph.length[node] == 1:
+    if graph.lanes[node] == 1:
         node = graph.intern("shuffle", (reference(node),) * size, size, graph.kind[node], owner)
     args = (op, node, reverse != backward)
     made = graph.intern("prefix", args, size, graph.kind[node], owner)
