@@ -142,4 +142,4 @@ def test_measurements_without_noise_have_no_error(name, margin):
     robot = nf.load_robot(name)
     load = nf.pull(0.3, 1.5, steps=3) if name == "pacheco2021-a" else nf.pull(0.5, 4.0, steps=4)
     found = nf.compare(robot, nf.simulate_measurements(robot, load))
-    margin.within("tip", found.rmse_tip, 1e-9, "mm")
+    margin.within("tip", found.rmse_tip, 1e-11, "mm")

@@ -99,7 +99,7 @@ def test_pull_and_release(margin):
     margin.within("loop", names["path"].total_angle - expected, ANGLE, "rad")
     width = np.degrees(expected[::-1] - expected)[:31]
     assert names["widest"] == width.argmax()
-    margin.within("its width", names["width"].max() - width.max(), 1e-6, "deg")
+    margin.within("its width", names["width"].max() - width.max(), 5e-10, "deg")
 
 
 def test_closing_order(margin):
@@ -119,7 +119,7 @@ def test_closing_order(margin):
         return float(oracle.pull(tension)[0][:notch].sum())
 
     expected = [brentq(left, 0.5, 4.0, args=(notch,), xtol=1e-12) for notch in range(5)]
-    margin.within("tension", found.tension - expected, 1e-7, "N")
+    margin.within("tension", found.tension - expected, 1e-9, "N")
     assert np.argsort(found.tension).tolist() == [4, 3, 2, 1, 0]
 
 
@@ -127,8 +127,8 @@ def test_weight_at_the_tip(margin):
     names = ran(5)[0]
     path, grams = names["path"], np.array(names["weights"])
     force, moment = left_over(path)
-    margin.within("force left over, of all that acts", force, 1e-10)
-    margin.within("moment left over, of all that acts", moment, 1e-10)
+    margin.within("force left over, of all that acts", force, 1e-11)
+    margin.within("moment left over, of all that acts", moment, 1e-11)
     # Where the first notch begins: the tendon's lever and the weight's, about its neutral line.
     # The weight's lever changes along the notch; the modes meet that to moment_error.
     weight = 9.81e-3 * grams
@@ -142,11 +142,11 @@ def test_weight_at_the_tip(margin):
 
 def test_stroke_and_tension(margin):
     path = ran(6)[0]["path"]
-    margin.within("stroke", A.stroke(path.notch_angle) - path.stroke[:, 0], 1e-9, "mm")
-    margin.within("stroke as given", path.stroke - path.load.stroke, 1e-9, "mm")
+    margin.within("stroke", A.stroke(path.notch_angle) - path.stroke[:, 0], 1e-11, "mm")
+    margin.within("stroke as given", path.stroke - path.load.stroke, 1e-11, "mm")
     # The tensions found, given to the oracle in the same order, lead to the same angles.
     expected = [state.angle for state in A.march(path.tension[:, 0])]
-    margin.within("angles", path.notch_angle - expected, 1e-7, "rad")
+    margin.within("angles", path.notch_angle - expected, 1e-11, "rad")
 
 
 def test_antagonist(margin):
@@ -156,9 +156,9 @@ def test_antagonist(margin):
     oracle = frames.Robot(wrist, np.tile(sides, 3), frames.Tendons(np.full(2, 0.7), sides))
     for other, state in zip(names["pretensions"], names["path"], strict=True):
         angle, _ = oracle.equilibrium(np.array([1.0, other]))
-        margin.within(f"against {other} N", state.notch_angle - angle, 1e-9, "rad")
+        margin.within(f"against {other} N", state.notch_angle - angle, 1e-11, "rad")
         total = angle[0::2].sum() - angle[1::2].sum()
-        margin.within("total", state.total_angle - total, 1e-9, "rad")
+        margin.within("total", state.total_angle - total, 1e-11, "rad")
 
 
 def test_two_axis_workspace(margin):
@@ -202,7 +202,7 @@ def test_compare_with_my_data(margin):
     expected = [oracle.pull(force)[0].sum() for force in table[:, 0]]
     error = np.degrees(expected) - table[:, 1:].sum(axis=1)
     found = np.degrees(names["found"].rmse_total)
-    margin.within("error of the total", found - np.sqrt(np.mean(error**2)), 1e-6, "deg")
+    margin.within("error of the total", found - np.sqrt(np.mean(error**2)), 5e-11, "deg")
 
 
 def test_what_friction_does(margin):
@@ -210,8 +210,8 @@ def test_what_friction_does(margin):
     for mu, bend, loop in zip(names["coefficients"], names["bends"], names["loops"], strict=True):
         states = A.with_(mu=mu).march(names["way"].tension[:, 0])
         angle = np.degrees([state.angle.sum() for state in states])
-        margin.within(f"bend at mu {mu}", bend - angle[30], 1e-6, "deg")
-        margin.within("loop", loop - (angle[::-1] - angle)[:31].max(), 1e-6, "deg")
+        margin.within(f"bend at mu {mu}", bend - angle[30], 2e-9, "deg")
+        margin.within("loop", loop - (angle[::-1] - angle)[:31].max(), 2e-9, "deg")
 
 
 def test_from_robot_to_cut_file(margin):
@@ -219,7 +219,7 @@ def test_from_robot_to_cut_file(margin):
     names = ran(12)[0]
     half = np.arccos(1.0 - 1.4 / 0.81)
     wanted = np.array([0.8, 2.0 * 0.81 * half]) - names["kerf"]
-    margin.within("path of the beam", names["window"] - wanted, 1e-9, "mm")
+    margin.within("path of the beam", names["window"] - wanted, 1e-11, "mm")
     wide = half + 0.5 * names["kerf"] / 0.81
     larger = A.with_(
         depth=(0.81 * (1.0 - np.cos(wide)),) * 5,
@@ -227,7 +227,7 @@ def test_from_robot_to_cut_file(margin):
         uncut=(1.2 - names["kerf"],) * 5,
     )
     expected = [np.degrees(one.pull(1.0)[0].sum()) for one in (A, larger)]
-    margin.within("bends", names["bends"] - np.array(expected), 1e-6, "deg")
+    margin.within("bends", names["bends"] - np.array(expected), 1e-9, "deg")
 
 
 def test_run_it_in_mujoco(margin):
@@ -288,7 +288,7 @@ def test_follow_with_hysteresis(margin):
     for target, branch in ((0, slice(0, 4001)), (1, slice(0, 4001)), (3, slice(4001, None))):
         at = np.argsort(total[branch], kind="stable")
         expected = np.interp(angle[target], total[branch][at], tension[branch][at])
-        margin.within("tension", found.tension[target, 0] - expected, 1e-4, "N")
+        margin.within("tension", found.tension[target, 0] - expected, 2e-6, "N")
 
 
 def test_learning(margin):
@@ -302,7 +302,7 @@ def test_learning(margin):
     angle, _ = A.pull(settings.change)
     margin.within("tension", seen[:, 0] * settings.largest - settings.change, 1e-12, "N")
     tip = nf.tip_from_angles(settings.model, np.array(angle))[0]
-    margin.within("tip", seen[:, 1:4] * settings.length - tip, 1e-6, "mm")
+    margin.within("tip", seen[:, 1:4] * settings.length - tip, 1e-11, "mm")
 
 
 def test_sweep_of_designs():

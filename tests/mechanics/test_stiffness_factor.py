@@ -69,7 +69,7 @@ def test_it_varies_as_other_numbers_do(wrist: nf.Robot, margin):
     by_hand = [nf.solve(wrist.with_value(name, one), load).total_angle for one in factors]
     batch = nf.batch(wrist, {name: factors}, load, outputs=("total_angle",))
     angles = batch["total_angle"].ravel()
-    margin.within("batch", angles - np.ravel(by_hand), 1e-9, "rad")
+    margin.within("batch", angles - np.ravel(by_hand), 1e-11, "rad")
     bands = nf.uncertain(wrist, load, {name: 0.05, FACTOR: 0.02}, draws=8)
     assert list(bands.drawn)[1:] == [f"notch[{one}].stiffness_factor" for one in range(1, 5)]
     found = nf.differentiable(wrist, load, [name], outputs=("total_angle",))

@@ -33,7 +33,7 @@ TENSIONS = np.array([0.2, 0.4, 0.6, 0.8, 0.6, 0.4, 0.5])
 def test_a_force_that_comes_changes_and_goes_is_found_reading_by_reading(wrist, margin):
     path = read(wrist, TENSIONS, COMES)
     sensed = sense(wrist, path.tension, path.stroke, noise=EXACT)
-    margin.within("force", sensed.force[:, 0] - COMES, 1e-6, "N")
+    margin.within("force", sensed.force[:, 0] - COMES, 1e-9, "N")
     assert ((sensed.low[:, 0] <= COMES) & (sensed.high[:, 0] >= COMES)).all()
     assert sensed.components == ("x",)
     assert not sensed.reason

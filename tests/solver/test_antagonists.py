@@ -33,8 +33,8 @@ def test_stroke_finds_the_state_of_the_tension(stiffness, margin) -> None:
     by_stroke = nf.simulate(
         robot, nf.LoadPath(np.full_like(strokes, np.nan), strokes)
     ).raise_if_failed()
-    margin.within("angles", by_stroke.notch_angle - by_force.notch_angle, 1e-9, "rad")
-    margin.within("tensions", by_stroke.tension - by_force.tension, 1e-7, "N")
+    margin.within("angles", by_stroke.notch_angle - by_force.notch_angle, 1e-11, "rad")
+    margin.within("tensions", by_stroke.tension - by_force.tension, 2e-11, "N")
 
 
 def test_elastic_cable_gives_by_its_tension(elastic, margin) -> None:
@@ -46,8 +46,8 @@ def test_elastic_cable_gives_by_its_tension(elastic, margin) -> None:
     # Gaps of H = 3.5 mm and pieces of h = 1.5 mm; the cable ends where it enters the last piece,
     # and goes on through it with the tension of the last gap.
     stretch = (3.5 * gaps.sum() + 1.5 * bodies.sum() + 1.5 * gaps[-1]) / STIFF
-    margin.within("stroke", soft.stroke[0] - rigid.stroke[0] - stretch, 1e-9, "mm")
-    margin.within("shape", soft.notch_angle - rigid.notch_angle, 1e-9, "rad")
+    margin.within("stroke", soft.stroke[0] - rigid.stroke[0] - stretch, 1e-11, "mm")
+    margin.within("shape", soft.notch_angle - rigid.notch_angle, 1e-11, "rad")
 
 
 def test_slack_cable_never_pushes(elastic) -> None:
@@ -72,8 +72,8 @@ def test_pretension_is_held_by_stroke(elastic, pretensioned, margin) -> None:
     held = nf.simulate(
         elastic, [nf.Load(stroke=tuple(state.stroke))], from_state=state.state
     ).raise_if_failed()
-    margin.within("tensions", held.tension[0] - 3.0, 1e-7, "N")
-    margin.within("shape", held.notch_angle[0] - state.notch_angle, 1e-10, "rad")
+    margin.within("tensions", held.tension[0] - 3.0, 2e-11, "N")
+    margin.within("shape", held.notch_angle[0] - state.notch_angle, 1e-11, "rad")
 
 
 def test_antagonists_drawn_against_each_other(elastic, pretensioned) -> None:
@@ -103,8 +103,8 @@ def test_one_by_force_one_by_stroke(elastic, margin) -> None:
             for k, u in zip((2.0, 4.0, 6.0, 3.0), both.stroke[:, 0], strict=True)
         ],
     ).raise_if_failed()
-    margin.within("tension found", mixed.tension - both.tension, 1e-7, "N")
-    margin.within("shape", mixed.notch_angle - both.notch_angle, 1e-9, "rad")
+    margin.within("tension found", mixed.tension - both.tension, 2e-10, "N")
+    margin.within("shape", mixed.notch_angle - both.notch_angle, 1e-11, "rad")
 
 
 def _notch(path: str, opposite: str, friction: nf.Capstan | nf.Frictionless) -> nf.Robot:

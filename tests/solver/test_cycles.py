@@ -53,8 +53,8 @@ def test_return_point_memory_of_a_tension(robot, margin) -> None:
     tension = ramp(0.4, 1.2, 0.6, 1.0, 0.6, 1.2, 0.6)
     path = run(robot, tension, 0.02)
     for before, after in ((24, 48), (24, 72), (12, 60)):
-        margin.within("angles", path.notch_angle[after] - path.notch_angle[before], 1e-8, "rad")
-        margin.within("tensions", path.span_tension[after] - path.span_tension[before], 1e-8, "N")
+        margin.within("angles", path.notch_angle[after] - path.notch_angle[before], 1e-11, "rad")
+        margin.within("tensions", path.span_tension[after] - path.span_tension[before], 1e-11, "N")
 
 
 def test_loops_of_a_force_while_the_tendons_hold_settle(robot, margin) -> None:

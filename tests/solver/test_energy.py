@@ -75,7 +75,7 @@ def test_loading_to_3_newton(wrap, margin):
     work, lost = tendon_work(path), friction_work(path)
     margin.within("balance", (work - stored(path, -1) - lost.sum()) / work, 1e-6)
     margin.within("reported work", path.tendon_work[-1, 0] / work - 1, 1e-12)
-    margin.within("reported energy", path.stored_energy[-1] / stored(path, -1) - 1, 1e-9)
+    margin.within("reported energy", path.stored_energy[-1] / stored(path, -1) - 1, 1e-11)
     margin.within("reported dissipation", (path.dissipation[-1, 0] - lost) / lost.sum(), 1e-12)
     assert (lost >= 0).all()
     assert lost.sum() > 0.1 * work
@@ -103,7 +103,7 @@ def test_partial_loops_in_the_linear_range_at_any_step(margin):
 @pytest.mark.parametrize("wrap", ["whole-before", "geometric"])
 def test_loop_from_rest_to_rest(wrap, turns, margin):
     path = simulate(with_friction(wrap), legs(turns, FINE / 3))
-    margin.within("shape at the end", path.notch_angle[-1], 1e-9, "rad")
+    margin.within("shape at the end", path.notch_angle[-1], 1e-11, "rad")
     check_loop(path, 0, margin)
 
 
@@ -113,7 +113,7 @@ def test_closed_inner_loop(margin):
     start = int(np.flatnonzero(tension == 1.2)[0])
     path = simulate(with_friction("whole-before"), tension)
     assert tension[start] == tension[-1] == 1.2
-    margin.within("loop closes", path.notch_angle[-1] - path.notch_angle[start], 1e-9, "rad")
+    margin.within("loop closes", path.notch_angle[-1] - path.notch_angle[start], 1e-11, "rad")
     check_loop(path, start, margin)
 
 

@@ -46,7 +46,7 @@ def test_moment_on_a_strip_is_a_circle(one_strip, margin) -> None:
     end = state.tip_position + state.tip_rotation @ np.array([4.0, 0.0, -1.5])
     radius = LENGTH / turned
     expected = [radius * np.sin(turned) - 4.0, 0.0, 3.5 - radius * (1.0 - np.cos(turned))]
-    margin.within("end", end - expected, 1e-9, "mm")
+    margin.within("end", end - expected, 1e-11, "mm")
 
 
 def test_compression_that_buckles_is_told() -> None:
@@ -70,8 +70,8 @@ def test_going_on_with_loads_from_a_state_without(margin) -> None:
     before = nf.simulate(wrist, first).raise_if_failed()
     after = nf.simulate(wrist, then, from_state=before.state).raise_if_failed()
     assert before.chain.rods.modes < after.chain.rods.modes
-    margin.within("angles", after.notch_angle - whole.notch_angle[3:], 1e-10, "rad")
-    margin.within("tensions", after.span_tension - whole.span_tension[3:], 1e-9, "N")
+    margin.within("angles", after.notch_angle - whole.notch_angle[3:], 2e-11, "rad")
+    margin.within("tensions", after.span_tension - whole.span_tension[3:], 3e-11, "N")
 
 
 @pytest.mark.parametrize(
@@ -112,8 +112,8 @@ def test_opposite_tendon_is_the_mirror_image(margin) -> None:
     )
     one, other = (nf.solve(robot, nf.Load(tension=7.0)) for robot in (left, right))
     mirrored = other.tip_position * np.array([-1.0, 1.0, 1.0])
-    margin.within("tip", one.tip_position - mirrored, 1e-9, "mm")
-    margin.within("tensions", one.span_tension - other.span_tension, 1e-9, "N")
+    margin.within("tip", one.tip_position - mirrored, 1e-11, "mm")
+    margin.within("tensions", one.span_tension - other.span_tension, 3e-11, "N")
 
 
 @pytest.mark.nightly

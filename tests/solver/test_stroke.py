@@ -32,12 +32,12 @@ def test_stroke_gives_the_shape_of_its_tension(name, make, margin):
     drawn = nf.simulate(robot, strokes(pulled.stroke))
     assert drawn.converged.all(), drawn.reason
     margin.within("angles along a path", drawn.notch_angle - pulled.notch_angle, ANGLE, "rad")
-    margin.within("stroke kept", drawn.stroke - pulled.stroke, 1e-9, "mm")
+    margin.within("stroke kept", drawn.stroke - pulled.stroke, 1e-11, "mm")
     for i in (1, 4, 7, 9):
         state = nf.solve(robot, nf.Load(stroke=float(pulled.stroke[i, 0])))
         assert state.converged, state.reason
         margin.within("angles from rest", state.notch_angle - pulled.notch_angle[i], ANGLE, "rad")
-        margin.within("tension found", state.tension - pulled.tension[i], 1e-6, "N")
+        margin.within("tension found", state.tension - pulled.tension[i], 5e-11, "N")
 
 
 @pytest.mark.parametrize("wrap", ["geometric", "whole-before"])
@@ -62,7 +62,7 @@ def test_drawn_and_let_go_in_small_steps(name, wrap, part, margin):
     up = np.linspace(0.0, part * wrist.stroke(wrist.closing_angle), 31)
     path = nf.simulate(of_wrist(wrist), strokes([*up, *up[::-1]]))
     assert path.converged.all(), [reason for reason in path.reason if reason]
-    margin.within("stroke kept", path.stroke[:, 0] - [*up, *up[::-1]], 1e-9, "mm")
+    margin.within("stroke kept", path.stroke[:, 0] - [*up, *up[::-1]], 1e-11, "mm")
 
     # The oracle knows tensions only: it is asked for the one that leads to the stroke.
     def missing(tension: float, history: list[float], stroke: float) -> float:
@@ -105,7 +105,7 @@ def test_elastic_tendon_reaches_beyond_the_last_closing(margin):
     drawn = nf.simulate(robot, strokes(pulled.stroke))
     assert drawn.converged.all(), drawn.reason
     margin.within("angles", drawn.notch_angle - pulled.notch_angle, ANGLE, "rad")
-    margin.within("tension", drawn.tension - pulled.tension, 1e-7, "N")
+    margin.within("tension", drawn.tension - pulled.tension, 1e-11, "N")
     stiff = nf.simulate(ready("A"), tensions(pulled.tension))
     # 300 mm under 1 N stretch by 0.6 mm; what lies in the wrist adds less than 10 mm to that.
     longer = (pulled.stroke - stiff.stroke) / pulled.tension

@@ -60,5 +60,5 @@ def test_work_goes_into_energy(path, margin):
     more, less = (solve(made, TENSION + sign * change) for sign in (1, -1))
     energy = (more.stored_energy - less.stored_energy) / (2 * STEP)
     work = TENSION @ (more.stroke - less.stroke) / (2 * STEP)
-    margin.within(f"{path}: dU - sum T ds", energy - work, 1e-7, "N mm/N")
+    margin.within(f"{path}: dU - sum T ds", energy - work, 2e-10, "N mm/N")
     assert abs(work) > 0.05

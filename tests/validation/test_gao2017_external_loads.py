@@ -70,5 +70,5 @@ def test_a_hung_mass_is_its_weight(margin):
     path = nf.simulate(light, loads)
     check(margin, path, rows, LENGTH, ANGLE, FORCE)
     same = under_weight(TIP_TOWARD)
-    margin.within("tip against the force", path.tip_position - same.tip_position, 1e-9, "mm")
-    margin.within("bodies", path.body_position - same.body_position, 1e-9, "mm")
+    margin.within("tip against the force", path.tip_position - same.tip_position, 1e-11, "mm")
+    margin.within("bodies", path.body_position - same.body_position, 1e-11, "mm")

@@ -66,7 +66,7 @@ def test_shapes_are_even_while_bending_and_uneven_while_unbending(margin):
     margin.note(f"spread of the gaps: bending {spread:.3f}, unbending {other:.3f} of their mean")
     assert spread < 0.25 < 3.0 * spread < other
     # From 13 to 12 N the shape does not move at all.
-    margin.within("first gap of unbending", unbending[0] / bending.min(), 1e-9)
+    margin.within("first gap of unbending", unbending[0] / bending.min(), 1e-11)
 
 
 def test_shape_is_no_circular_arc(margin):
@@ -91,12 +91,12 @@ def test_slots_close_under_a_strong_pull(margin):
     assert first[closes].min() == first[1]
     assert (np.diff(first[closes]) >= 0).all()
     assert not closes[0::2][:-1].any()  # the other side opens
-    margin.within("overlap", np.minimum(gap, 0.0), 1e-9, "mm")
-    margin.within("force times gap", force * gap, 1e-9, "N mm")
-    margin.within("residual", path.residual, 1e-9)
+    margin.within("overlap", np.minimum(gap, 0.0), 1e-11, "mm")
+    margin.within("force times gap", force * gap, 1e-11, "N mm")
+    margin.within("residual", path.residual, 1e-11)
     for what, error in zip(("force", "moment"), left_over(path), strict=True):
-        margin.within(f"{what} left over", error, 1e-9)
-    margin.within("friction beyond its cone", np.maximum(cone_used(path), 1.0) - 1.0, 1e-9)
+        margin.within(f"{what} left over", error, 1e-11)
+    margin.within("friction beyond its cone", np.maximum(cone_used(path), 1.0) - 1.0, 5e-11)
 
 
 @pytest.mark.parametrize("step", [10, 25])

@@ -17,7 +17,7 @@ def test_a_long_shaft_or_tip_changes_no_angle(name, margin):
     states = [nf.solve(wrist.with_value(name, length), load) for length in LENGTHS]
     assert all(state.converged for state in states)
     angles = np.array([state.notch_angle for state in states])
-    margin.within("notch angles", angles - angles[0], 1e-9, "rad")
+    margin.within("notch angles", angles - angles[0], 1e-11, "rad")
 
 
 @pytest.mark.parametrize("boundary", ["clamped", "free"])

@@ -151,7 +151,7 @@ def test_compiled_by_lanewise(margin):
     compiled = Program(machine_code(program.text, 2), program.sizes, program.memory, (True,))
     computed = np.asarray(compiled([rows])[0]).reshape(len(rows), -1)
     wanted = np.array(jax.jit(jax.vmap(both))(rows))
-    margin.within("lengths and slopes", (computed - wanted) / (1.0 + np.abs(wanted)), 1e-7)
+    margin.within("lengths and slopes", (computed - wanted) / (1.0 + np.abs(wanted)), 2e-8)
 
 
 @pytest.mark.parametrize("boundary", BOUNDARIES)

@@ -88,7 +88,7 @@ def test_an_elastic_stop(margin, ends, most):
     stop = law.closed_ratio * LINEAR.elastic_modulus * section.second_moment_weak / law.weak
     arm = 0.8 / closing
     beyond = stop * (angle[closed] - closing)
-    margin.within("moment of the stop, relative", force[closed] * arm / beyond - 1.0, 1e-9)
+    margin.within("moment of the stop, relative", force[closed] * arm / beyond - 1.0, 5e-11)
     rigid = nf.simulate(wrist(ends=ends), nf.Load(tension=most))
     assert rigid.notch_angle[0, 2] == pytest.approx(closing / law.closing_factor)
 
@@ -125,7 +125,7 @@ def test_rings_shift_by_the_compliance_in_shear(across, margin):
     arm = np.array([-law.shear_centre, 0.0, middle - tip])
     state = nf.solve(one, nf.Load(tension=0.0, tip_force=force, tip_moment=np.cross(arm, force)))
     turned = state.body_rotation[-1] - np.eye(3)
-    margin.within("turn, rad", turned, 1e-9)
+    margin.within("turn, rad", turned, 1e-11)
     at_middle = state.tip_position - np.array([0.0, 0.0, tip]) + turned @ arm
     wanted = (law.shear, law.sway)[across] * 1e-5 / LINEAR.elastic_modulus
     margin.within("shift, relative", at_middle[across] / wanted - 1.0, 1e-8)

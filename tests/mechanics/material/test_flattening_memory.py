@@ -95,7 +95,7 @@ def test_moment_is_the_derivative_of_the_energy_behind_a_corner(
 
     near, far = ((held(by) - held(-by)) / (2.0 * by) for by in (step, 2.0 * step))
     expected = float(respond(LAW, bending(at), SECTION, memory).resultants[1])
-    margin.within("moment, N mm", (4.0 * near - far) / 3.0 - expected, 1e-8)
+    margin.within("moment, N mm", (4.0 * near - far) / 3.0 - expected, 5e-10)
 
 
 @pytest.mark.nightly
