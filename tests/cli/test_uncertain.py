@@ -25,9 +25,7 @@ def test_table_files_and_picture_have_the_bands(call, tmp_path, bands: nf.Bands)
     one = bands["total_angle"]
     ends = {"low": one.low, "median": one.median, "high": one.high}
     (line,) = (line.split() for line in out.splitlines() if line.startswith("   3 "))
-    degrees = {
-        name: float(end[2]) * DEGREES for name, end in ends.items()
-    }
+    degrees = {name: float(end[2]) * DEGREES for name, end in ends.items()}
     assert line[2:5] == [f"{value:.2f}" for value in degrees.values()]
     assert "Tolerances assumed: notch.depth 0.01 mm (SD)" in out
     assert max(map(len, out.splitlines())) <= 100
