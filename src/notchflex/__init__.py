@@ -81,6 +81,7 @@ _HOME = {
             "ClosingStatus",
             "Differentiable",
             "Kink",
+            "PathGradient",
             "SharedStroke",
             "Step",
             "Stepper",

@@ -7,6 +7,7 @@ from notchflex.analysis import Closing as Closing
 from notchflex.analysis import ClosingStatus as ClosingStatus
 from notchflex.analysis import Differentiable as Differentiable
 from notchflex.analysis import Kink as Kink
+from notchflex.analysis import PathGradient as PathGradient
 from notchflex.analysis import SharedStroke as SharedStroke
 from notchflex.analysis import Step as Step
 from notchflex.analysis import Stepper as Stepper

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex._jax import jax
 from notchflex.analysis.forward_model import ForwardModel
+from notchflex.analysis.slopes import changes, differences
 from notchflex.loads import LoadPath
 from notchflex.robot.value_names import number_at
-from notchflex.solver.programs.static_structure import padded_indices
 from refusals import refused
 
 PULL = nf.pull(1.0, 1.0, steps=1)
@@ -19,14 +20,12 @@ HEAVY = PULL.loaded(tip_force=(0.01, 0.0, 0.0), gravity=(9.81, 0.0, 0.0))
 LONG = pytest.mark.nightly
 
 
-def within(margin, what: str, computed: np.ndarray, expected: np.ndarray, model: ForwardModel):
+def within(margin, what: str, computed: np.ndarray, expected: np.ndarray, path):
     """Every array of the chain within 1e-8 of the largest of its slopes.
 
     Where all slopes are the rounding of a difference, within 1e-8 of the array.
     """
-    ready = model.ready
-    there = padded_indices(ready.chain_layout, ready.long.chain_layout)
-    computed, expected = computed[there], expected[there]
+    ready = path.prepared
     for indices in ready.chain_layout.indices:
         own = indices.ravel()
         values = np.abs(ready.vector[own])
@@ -57,11 +56,11 @@ def test_slopes_are_those_of_differences(name, keys, others, load: LoadPath, mar
     robot = robot.with_values(
         {name: number_at(robot, name) * random.uniform(0.999, 1.001) for name in names}
     )
-    model = ForwardModel(robot, load)
-    for name, by in zip(names, model.changes(robot, load, names), strict=True):
+    path = nf.simulate(robot, load)
+    for name, by in zip(names, changes(path, names), strict=True):
         moved, at = partial(robot.with_value, name), number_at(robot, name)
-        expected = model._differences(moved, at, load)
-        within(margin, f"by {name}", by.chain, expected.chain, model)
+        expected = differences(path, moved, at)
+        within(margin, f"by {name}", by.chain, expected.chain, path)
         if by.loads is not None:
             size = np.abs(expected.loads).max() or 1.0
             margin.within(f"loads by {name}", (by.loads - expected.loads) / size, 1e-9)
@@ -73,10 +72,10 @@ def test_a_direction_is_differentiated_by_differences(margin):
     robot = nf.load_robot("two-axis-wrist")
     load = nf.LoadPath([[1.0, 0.0, 0.0, 0.0]]).loaded(tip_force=(0.001, 0.002, 0.0))
     model = ForwardModel(robot, load)
-    direction, depth = model.changes(robot, model.load, ["notch[1].direction_deg", "notch.depth"])
+    names = ["notch[1].direction_deg", "notch.depth"]
     path = model.solve(robot, model.load)
-    by = model.derivatives(path, [direction, depth], ("tip_position",))["tip_position"][:, 0]
-    for name, slope in zip(("notch[1].direction_deg", "notch.depth"), by, strict=True):
+    by = path.jacobian(names, "tip_position")["tip_position"][0].T
+    for name, slope in zip(names, by, strict=True):
         at, width = number_at(robot, name), 1e-4
         tips = [
             model.solve(robot.with_value(name, at + side * width), model.load).tip_position[0]
@@ -93,10 +92,8 @@ def test_a_number_of_all_notches_and_that_of_one(key, tip, margin):
     """The notch with a name of its own does not move with the others."""
     robot, load = nf.load_robot("pacheco2021-a"), PULL.loaded(tip_force=(0.0, tip, 0.0))
     names = [f"notch.{key}", f"notch[2].{key}"]
-    model = ForwardModel(robot, load, any_load=tip > 0.0)
-    both = model.changes(robot, load, names)
-    path = model.solve(robot, load)
-    by = model.derivatives(path, both, ("tip_position",))["tip_position"][:, 0]
+    path = nf.simulate(robot, load)
+    by = path.jacobian(names, "tip_position")["tip_position"][0].T
     at, width = number_at(robot, f"notch.{key}"), 1e-4
     for number, slope in enumerate(by):
         ends = []
@@ -112,9 +109,10 @@ def test_a_number_at_the_end_of_its_range():
     """Without friction the slope by its coefficient is that of more of it."""
     robot = nf.load_robot("pacheco2021-a").with_value("friction.coefficient", 0.0)
     bend = nf.differentiable(robot, PULL, ["friction.coefficient"])
-    slope = bend.model.changes(robot, PULL, ["friction.coefficient"])[0]
-    path = bend.model.solve(robot, PULL)
-    by = bend.model.derivatives(path, [slope], ("total_angle",))["total_angle"][0, 0]
+    by = jax.grad(lambda at: bend(at)["total_angle"][0])(bend.start)["friction.coefficient"]
+    path = nf.simulate(robot, PULL)
+    own = path.gradient({"total_angle": 1.0})["friction.coefficient"]
+    assert by == pytest.approx(own, rel=1e-13)
     width = 1e-5
     more = nf.simulate(robot.with_value("friction.coefficient", width), PULL).total_angle[0]
     assert by == pytest.approx((more - path.total_angle[0]) / width, rel=1e-3)
@@ -124,7 +122,5 @@ def test_a_number_that_cannot_be_varied_is_refused():
     """Two links share a slot, so that its radius cannot be that of one."""
     robot, load = nf.load_robot("gao2017"), nf.pull(6.0, 6.0, steps=1)
     with refused("OUT_OF_RANGE") as caught:
-        ForwardModel(robot, load).changes(
-            robot, load, ["notch[1].strip_length", "notch[2].slot_radius"]
-        )
+        nf.simulate(robot, load).jacobian(["notch[1].strip_length", "notch[2].slot_radius"])
     assert "0.275" in str(caught.value)

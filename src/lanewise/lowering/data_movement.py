@@ -153,19 +153,20 @@ def scatter_static(
     indices: np.ndarray,
     updates: References,
     params: dict[str, Any],
-    combine: Callable[[References, References], References],
+    combine: Callable[[References, References], References] | None,
 ) -> References:
-    """Return an array with entries at known indices replaced, as JAX's `scatter`.
+    """Return an array with entries at known indices changed, as JAX's `scatter`.
 
     Args:
         refs: The array.
         indices: Where to write.
         updates: What to write.
         params: Parameters of the primitive.
-        combine: Computes the new entry from the old one and the update.
+        combine: Computes the new entry from the old one and the update; None replaces it.
 
     Raises:
-        UnsupportedPrimitiveError: Indices are out of bounds or repeated.
+        UnsupportedPrimitiveError: Indices are out of bounds, or repeated where entries are
+            replaced.
     """
     numbers = params["dimension_numbers"]
     batch = list(numbers.operand_batching_dims)
@@ -185,10 +186,16 @@ def scatter_static(
     for own, axis in zip(batch, numbers.scatter_indices_batching_dims, strict=True):
         at[own] = at[own] + grid[batch_axes[axis]]
     flat = np.ravel_multi_index(tuple(at), refs.shape).ravel()
-    if len(set(flat.tolist())) < len(flat):
+    out, new = refs.ravel().copy(), updates.ravel()
+    order = np.argsort(flat, kind="stable")
+    turn = np.empty_like(flat)  # how often the same index has come before
+    turn[order] = np.arange(len(flat)) - np.searchsorted(flat[order], flat[order])
+    if combine is None and turn.any():
         raise UnsupportedPrimitiveError("repeated indices", "scatter")
-    out = refs.ravel().copy()
-    out[flat] = combine(out[flat], updates.ravel())
+    for number in range(turn.max(initial=-1) + 1):
+        some = turn == number
+        target = flat[some]
+        out[target] = new[some] if combine is None else combine(out[target], new[some])
     return out.reshape(refs.shape)
 
 

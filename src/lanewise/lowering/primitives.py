@@ -7,6 +7,7 @@ of numbers (as dtypes) of its operands and results.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -208,9 +209,7 @@ def _scatter(op: str | None) -> Callable[..., References]:
         if known is None:
             raise UnsupportedPrimitiveError("computed indices", "scatter")
 
-        def combine(old: References, new: References) -> References:
-            return new if op is None else arrays.elementwise(op, old, new)
-
+        combine = None if op is None else partial(arrays.elementwise, op)
         return scatter_static(refs, known, updates, params, combine)
 
     return lower

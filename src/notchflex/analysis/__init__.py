@@ -28,6 +28,7 @@ __all__ = [
     "ClosingStatus",
     "Differentiable",
     "Kink",
+    "PathGradient",
     "SharedStroke",
     "Step",
     "Stepper",

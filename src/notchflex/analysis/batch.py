@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypedDict, Unpack
+from typing import Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -45,6 +45,7 @@ from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import number_of_cores, on_cores
 from notchflex.solver.programs.prepare import PreparedChain
+from notchflex.solver.programs.static_structure import PytreeLayout
 
 # Largest number of rows of a piece, by the number of rows.
 _PIECE_SIZES = {0: 64, 512: 256, 8192: 2048}
@@ -417,11 +418,7 @@ class LoadRows:
         load = self.load[steps]
         if self.tip is None:
             return load
-        external = tuple(
-            replace(one, tip_force=tip[:3], tip_moment=tip[3:])
-            for one, tip in zip(load.external, self.tip[steps].tolist(), strict=True)
-        )
-        return replace(load, external=external)
+        return load.commanding(dict(zip(TIP, np.split(self.tip[steps], 2, axis=1), strict=True)))
 
     def varied(self, which: Int[np.ndarray, " n"], values: Mapping[str, np.ndarray]) -> LoadRows:
         """Return paths made of some of these and of numbers of their own.
@@ -439,7 +436,7 @@ class LoadRows:
         tables = {
             name: self._table(name, each, load.numbers(name)) for name, each in values.items()
         }
-        load = load.commanding(tables)
+        load = load.commanding({one: tables[one] for one in TENDONS if one in tables})
         if not any(name in TIP for name in tables):
             return replace(self, load=load)
         tip = np.hstack([tables[one] if one in tables else load.numbers(one) for one in TIP])
@@ -515,8 +512,8 @@ class BatchRows:
             for form in self.robots.forms(np.unique(self.robot_of[rows])):
                 own = rows[np.isin(self.robot_of[rows], form.members)]
                 for kind, part in self._by_kind(form.example, own):
-                    number = len(np.unique(self.robot_of[part]))
-                    chains = form.chains(kind, self.refinement, number)
+                    several = len(np.unique(self.robot_of[part])) > FEW
+                    chains = form.chains(kind, self.refinement) if several else None
                     if chains is None:
                         few.append(part)
                     else:
@@ -596,33 +593,63 @@ class BatchTable:
     def run(self, index: slice) -> dict[str, np.ndarray]:
         """Solve a piece of the rows: quantities in the world, NaN where they are not known."""
         batch, rows = self.batch, self.rows[index]
-        load, names = batch.loads.load, batch.outputs
-        robots, paths = batch.robot_of[rows], batch.path_of[rows]
-        chains, alike = self.chains.packed(robots)
-        steps, bodies = batch.loads.steps_of(paths), self.chains.bodies(chains)
-        drawn = bool(self.kind & DRAWN)
-        commands = row_commands(load, steps, bodies, batch.loads.tip, drawn=drawn)
-        layout = self.chains.ready.command_layout(commands)
-        solved = tuple(dict.fromkeys(one for name in names for one in WORKS.get(name, (name,))))
-        found = follow_row.rows(
-            (chains.ndim == 2, True, False),
-            *(chains, layout.pack(commands, leading=2), np.array(batch.settings.numbers)),
-            *(self.chains.structure, layout, solved),
-        )
+        outputs, alike = self.solved(rows)
+        if not alike.all():
+            wrong = rows[~alike]
+            alone = replace(batch, robot_of=batch.robot_of[wrong], path_of=batch.path_of[wrong])
+            for name, values in alone.solved(1, alone.tables(compiled=False)).items():
+                outputs[name][~alike] = values
+        return outputs
+
+    def solved(
+        self, rows: Int[np.ndarray, " k"]
+    ) -> tuple[dict[str, np.ndarray], Bool[np.ndarray, " k"]]:
+        """Solve some rows: quantities as `run` returns them, and which rows are right."""
+        names, turn = self.batch.outputs, self.batch.loads.load.base_to_world
+        every = (one for name in names for one in WORKS.get(name, (name,)))
+        followed = self.followed(rows, (*dict.fromkeys(every),))
+        found = followed.outputs
         outputs = found | {name: _work(found, name) for name in names if name in WORKS}
         outputs = {name: outputs[name] for name in sorted(names)}
         failed = ~outputs["converged"]
         for name, values in outputs.items():
             if name in REGISTERED and values.dtype.kind == "f":
-                outputs[name] = REGISTERED[name].turned(values, load.base_to_world)
+                outputs[name] = REGISTERED[name].turned(values, turn)
                 if failed.any():
                     outputs[name][failed] = np.nan
-        if not alike.all():
-            wrong = ~alike
-            alone = replace(batch, robot_of=robots[wrong], path_of=paths[wrong])
-            for name, values in alone.solved(1, alone.tables(compiled=False)).items():
-                outputs[name][wrong] = values
-        return outputs
+        return outputs, followed.alike
+
+    def followed(self, rows: Int[np.ndarray, " k"], names: tuple[str, ...]) -> FollowedRows:
+        """Follow the paths of some rows; report quantities in the frame of the base."""
+        batch = self.batch
+        chains, alike = self.chains.packed(batch.robot_of[rows])
+        steps, bodies = batch.loads.steps_of(batch.path_of[rows]), self.chains.bodies(chains)
+        drawn = bool(self.kind & DRAWN)
+        acting = row_commands(batch.loads.load, steps, bodies, batch.loads.tip, drawn=drawn)
+        layout = self.chains.ready.command_layout(acting)
+        commands = np.asarray(layout.pack(acting, leading=2))
+        tables = chains, commands, np.array(batch.settings.numbers)
+        layouts = self.chains.structure, layout, names
+        found = follow_row.rows((chains.ndim == 2, True, False), *tables, *layouts)
+        return FollowedRows(chains, alike, commands, layout, found)
+
+
+class FollowedRows(NamedTuple):
+    """Rows of a batch that were followed along their paths.
+
+    Attributes:
+        chains: Their chains, packed; one where all have the same.
+        alike: Which of the chains are right.
+        commands: Their loads, packed, rows and steps as leading axes.
+        layout: Layout of one load.
+        outputs: What was asked for, by name.
+    """
+
+    chains: np.ndarray
+    alike: Bool[np.ndarray, " k"]
+    commands: Float[np.ndarray, "k s command"]
+    layout: PytreeLayout
+    outputs: dict[str, np.ndarray]
 
 
 def _work(found: Mapping[str, np.ndarray], name: str) -> np.ndarray:

@@ -7,7 +7,7 @@ costs a notch one trial, not its result.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
@@ -19,6 +19,9 @@ from jaxtyping import Bool, Float
 from notchflex._jax import jax, jit, jnp
 from notchflex._summary import Displayed, Summary, short
 from notchflex.analysis.batch import BatchRows, BatchTable, LoadRows
+from notchflex.analysis.forward_model import ForwardModel
+from notchflex.analysis.slopes import changes, derivatives, load_change
+from notchflex.analysis.tangent import Change
 from notchflex.analysis.varied import VariedRobots
 from notchflex.loads import LoadPath
 from notchflex.loads.command import tension_commands
@@ -26,10 +29,12 @@ from notchflex.mechanics.chain import Chain, assemble, sites_of
 from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.mechanics.flexure import Site, rod_at
 from notchflex.mechanics.material import FibreSection, SectionLaw, peak_strain, section_strain
+from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities import DEGREES, QUANTITIES
 from notchflex.robot import Robot, Tube
 from notchflex.robot.kinds import Notch
 from notchflex.robot.part import fields_of, unit_of
+from notchflex.robot.value_names import number_at
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import number_of_cores
 from notchflex.solver.programs.prepare import PreparedChain, prepare
@@ -174,6 +179,8 @@ def find_roots(
 
 _ANGLE = QUANTITIES["total_angle"]
 _MAX_ROWS = 12
+# So much below its closing tension a notch is taken to be open, relative.
+_BELOW = 1e-9
 # Number of steps of the first pull, and its end over the tension that would close the softest notch
 # if it were linear and alone; notches that do not close by then are reported as never closing.
 _STEPS, _BEYOND_LINEAR = 40, 2.0
@@ -184,6 +191,7 @@ class Closing(Displayed):
     """Closing of every notch, base to tip.
 
     Attributes:
+        robot: The robot.
         angle: Notch angle at which its edges touch, precurvature included, rad.
         tension: Base tension that closes it, N, loading from rest; NaN where none was found.
         status: A `ClosingStatus`: "closes"; "never", no tension up to 64 times the one that
@@ -194,12 +202,64 @@ class Closing(Displayed):
         peak_strain: Largest strain of any fibre when closed.
     """
 
+    robot: Robot
     angle: Float[np.ndarray, " n"]
     tension: Float[np.ndarray, " n"]
     status: np.ndarray
     tendon: np.ndarray
     outer_strain: Float[np.ndarray, " n"]
     peak_strain: Float[np.ndarray, " n"]
+
+    def jacobian(self, names: str | Sequence[str]) -> dict[str, Float[np.ndarray, "n k"]]:
+        """Differentiate closing tensions and angles by numbers of the robot.
+
+        Args:
+            names: Numbers of the robot file, as for `Robot.with_value`, in the units of the file.
+
+        Returns:
+            "tension" (N) and "angle" (rad) per unit of each number, notches by numbers; NaN for
+            notches without a tension that closes them.
+
+        Raises:
+            InputError: There is no such number.
+
+        Example:
+            >>> from notchflex import load_robot
+            >>> slopes = closing(load_robot("pacheco2021-a")).jacobian(["notch.height"])
+            >>> print(f"{slopes['tension'][0, 0]:.2f} N/mm")
+            0.14 N/mm
+        """
+        names = (names,) if isinstance(names, str) else tuple(names)
+        for name in names:
+            number_at(self.robot, name)
+        if not np.isfinite(self.tension).any():
+            return dict.fromkeys(
+                ("tension", "angle"), np.full((len(self.tension), len(names)), np.nan)
+            )
+        tension, angle = self.along(lambda path: changes(path, names))
+        return {"tension": tension, "angle": angle}
+
+    def along(
+        self, directions: Callable[[EquilibriumPath], Sequence[Change]]
+    ) -> tuple[Float[np.ndarray, "n v"], Float[np.ndarray, "n v"]]:
+        """Differentiate closing tensions (N) and angles (rad) along changes of the robot.
+
+        Args:
+            directions: Gives the changes for a path of the robot just before its notches close.
+        """
+        closes = np.flatnonzero(np.isfinite(self.tension))
+        rows = np.arange(len(closes))
+        unit = np.zeros((len(closes), self.robot.number_of_tendons))
+        unit[rows, self.tendon[closes] - 1] = 1.0
+        load = LoadPath((1.0 - _BELOW) * self.tension[closes, None] * unit)
+        path = ForwardModel(self.robot, load, from_rest=True).solve(self.robot, load)
+        along = [*directions(path), Change(load_change(path, LoadPath(load.tension + unit)), None)]
+        by = derivatives(path, along, ("gap", "notch_angle"))
+        gap, angle = (by[name][:, rows, closes].T for name in ("gap", "notch_angle"))
+        slopes = np.full((2, len(self.tension), len(along) - 1), np.nan)
+        slopes[0, closes] = -gap[:, :-1] / gap[:, -1:]
+        slopes[1, closes] = angle[:, :-1] + angle[:, -1:] * slopes[0, closes]
+        return slopes[0], slopes[1]
 
     def _summary(self) -> Summary:
         rows = [
@@ -251,6 +311,7 @@ def closing(robot: Robot) -> Closing:
     first = jax.tree.map(lambda leaf: leaf[:, 0], section)
     outer, peak = _strains(chain.law, first, elastic, chain.law.rest(first))
     return Closing(
+        robot=robot,
         angle=np.where(has_spine, closing_angle + free, contact_angle),
         tension=tension,
         status=status,

@@ -2,32 +2,41 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
+from math import prod
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
-from jax.core import Tracer
-from jaxtyping import Array, Float
+from jax.core import ShapedArray, Tracer
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
+from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import jax, jnp
 from notchflex._summary import Displayed, Summary
-from notchflex.analysis.forward_model import Change, ForwardModel
+from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.outputs import OutputTable, check_outputs
+from notchflex.analysis.slopes import (
+    LOADS,
+    SLOPING,
+    RobotRows,
+    changes,
+    derivatives,
+    gradient_by,
+    start_of,
+)
 from notchflex.analysis.solve import check_refinement
-from notchflex.analysis.tangent import Kink, kinks
+from notchflex.analysis.tangent import Kink, kinks, path_gradient
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.load import check_is_robot, short_repr
-from notchflex.loads.load_path import TENDONS, TIP, load_path
+from notchflex.loads.load_path import TIP, load_path
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.robot.value_names import number_at
 from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.programs.static_structure import as_kind
 
 # Largest change of a parameter in one-sided differences.
 _ASIDE = 1e-5
@@ -84,15 +93,10 @@ def differentiable(
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     if not names or len(set(names)) < len(names):
         raise InputError.NO_DATA("parameters must name at least one number, and none of them twice")
-    start = {name: jnp.asarray(_present(robot, path, name), float) for name in names}
+    start = {name: jnp.asarray(at) for name, at in start_of(robot, path, names).items()}
     return Differentiable(
         robot, path, start, check_outputs(outputs), settings or DEFAULT, refinement
     )
-
-
-def _present(robot: Robot, path: LoadPath, name: str) -> Any:
-    """Return the present value of a parameter."""
-    return path.numbers(name) if name in (*TENDONS, *TIP) else number_at(robot, name)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -129,7 +133,9 @@ class Differentiable(Displayed):
         if any(isinstance(value, Tracer) for value in complete.values()):
             return self._traced(complete)
         self._check(complete)
-        return self._function(self._flat(complete))
+        plain = np.concatenate([np.ravel(value) for value in complete.values()])
+        values = self._solver.table(plain)
+        return OutputTable({name: jnp.asarray(value) for name, value in values.items()})
 
     def _summary(self) -> Summary:
         shapes = {
@@ -199,7 +205,7 @@ class Differentiable(Displayed):
 
     def _path(self, values: Mapping[str, Any]) -> EquilibriumPath:
         """Solve the path at some values."""
-        return self.model.solve(self._robot(values), self._load(values))
+        return self.model.solve(self._robot(values), self.load.commanding(values))
 
     def _robot(self, values: Mapping[str, Any]) -> Robot:
         return self._robots(tuple(float(values[name]) for name in self.numbers))
@@ -213,17 +219,6 @@ class Differentiable(Displayed):
             return self.robot.with_values(values) if numbers else self.robot
 
         return lru_cache(maxsize=4)(made)
-
-    def _load(self, values: Mapping[str, Any]) -> LoadPath:
-        load = self.load.commanding(values)
-        tip = {name: np.asarray(values[name]) for name in self._tip}
-        if tip:
-            external = tuple(
-                dataclasses.replace(one, **{name: tuple(at[step]) for name, at in tip.items()})
-                for step, one in enumerate(load.external)
-            )
-            load = dataclasses.replace(load, external=external)
-        return load
 
     def _complete(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
         """Return values of all parameters, in their shapes."""
@@ -264,112 +259,159 @@ class Differentiable(Displayed):
     @cached_property
     def numbers(self) -> tuple[str, ...]:
         """Names of the parameters that are numbers of the robot."""
-        return tuple(name for name in self.start if name not in (*TENDONS, *TIP))
-
-    @cached_property
-    def _tip(self) -> tuple[str, ...]:
-        return tuple(name for name in TIP if name in self.start)
+        return tuple(name for name in self.start if name not in LOADS)
 
     @cached_property
     def model(self) -> ForwardModel:
         """The forward model of the robot and its loads."""
-        free = bool(self._tip)
+        free = any(name in TIP for name in self.start)
         return ForwardModel(self.robot, self.load, self.settings, self.refinement, any_load=free)
+
+    @cached_property
+    def _solver(self) -> VectorSolver:
+        start = {name: np.asarray(at) for name, at in self.start.items()}
+        return VectorSolver(start, self.outputs, self._path, self.refinement)
 
     @cached_property
     def _traced(self) -> Callable[[dict[str, Array]], OutputTable]:
         """The function of named values for JAX, as one program: JAX compiles each step else."""
-        return jax.jit(lambda values: self._function(self._flat(values)))
-
-    def _flat(self, values: dict[str, Array]) -> Array:
-        return jnp.concatenate([values[name].ravel() for name in self.start])
-
-    @cached_property
-    def _function(self) -> Callable[[Array], OutputTable]:
-        """All values as one vector to the outputs, as a function of JAX."""
-        start = np.concatenate([np.ravel(self.start[name]) for name in self.start])
-        solver = VectorSolver(
-            self.model, self.start, self.outputs, self.numbers, self._path, self._load
+        function = outputs_function(self._solver)
+        return jax.jit(
+            lambda values: function(jnp.concatenate([values[name].ravel() for name in self.start]))
         )
-        return outputs_function(solver, start)
 
 
-# Wrapper of a plain function with a Jacobian that JAX can differentiate, map and compile.
+# A robot under loads as primitives of JAX: outputs, their change along one, and the transpose.
 #
 # JAX calls back to compiled programs of the library, so that user code around it does not compile
-# the mechanics again.
-
-# Number of robots whose derivatives by their numbers are cached.
-_REMEMBERED = 16
+# the mechanics again. A call takes any number of rows, so that a map of JAX is one call.
 
 
 @dataclass(frozen=True, eq=False)
 class VectorSolver:
-    """Outputs and their Jacobian by compiled programs, for plain vectors of values.
+    """Outputs and their derivatives by compiled programs, for rows of plain values.
 
     Attributes:
-        model: The forward model.
         start: Present values of the parameters, by name.
         outputs: Names of the outputs.
-        numbers: Names of the parameters that are numbers of the robot.
         solve: Solves the path at named values; raises `InputError` for invalid values.
-        load: Returns the loads at named values.
+        refinement: More strain modes.
     """
 
-    model: ForwardModel
-    start: Mapping[str, Array]
+    start: Mapping[str, np.ndarray]
     outputs: tuple[str, ...]
-    numbers: tuple[str, ...]
     solve: Callable[[Mapping[str, Any]], EquilibriumPath]
-    load: Callable[[Mapping[str, Any]], LoadPath]
-
-    def values(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
-        """Return the outputs; raise `InputError` for values that no robot or load can have."""
-        path = self._path(flat)
-        values = {name: np.asarray(getattr(path, name)) for name in self.outputs}
-        for name, each in values.items():
-            if _is_float(path, name) and not path.converged.all():
-                values[name] = each.copy()
-                values[name][~path.converged] = np.nan
-        return values
-
-    def slopes(self, flat: Float[np.ndarray, " k"], output: str) -> np.ndarray:
-        """Return the derivatives of an output by every value, as last axis.
-
-        Tangents give those of all outputs at once, which are cached; the adjoint one by one.
-        """
-        path = self._path(flat)
-        kept = self._kept_slopes.setdefault(path, {})
-        if output in kept:
-            return kept[output]
-        if output == "residual":  # the remaining error of the solver does not depend on the values
-            return np.zeros((len(path), len(flat)))
-        names = (output,)
-        if not self.model.takes_adjoint(path, names, len(flat)):
-            names = tuple(name for name in self.outputs if _is_float(path, name))
-        changes = self._changes(path, self._named(flat))
-        by_change = self.model.derivatives(path, changes, names)
-        kept |= {name: np.moveaxis(one, 0, -1) for name, one in by_change.items()}
-        return kept[output]
-
-    def _named(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
-        return {name: flat[part].reshape(shape) for name, part, shape in self._parts}
+    refinement: int
 
     @cached_property
-    def _parts(self) -> list[tuple[str, slice, tuple[int, ...]]]:
-        """Name, slice of the vector and shape of every value."""
-        shapes = [np.shape(at) for at in self.start.values()]
-        ends = np.cumsum([0, *(math.prod(shape) for shape in shapes)]).tolist()
-        parts = [slice(*ends[number : number + 2]) for number in range(len(shapes))]
-        return list(zip(self.start, parts, shapes, strict=True))
+    def first(self) -> Float[np.ndarray, " n"]:
+        """The present values as a row."""
+        return np.concatenate([at.ravel() for at in self.start.values()])
 
-    def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
+    @cached_property
+    def forms(self) -> dict[str, tuple[slice, tuple[int, ...], str]]:
+        """Where every output is in a row of them, its shape, and its kind of numbers."""
+        values = self.table(self.first)
+        ends = np.cumsum([0, *(one.size for one in values.values())]).tolist()
+        parts = map(slice, ends, ends[1:])
+        return {
+            name: (part, one.shape, one.dtype.kind)
+            for part, (name, one) in zip(parts, values.items(), strict=True)
+        }
+
+    @cached_property
+    def size(self) -> int:
+        """Number of all outputs."""
+        return max(part.stop for part, _, _ in self.forms.values())
+
+    @cached_property
+    def _sloping(self) -> tuple[str, ...]:
+        return tuple(name for name in self.outputs if name in SLOPING)
+
+    @cached_property
+    def _rows(self) -> RobotRows:
+        return RobotRows(self._path(self.first), self.start, self.forms, self.refinement)
+
+    def table(self, at: Float[np.ndarray, " n"]) -> dict[str, np.ndarray]:
+        """Return the outputs; raise `InputError` for values that no robot or load can have."""
+        path = self._path(at)
+        values = {name: np.asarray(getattr(path, name)) for name in self.outputs}
+        for name in self._sloping if not path.converged.all() else ():
+            values[name] = values[name].copy()
+            values[name][~path.converged] = np.nan
+        return values
+
+    def values(self, at: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k m"]:
+        """Return the outputs of rows of values, as rows; NaN where values are refused."""
+
+        def single(at: np.ndarray) -> np.ndarray:
+            return np.hstack([one.ravel() for one in self.table(at).values()])[None]
+
+        return self._each(single, RobotRows.values, self.size, at)
+
+    def along(
+        self, at: Float[np.ndarray, "k n"], change: Float[np.ndarray, "j n"]
+    ) -> Float[np.ndarray, "j m"]:
+        """Return the changes of the outputs along changes of the values."""
+
+        def single(at: np.ndarray, change: np.ndarray) -> np.ndarray:
+            path = self._path(at)
+            slopes = np.zeros((len(change), self.size))
+            by = derivatives(path, changes(path, (*self.start,), change), self._sloping)
+            for name, values in by.items():
+                slopes[:, self.forms[name][0]] = values.reshape(len(change), -1)
+            return slopes
+
+        return self._each(single, RobotRows.along, self.size, at, change)
+
+    def back(
+        self, at: Float[np.ndarray, "k n"], weights: Float[np.ndarray, "j m"]
+    ) -> Float[np.ndarray, "j n"]:
+        """Return the derivatives of weighted sums of the outputs by the values."""
+
+        def single(at: np.ndarray, weights: np.ndarray) -> np.ndarray:
+            path = self._path(at)
+            gradients: list[np.ndarray] = []
+            for row in weights:
+                parts = {name: self.forms[name] for name in self._sloping}
+                named = {name: row[part].reshape(form) for name, (part, form, _) in parts.items()}
+                gradients.append(gradient_by(path, path_gradient(path, named), (*self.start,)))
+            return np.stack(gradients)
+
+        return self._each(single, RobotRows.back, len(self.first), at, weights)
+
+    def _each(
+        self,
+        single: Callable[..., np.ndarray],
+        several: Callable[..., tuple[np.ndarray, Bool[np.ndarray, " k"]]],
+        size: int,
+        at: np.ndarray,
+        *others: np.ndarray,
+    ) -> np.ndarray:
+        """Evaluate one row, with some directions, or rows, which are solved at once if possible."""
+
+        def safe(*arguments: np.ndarray) -> np.ndarray:
+            try:
+                return single(*arguments)
+            except InputError:
+                return np.full((len(arguments[-1]) if others else 1, size), np.nan)
+
+        if len(at) == 1:
+            return safe(at[0], *others)
+        results, solved = several(self._rows, at, *others)
+        for row in np.flatnonzero(~solved):
+            results[row] = safe(at[row], *(other[row : row + 1] for other in others))
+        return results
+
+    def _path(self, at: Float[np.ndarray, " n"]) -> EquilibriumPath:
         """Solve the path at some values; the last one is cached for its derivatives."""
-        if not np.isfinite(flat).all():  # a tension that is not a number would mean a slack tendon
+        if not np.isfinite(at).all():  # a tension that is not a number would mean a slack tendon
             raise InputError.NOT_FINITE("values must be finite numbers")
-        key = flat.tobytes()
+        key = at.tobytes()
         if key not in self._last:
-            path = self.solve(self._named(flat))
+            ends = np.cumsum([one.size for one in self.start.values()])[:-1]
+            pairs = zip(self.start.items(), np.split(at, ends), strict=True)
+            path = self.solve({name: part.reshape(one.shape) for (name, one), part in pairs})
             self._last.clear()
             self._last[key] = path
         return self._last[key]
@@ -378,147 +420,105 @@ class VectorSolver:
     def _last(self) -> dict[bytes, EquilibriumPath]:
         return {}
 
-    @cached_property
-    def _kept_slopes(self) -> WeakKeyDictionary[EquilibriumPath, dict[str, np.ndarray]]:
-        return WeakKeyDictionary()
 
-    @cached_property
-    def _kept(self) -> dict[Any, dict[str, Change]]:
-        return {}
-
-    def _changes(self, path: EquilibriumPath, values: Mapping[str, np.ndarray]) -> Iterator[Change]:
-        """Compute the change of loads and chain per unit of every value."""
-        # One program for all: with a change of the chain where any value changes it.
-        still = np.zeros(self.model.ready.long.chain_layout.size) if self.numbers else None
-        by_number = self._by_numbers(path, values)
-        for name, value in values.items():
-            if name in by_number:
-                yield by_number[name]
-                continue
-            for index in np.ndindex(value.shape):
-                varied = np.array(value)
-                varied[index] += 1.0  # loads are linear in tension, stroke, tip force and moment
-                more = self.load({**values, name: varied})
-                yield Change(self.model.load_change(path, more), still)
-
-    def _by_numbers(
-        self, path: EquilibriumPath, values: Mapping[str, np.ndarray]
-    ) -> Mapping[str, Change]:
-        """Compute the changes by numbers of the robot, cached for the next tensions and strokes."""
-        numbers = [float(values[one]) for one in self.numbers]
-        key = (*numbers, *(values[one].tobytes() for one in values if one in TIP))
-        if key not in self._kept:
-            if len(self._kept) >= _REMEMBERED:
-                del self._kept[next(iter(self._kept))]
-            changes = self.model.changes(path.robot, path.load, self.numbers)
-            self._kept[key] = dict(zip(self.numbers, changes, strict=True))
-        return self._kept[key]
-
-
-def _is_float(path: EquilibriumPath, name: str) -> bool:
-    return name != "residual" and np.asarray(getattr(path, name)).dtype.kind == "f"
-
-
-def outputs_function(
-    solver: VectorSolver, start: Float[np.ndarray, " k"]
-) -> Callable[[Array], OutputTable]:
+def outputs_function(solver: VectorSolver) -> Callable[[Array], OutputTable]:
     """Wrap a solver as a function of JAX.
 
     Invalid values give NaN for numbers and false for flags, as a program of JAX cannot raise.
 
     Args:
-        solver: Gives outputs and Jacobians.
-        start: Valid values, whose outputs define the shapes.
+        solver: Gives outputs and derivatives.
 
     Returns:
-        A function of a vector of values, differentiable once, forward and reverse.
+        A function of a vector of values that JAX traces, differentiable once, forward and reverse.
     """
-    shapes = {
-        name: jax.ShapeDtypeStruct(value.shape, value.dtype)
-        for name, value in solver.values(start).items()
-    }
-    floats = {name: shape for name, shape in shapes.items() if shape.dtype.kind == "f"}
-    others = {name: shape for name, shape in shapes.items() if name not in floats}
-    values_of_others = _callback(solver.values, others)
-    values_of_floats = _differentiable_once(solver, start, floats)
 
     def function(at: Array) -> OutputTable:
-        if not isinstance(at, Tracer):
-            values = solver.values(np.asarray(at))
-            return OutputTable({name: jnp.asarray(value) for name, value in values.items()})
-        outputs = dict(values_of_floats(at)) if floats else {}
-        if others:
-            outputs |= values_of_others(jax.lax.stop_gradient(at))
-        return OutputTable({name: outputs[name] for name in shapes})
+        flat = _VALUES.bind(at, solver=solver)
+        table = OutputTable()
+        for name, (part, shape, kind) in solver.forms.items():
+            values = flat[part].reshape(shape)
+            table[name] = values if kind == "f" else as_kind(jnp.nan_to_num(values), kind)
+        return table
 
     return function
 
 
-def _differentiable_once(
-    solver: VectorSolver, start: np.ndarray, shapes: dict[str, Any]
-) -> Callable[[Array], dict[str, Array]]:
-    """Return the outputs of some shapes as a function with a first derivative."""
-    names = tuple(shapes)
-    slope_shapes = {
-        name: jax.ShapeDtypeStruct((*shape.shape, len(start)), shape.dtype)
-        for name, shape in shapes.items()
-    }
-    values_of = _callback(solver.values, shapes)
-    # One for each, so that JAX omits those of outputs that are not differentiated.
-    slopes_of = {
-        name: _callback(lambda at, name=name: {name: solver.slopes(at, name)}, {name: shape})
-        for name, shape in slope_shapes.items()
-    }
-    compiled: list[bool] = []
+def _primitive(name: str, method: Callable[..., np.ndarray], size: Callable[..., int]) -> Primitive:
+    """Make a primitive of rows of values and, for each, of a vector; see `VectorSolver`."""
+    primitive = Primitive(f"notchflex_{name}")
 
-    @jax.custom_jvp
-    def slopes(at: Array) -> dict[str, Array]:
-        return {name: slopes_of[name](at)[name] for name in names}
+    def evaluate(solver: VectorSolver, *arrays: Any) -> np.ndarray:
+        plain = [np.asarray(one) for one in arrays]
+        shape = np.broadcast_shapes(*(one.shape[:-1] for one in plain))
+        if plain[0].size > plain[0].shape[-1]:
+            plain[0] = np.broadcast_to(plain[0], (*shape, plain[0].shape[-1]))
+        rows = [one.reshape(-1, one.shape[-1]) for one in plain]
+        return method(solver, *rows).reshape(*shape, size(solver))
 
-    @slopes.defjvp
-    def _(primals: Any, tangents: Any) -> Any:
-        raise InputError.UNSUPPORTED(
-            "a robot under loads can be differentiated once, not twice: take differences of its "
-            "gradients, or minimise by a method that needs first derivatives only"
-        )
+    def form(*arrays: Any, solver: VectorSolver) -> Any:
+        shape = np.broadcast_shapes(*(one.shape[:-1] for one in arrays))
+        return ShapedArray((*shape, size(solver)), np.dtype(float))
 
-    @jax.custom_jvp
-    def values(at: Array) -> dict[str, Array]:
-        return values_of(at)
-
-    @values.defjvp
-    def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Any, Any]:
-        (at,), (change,) = primals, tangents
+    def lowered(*arrays: Array, solver: VectorSolver) -> Array:
         # Compiled now: within a program of JAX nothing may be traced.
-        if not compiled:
-            for name in names:
-                solver.slopes(start, name)
-            compiled.append(True)
-        by = slopes(at)
-        return values(at), {name: by[name] @ change for name in names}
+        rows = np.tile(solver.first, (min(prod(arrays[0].shape[:-1]), 2), 1))
+        evaluate(solver, rows, *(np.ones((len(rows), one.shape[-1])) for one in arrays[1:]))
+        shape = jax.ShapeDtypeStruct(form(*arrays, solver=solver).shape, float)
+        return jax.pure_callback(partial(evaluate, solver), shape, *arrays)
 
-    return values
+    def mapped(arrays: Any, axes: Any, *, solver: VectorSolver) -> tuple[Array, int]:
+        moved = [
+            jnp.expand_dims(one, 0) if axis is batching.not_mapped else jnp.moveaxis(one, axis, 0)
+            for one, axis in zip(arrays, axes, strict=True)
+        ]
+        count = max(len(one) for one in moved)
+        # Vectors have all leading axes, so that the transpose has the same.
+        vectors = [jnp.broadcast_to(one, (count, *one.shape[1:])) for one in moved[1:]]
+        return primitive.bind(moved[0], *vectors, solver=solver), 0
+
+    primitive.def_impl(lambda *arrays, solver: jnp.asarray(evaluate(solver, *arrays)))
+    primitive.def_abstract_eval(form)
+    mlir.register_lowering(primitive, mlir.lower_fun(lowered, multiple_results=False))
+    batching.primitive_batchers[primitive] = mapped
+    return primitive
 
 
-def _callback(
-    function: Callable[[np.ndarray], Any], shapes: dict[str, Any]
-) -> Callable[[Array], dict[str, Array]]:
-    """Return a plain function as one that JAX can trace; NaN or 0 where it refuses its values."""
+_VALUES = _primitive("values", VectorSolver.values, lambda solver: solver.size)
+_ALONG = _primitive("along", VectorSolver.along, lambda solver: solver.size)
+_BACK = _primitive("back", VectorSolver.back, lambda solver: len(solver.first))
 
-    def safe(at: Any) -> dict[str, np.ndarray]:
-        try:
-            values = function(np.asarray(at))
-            return {name: np.asarray(values[name], one.dtype) for name, one in shapes.items()}
-        except InputError:
-            return {
-                name: np.full(one.shape, np.nan if one.dtype.kind == "f" else 0, one.dtype)
-                for name, one in shapes.items()
-            }
 
-    # Compiled once: a callback on its own is compiled at every call.
-    compiled = jax.jit(lambda at: jax.pure_callback(safe, shapes, at, vmap_method="sequential"))
+def _values_along(primals: Any, tangents: Any, *, solver: VectorSolver) -> tuple[Array, Any]:
+    (at,), (change,) = primals, tangents
+    values = _VALUES.bind(at, solver=solver)
+    if type(change) is ad.Zero:
+        return values, jnp.zeros_like(values)
+    return values, _ALONG.bind(at, change, solver=solver)
 
-    def call(at: Array) -> dict[str, Array]:
-        return compiled(at) if isinstance(at, Tracer) else jax.tree.map(jnp.asarray, safe(at))
 
-    return call
+def _linear(primitive: Primitive, transpose: Primitive) -> None:
+    """Tell JAX that a primitive is linear in its vector, and what its transpose is."""
+
+    def moved(primals: Any, tangents: Any, *, solver: VectorSolver) -> tuple[Array, Array]:
+        (at, vector), (change, by_vector) = primals, tangents
+        if type(change) is not ad.Zero:
+            raise InputError.UNSUPPORTED(
+                "a robot under loads can be differentiated once, not twice: take differences of "
+                "its gradients, or minimise by a method that needs first derivatives only"
+            )
+        values = primitive.bind(at, vector, solver=solver)
+        return values, primitive.bind(at, by_vector, solver=solver)
+
+    def back(cotangent: Any, at: Array, vector: Any, *, solver: VectorSolver) -> tuple[Any, Any]:
+        if type(cotangent) is ad.Zero:
+            return None, ad.Zero(vector.aval)
+        return None, transpose.bind(at, cotangent, solver=solver)
+
+    ad.primitive_jvps[primitive] = moved
+    ad.primitive_transposes[primitive] = back
+
+
+ad.primitive_jvps[_VALUES] = _values_along
+_linear(_ALONG, _BACK)
+_linear(_BACK, _ALONG)

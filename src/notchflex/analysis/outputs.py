@@ -32,6 +32,10 @@ WORKS = {name: one.work_of for name, one in REGISTERED.items() if one.work_of}
 """What can be asked of a batch besides: works, with what they are integrated of."""
 
 
+STEPS = ("states", "between", "how")
+"""What derivatives take of every step of a row; see `PathTangents.steps`."""
+
+
 class UnknownOutputError(InputError, KeyError):
     """No output of this name was asked for."""
 
@@ -154,6 +158,11 @@ def follow_row(
             "iterations": result.iterations,
             "converged": reached & believable(quantity),
         }
+        if STEPS[0] in outputs:
+            known = reached & believable(quantity)
+            how = [result.fraction_before, result.substeps, known, True]
+            packed = [PytreeLayout.of(one).pack(one) for one in (solved, result.between)]
+            values |= dict(zip(STEPS, [*packed, jnp.array(how, float)], strict=True))
         return (solved, reached), {name: values[name] for name in outputs}
 
     return jax.lax.scan(step, (at_rest(robot), jnp.array(True)), loads)[1]

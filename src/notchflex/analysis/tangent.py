@@ -15,7 +15,7 @@ slip, as after a step that changed nothing. A notch at the switch is closed with
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
@@ -35,6 +35,7 @@ from notchflex.solver.programs.static_structure import (
     StaticStructure,
     lane_sizes,
     pad_rows,
+    padded_indices,
 )
 from notchflex.solver.quantities import unpad_quantity
 from notchflex.solver.residual import SolverState, slip_mask
@@ -64,26 +65,22 @@ class Change:
     """Change of what a path is computed from, per unit of a number.
 
     Attributes:
-        loads: Of the loads, packed for the long chain, steps as leading axis; None for none.
-        chain: Of the long chain, packed whole; None for none.
+        loads: Of the loads, packed, steps as leading axis; None for none.
+        chain: Of the chain, packed whole; None for none.
     """
 
     loads: Float[np.ndarray, "s command"] | None
     chain: Float[np.ndarray, " chain"] | None
 
-    def entries(
-        self, structure: StaticStructure
-    ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
-        """Return where the chain changes, as packed for programs, and by how much."""
-        if structure not in self._entries:
-            chain = np.zeros(0) if self.chain is None else self.chain
-            indices = np.flatnonzero(chain)
-            self._entries[structure] = structure.indices_of(indices), chain[indices]
-        return self._entries[structure]
-
-    @cached_property
-    def _entries(self) -> dict[StaticStructure, tuple[np.ndarray, np.ndarray]]:
-        return {}
+    def plus(self, other: Change, size: float = 1.0) -> Change:
+        """Add a multiple of another change."""
+        pairs = (self.loads, other.loads), (self.chain, other.chain)
+        return Change(
+            *(
+                own if more is None else size * more + (0.0 if own is None else own)
+                for own, more in pairs
+            )
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,27 +98,41 @@ class PathTangents:
     outputs: tuple[str, ...]
     remembers: bool = True
 
-    def along(self, direction: Change) -> dict[str, np.ndarray]:
-        """Differentiate along one direction.
+    def along(self, directions: Sequence[Change]) -> list[dict[str, np.ndarray]]:
+        """Differentiate along some directions, by one program.
 
         Returns:
-            Change of every output by name, in the world, steps as leading axis. NaN from a step on
-            that did not converge, or was so hard that its derivatives are not known.
+            For each the change of every output by name, in the world, steps as leading axis. NaN
+            from a step on that did not converge, or was so hard that its derivatives are not known.
         """
-        loads, chain = direction.loads, direction.chain
-        long = self.path.prepared.long
-        layouts = self.layouts._replace(chain_varies=chain is not None)
-        change = np.zeros(1) if chain is None else layouts.chain.pack(chain)
-        constant = (np.zeros(long.state.size), long.dynamic_vector, change)
-        load_change = np.zeros_like(self.loads) if loads is None else loads
-        steps = (*self.steps, self.loads, load_change)
-        by_row = (*(False,) * len(constant), *(True,) * len(steps))
-        changes = _tangent.along(by_row, *constant, *steps, layouts)
+        ready = self.path.prepared
+        varies = any(one.chain is not None for one in directions)
+        layouts = self.layouts._replace(chain_varies=varies)
+        start = np.zeros(ready.long.state.size)
+        by_row = (*(False,) * 3, *(True,) * (len(self.steps) + 2))
         turn = self.path.load.base_to_world
-        for name, values in changes.items():
-            values = unpad_quantity(self.path.chain, name, values)
-            changes[name] = REGISTERED[name].turned(values, turn)
-        return changes
+        every: list[dict[str, np.ndarray]] = []
+        for one in directions:
+            change = np.zeros(layouts.chain.size if varies else 1)
+            if one.chain is not None:
+                change = np.append(0.0, one.chain)[ready.own_numbers]
+            load_change = np.zeros_like(self.loads)
+            if one.loads is not None:
+                load_change[:, self.own_loads] = one.loads
+            vectors = (start, ready.long.dynamic_vector, change, *self.steps, self.loads)
+            by_name = tangent_step.along(by_row, *vectors, load_change, layouts)
+            for name, values in by_name.items():
+                own = unpad_quantity(self.path.chain, name, values)
+                by_name[name] = REGISTERED[name].turned(own, turn)
+            every.append(by_name)
+        return every
+
+    @property
+    def own_loads(self) -> Int[np.ndarray, " command"]:
+        """Where the numbers of a load are among those of a load for the long chain."""
+        ready, commands = self.path.prepared, self.path.commands
+        own, long = ready.command_layout(commands), ready.long.command_layout(commands)
+        return padded_indices(own, long)
 
     @cached_property
     def layouts(self) -> StepLayouts:
@@ -192,7 +203,7 @@ def lanes_of(layouts: StepLayouts) -> tuple[int, int]:
 
 
 @native(9, lanes_of)
-def _tangent(
+def tangent_step(
     last_change: Float[Array, " state"],
     chain: Float[Array, " chain"],
     chain_change: Float[Array, " chain"],
@@ -225,25 +236,22 @@ class Gradient:
     """Derivatives of a number by all that a path is computed from.
 
     Attributes:
-        loads: By the loads, packed for the long chain, steps as leading axis.
-        chain: By the long chain, packed for programs.
-        structure: How it is packed.
+        loads: By the loads, packed, steps as leading axis.
+        chain: By the chain, packed whole.
     """
 
     loads: Float[np.ndarray, "s command"]
-    chain: Float[np.ndarray, " unknown"]
-    structure: StaticStructure
+    chain: Float[np.ndarray, " chain"]
 
     def along(self, change: Change) -> float:
         """Return the derivative of the number along a change."""
-        indices, sizes = change.entries(self.structure)
-        by_chain = float(self.chain[indices] @ sizes)
+        by_chain = 0.0 if change.chain is None else float(self.chain @ change.chain)
         if change.loads is None:
             return by_chain
         return by_chain + float(self.loads.ravel() @ change.loads.ravel())
 
 
-def gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradient:
+def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradient:
     """Differentiate a weighted sum of quantities by all loads and by all numbers of the chain.
 
     Args:
@@ -264,10 +272,13 @@ def gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradie
     steps = [one[backwards] for one in (*tangents.steps, tangents.loads, seeds)]
     by_row = (False, False, *(True,) * len(steps))
     start = (np.zeros(long.state.size), long.dynamic_vector)
-    result = _adjoint.along(by_row, *start, *steps, layouts)
+    result = adjoint_step.along(by_row, *start, *steps, layouts)
     loads = np.zeros_like(tangents.loads)
     loads[backwards] = result["load"]
-    return Gradient(loads, result["chain"].sum(axis=0), layouts.chain)
+    loads = loads[:, tangents.own_loads]
+    by_chain, own = result["chain"].sum(axis=0), path.prepared.own_numbers
+    size = path.prepared.chain_layout.size + 1
+    return Gradient(loads, np.bincount(own, by_chain, size)[1:])
 
 
 def _packed(
@@ -284,7 +295,7 @@ def _packed(
 
 
 @native(8, lanes_of)
-def _adjoint(
+def adjoint_step(
     seed: Float[Array, " state"],
     chain: Float[Array, " chain"],
     before: Float[Array, " state"],

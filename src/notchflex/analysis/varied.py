@@ -12,13 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from notchflex._jax import jax
 from notchflex.analysis.solve import level_of
 from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.command import FOLLOWING, LOADED, SIDEWAYS
 from notchflex.mechanics.chain import Chain
 from notchflex.robot import Robot
-from notchflex.robot.numbers import PartsForm, Place, apart, parts_of, places_of
+from notchflex.robot.numbers import PartsForm, Place, parts_of, places_by_name
 from notchflex.robot.value_names import parse_path
 from notchflex.solver.programs.assembled import AssembledRobots
 from notchflex.solver.programs.prepare import PreparedChain, prepare
@@ -79,13 +78,12 @@ class VariedRobots:
 
     def forms(self, numbers: Int[np.ndarray, " k"]) -> Iterator[RobotForm]:
         """Yield some of the robots by the forms of their parts."""
-        # Values of all notches come before those of one, as in a robot file.
-        names = sorted(self.values, key=lambda name: parse_path(name).number is not None)
         forms = dict[PartsForm, RobotForm]()
         for number in np.unique(self.which[numbers]).tolist():
-            robot = apart(self.robots[number], names)
-            columns = [(place, name) for name in names for place in places_of(robot, name)]
-            form = PartsForm.of(parts_of(robot), [place for place, _ in columns])
+            robot, places = places_by_name(self.robots[number], [*self.values])
+            pairs = zip(self.values, places, strict=True)
+            columns = {place: name for name, own in pairs for place in own}
+            form = PartsForm.of(parts_of(robot), columns)
             of_form = forms.setdefault(form, RobotForm(self, numbers, form, {}, columns))
             of_form.bases[number] = robot
         for of_form in forms.values():
@@ -175,18 +173,21 @@ class Chains:
         structure: Layout of all.
         packed: Returns the chains of some robots by their numbers (one where all have the same),
             and which are right.
+        programs: What makes the chains from numbers of the robots; None where nothing does.
+        form: The form of those robots.
     """
 
     ready: PreparedChain
     structure: StaticStructure
     packed: Callable[[Int[np.ndarray, " k"]], tuple[np.ndarray, Bool[np.ndarray, " k"]]]
+    programs: AssembledRobots | None = None
+    form: RobotForm | None = None
 
     def bodies(self, chains: Float[np.ndarray, "k chain"]) -> Chain:
         """Return the chain with the masses and lengths of the bodies of every robot, for loads."""
         if chains.ndim == 1 or not self.ready.chain.loaded:
             return self.ready.chain
-        form = self.structure.form
-        indices: Chain = jax.tree.unflatten(form.structure, form.indices)
+        indices: Chain = self.structure.form.unpack_indices()
         names = ("body_length", "body_mass", "body_centre")
         values: dict[str, Any] = {
             name: chains[:, self.structure.indices_of(getattr(indices, name))] for name in names
@@ -216,49 +217,58 @@ class RobotForm(NamedTuple):
         members: Numbers of those of this form.
         form: The form.
         bases: What they are made of, by numbers; notches that have a name stand alone.
-        columns: Places of the numbers that vary, with their names.
+        columns: Names of the numbers that vary, by their places.
     """
 
     robots: VariedRobots
     members: Int[np.ndarray, " k"]
     form: PartsForm
     bases: dict[int, Robot]
-    columns: list[tuple[Place, str]]
+    columns: dict[Place, str]
 
     @property
     def example(self) -> Robot:
         """One of these robots."""
         return next(iter(self.bases.values()))
 
-    def chains(self, kind: int, refinement: int, count: int) -> Chains | None:
-        """Return the chains for a kind of loads; None where each is assembled by itself.
+    @property
+    def units(self) -> Bool[np.ndarray, "names numbers"]:
+        """Which numbers of a robot each value by name is."""
+        names = np.array([self.columns.get(place, "") for place in self.form.places])
+        return np.array([*self.robots.values])[:, None] == names
+
+    def table(self, numbers: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k numbers"]:
+        """Return the numbers of some robots, as `PartsForm.numbers_of` does."""
+        bases = np.zeros((len(self.robots.robots), len(self.form.places)))
+        own = [self.form.numbers_of(parts_of(one)) for one in self.bases.values()]
+        bases[list(self.bases)] = own
+        rows = bases[self.robots.which[numbers]]
+        for place, name in self.columns.items():
+            rows[:, self.form.places.index(place)] = self.robots.values[name][numbers]
+        return rows
+
+    def chains(self, kind: int, refinement: int) -> Chains | None:
+        """Return the chains for a kind of loads; None where no program makes them.
 
         Args:
             kind: Bits of `loads.command.acting`.
             refinement: More strain modes.
-            count: How many robots there are.
         """
-        form, places = self.form, tuple(place for place, _ in self.columns)
         # A direction, or no finite number, is no number of a form.
-        if count <= FEW or not set(places) <= set(form.places):
+        if not set(self.columns) <= set(self.form.places):
             return None
-        programs, ready = _programs(self.example, places, kind, refinement)
+        programs, ready = _programs(self.example, (*self.columns,), kind, refinement)
         if programs is None or programs.joined.structure.form is not ready.chain_layout:
             return None
-        table = np.zeros((len(self.robots.robots), len(form.places)))
-        table[list(self.bases)] = [form.numbers_of(parts_of(one)) for one in self.bases.values()]
 
         def packed(numbers: Int[np.ndarray, " k"]) -> tuple[np.ndarray, Bool[np.ndarray, " k"]]:
             distinct, inverse = np.unique(numbers, return_inverse=True)
-            rows = table[self.robots.which[distinct]]
-            for place, name in self.columns:
-                rows[:, form.places.index(place)] = self.robots.values[name][distinct]
-            chains, alike = programs.chains(rows)
+            chains, alike = programs.chains(self.table(distinct))
             if np.array_equal(distinct, numbers):  # a copy would take time
                 return chains, alike
             return chains[inverse], alike[inverse]
 
-        return Chains(ready, programs.joined.structure, packed)
+        return Chains(ready, programs.joined.structure, packed, programs, self)
 
 
 def prepare_kind(robot: Robot, kind: int, refinement: int) -> PreparedChain:

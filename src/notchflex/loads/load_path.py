@@ -208,18 +208,27 @@ class LoadPath(ByValue, Displayed):
         return np.nan_to_num(commanded)
 
     def commanding(self, values: Mapping[str, Any]) -> LoadPath:
-        """Return the path with other tensions (N) or strokes (mm) where it commands them.
+        """Return the path with other numbers of its loads.
 
         Args:
-            values: Numbers by name, of which only those of `TENDONS` count.
+            values: Numbers of every step by name, of which only those of `TENDONS`, where the path
+                commands them, and of `TIP` count.
 
         Raises:
             InputError: A negative tension, or a number that is not finite.
         """
-        tables = {name: np.asarray(values[name]) for name in TENDONS if name in values}
-        for name, table in tables.items():
-            tables[name] = np.where(np.isnan(getattr(self, name)), np.nan, table)
-        return replace(self, **tables) if tables else self
+        tables = {name: np.asarray(one) for name, one in values.items() if name in (*TENDONS, *TIP)}
+        changed: dict[str, Any] = {
+            name: np.where(np.isnan(getattr(self, name)), np.nan, table)
+            for name, table in tables.items()
+            if name in TENDONS
+        }
+        if tip := {name: table.tolist() for name, table in tables.items() if name in TIP}:
+            changed["external"] = tuple(
+                replace(one, **{name: tuple(each[step]) for name, each in tip.items()})
+                for step, one in enumerate(self.external)
+            )
+        return replace(self, **changed) if changed else self
 
     def release(self) -> LoadPath:
         """Return the path there and back, the peak twice.

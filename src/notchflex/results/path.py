@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from notchflex._plot import Picture
+    from notchflex.analysis.slopes import PathGradient
 
 
 # A run read back from a file: its numbers are reported without solving.
@@ -443,6 +444,69 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
     def state(self) -> State:
         """State after the last converged step."""
         return self.state_at(-1)
+
+    def jacobian(
+        self,
+        names: str | Sequence[str],
+        outputs: str | Sequence[str] = ("total_angle", "tip_position"),
+    ) -> dict[str, np.ndarray]:
+        """Differentiate quantities by numbers of the robot and by loads.
+
+        Slopes go through the memory of the contacts. Where a contact changes between sticking and
+        sliding, lips meet or the material's law has a kink, they are those of one side
+        (`Differentiable.kinks` lists these). They are NaN from a step on that did not converge, and
+        with friction from one that was solved in three parts or more.
+
+        Args:
+            names: Numbers of the robot file (as for `Robot.with_value`, in the units of the file)
+                and loads: "tension" (N), "stroke" (mm), "tip_force" (N) and "tip_moment" (N mm).
+            outputs: Names of quantities that are numbers.
+
+        Returns:
+            By name of the quantity, in the world: its slopes, steps as leading axis and a column of
+            the last axis for each number. A load has one column for each of its numbers, all
+            tendons or axes of the first step, then those of the second.
+
+        Raises:
+            InputError: There is no such number or quantity, or the path was read from a file.
+
+        Example:
+            >>> from notchflex import load_robot, pull, simulate
+            >>> path = simulate(load_robot("pacheco2021-a"), pull(1.0, 1.0, steps=1))
+            >>> path.jacobian(["notch.depth", "tension"])["total_angle"].round(2).tolist()
+            [[13.3, 1.52]]
+        """
+        from notchflex.analysis.slopes import jacobian
+
+        return jacobian(self, names, outputs)
+
+    def gradient(self, weights: Mapping[str, Any]) -> PathGradient:
+        """Differentiate a weighted sum of quantities by everything that the path depends on.
+
+        It runs once backwards over the path, whatever the number of names asked for afterwards.
+
+        Args:
+            weights: By name of a quantity the weight of each of its numbers, in the shape of the
+                quantity or one that broadcasts to it.
+
+        Returns:
+            The derivatives: `[name]` is that by a number of the robot or by a load, `by(names)`
+            those by several; names as for `jacobian`.
+
+        Raises:
+            InputError: There is no such quantity, weights have another shape, or the path was read
+                from a file.
+
+        Example:
+            >>> from notchflex import load_robot, pull, simulate
+            >>> path = simulate(load_robot("pacheco2021-a"), pull(1.0, 1.0, steps=1))
+            >>> gradient = path.gradient({"total_angle": 1.0})
+            >>> f"{gradient['notch.depth']:.2f} rad/mm, {gradient['tension'][0, 0]:.3f} rad/N"
+            '13.30 rad/mm, 1.520 rad/N'
+        """
+        from notchflex.analysis.slopes import gradient
+
+        return gradient(self, weights)
 
     def to_xarray(self) -> Dataset:
         """Return the whole path as a labelled data set: every quantity, with its name and unit.

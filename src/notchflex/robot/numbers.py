@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -84,11 +85,31 @@ def robot_of(parts: Sequence[Any]) -> Robot:
     return robot
 
 
-def places_of(robot: Robot, name: str) -> list[Place]:
-    """Return where the values of a name stand among the parts of a robot."""
-    target = parse_path(name)
-    parts = enumerate(_parts_of_arrays(robot))
-    return [(number, target.key) for number, named in parts if named.is_meant(target)]
+def places_by_name(robot: Robot, names: Sequence[str]) -> tuple[Robot, list[list[Place]]]:
+    """Return where values stand among the parts of a robot, by their names.
+
+    Args:
+        robot: The robot.
+        names: Such as `notch[2].depth`; a number of one notch is not that of all.
+
+    Returns:
+        The robot, with notches of their own where a name is of one, and the places in it.
+    """
+    targets = [parse_path(name) for name in names]
+    single = any(one.section == "notch" and one.number is not None for one in targets)
+    if single and len(robot.notch) < robot.number_of_notches:
+        robot = robot.replace(notch=robot.notches)
+    parts = list(enumerate(_parts_of_arrays(robot)))
+    places = [
+        [(number, target.key) for number, named in parts if named.is_meant(target)]
+        for target in targets
+    ]
+    of_one = [target.number is not None for target in targets]
+    taken = {place for own in itertools.compress(places, of_one) for place in own}
+    return robot, [
+        [place for place in own if alone or place not in taken]
+        for own, alone in zip(places, of_one, strict=True)
+    ]
 
 
 def differing(parts: Sequence[Any], others: Sequence[Any]) -> list[Place] | None:
@@ -100,11 +121,3 @@ def differing(parts: Sequence[Any], others: Sequence[Any]) -> list[Place] | None
         keys = (field.name for field in dataclasses.fields(part))
         places += [(number, key) for key in keys if getattr(part, key) != getattr(other, key)]
     return places if set(places) <= set(PartsForm.of(parts, places).places) else None
-
-
-def apart(robot: Robot, names: Iterable[str]) -> Robot:
-    """Return the robot with notches of their own if any name is of one, as `notch[2].depth` is."""
-    targets = map(parse_path, names)
-    single = any(target.section == "notch" and target.number for target in targets)
-    is_repeated = len(robot.notch) < robot.number_of_notches
-    return robot.replace(notch=robot.notches) if single and is_repeated else robot

@@ -164,16 +164,15 @@ def _slopes_along(
 ) -> tuple[Float[np.ndarray, "s s t outputs"], Float[np.ndarray, "s s d outputs"]]:
     """Change of each reading by the command of each tendon, and by the force, of each before."""
     tangents = PathTangents(path, model.outputs)
-    shape = tangents.loads.shape
     results = []
     for changes in (model.drive_changes(path), model.force_changes(path)):
         slopes = []
         for step in range(len(path)):
             row = []
             for change in changes:
-                load = np.zeros(shape)
+                load = np.zeros((len(path), len(change)))
                 load[step] = change
-                along = tangents.along(Change(load, None))
+                along = tangents.along([Change(load, None)])[0]
                 parts = [along[name].reshape(len(path), -1) for name in model.outputs]
                 row.append(np.concatenate(parts, axis=1))
             slopes.append(np.stack(row, axis=1))

@@ -246,8 +246,8 @@ class SensingModel:
         every = self.drive_changes(path) if of_drives else self.force_changes(path)
         tangents = PathTangents(path, self.outputs, remembers=False)
         columns = []
-        for change in every:
-            along = tangents.along(Change(np.broadcast_to(change, tangents.loads.shape), None))
+        directions = [Change(np.tile(change, (len(path), 1)), None) for change in every]
+        for along in tangents.along(directions):
             parts = [along[name].reshape(len(path), -1) for name in self.outputs]
             columns.append(np.concatenate(parts, axis=1))
         return np.stack(columns, axis=-1)
@@ -286,7 +286,7 @@ class SensingModel:
 
     def force_changes(self, path: EquilibriumPath) -> list[Float[np.ndarray, " command"]]:
         """Change of a packed load by a unit of each component; loads are linear in them."""
-        load, ready = path.load, path.prepared
+        load = path.load
         kind = tuple(np.isnan(load.stroke[0]).tolist())
         if kind not in self._changes:
             forces = np.concatenate([np.zeros((1, self.size)), np.eye(self.size)])
@@ -295,7 +295,7 @@ class SensingModel:
                 np.tile(one[:1], (len(forces), 1)) for one in (load.tension, load.stroke)
             )
             probe = LoadPath.of_valid(tension, stroke, load.base_rotation, external)
-            packed, _ = ready.padded_commands(make_commands(probe, self.robot, ready.chain))
+            packed = make_commands(probe, self.robot, path.chain).packed()
             self._changes[kind] = list(packed[1:] - packed[0])
         return self._changes[kind]
 
@@ -305,8 +305,8 @@ class SensingModel:
 
     def drive_changes(self, path: EquilibriumPath) -> list[Float[np.ndarray, " command"]]:
         """Change of a packed load by a unit of what drives each tendon."""
-        packed, form = path.prepared.padded_commands(path.commands)
-        none = form.unpack(np.zeros(packed.shape[1]))
+        form = path.prepared.command_layout(path.commands)
+        none = form.unpack(np.zeros(form.size))
         units = np.eye(path.chain.tendons)
         return [np.asarray(form.pack(none._replace(target=constant(row)))) for row in units]
 

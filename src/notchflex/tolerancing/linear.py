@@ -10,9 +10,6 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.analysis.draws import ToleranceSource, deviation, moments
-from notchflex.analysis.forward_model import ForwardModel
-from notchflex.analysis.tangent import PathTangents
-from notchflex.solver.newton import DEFAULT
 from notchflex.support import Tolerance
 from notchflex.tolerancing.study import Study
 
@@ -72,17 +69,13 @@ def linear_effects(study: Study) -> LinearEffects:
     names = list(dict.fromkeys(name for one in study.sources for name in one.nominal))
     slopes = np.empty((len(study.criteria), len(names)))
     for load, path in study.loads.items():
-        model = ForwardModel(study.exact, path, study.settings or DEFAULT, study.refinement)
-        solved = model.solve(study.exact, path)
-        changes = model.changes(study.exact, path, names)
         own = [index for index, one in enumerate(study.criteria) if one.load == load]
         outputs = tuple(dict.fromkeys(study.criteria[index].quantity.name for index in own))
-        tangents = PathTangents(solved, outputs)
-        columns = [tangents.along(change) for change in changes]
-        effects = {name: np.stack([one[name] for one in columns]) for name in outputs}
+        effects = study.paths[load][: len(path)].jacobian(names, outputs)
         for index in own:
             criterion = study.criteria[index]
-            slopes[index] = criterion.of(effects[criterion.quantity.name])
+            by_name = np.moveaxis(effects[criterion.quantity.name], -1, 0)
+            slopes[index] = criterion.of(by_name)
     columns_of = {name: index for index, name in enumerate(names)}
     own_slopes = [slopes[:, [columns_of[name] for name in one.nominal]] for one in study.sources]
     shift, spread, one_end, other = (

@@ -12,12 +12,12 @@ from jaxtyping import Float
 
 from notchflex import Closing, EquilibriumPath, InputError, LoadPath, Robot, closing
 from notchflex.analysis.forward_model import ForwardModel, slope
+from notchflex.analysis.slopes import change_along, changes, derivatives, load_change
 from notchflex.analysis.tangent import Change
 from notchflex.designing.model.quantities import (
     OF_ROBOTS,
     Bodies,
     Reading,
-    closing_slopes,
     distances,
     edge_unit,
     offsets,
@@ -27,7 +27,6 @@ from notchflex.designing.model.variables import (
     PROBE,
     Deviation,
     Direction,
-    LoadNumber,
     Probe,
     StatePaths,
     Variables,
@@ -88,7 +87,7 @@ class Point:
             return Reading(table.tension, None)
 
         def slopes() -> np.ndarray:
-            return closing_slopes(self.robot, table, self._changes)
+            return table.along(self.directions)[0]
 
         return Reading(table.tension, self.once("closing slopes", slopes))
 
@@ -168,36 +167,32 @@ class Point:
         x[number] += part * self.variables.columns[number].span
         return self.once(("robot", number, part), lambda: self.variables.robot_at(x))
 
-    def _changes(self, model: ForwardModel, load: LoadPath) -> list[Change]:
-        """Directions of all variables for a model whose loads do not depend on them."""
-        own = [self.change(model, load, number) for number in range(len(self.x))]
-        return own + self.changes_of_deviations(model, load)
+    def directions(self, path: EquilibriumPath) -> list[Change]:
+        """Return directions of all variables, then of one standard deviation of every deviation.
 
-    def changes_of_deviations(self, model: ForwardModel, load: LoadPath) -> list[Change]:
-        """Return directions of one standard deviation of every deviation, for a model."""
-        changes: list[Change] = []
+        Args:
+            path: States of the robot, whose loads are taken not to depend on the variables.
+        """
+        every = [self._change(path, number) for number in range(len(self.x))]
         for one in self.deviations:
             if one.law is not None:
-                by = model.change(self.robot, load, one.law)
-                assert by.chain is not None
-                changes.append(Change(None, one.sd[one.law] * by.chain))
+                every += changes(path, [one.law], np.array([[one.sd[one.law]]]))
             else:
-                move = partial(one.moved, self.robot)
-                changes.append(model.change_along(move, 0.0, load, order=2))
-        return changes
+                every.append(change_along(path, partial(one.moved, self.robot), 0.0, order=2))
+        return every
 
-    def change(self, model: ForwardModel, load: LoadPath, number: int) -> Change:
-        """Return the direction of a variable of the robot for a model; zero for a load."""
+    def _change(self, path: EquilibriumPath, number: int) -> Change:
+        """Return the direction of a variable of the robot; nothing for a load."""
         column = self.variables.columns[number]
         if column.load is not None:
-            return Change(None, np.zeros(model.ready.long.chain_layout.size))
+            return Change(None, None)
         if column.law is not None:
-            return model.change(self.robot, load, column.law)
-        loaded = any(not one.is_nothing for one in load.external)
-        key = ("change", number, id(model.ready.chain_layout))
+            return changes(path, [column.law])[0]
+        loaded = any(not one.is_nothing for one in path.load.external)
+        key = ("change", number, id(path.prepared.chain_layout))
         if not loaded and key in self.kept:  # the arrays of the robot, without its weight
             return Change(None, self.kept[key])
-        by = model.change_along(lambda part: self.moved(number, part), 0.0, load, order=2)
+        by = change_along(path, lambda part: self.moved(number, part), 0.0, order=2)
         assert by.chain is not None
         self.kept[key] = by.chain / column.span
         loads = None if by.loads is None else by.loads / column.span
@@ -242,8 +237,7 @@ class Solver:
         if not self.paths.pieces:
             return self._without_states(robot, x)
         load = self.path_at(x)
-        model = self._model(robot, load)
-        path = model.solve(robot, load)
+        path = self._model(robot, load).solve(robot, load)
         if not path.converged.all():
             step = int(np.argmin(path.converged))
             raise InputError.NOT_CONVERGED(path.failures[step][1])
@@ -253,7 +247,7 @@ class Solver:
         def slopes_of(name: str) -> np.ndarray:
             if not slopes:
                 self.counts["gradients"] += 1
-                slopes.update(self._slopes(point, model, path))
+                slopes.update(self._slopes(point, path))
             return slopes[name]
 
         point = Point(self.variables, x, robot, self.paths, arrays, slopes_of)
@@ -277,31 +271,21 @@ class Solver:
 
         return Point(self.variables, x, robot, self.paths, {}, slopes_of)
 
-    def _slopes(
-        self, point: Point, model: ForwardModel, path: EquilibriumPath
-    ) -> dict[str, np.ndarray]:
-        changes: list[Change] = []
+    def _slopes(self, point: Point, path: EquilibriumPath) -> dict[str, np.ndarray]:
+        directions = point.directions(path)
+        numbers = self.variables.loads_at(point.x)
         for number, column in enumerate(self.variables.columns):
-            change = point.change(model, path.load, number)
             if column.load is not None:
-                change = Change(self._load_change(model, path, point.x, column.load), change.chain)
-            changes.append(change)
-        changes += point.changes_of_deviations(model, path.load)
-        derivatives = model.derivatives(path, changes, self.outputs)
-        wrong = [name for name, one in derivatives.items() if not _known(name, one, path)]
+                more = self.paths.path(numbers | {column.load: numbers[column.load] + 1.0})
+                directions[number] = Change(load_change(path, more), None)
+        slopes = derivatives(path, directions, self.outputs)
+        wrong = [name for name, one in slopes.items() if not _known(name, one, path)]
         if wrong:
             raise InputError.NOT_CONVERGED(
                 f"a step was so hard that the derivatives of {wrong[0]} are not known; "
                 "give the state more `steps`"
             )
-        return derivatives
-
-    def _load_change(
-        self, model: ForwardModel, path: EquilibriumPath, x: np.ndarray, number: LoadNumber
-    ) -> np.ndarray:
-        numbers = self.variables.loads_at(x)
-        more = self.paths.path(numbers | {number: numbers[number] + 1.0})
-        return model.load_change(path, more)
+        return slopes
 
 
 def _known(name: str, slopes: np.ndarray, path: EquilibriumPath) -> bool:

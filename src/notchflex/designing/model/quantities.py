@@ -1,12 +1,8 @@
-"""What a design reads of a solved robot: quantities, closing tensions, target curves, with slopes.
-
-The gap of a notch is zero at its closing tension T: 0 = gap(T, x). So
-dT/dx = -(dgap/dx) / (dgap/dT), on the side where the notch is still open.
-"""
+"""What a design reads of a solved robot: quantities and target curves, with slopes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -14,16 +10,14 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
-from notchflex import Closing, LoadPath, Robot
+from notchflex import Robot
 from notchflex._jax import constant
-from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.kinematics import (
     AxisPlaces,
     axis_places,
     axis_point_changes,
     points_on_axis,
 )
-from notchflex.analysis.tangent import Change
 from notchflex.designing.specification import TargetCurve
 from notchflex.support import DEGREES, QUANTITIES
 
@@ -185,38 +179,6 @@ def taken(reading: Reading, take: str) -> Reading:
         row[0, low] -= 1.0
         return reading.map(row)
     return reading.pick(np.array([high if take == "largest" else low]))
-
-
-# So much below its closing tension a notch is taken to be open, relative.
-_BELOW = 1e-7
-
-
-def closing_slopes(
-    robot: Robot, table: Closing, changes: Callable[[ForwardModel, LoadPath], Sequence[Change]]
-) -> Float[np.ndarray, "n v"]:
-    """Differentiate the closing tension of every notch.
-
-    Args:
-        robot: The robot.
-        table: Its closing; every notch closes.
-        changes: Gives the direction of every variable for a model and its loads.
-
-    Returns:
-        Derivatives, N per unit of the variable.
-    """
-    count = len(table.tension)
-    rows = np.arange(count)
-    unit = np.zeros((count, robot.number_of_tendons))
-    unit[rows, table.tendon - 1] = 1.0
-    load = LoadPath((1.0 - _BELOW) * table.tension[:, None] * unit)
-    model = ForwardModel(robot, load, from_rest=True)
-    path = model.solve(robot, load)
-    more = LoadPath(load.tension + unit)
-    directions = list(changes(model, load))
-    still = np.zeros(model.ready.long.chain_layout.size)
-    directions.append(Change(model.load_change(path, more), still))
-    by = model.derivatives(path, directions, ("gap",))["gap"][:, rows, rows]
-    return -(by[:-1] / by[-1]).T
 
 
 # Points of the axis among which the nearest is searched, and how often the search narrows.

@@ -14,13 +14,15 @@ from scipy.stats import t as student
 
 from notchflex import EquilibriumPath, LoadPath, Robot, Settings
 from notchflex._jax import constant
-from notchflex.analysis.forward_model import Change, ForwardModel
+from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.kinematics import (
     AxisPlaces,
     axis_places,
     axis_point_changes,
     points_on_axis,
 )
+from notchflex.analysis.slopes import changes, derivatives, load_change
+from notchflex.analysis.tangent import Change
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.constants import RobotNumber
 from notchflex.mechanics.motion import left_slope
@@ -165,16 +167,15 @@ class Sample:
         outputs = {name: np.asarray(path.quantity(name)) for name in solved}
         slopes: dict[str, np.ndarray] = {}
         if self.numbers and path.converged.all():
-            changes = [self._change(path, load, values, column) for column in self.columns]
-            slopes = self._model.derivatives(path, changes, solved)
+            slopes = derivatives(path, self._changes(path, load, values), solved)
         if self._places is not None:
             bodies = [outputs[name] for name in _BODIES]
             outputs["axis_points"] = np.asarray(
                 points_on_axis(self._places, *map(constant, bodies))
             )
             if slopes:
-                changes = [slopes[name] for name in _BODIES]
-                slopes["axis_points"] = axis_point_changes(self._places, bodies, changes)
+                moves = [slopes[name] for name in _BODIES]
+                slopes["axis_points"] = axis_point_changes(self._places, bodies, moves)
         back = np.argsort(self._order)
         return Predicted(
             {name: outputs[name][back] for name in names},
@@ -220,21 +221,25 @@ class Sample:
         }
         return replace(load, **given)
 
-    def _change(
-        self, path: EquilibriumPath, load: LoadPath, values: Float[np.ndarray, " k"], column: int
-    ) -> Change:
-        """Change of the robot and of its loads with a constant: the sum over what it sets."""
-        loads, chain = np.zeros(1), np.zeros(1)
-        for one, setter in zip(self.numbers, self.setters, strict=True):
-            if setter != column or not one.slope:
-                continue
-            if one.path in SENSOR:
-                loads = loads + one.slope * self._load_change(path, load, values, one.path)
-                continue
-            change = self._model.change(path.robot, load, one.path)
-            loads = loads if change.loads is None else loads + one.slope * change.loads
-            chain = chain if change.chain is None else chain + one.slope * change.chain
-        return Change(*(one if one.any() else None for one in (loads, chain)))
+    def _changes(
+        self, path: EquilibriumPath, load: LoadPath, values: Float[np.ndarray, " k"]
+    ) -> list[Change]:
+        """Changes of the robot and of its loads with every constant: sums over what it sets."""
+        columns = {column: row for row, column in enumerate(self.columns)}
+        along = np.zeros((len(columns), len(self.numbers)))
+        for number, (one, setter) in enumerate(zip(self.numbers, self.setters, strict=True)):
+            if setter in columns:
+                along[columns[setter], number] = one.slope
+        paths = [one.path for one in self.numbers]
+        of_robot = [number for number, name in enumerate(paths) if name not in SENSOR]
+        made = changes(path, [paths[number] for number in of_robot], along[:, of_robot])
+        for number, name in enumerate(paths):
+            rows = np.flatnonzero(along[:, number]) if name in SENSOR else ()
+            for row in rows:
+                more = along[row, number] * self._load_change(path, load, values, name)
+                loads = made[row].loads
+                made[row] = replace(made[row], loads=more if loads is None else loads + more)
+        return made
 
     def _load_change(
         self, path: EquilibriumPath, load: LoadPath, values: Float[np.ndarray, " k"], name: str
@@ -244,7 +249,7 @@ class Sample:
         # Loads are linear in tension and stroke; below 0 N the robot has none.
         size = {"sensor.force_offset": factor, "sensor.stroke_slack": 1.0}.get(name)
         more = value / factor if size is None else np.where(value > 0.0, size, 0.0)
-        varied = self._model.load_change(path, replace(load, **{command: value + more}))
+        varied = load_change(path, replace(load, **{command: value + more}))
         return varied if size is None else -varied
 
 

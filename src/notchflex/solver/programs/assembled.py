@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Collection, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -26,6 +26,7 @@ from notchflex.robot import Robot, Tube
 from notchflex.robot.kinds import Notch
 from notchflex.robot.numbers import PartsForm, Place, parts_of, robot_of
 from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,
     StaticStructure,
@@ -153,6 +154,24 @@ def _joined_along(
     return {"slopes": slopes, "alike": alike}
 
 
+@native(3, lambda *_: ())
+def _joined_back(
+    numbers: Float[Array, " numbers"],
+    flexures: Float[Array, " packed"],
+    weights: Float[Array, " chain"],
+    form: _JoinedForm,
+) -> dict[str, Array]:
+    """Differentiate a weighted sum of a chain's numbers by those of its robot and its flexures."""
+
+    def joined(own: Array, packed: Array) -> tuple[Array, Array]:
+        made = _joined.function(own, packed, form)
+        return made["chain"], made["alike"]
+
+    _, back, alike = jax.vjp(joined, numbers, flexures, has_aux=True)
+    by_numbers, by_flexures = back(weights)
+    return {"numbers": by_numbers, "flexures": by_flexures, "alike": alike}
+
+
 @contextmanager
 def _following(decisions: tuple[bool, ...]) -> Generator[Decisions]:
     """Follow the decisions of an example while a program is traced."""
@@ -165,18 +184,20 @@ def _all(decisions: Decisions) -> Array:
     return jnp.stack([jnp.asarray(True), *map(jnp.asarray, decisions.alike)]).all()
 
 
-class _Notch(NamedTuple):
-    """A notch of robots, with all flexures that are made of it.
+class _Notches(NamedTuple):
+    """Distinct notches of robots that are made by one program, with all flexures made of them.
 
     Attributes:
-        form: What its program is compiled for.
-        columns: Its numbers among those of the robot.
+        form: What the program is compiled for.
+        columns: The numbers of each among those of the robot.
         first: First notch of the robot that each flexure stands for, from 0.
+        packed: The numbers of its flexures among those of all flexures.
     """
 
     form: _NotchForm
-    columns: Int[np.ndarray, " numbers"]
-    first: Int[np.ndarray, " flexures"]
+    columns: Int[np.ndarray, "m numbers"]
+    first: Int[np.ndarray, "m flexures"]
+    packed: Int[np.ndarray, "m packed"]
 
 
 def _sparse(flexure: Any) -> StaticStructure:
@@ -251,7 +272,7 @@ def _first_alike(
     return None
 
 
-def assembled_chain(robot: Robot, like: Chain) -> Chain | None:
+def assembled_chain(robot: Robot, like: Chain) -> PreparedChain | None:
     """Assemble the chain of a robot by programs.
 
     Args:
@@ -259,12 +280,12 @@ def assembled_chain(robot: Robot, like: Chain) -> Chain | None:
         like: A chain for the same level and kinds of loads.
 
     Returns:
-        The chain; None where no program has its form.
+        The chain, prepared; None where no program has its form.
     """
 
-    def chain_of(programs: AssembledRobots, numbers: np.ndarray) -> Chain | None:
+    def chain_of(programs: AssembledRobots, numbers: np.ndarray) -> PreparedChain | None:
         chains, alike = programs.chains(numbers[None])
-        return programs.joined.structure.unpack(chains[0]) if alike[0] else None
+        return programs.prepared(chains[0]) if alike[0] else None
 
     return _first_alike(robot, like, (), chain_of)
 
@@ -288,10 +309,35 @@ def chain_slopes(
     """
 
     def slopes_of(programs: AssembledRobots, numbers: np.ndarray) -> np.ndarray | None:
-        slopes = programs.along(numbers, changes(programs.form))
-        return None if slopes is None else programs.joined.structure.whole(slopes)
+        along = changes(programs.form)
+        slopes, alike = programs.along(np.tile(numbers, (len(along), 1)), along)
+        return programs.joined.structure.whole(slopes) if alike.all() else None
 
     return _first_alike(robot, chain, varied, slopes_of)
+
+
+def chain_gradient(
+    robot: Robot, chain: Chain, places: Sequence[Place], weights: Float[np.ndarray, " chain"]
+) -> Float[np.ndarray, " places"] | None:
+    """Differentiate a weighted sum of the numbers of a robot's chain.
+
+    Args:
+        robot: The robot.
+        chain: Its chain, for the level and the kinds of loads.
+        places: Places of the numbers of the robot by which to differentiate.
+        weights: Of the numbers of the chain, packed whole.
+
+    Returns:
+        A derivative for each place; None where no program has this form.
+    """
+
+    def gradient_of(programs: AssembledRobots, numbers: np.ndarray) -> np.ndarray | None:
+        varied = np.array([programs.form.places.index(place) for place in places])
+        packed = programs.joined.structure.pack(weights)
+        gradient, alike = programs.gradient(numbers[None], packed[None], varied)
+        return gradient[0] if alike[0] else None
+
+    return _first_alike(robot, chain, places, gradient_of)
 
 
 # Robots of one piece; more would not fit the cache.
@@ -306,13 +352,15 @@ class AssembledRobots:
 
     Attributes:
         form: The form of the robots' parts.
-        notches: Their distinct notches.
+        notches: Their distinct notches, by their programs.
         joined: What the program that joins their flexures is compiled for.
+        example: A chain of this form.
     """
 
     form: PartsForm
-    notches: tuple[_Notch, ...]
+    notches: tuple[_Notches, ...]
     joined: _JoinedForm
+    example: PreparedChain
 
     @classmethod
     def of(cls, robot: Robot, chain: Chain, varied: Collection[Place] = ()) -> AssembledRobots:
@@ -337,7 +385,7 @@ class AssembledRobots:
             first.setdefault((id(notch), id(site)), number)
         group_of = np.repeat(np.arange(len(robot.notch)), [one.repeat for one in robot.notch])
         options = chain.level, chain.refinement, robot.material.by_fibres
-        notches, trees = list[_Notch](), dict[int, Any]()
+        groups, trees = dict[_NotchForm, list[Any]](), dict[int, Any]()
         for same in dict.fromkeys(key for key, _ in first):
             own = [number for (key, _), number in first.items() if key == same]
             places = {0: 0, 3 + int(group_of[own[0]]): 1}
@@ -346,7 +394,7 @@ class AssembledRobots:
             notch = example.notches[own[0]]
             notch_form, made = _form_of(notch, example.tube, around, options, zeros)
             columns = [k for k, (part, _) in enumerate(form.places) if part in places]
-            notches.append(_Notch(notch_form, np.array(columns), np.array(own)))
+            groups.setdefault(notch_form, []).append((columns, own))
             trees.update(zip(own, made, strict=True))
         given = iter([trees[number] for number in first.values()])
         loads: dict[str, Any] = {
@@ -359,17 +407,26 @@ class AssembledRobots:
         with Decisions().deciding() as decisions:
             joined = assemble(example, **loads, flexures=lambda *_: next(given))
         layouts = tuple(_sparse(trees[number]) for number in first.values())
-        layout = PytreeLayout.of(joined)
-        structure = StaticStructure.of(joined, layout, np.asarray(layout.pack(joined)))
+        prepared = PreparedChain(joined)
+        structure = prepared.static_structure
         made_for = form, layouts, tuple(loads.items()), tuple(decisions.made), structure
-        return cls(form, tuple(notches), _JoinedForm(*made_for))
+        ends = np.cumsum([0, *(layout.size for layout in layouts)]).tolist()
+        packed = dict(zip(first.values(), map(np.arange, ends, ends[1:]), strict=True))
+        notches = [
+            _Notches(
+                notch_form,
+                np.array([columns for columns, _ in made]),
+                np.array([own for _, own in made]),
+                np.array([np.concatenate([packed[number] for number in own]) for _, own in made]),
+            )
+            for notch_form, made in groups.items()
+        ]
+        return cls(form, tuple(notches), _JoinedForm(*made_for), prepared)
 
-    @cached_property
-    def _columns(self) -> dict[int, slice]:
-        """Where flexures stand side by side, by the first notch that each stands for."""
-        first = sorted(number for one in self.notches for number in one.first.tolist())
-        ends = np.cumsum([0, *(structure.size for structure in self.joined.flexures)]).tolist()
-        return dict(zip(first, map(slice, ends, ends[1:]), strict=True))
+    def prepared(self, chain: Float[np.ndarray, " chain"]) -> PreparedChain:
+        """Return a chain as `chains` makes it, prepared for repeated solves."""
+        structure = self.joined.structure
+        return self.example.with_numbers(structure.whole(chain, constants=True))
 
     @classmethod
     def tried(cls, robot: Robot, chain: Chain, varied: Collection[Place]) -> AssembledRobots | None:
@@ -394,31 +451,55 @@ class AssembledRobots:
         return np.concatenate(chains), np.concatenate(alike)
 
     def _piece(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        made = self._of_notches(numbers, lambda table, form: _flexures.rows((True,), table, form))
+        made = self._of_notches(numbers, _built)
         joined = _joined.rows((True, True), numbers, made["flexures"], self.joined)
         return joined["chain"], made["alike"] & joined["alike"]
 
     def along(
-        self, numbers: Float[np.ndarray, " numbers"], changes: Float[np.ndarray, "k numbers"]
-    ) -> Float[np.ndarray, "k chain"] | None:
-        """Differentiate the chain of a robot along changes of its numbers.
+        self, numbers: Float[np.ndarray, "k numbers"], changes: Float[np.ndarray, "k numbers"]
+    ) -> tuple[Float[np.ndarray, "k chain"], Bool[np.ndarray, " k"]]:
+        """Differentiate the chains of robots along changes of their numbers.
 
         Returns:
-            The slopes, packed for programs; None where the chain is not of the example's form.
+            The slopes, packed for programs, and which of them are of the form of the example.
         """
-
-        def differentiated(table: np.ndarray, form: _NotchForm) -> dict[str, np.ndarray]:
-            own, change = np.ascontiguousarray(np.real(table)), np.imag(table) / _SMALL
-            return _flexures_along.rows((True, True), own, change, form)
-
         # Lengths of rings are sums of numbers: imaginary parts pass them as slopes do. The first
         # row is without a change, as notches that a change does not touch.
-        rows = np.concatenate([np.zeros_like(changes[:1]), changes])
-        made = self._of_notches(numbers + 1j * _SMALL * rows, differentiated)
-        flexures, slopes = made["flexures"][0].copy(), made["slopes"]
-        by_row = (False, False, True, True)
-        joined = _joined_along.rows(by_row, numbers, flexures, rows, slopes, self.joined)
-        return joined["slopes"][1:] if (made["alike"] & joined["alike"]).all() else None
+        rows = np.concatenate([numbers[:1] + 0j, numbers + 1j * _SMALL * changes])
+        made = self._of_notches(rows, _differentiated)
+        tables = np.real(rows), made["flexures"], np.imag(rows) / _SMALL, made["slopes"]
+        joined = _joined_along.rows((True,) * 4, *map(np.ascontiguousarray, tables), self.joined)
+        return joined["slopes"][1:], (made["alike"] & joined["alike"])[1:]
+
+    def gradient(
+        self,
+        numbers: Float[np.ndarray, "robots numbers"],
+        weights: Float[np.ndarray, "robots chain"],
+        varied: Int[np.ndarray, " varied"],
+    ) -> tuple[Float[np.ndarray, "robots varied"], Bool[np.ndarray, " robots"]]:
+        """Differentiate weighted sums of the numbers of chains.
+
+        Args:
+            numbers: Those of the robots.
+            weights: Of the numbers of the chains, packed for programs.
+            varied: Which numbers of the robots to differentiate by.
+
+        Returns:
+            The derivatives, and which of the chains are of the form of the example.
+        """
+        made = self._of_notches(numbers, _built)
+        back = _joined_back.rows((True,) * 3, numbers, made["flexures"], weights, self.joined)
+        gradient = back["numbers"][:, varied].ravel()
+        units = np.tile(np.eye(numbers.shape[1])[varied], (len(numbers), 1))
+        moved = np.repeat(numbers, len(varied), axis=0) + 1j * _SMALL * units
+        for notches in self.notches:
+            table = self._table(moved, notches)
+            row, notch = np.nonzero(np.imag(table).any(axis=-1))
+            if len(row):
+                slopes = _differentiated(table[row, notch], notches.form)["slopes"]
+                which = (row // len(varied))[:, None], notches.packed[notch]
+                np.add.at(gradient, row, (slopes * back["flexures"][which]).sum(axis=-1))
+        return gradient.reshape(len(numbers), -1), made["alike"] & back["alike"]
 
     def _of_notches(
         self, numbers: np.ndarray, program: Callable[[np.ndarray, _NotchForm], dict[str, Any]]
@@ -428,36 +509,39 @@ class AssembledRobots:
         Notches that are equal to those of the first robot are made once.
         """
         count, size = len(numbers), sum(one.size for one in self.joined.flexures)
-        robot = robot_of(self.form.with_numbers(numbers.T))
-        lengths = np.asarray(body_lengths(robot.tube, robot.notches))
-        rings = lengths, robot.material.poisson_ratio
         made: dict[str, Any] = {"alike": np.ones(count, bool)}
-        for form in dict.fromkeys(one.form for one in self.notches):
-            own = [one for one in self.notches if one.form == form]
-            tables = [_table(numbers, one, *rings) for one in own]
-            others = [np.flatnonzero((table != table[:1]).any(axis=1)) for table in tables]
-            kept = [table[np.append(0, rows)] for table, rows in zip(tables, others, strict=True)]
-            results = program(np.concatenate(kept), form)
-            index = np.zeros(count, int)
-            for one, rows in zip(own, others, strict=True):
-                index[rows] += np.arange(1, len(rows) + 1)
-                made["alike"] &= results["alike"][index]
-                for name in set(results) - {"alike"}:
-                    values = made.setdefault(name, np.empty((count, size)))
-                    stop = 0
-                    for first, structure in zip(one.first.tolist(), form.flexures, strict=True):
-                        start, stop = stop, stop + structure.size
-                        values[:, self._columns[first]] = results[name][index, start:stop]
-                index[:] = index.max() + 1
+        for notches in self.notches:
+            table = self._table(numbers, notches)
+            others = (table != table[:1]).any(axis=-1)
+            results = program(np.concatenate([table[0], table[others]]), notches.form)
+            first = np.arange(len(notches.columns))
+            after = others.cumsum().reshape(others.shape) + len(first) - 1
+            index = np.where(others, after, first)
+            made["alike"] &= results.pop("alike")[index].all(axis=1)
+            for name, values in results.items():
+                every = made.setdefault(name, np.empty((count, size)))
+                every[:, notches.packed] = values[index]
         return made
 
+    def _table(self, numbers: np.ndarray, notches: _Notches) -> np.ndarray:
+        """Return the numbers of every notch and its rings, robots and notches as leading axes."""
+        own = numbers[:, notches.columns]
+        around = np.zeros((*own.shape[:2], 2 * notches.first.shape[1] + 1), own.dtype)
+        if notches.form.rings[0] is not None:
+            robot = robot_of(self.form.with_numbers(numbers.T))
+            lengths = np.asarray(body_lengths(robot.tube, robot.notches)).T
+            beside = notches.first[..., None] + np.arange(2)
+            around[..., :-1] = lengths[..., beside.reshape(len(beside), -1)]
+            around[..., -1] = np.reshape(robot.material.poisson_ratio, (-1, 1))
+        return np.concatenate([own, around], axis=-1)
 
-def _table(
-    numbers: np.ndarray, notch: _Notch, lengths: np.ndarray, poisson_ratio: Any
-) -> np.ndarray:
-    """Return the numbers of a notch and its rings, robots as leading axis."""
-    beside = [lengths[k] for first in notch.first for k in (first, first + 1)]
-    if notch.form.rings[0] is None:
-        beside, poisson_ratio = [0.0] * len(beside), 0.0
-    every = [*numbers[:, notch.columns].T, *beside, poisson_ratio]
-    return np.stack([np.broadcast_to(values, len(numbers)) for values in every], axis=-1)
+
+def _built(table: np.ndarray, form: _NotchForm) -> dict[str, np.ndarray]:
+    """Build flexures."""
+    return _flexures.rows((True,), table, form)
+
+
+def _differentiated(table: np.ndarray, form: _NotchForm) -> dict[str, np.ndarray]:
+    """Build flexures, and differentiate them along the imaginary parts of their numbers."""
+    own, change = np.ascontiguousarray(np.real(table)), np.imag(table) / _SMALL
+    return _flexures_along.rows((True, True), own, change, form)

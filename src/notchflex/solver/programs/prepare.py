@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from lanewise import FixedVector
-from notchflex._jax import jax
 from notchflex.loads.command import Command, usual_loads
 from notchflex.mechanics.chain import Chain, assemble, padded
 from notchflex.robot import Robot
@@ -68,44 +67,30 @@ class PreparedChain:
         edges = np.tile(np.arange(2 * more.flexures), (chain.tendons, 1))
         return PreparedChain(dataclasses.replace(more, contacts=edges))
 
-    def long_slopes(self, slopes: Float[np.ndarray, "k chain"]) -> Float[np.ndarray, "k long"]:
-        """Return slopes of the chain, packed whole, as those of the long chain."""
-        which = _own_numbers(self.chain_layout, self.long.chain_layout)
-        return np.pad(slopes, ((0, 0), (1, 0)))[:, which]
-
-    def field_indices(self, fields: Mapping[str, Any]) -> Int[np.ndarray, " m"]:
-        """Return the indices of some fields of the chain in the vector of the long chain.
-
-        Args:
-            fields: As `chain.laws` returns them.
-        """
-        if (key := tuple(fields)) not in self._field_indices:
-            form = self.long.chain_layout
-            every: Chain = jax.tree.unflatten(form.structure, form.indices)
-            long = {name: getattr(every, name) for name in fields}
-            own = jax.tree.map(lambda at, leaf: at[tuple(map(slice, leaf.shape))], long, fields)
-            self._field_indices[key] = flat(own)
-        return self._field_indices[key]
+    @cached_property
+    def own_numbers(self) -> Int[np.ndarray, " dynamic"]:
+        """Which number of the chain each dynamic number of the long chain is, from 1; or 0."""
+        return _dynamic_numbers(self.chain_layout, self.long.static_structure)
 
     @cached_property
-    def _field_indices(self) -> dict[Any, Int[np.ndarray, " m"]]:
+    def slopes(self) -> dict[Any, Float[np.ndarray, "k chain"]]:
+        """The last slopes of the chain, by the numbers and directions that they are along."""
         return {}
 
-    def with_fields(self, fields: Mapping[str, Any]) -> PreparedChain:
-        """Return a robot of the same shape with other laws of material or friction.
+    def with_numbers(self, numbers: Float[np.ndarray, " chain"]) -> PreparedChain:
+        """Return a chain of the same form, with the same constants.
 
         Args:
-            fields: Those of the chain that change, as `chain.laws` returns them.
+            numbers: The chain, packed whole.
         """
-        vector = self.long.vector.copy()
-        vector[self.field_indices(fields)] = flat(fields)
-        other = PreparedChain(dataclasses.replace(self.chain, **fields))
-        long = PreparedChain(self.long.chain_layout.unpack(vector))
-        for new, old in ((other, self), (long, self.long)):
-            new.__dict__.update({name: getattr(old, name) for name in _OF_SHAPE})
-        long.__dict__["vector"] = vector
-        other.__dict__["long"] = long
-        return other
+        which = _own_numbers(self.chain_layout, self.long.chain_layout)
+        long_numbers = np.where(which > 0, numbers[which - 1], self.long.vector)
+        pairs = (self, numbers), (self.long, long_numbers)
+        own, long = (PreparedChain(like.chain_layout.unpack(vector)) for like, vector in pairs)
+        for new, (like, vector) in zip((own, long), pairs, strict=True):
+            new.__dict__.update({name: getattr(like, name) for name in _OF_FORM}, vector=vector)
+        own.__dict__["long"] = long
+        return own
 
     @cached_property
     def rest(self) -> SolverState:
@@ -184,17 +169,16 @@ def _own_numbers(own: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, " lon
     return which.astype(int)
 
 
-# Cached properties that robots of one shape share.
-_OF_SHAPE = (
-    *("chain_layout", "rest", "rest_vector", "rest_carried", "state", "shape"),
+@lru_cache(maxsize=64)
+def _dynamic_numbers(own: PytreeLayout, long: StaticStructure) -> Int[np.ndarray, " dynamic"]:
+    return long.pack(_own_numbers(own, long.form)).astype(int)
+
+
+# Cached properties that chains of one form share.
+_OF_FORM = (
+    *("chain_layout", "static_structure", "rest", "rest_vector", "rest_carried", "state", "shape"),
     "_command_layouts",
 )
-
-
-def flat(tree: Any) -> np.ndarray:
-    """Return all numbers of a tree as one vector; it may be empty."""
-    leaves = [np.ravel(leaf) for leaf in jax.tree.leaves(tree)]
-    return np.concatenate([np.zeros(0, int), *leaves])
 
 
 @lru_cache(maxsize=6)

@@ -79,6 +79,10 @@ class PytreeLayout:
         leaves = [self.leaf(vector, number) for number in range(len(self.shapes))]
         return jax.tree.unflatten(self.structure, leaves)
 
+    def unpack_indices(self) -> Any:
+        """Return the tree with the indices of its numbers in a vector in their places."""
+        return jax.tree.unflatten(self.structure, self.indices)
+
     def leaf(self, vector: Any, number: int) -> Any:
         """Return one leaf of the tree of a vector, by its number."""
         part = vector[..., self.ends[number] : self.ends[number + 1]]
@@ -180,9 +184,13 @@ class StaticStructure:
         padding = np.zeros((*numbers.shape[:-1], _PADDING))
         return xp.concatenate([numbers[..., self._taken], padding], axis=-1)
 
-    def whole(self, vectors: Float[np.ndarray, "*k dynamic"]) -> Float[np.ndarray, "*k chain"]:
-        """Return packed numbers of whole chains, 0 for constants: of slopes."""
+    def whole(
+        self, vectors: Float[np.ndarray, "*k dynamic"], *, constants: bool = False
+    ) -> Float[np.ndarray, "*k chain"]:
+        """Return packed numbers of whole chains, with the constants or, for slopes, 0 for them."""
         numbers = np.zeros((*vectors.shape[:-1], self.form.size))
+        if constants:
+            numbers[:] = self._numbers
         numbers[..., self._taken] = vectors[..., : len(self._taken)]
         return numbers
 
