@@ -41,7 +41,7 @@ def lower(
     lane_sizes: Sequence[int],
     by_row: Sequence[bool] | None = None,
     *,
-    carries: bool = False,
+    how: str = "rows",
 ) -> tuple[LoweredProgram, Any]:
     """Lower a function to LLVM IR.
 
@@ -50,8 +50,9 @@ def lower(
         arguments: Vectors of the sizes it takes, those of one row; their values are not used.
         lane_sizes: Sizes of axes that rows are laid out along, such as the number of bodies.
         by_row: Which arguments have a row for every row of a batch; None without a batch.
-        carries: Whether rows follow one another: the first vector is carried from row to row, and
-            the function returns it before its results.
+        how: What happens to the rows of a batch: "rows" are computed side by side, "map" one after
+            the other; "scan" also carries the first vector from row to row, which the function
+            returns before its results.
 
     Returns:
         The program, and the tree of the function's results with shapes and dtypes.
@@ -62,11 +63,11 @@ def lower(
     closed, tree = jax.make_jaxpr(function, return_shape=True)(*arguments)
     if by_row is None:
         lowered = lower_single(closed, lane_sizes)
-    elif carries:
-        lowered = lower_path(closed, lane_sizes, by_row)
-        tree = tree[1]
-    else:
+    elif how == "rows":
         lowered = lower_batch(closed, lane_sizes, by_row)
+    else:
+        lowered = lower_path(closed, lane_sizes, by_row, carries=how == "scan")
+        tree = tree[1] if how == "scan" else tree
     emitter = Emitter(lowered)
     size = emitter.storage.arena.size + 64
     return LoweredProgram(emitter.source, tuple(lowered.sizes), size), tree

@@ -71,16 +71,18 @@ def lower_batch(closed: Any, lane_sizes: Sequence[int], by_row: Sequence[bool]) 
     return LoweredFunction(graph, [], [], [buffer.size for buffer in outputs], True)
 
 
-def lower_path(closed: Any, lane_sizes: Sequence[int], by_row: Sequence[bool]) -> LoweredFunction:
-    """Lower a function that is called along rows of arrays and carries a vector from row to row.
+def lower_path(
+    closed: Any, lane_sizes: Sequence[int], by_row: Sequence[bool], *, carries: bool
+) -> LoweredFunction:
+    """Lower a function that is called along rows of arrays, perhaps with a vector carried.
 
-    The first argument is the vector carried into the first row; the function returns the vector
-    carried to the next row, and then the results of the row.
+    The vector carried into the first row is then the first argument, and the function returns the
+    vector carried to the next row, and then the results of the row.
     """
     lowering = JaxprLowering(lane_sizes)
     buffers, top = lowering.buffers, lowering.graph.top
     body = top.nested(repeats=True)
-    carried = buffers.allocate(closed.in_avals[0].shape, "f")
+    carried: list[Any] = []
     initial: list[Store] = []
     args: list[References] = []
     slices: list[Buffer] = []
@@ -93,15 +95,16 @@ def lower_path(closed: Any, lane_sizes: Sequence[int], by_row: Sequence[bool]) -
         block = body if has_rows else top
         with lowering.inside(block):
             refs = buffers.read((buffer, positions), block)
-        if number == 0:
-            initial = [buffers.store(lowering.arrays.loaded(refs), carried)]
+        if carries and number == 0:
+            carried = [buffers.allocate(aval.shape, "f")]
+            initial = [buffers.store(lowering.arrays.loaded(refs), carried[0])]
             with lowering.inside(body):
-                refs = buffers.read(carried, body)
+                refs = buffers.read(carried[0], body)
         args.append(refs)
     with lowering.inside(body):
-        carry, *results = lowering.function(closed, args)
-        updates = [buffers.store(carry, carried)]
-        stores = buffers.store_results(results, _result_slice)
+        results = lowering.function(closed, args)
+        updates = list(map(buffers.store, results, carried))
+        stores = buffers.store_results(results[len(carried) :], _result_slice)
     slices += [store.buffer for store in stores]
     loop = ScanLoop(initial, None, False, slices, [], body, [*updates, *stores])
     lowering.add_region(loop, top)

@@ -628,9 +628,9 @@ class BatchTable:
         acting = row_commands(batch.loads.load, steps, bodies, batch.loads.tip, drawn=drawn)
         layout = self.chains.ready.command_layout(acting)
         commands = np.asarray(layout.pack(acting, leading=2))
-        tables = chains, commands, np.array(batch.settings.numbers)
-        layouts = self.chains.structure, layout, names
-        found = follow_row.rows((chains.ndim == 2, True, False), *tables, *layouts)
+        packed = Packed(chains, self.chains.structure, chains.ndim == 2)
+        numbers = np.array(batch.settings.numbers)
+        found = follow_row.rows(packed, Packed(commands, layout, True), numbers, names)
         return FollowedRows(chains, alike, commands, layout, found)
 
 

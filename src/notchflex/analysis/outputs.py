@@ -118,14 +118,9 @@ def own_entries(ready: PreparedChain, outputs: Sequence[str]) -> dict[str, Int[n
     return indices
 
 
-@native(3, lane_sizes)
+@Native
 def follow_row(
-    chain: Float[Array, " chain"],
-    commands: Float[Array, "s command"],
-    numbers: Float[Array, " settings"],
-    chain_layout: StaticStructure,
-    command_layout: PytreeLayout,
-    outputs: tuple[str, ...],
+    robot: Chain, loads: Command, numbers: Float[Array, " settings"], outputs: tuple[str, ...]
 ) -> dict[str, Array]:
     """Follow the path of one row of a batch from rest.
 
@@ -134,17 +129,14 @@ def follow_row(
     all that a path may be asked for later; here only what is asked for is kept.
 
     Args:
-        chain: The robot.
-        commands: Its loads, step by step.
+        robot: The robot.
+        loads: Its loads, step by step.
         numbers: Tolerance and limits of the solver.
-        chain_layout: Structure of the robot and layout of its other numbers.
-        command_layout: Layout of one step.
         outputs: Names of the outputs.
 
     Returns:
         By name, steps as leading axis; after a load that failed the last good state.
     """
-    robot, loads = chain_layout.unpack(chain), command_layout.unpack(commands)
     settings = Settings.of(numbers)
 
     def step(state: tuple[SolverState, Array], command: Any) -> tuple[Any, dict[str, Array]]:

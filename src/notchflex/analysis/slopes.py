@@ -565,7 +565,7 @@ class RobotRows:
         for step in range(len(self.path)):
             vectors = (carried, followed.chains, by_robot, *(one[:, step] for one in tables))
             which = (True, by_row, by_row, *(True,) * len(tables))
-            carried, by = tangent_step.rows(which, *vectors, layouts)
+            carried, by = tangent_step.rows(*map(Packed, vectors, repeat(None), which), layouts)
             parts.append(by)
         turn = self.path.load.base_to_world
         slopes = {
@@ -586,7 +586,7 @@ class RobotRows:
         counts = np.zeros((len(rows), 1), bool)
         for step in reversed(range(len(self.path))):
             vectors = carried, followed.chains, *(one[:, step] for one in tables)
-            before, by = adjoint_step.rows(by_row, *vectors, layouts)
+            before, by = adjoint_step.rows(*map(Packed, vectors, repeat(None), by_row), layouts)
             # No step beyond the last that counts: one that failed there must not matter.
             counts |= tables[-1][:, step].any(axis=1, keepdims=True)
             carried = np.where(counts, before, 0.0)

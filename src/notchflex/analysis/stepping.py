@@ -339,17 +339,22 @@ class Stepper(Displayed):
     def _single(self) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, ...]]:
         """Solves one load by the padded chain, as `simulate` does."""
         ready, long = self.prepared, self.prepared.long
-        loads, layout = ready.padded_commands(self._command)
-        forms = long.static_structure, layout, long.state, self.outputs, self.jacobian
-        fixed = long.dynamic_vector, loads[0], self.settings.numbers
-        chain, load, numbers = map(FixedVector, fixed)
-        vectors = chain, long.rest_vector, load, np.zeros(len(self.drives)), numbers
-        program = _step.bound("once", None, (*vectors, *forms))
+        loads, chain = ready.packed_commands(self._command), long.packed
+        load, numbers = FixedVector(loads.numbers[0]), FixedVector(self.settings.numbers)
+        program = _step.bound(
+            "once",
+            chain,
+            Packed(long.rest_vector, long.state),
+            Packed(load, loads.layout),
+            np.zeros(len(self.drives)),
+            numbers,
+            *(long.state, self.outputs, self.jacobian),
+        )
         places = padded_indices(ready.state, long.state)
 
         def solve(state: np.ndarray, drives: np.ndarray) -> tuple[np.ndarray, ...]:
             padded = pad_rows(state, ready.state, long.state)
-            after, flat, converged = program((chain, padded, load, drives, numbers))
+            after, flat, converged = program((chain.numbers, padded, load, drives, numbers))
             return after[places], flat[:, self.entries], converged
 
         return solve
@@ -357,14 +362,14 @@ class Stepper(Displayed):
     def _parallel(self, states: np.ndarray, drives: np.ndarray) -> tuple[np.ndarray, ...]:
         """Solve a load for every row, in pieces on several cores."""
         ready, cores, command = self.prepared, number_of_threads(self.cores), self._command
-        layout, numbers = ready.command_layout(command), np.array(self.settings.numbers, float)
-        forms = ready.static_structure, layout, ready.state, self.outputs, self.jacobian
+        load = Packed(command.packed()[0], ready.command_layout(command))
+        others = np.array(self.settings.numbers, float), ready.state, self.outputs, self.jacobian
         size = max(1, -(-len(states) // (cores * WIDTH))) * WIDTH
 
         def solve(start: int) -> tuple[np.ndarray, ...]:
             rows = slice(start, start + size)
-            vectors = ready.dynamic_vector, states[rows], command.packed()[0], drives[rows], numbers
-            return _step.rows((False, True, False, True, False), *vectors, *forms)
+            before = Packed(states[rows], ready.state, True)
+            return _step.rows(ready.packed, before, load, Packed(drives[rows], None, True), *others)
 
         starts = range(0, max(1, len(states)), size)
         with closing(on_cores(solve, starts, cores)) as solving:
@@ -456,15 +461,13 @@ def _repeated(
     return np.repeat(state[None], rows, axis=0)
 
 
-@native(5, lane_sizes)
+@Native
 def _step(
-    chain: Float[Array, " chain"],
-    before: Float[Array, " state"],
-    load: Float[Array, " command"],
+    robot: Chain,
+    last: SolverState,
+    command: Command,
     drives: Float[Array, " t"],
     numbers: Float[Array, " settings"],
-    chain_layout: StaticStructure,
-    command_layout: PytreeLayout,
     state_layout: PytreeLayout,
     outputs: tuple[str, ...],
     jacobian: bool,
@@ -475,8 +478,7 @@ def _step(
         The state, that before after a failure; the outputs and, as further rows, their change by
         every drive, and in a last column NaN; and whether it converged.
     """
-    robot, last = chain_layout.unpack(chain), state_layout.unpack(before)
-    command: Command = command_layout.unpack(load)._replace(target=drives)
+    command = command._replace(target=drives)
     result = solve_load_step(robot, command, last, Settings.of(numbers))
     converged = result.converged & believable(SolvedState(robot, result.solved).quantity)
     # What the contacts remember of parts of the step changes with the drives, unseen.

@@ -59,6 +59,11 @@ class StepLayouts(NamedTuple):
     outputs: tuple[str, ...]
     chain_varies: bool = False
 
+    @property
+    def lanes(self) -> tuple[int, int]:
+        """Sizes of the axes that run along the chain."""
+        return self.chain.lanes
+
 
 @dataclass(frozen=True, eq=False)
 class Change:
@@ -120,7 +125,8 @@ class PathTangents:
             if one.loads is not None:
                 load_change[:, self.own_loads] = one.loads
             vectors = (start, ready.long.dynamic_vector, change, *self.steps, self.loads)
-            by_name = tangent_step.along(by_row, *vectors, load_change, layouts)
+            packed = map(Packed, (*vectors, load_change), repeat(None), by_row)
+            by_name = tangent_step.scan(*packed, layouts)
             for name, values in by_name.items():
                 own = unpad_quantity(self.path.chain, name, values)
                 by_name[name] = REGISTERED[name].turned(own, turn)
@@ -138,16 +144,16 @@ class PathTangents:
     def layouts(self) -> StepLayouts:
         """How programs take chain, load and state, for the long chain."""
         long = self.path.prepared.long
-        return StepLayouts(long.static_structure, self._commands[1], long.state, self.outputs)
+        return StepLayouts(long.static_structure, self._commands.layout, long.state, self.outputs)
 
     @property
     def loads(self) -> Float[np.ndarray, "s command"]:
         """The loads, packed for the long chain."""
-        return self._commands[0]
+        return self._commands.numbers
 
     @cached_property
-    def _commands(self) -> tuple[np.ndarray, PytreeLayout]:
-        return self.path.prepared.padded_commands(self.path.commands)
+    def _commands(self) -> Packed:
+        return self.path.prepared.packed_commands(self.path.commands)
 
     @cached_property
     def steps(self) -> tuple[np.ndarray, ...]:
@@ -196,13 +202,7 @@ def step_function(
     return step
 
 
-def lanes_of(layouts: StepLayouts) -> tuple[int, int]:
-    """Return the sizes of the axes that run along the chain."""
-    chain: Any = layouts.chain
-    return lane_sizes(chain)
-
-
-@native(9, lanes_of)
+@Native
 def tangent_step(
     last_change: Float[Array, " state"],
     chain: Float[Array, " chain"],
@@ -272,7 +272,8 @@ def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> G
     steps = [one[backwards] for one in (*tangents.steps, tangents.loads, seeds)]
     by_row = (False, False, *(True,) * len(steps))
     start = (np.zeros(long.state.size), long.dynamic_vector)
-    result = adjoint_step.along(by_row, *start, *steps, layouts)
+    packed = map(Packed, (*start, *steps), repeat(None), by_row)
+    result = adjoint_step.scan(*packed, layouts)
     loads = np.zeros_like(tangents.loads)
     loads[backwards] = result["load"]
     loads = loads[:, tangents.own_loads]
@@ -294,7 +295,7 @@ def _packed(
     return seeds[:, :-1]  # the last column takes what is beyond the end of a tendon
 
 
-@native(8, lanes_of)
+@Native
 def adjoint_step(
     seed: Float[Array, " state"],
     chain: Float[Array, " chain"],

@@ -64,17 +64,15 @@ def held_stiffness(
         tendons depend on each other, so that many tensions answer them.
     """
     long, chain = prepared.long, prepared.chain
-    loads, command_layout = prepared.padded_commands(commands)
-    packed = np.asarray(prepared.state.pack(solved, leading=1))
-    states = pad_rows(packed, prepared.state, long.state)
+    loads = prepared.packed_commands(commands)
+    states = prepared.packed_states(np.asarray(prepared.state.pack(solved, leading=1)))
     form = unit_rows(chain, by_stroke=commands.by_stroke is not None)
     modes = np.arange(chain.flexures)[:, None] * form.unknowns + np.arange(len(form.modes))
     own = modes[np.asarray(chain.rods.padding_mask) == 0.0]  # without padding
-    layouts = (long.static_structure, command_layout, long.state)
-    for start in range(0, len(loads), _BATCH):
+    for start in range(0, len(loads.numbers), _BATCH):
         some = slice(start, start + _BATCH)
-        vectors = (np.zeros(1), long.dynamic_vector, loads[some], states[some])
-        *rows, slopes = _rows.along((False, False, True, True), *vectors, *layouts)
+        tables = (table._replace(numbers=table.numbers[some]) for table in (loads, states))
+        *rows, slopes = _rows.map(long.packed, *tables)
         rows = LinearisedRows(*(one[:, : chain.flexures] for one in rows))
         by_stroke = None if commands.by_stroke is None else np.asarray(commands.by_stroke)[some]
         matrix, strokes = _assemble(chain, form, rows, slopes, by_stroke)
@@ -95,20 +93,9 @@ def held_stiffness(
         yield stiffness, sign
 
 
-@native(4, lane_sizes)
-def _rows(
-    carried: Float[Array, " one"],
-    vector: Float[Array, " chain"],
-    load: Float[Array, " command"],
-    state: Float[Array, " state"],
-    chain_layout: StaticStructure,
-    command_layout: PytreeLayout,
-    state_layout: PytreeLayout,
-) -> tuple[Array, tuple[Array, ...]]:
+@Native
+def _rows(chain: Chain, command: Command, solved: SolverState) -> tuple[Array, ...]:
     """Compute the rows of all flexures of a state, and slopes of the command."""
-    solved: SolverState = state_layout.unpack(state)
-    chain: Chain = chain_layout.unpack(vector)
-    command: Command = command_layout.unpack(load)
     unknowns = solved.point.unknowns
     at = evaluate(chain, solved.point, solved.memory, solved.applied)
     slid = tuple(
@@ -119,7 +106,7 @@ def _rows(
     memory = Memory(unknowns.log_ratio, slid, bound, solved.memory.material)
     form = unit_rows(chain, by_stroke=command.by_stroke is not None)
     rows = linearise(chain, unknowns, memory, solved.applied, at, form)
-    return carried, (*rows, jnp.stack(command_slopes(chain, command, at.base)))
+    return (*rows, jnp.stack(command_slopes(chain, command, at.base)))
 
 
 def _assemble(

@@ -203,12 +203,12 @@ _CLOSE = 0.1
 _NO_CHANGE = 1e-11
 
 
-@native(5, lambda layouts: lane_sizes(layouts.chain))
+@Native
 def search_drives(
-    chain_vector: Float[Array, " chain"],
-    before: Float[Array, " state"],
-    load: Float[Array, " command"],
-    task_vector: Float[Array, " task"],
+    chain: Chain,
+    last: SolverState,
+    command: Command,
+    task: Task,
     numbers: Float[Array, " settings"],
     layouts: SearchLayouts,
 ) -> tuple[Array, Array, Array, Array, Array, Array]:
@@ -219,10 +219,7 @@ def search_drives(
         axis; 1 where a tendon sticks; the drives; and whether it is solved, whether in one part,
         whether the target is met, its error, and how many loads were solved.
     """
-    chain, command = layouts.chain.unpack(chain_vector), layouts.command.unpack(load)
-    last, task = layouts.state.unpack(before), layouts.task.unpack(task_vector)
-    settings = Settings.of(numbers)
-    search = _Search(chain, command, last, task, settings, layouts)
+    search = _Search(chain, command, last, task, Settings.of(numbers), layouts)
     final = jax.lax.while_loop(search.goes_on, search.solve, search.begin())
     at, result = final.at, final.result
     accepted = result.converged & believable(SolvedState(chain, at.state).quantity)

@@ -14,7 +14,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import lru_cache, partial, update_wrapper
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -135,14 +135,34 @@ def _rebuild(structure: Any, flat: Iterator[np.ndarray]) -> Any:
     return values if kind == "<f8" else values.astype(kind)
 
 
+class Packed(NamedTuple):
+    """An argument of a program: numbers, and what unpacks them inside it.
+
+    Attributes:
+        numbers: A vector of floats, or vectors as the rows of a table.
+        layout: Its method `unpack` makes of a vector what the function takes, a tree of arrays; the
+            function takes the vector itself where it is None.
+        by_row: Whether there are rows.
+    """
+
+    numbers: Any
+    layout: Any = None
+    by_row: bool = False
+
+    def unpack(self, vector: Any) -> Any:
+        """Return a vector as the function takes it."""
+        return vector if self.layout is None else self.layout.unpack(vector)
+
+
 class Native:
-    """A function of vectors of floats, compiled.
+    """A function of arrays and trees of arrays, compiled.
+
+    Its arguments are `Packed`, or vectors; all others are hashable and compiled in. It returns an
+    array, or plain tuples and dictionaries of arrays. Axes as long as `lanes` of an argument's
+    layout, such as that of the flexures of a chain, are laid out side by side.
 
     Args:
-        function: What to compile; vectors come first, then hashable values that are compiled in. It
-            returns an array, or plain tuples and dictionaries of arrays.
-        vectors: Number of vectors it takes.
-        lanes: From the other arguments, sizes of axes that rows are laid out along.
+        function: What to compile.
     """
 
     programs: ClassVar[OrderedDict[Any, CompiledFunction | None]] = OrderedDict()
@@ -151,80 +171,79 @@ class Native:
     traced: ClassVar[int] = 0
     """Number of them that it has traced, not found in the package."""
 
-    def __init__(
-        self, function: Callable[..., Any], vectors: int, lanes: Callable[..., Sequence[int]]
-    ) -> None:
+    def __init__(self, function: Callable[..., Any]) -> None:
         """Store the function; programs are compiled when called."""
-        self.function, self._vectors, self._lanes = function, vectors, lanes
+        self.function = function
         self._name = f"{function.__module__}.{function.__qualname__}"
         self._jitted: dict[Any, Callable[..., Any]] = {}
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Evaluate the function of single vectors."""
-        return self.bound("once", None, arguments)(arguments[: self._vectors])
+        """Evaluate the function once."""
+        return self.bound("once", *arguments)(vectors_of(arguments))
 
-    def along(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
-        """Evaluate the function row after row, with a vector carried from row to row.
-
-        Args:
-            by_row: Which of the vectors are tables, a row for each step.
-            arguments: As the function takes them; the first vector is the one carried into the
-                first step. The function returns the vector for the next step, and the results.
-
-        Returns:
-            The results, steps as leading axis of all.
-        """
-        return self.bound("along", by_row, arguments)(arguments[: self._vectors])
-
-    def rows(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
-        """Evaluate the function of every row of a batch.
-
-        Args:
-            by_row: Which of the vectors are tables, a row for each row of the batch.
-            arguments: As the function takes them.
+    def map(self, *arguments: Any) -> Any:
+        """Evaluate the function of every row, one after the other.
 
         Returns:
             The results, rows as leading axis of all.
         """
-        on_cpu = jax.default_backend() == "cpu"
-        program = self._program("rows", by_row, arguments) if on_cpu else None
-        tables = arguments[: self._vectors]
-        if program is not None:
-            return program(tables)
-        count = max(len(one) for one, rows in zip(tables, by_row, strict=True) if rows)
+        return self.bound("map", *arguments)(vectors_of(arguments))
+
+    def scan(self, *arguments: Any) -> Any:
+        """Evaluate the function row after row, with a vector carried from row to row.
+
+        Args:
+            arguments: The first is the vector carried into the first row. The function returns the
+                vector for the next row, and the results.
+
+        Returns:
+            The results, rows as leading axis of all.
+        """
+        return self.bound("scan", *arguments)(vectors_of(arguments))
+
+    def rows(self, *arguments: Any) -> Any:
+        """Evaluate the function of every row, side by side.
+
+        Returns:
+            The results, rows as leading axis of all.
+        """
+        if jax.default_backend() == "cpu":
+            return self.bound("rows", *arguments)(vectors_of(arguments))
+        vectors, forms = vectors_of(arguments), _forms_of(arguments)
+        by_row = _by_row(forms)
+        count = max(len(vector) for vector, rows in zip(vectors, by_row, strict=True) if rows)
         piece = next((size for size in _BATCH_SIZES if size >= count), _BATCH_SIZES[-1])
         results: list[Any] = []
         for start in range(0, count, piece):
             index = np.minimum(np.arange(start, start + piece), count - 1)
-            some = [one[index] if rows else one for one, rows in zip(tables, by_row, strict=True)]
-            results.append(self._by_xla("rows", by_row, (*some, *arguments[self._vectors :])))
+            some = [
+                vector[index] if rows else vector
+                for vector, rows in zip(vectors, by_row, strict=True)
+            ]
+            results.append(self._by_xla("rows", forms, some))
         return jax.tree.map(lambda *leaves: np.concatenate(leaves)[:count], *results)
 
-    def bound(
-        self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]
-    ) -> Callable[[Sequence[Any]], Any]:
+    def bound(self, how: str, *arguments: Any) -> Callable[[Sequence[Any]], Any]:
         """Return the program for arguments, as a function of vectors of the same sizes.
 
         Args:
-            how: "once", "along" or "rows", as the methods are called.
-            by_row: Which of the vectors are tables; None without tables.
+            how: "once" or the method that calls the function: "map", "scan" or "rows".
             arguments: As the function takes them.
         """
-        program = self._program(how, by_row, arguments)
-        others = arguments[self._vectors :]
-        return program or (lambda vectors: self._by_xla(how, by_row, (*vectors, *others)))
+        forms = _forms_of(arguments)
+        program = self._program(how, forms, vectors_of(arguments))
+        return program or partial(self._by_xla, how, forms)
 
     def _program(
-        self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]
+        self, how: str, forms: tuple[Any, ...], vectors: Sequence[Any]
     ) -> CompiledFunction | None:
-        """Return the program for these arguments; None where XLA must compile it."""
+        """Return the program for arguments of these forms; None where XLA must compile it."""
         if runs_uncompiled():
             return None
-        vectors, others = arguments[: self._vectors], arguments[self._vectors :]
-        per_row = by_row or (False,) * len(vectors)
-        shapes = tuple([one.shape[rows:] for one, rows in zip(vectors, per_row, strict=True)])
-        key = (self, how, by_row, shapes, others)
+        by_row = _by_row(forms)
+        shapes = tuple([one.shape[rows:] for one, rows in zip(vectors, by_row, strict=True)])
+        key = (self, how, shapes, forms)
         try:
             program = Native.programs[key]
             Native.programs.move_to_end(key)
@@ -233,26 +252,22 @@ class Native:
             pass
         with _lock:  # other threads wait while one compiles the same program
             if key not in Native.programs:
-                Native.programs[key] = self._load(how, by_row, shapes, others)
+                Native.programs[key] = self._load(how, shapes, forms)
                 while len(Native.programs) > _MAX_PROGRAMS:
                     Native.programs.popitem(last=False)
             return Native.programs[key]
 
     def _load(
-        self,
-        how: str,
-        by_row: tuple[bool, ...] | None,
-        shapes: Sequence[Any],
-        others: tuple[Any, ...],
+        self, how: str, shapes: Sequence[Any], forms: tuple[Any, ...]
     ) -> CompiledFunction | None:
         """Read the program from disk, or compile and store it; None where XLA must compile it."""
         if backend() == "xla":
             return None
-        key = repr((self._name, how, by_row, shapes, others))
+        key = repr((self._name, how, shapes, forms))
         on_processor = f"{key} {target()}"
         content = store.read(on_processor)
         if content is None:
-            text = shipped.read(key) or self._trace(key, how, by_row, shapes, others)
+            text = shipped.read(key) or self._trace(key, how, shapes, forms)
             if text is None:
                 return None
             Native.compiled += 1
@@ -265,18 +280,18 @@ class Native:
         return CompiledFunction(content)
 
     def _trace(
-        self,
-        key: str,
-        how: str,
-        by_row: tuple[bool, ...] | None,
-        shapes: Sequence[Any],
-        others: tuple[Any, ...],
+        self, key: str, how: str, shapes: Sequence[Any], forms: tuple[Any, ...]
     ) -> bytes | None:
         """Trace the program to text; None where XLA must compile it."""
-        function, zeros = self._of_vectors(others), [np.zeros(shape) for shape in shapes]
+        function, by_row = self._of_vectors(forms), None if how == "once" else _by_row(forms)
+        lanes = (getattr(getattr(form, "layout", form), "lanes", ()) for form in forms)
         try:
             program, tree = lower(
-                function, zeros, self._lanes(*others), by_row, carries=how == "along"
+                function,
+                list(map(np.zeros, shapes)),
+                max(lanes, default=()),
+                by_row,
+                how=how,
             )
         except UnsupportedPrimitiveError as error:
             warn_of_xla(self._name, error)
@@ -290,40 +305,72 @@ class Native:
         shipped.record(key, content)
         return content
 
-    def _of_vectors(self, others: tuple[Any, ...]) -> Callable[..., Any]:
-        return lambda *vectors: self.function(*vectors, *others)
+    def _of_vectors(self, forms: tuple[Any, ...]) -> Callable[..., Any]:
+        """Return the function of vectors alone."""
 
-    def _by_xla(self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]) -> Any:
+        def of_vectors(*vectors: Any) -> Any:
+            following = iter(vectors)
+            return self.function(
+                *(form.unpack(next(following)) if _is_packed(form) else form for form in forms)
+            )
+
+        return of_vectors
+
+    def _by_xla(self, how: str, forms: tuple[Any, ...], vectors: Sequence[Any]) -> Any:
         """Evaluate the function by a program of XLA."""
-        others = arguments[self._vectors :]
-        key = (how, by_row, others)
+        key = (how, forms)
         if key not in self._jitted:
-            function = self._of_vectors(others)
-            if by_row is not None:
-                along = partial(_scan, function, by_row)
-                axes = [0 if rows else None for rows in by_row]
-                function = along if how == "along" else jax.vmap(function, in_axes=axes)
+            function, by_row = self._of_vectors(forms), _by_row(forms)
+            if how == "rows":
+                function = jax.vmap(function, in_axes=[0 if rows else None for rows in by_row])
+            elif how != "once":
+                function = partial(_one_by_one, function, by_row, how == "scan")
             self._jitted[key] = jit(function)
-        vectors = map(jnp.asarray, arguments[: self._vectors])
-        return jax.tree.map(np.asarray, self._jitted[key](*vectors))
+        return jax.tree.map(np.asarray, self._jitted[key](*map(jnp.asarray, vectors)))
 
 
-def _scan(function: Callable[..., Any], by_row: tuple[bool, ...], *vectors: Any) -> Any:
-    """Evaluate a function row after row, with the first vector carried."""
-    tables = [one if rows else None for one, rows in zip(vectors, by_row, strict=True)]
+def _is_packed(argument: Any) -> bool:
+    return type(argument) is Packed
+
+
+def vectors_of(arguments: Sequence[Any]) -> list[Any]:
+    """Return the vectors and tables of a program's arguments."""
+    return [
+        argument.numbers if _is_packed(argument) else argument
+        for argument in arguments
+        if _is_packed(argument) or hasattr(argument, "shape")
+    ]
+
+
+def _forms_of(arguments: Sequence[Any]) -> tuple[Any, ...]:
+    """Return what a program is compiled for: arguments without their numbers."""
+    return tuple(
+        [
+            Packed(None) if hasattr(one, "shape")
+            else Packed(None, one.layout, one.by_row) if _is_packed(one)
+            else one
+            for one in arguments
+        ]
+    )  # fmt: skip
+
+
+def _by_row(forms: tuple[Any, ...]) -> tuple[bool, ...]:
+    return tuple([form.by_row for form in forms if _is_packed(form)])
+
+
+def _one_by_one(
+    function: Callable[..., Any], by_row: tuple[bool, ...], carries: bool, *vectors: Any
+) -> Any:
+    """Evaluate a function row after row, perhaps with the first vector carried."""
+    tables = [vector if rows else None for vector, rows in zip(vectors, by_row, strict=True)]
 
     def step(carry: Any, row: list[Any]) -> Any:
-        every = [one if own is None else own for one, own in zip(vectors, row, strict=True)]
-        return function(carry, *every[1:])
+        every = [
+            vector if entry is None else entry for vector, entry in zip(vectors, row, strict=True)
+        ]
+        return function(carry, *every[1:]) if carries else (None, function(*every))
 
-    return jax.lax.scan(step, vectors[0], tables)[1]
-
-
-def native(
-    vectors: int, lanes: Callable[..., Sequence[int]]
-) -> Callable[[Callable[..., Any]], Native]:
-    """Decorate a function to be compiled; see `Native`."""
-    return lambda function: Native(function, vectors, lanes)
+    return jax.lax.scan(step, vectors[0] if carries else None, tables)[1]
 
 
 # A pool of threads for the pieces of a table, started once: each reuses its memory.

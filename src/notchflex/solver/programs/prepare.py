@@ -15,6 +15,7 @@ from lanewise import FixedVector
 from notchflex.loads.command import Command, usual_loads
 from notchflex.mechanics.chain import Chain, assemble, padded
 from notchflex.robot import Robot
+from notchflex.solver.programs.compiled import Packed
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,
     StaticStructure,
@@ -113,9 +114,13 @@ class PreparedChain:
         return FixedVector(np.append(self.rest_vector, 1.0))
 
     @cached_property
-    def fixed_vector(self) -> FixedVector:
-        """The dynamic vector, for programs that are called many times."""
-        return FixedVector(self.dynamic_vector)
+    def packed(self) -> Packed:
+        """The chain, as programs take it."""
+        return Packed(FixedVector(self.dynamic_vector), self.static_structure)
+
+    def packed_states(self, states: Float[np.ndarray, "s state"]) -> Packed:
+        """Return states, as programs of the long chain take them."""
+        return Packed(pad_rows(states, self.state, self.long.state), self.long.state, True)
 
     @cached_property
     def programs(self) -> dict[Any, Callable[[Sequence[Any]], np.ndarray]]:
@@ -144,12 +149,10 @@ class PreparedChain:
             for by_stroke in (None, target > 0.0)
         }
 
-    def padded_commands(
-        self, commands: Command
-    ) -> tuple[Float[np.ndarray, "s command"], PytreeLayout]:
-        """Return s loads packed for the padded chain, and the layout of one of them."""
+    def packed_commands(self, commands: Command) -> Packed:
+        """Return loads, as programs of the long chain take them."""
         own, long = self.command_layout(commands), self.long.command_layout(commands)
-        return pad_rows(commands.packed(), own, long), long
+        return Packed(pad_rows(commands.packed(), own, long), long, True)
 
 
 @lru_cache(maxsize=64)

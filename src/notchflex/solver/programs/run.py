@@ -21,12 +21,10 @@ from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
 from notchflex.solver.held_stiffness import stability, stable
 from notchflex.solver.newton import Settings
-from notchflex.solver.programs.compiled import native, runs_uncompiled
+from notchflex.solver.programs.compiled import Native, Packed, runs_uncompiled, vectors_of
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,
-    StaticStructure,
-    lane_sizes,
     pad_rows,
     padded_indices,
 )
@@ -122,10 +120,9 @@ class SolverRun:
     @cached_property
     def _derived(self) -> dict[str, np.ndarray]:
         """Derived quantities of the state before the first load and of each state, by name."""
-        own, long = self._prepared, self._prepared.long
-        rows = pad_rows(np.concatenate([self.first[None], self.states]), own.state, long.state)
-        vectors = (np.zeros(1), long.dynamic_vector, rows)
-        every = _quantities.along((False, False, True), *vectors, long.static_structure, long.state)
+        own = self._prepared
+        states = own.packed_states(np.concatenate([self.first[None], self.states]))
+        every = _quantities.map(own.long.packed, states)
         return {name: unpad_quantity(own.chain, name, values) for name, values in every.items()}
 
     def quantity(self, name: str) -> np.ndarray:
@@ -153,16 +150,11 @@ class SolverRun:
     @cached_property
     def snapped(self) -> Float[np.ndarray, "s n"]:
         """Notches that snapped shut (1) or open (-1) on the way to each state; 0 for the others."""
-        own, long = self._prepared, self._prepared.long
+        own = self._prepared
         if own.chain.rods.section.ends is None:
             return np.zeros((len(self.table), own.chain.flexures))
-        pairs = (
-            pad_rows(rows, own.state, long.state) for rows in (self.states_before, self.states)
-        )
-        vectors = (np.zeros(1), long.dynamic_vector, *pairs)
-        layouts = long.static_structure, long.state
-        notches = _snapped.along((False, False, True, True), *vectors, *layouts)
-        return notches[:, : own.chain.flexures]
+        states = map(own.packed_states, (self.states_before, self.states))
+        return _snapped.map(own.long.packed, *states)[:, : own.chain.flexures]
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
         """Return the smallest real part of the eigenvalues, and the determinant's sign."""
@@ -194,25 +186,21 @@ def run(
         One entry per load.
     """
     long = prepared.long
-    loads, layout = prepared.padded_commands(commands)
+    loads = prepared.packed_commands(commands)
     first, start_row, carried = prepared.rest_vector, long.rest_vector, long.rest_carried
     if start is not None:
         first = np.asarray(prepared.state.pack(start))
         start_row = pad_rows(first, prepared.state, long.state)
         carried = np.append(start_row, 1.0)
-    from_start = np.zeros((len(loads), 1))
+    from_start = np.zeros((len(loads.numbers), 1))
     from_start[:, 0] = each_from_start
-    numbers = _numbers(settings)
-    vectors = (carried, long.fixed_vector, loads, from_start, start_row, numbers)
-    compiled_for = layout, runs_uncompiled()
+    arguments = (carried, long.packed, loads, Packed(from_start, None, True), start_row)
+    arguments = (*arguments, _numbers(settings), long.state)
+    compiled_for = loads.layout, runs_uncompiled()
     if compiled_for not in long.programs:
-        arguments = (*vectors, long.static_structure, layout, long.state)
-        long.programs[compiled_for] = _follow.bound("along", _BY_ROW, arguments)
-    return SolverRun(prepared, first, long.programs[compiled_for](vectors), from_start)
-
-
-# Which vectors of `_follow` have a row for every load.
-_BY_ROW = (False, False, True, True, False, False)
+        long.programs[compiled_for] = _follow.bound("scan", *arguments)
+    table = long.programs[compiled_for](vectors_of(arguments))
+    return SolverRun(prepared, first, table, from_start)
 
 
 @lru_cache(maxsize=64)
@@ -221,16 +209,14 @@ def _numbers(settings: Settings) -> FixedVector:
     return FixedVector(settings.numbers)
 
 
-@native(6, lane_sizes)
+@Native
 def _follow(
     carried: Float[Array, " state+1"],
-    vector: Float[Array, " chain"],
-    load: Float[Array, " command"],
+    chain: Chain,
+    command: Command,
     from_start: Float[Array, " 1"],
     start: Float[Array, " state"],
     numbers: Float[Array, " settings"],
-    chain_layout: StaticStructure,
-    command_layout: PytreeLayout,
     state_layout: PytreeLayout,
 ) -> tuple[Float[Array, " state+1"], Float[Array, " row"]]:
     """Solve one load; return both its states, their reported shape and the solver's status.
@@ -238,14 +224,12 @@ def _follow(
     The last solved state is carried from load to load, with a flag that all loads since the start
     converged.
     """
-    chain: Chain = chain_layout.unpack(vector)
     settings = Settings.of(numbers)
     alive = (carried[-1] > 0.0) | (from_start[0] > 0.0)
     before = jnp.where(from_start[0] > 0.0, start, carried[:-1])
 
     def solve() -> tuple[Array, Array, Array]:
-        command, last = command_layout.unpack(load), state_layout.unpack(before)
-        result = solve_load_step(chain, command, last, settings)
+        result = solve_load_step(chain, command, state_layout.unpack(before), settings)
         form = shape(chain, result.solved)
         parts = [state_layout.pack(result.between), PytreeLayout.of(form).pack(form)]
         row = jnp.concatenate([*parts, _status(result)])
@@ -268,30 +252,7 @@ def _status(result: LoadStepResult) -> Float[Array, " status"]:
     return jnp.stack([jnp.asarray(value, float) for value in status])
 
 
-@native(3, lane_sizes)
-def _quantities(
-    carried: Float[Array, " one"],
-    vector: Float[Array, " chain"],
-    state: Float[Array, " state"],
-    chain_layout: StaticStructure,
-    state_layout: PytreeLayout,
-) -> tuple[Array, dict[str, Array]]:
-    """Compute derived quantities of a state beyond its reported shape, by name."""
-    return carried, quantities(chain_layout.unpack(vector), state_layout.unpack(state))
-
-
-@native(4, lane_sizes)
-def _snapped(
-    carried: Float[Array, " one"],
-    vector: Float[Array, " chain"],
-    before: Float[Array, " state"],
-    after: Float[Array, " state"],
-    chain_layout: StaticStructure,
-    state_layout: PytreeLayout,
-) -> tuple[Array, Array]:
-    """Find the notches that snapped between two states."""
-    states = (state_layout.unpack(state) for state in (before, after))
-    return carried, snapped_notches(chain_layout.unpack(vector), *states)
+_quantities, _snapped = Native(quantities), Native(snapped_notches)
 
 
 def solve_contacts(
@@ -304,32 +265,20 @@ def solve_contacts(
     Returns:
         Contact forces and gaps, loads by notches, and which loads converged.
     """
-    long = prepared.long
-    packed, form = prepared.padded_commands(commands)
-    before = pad_rows(np.asarray(prepared.state.pack(start)), prepared.state, long.state)
-    vectors = (np.zeros(1), long.dynamic_vector, packed, before, _numbers(settings))
-    force, gap, converged = _solve_contacts.along(
-        (False, False, True, False, False), *vectors, long.static_structure, form, long.state
-    )
+    command, row = prepared.packed_commands(commands), prepared.state.pack(start)
+    last = prepared.packed_states(np.asarray(row))._replace(by_row=False)
+    found = _solve_contacts.map(prepared.long.packed, command, last, _numbers(settings))
+    force, gap, converged = found
     own = prepared.chain.flexures
     return force[:, :own], gap[:, :own], converged
 
 
-@native(5, lane_sizes)
+@Native
 def _solve_contacts(
-    carried: Float[Array, " one"],
-    vector: Float[Array, " chain"],
-    load: Float[Array, " command"],
-    start: Float[Array, " state"],
-    numbers: Float[Array, " settings"],
-    chain_layout: StaticStructure,
-    command_layout: PytreeLayout,
-    state_layout: PytreeLayout,
-) -> tuple[Array, tuple[Array, Array, Array]]:
+    chain: Chain, command: Command, last: SolverState, numbers: Float[Array, " settings"]
+) -> tuple[Array, Array, Array]:
     """Compute contact forces and gaps of one load, and whether it converged."""
-    chain, settings = chain_layout.unpack(vector), Settings.of(numbers)
-    command, last = command_layout.unpack(load), state_layout.unpack(start)
-    result = solve_load_step(chain, command, last, settings)
+    result = solve_load_step(chain, command, last, Settings.of(numbers))
     point, memory, _, applied = result.solved
     at = evaluate(chain, point, memory, applied)
-    return carried, (*notch_contact(chain, point.unknowns, at), result.converged)
+    return (*notch_contact(chain, point.unknowns, at), result.converged)

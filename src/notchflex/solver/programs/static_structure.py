@@ -90,12 +90,6 @@ class PytreeLayout:
         return as_kind(part.reshape(shape), self.kinds[number])
 
 
-def lane_sizes(chain_layout: PytreeLayout, *_others: Any) -> tuple[int, int]:
-    """Return the sizes of the axes that run along the chain: its flexures, and its bodies."""
-    chain = jax.eval_shape(chain_layout.unpack, jax.ShapeDtypeStruct((chain_layout.size,), float))
-    return chain.flexures, chain.flexures + 1
-
-
 def as_kind(values: Array, kind: str) -> Array:
     """Return floats as numbers of a kind of NumPy's."""
     if kind == "b":
@@ -120,6 +114,7 @@ class StaticStructure:
     Attributes:
         form: Layout of the whole chain.
         size: Numbers in a vector.
+        lanes: Sizes of the axes that run along the chain: its flexures, and its bodies.
     """
 
     _structures: ClassVar[dict[tuple[PytreeLayout, bytes, bytes], StaticStructure]] = {}
@@ -133,6 +128,7 @@ class StaticStructure:
     ) -> None:
         """Store which numbers of a whole chain are constants, and those numbers."""
         self.form, self._constant, self._numbers = form, constant, numbers
+        self.lanes = (flexures, flexures + 1)
         rows = [_by_flexure(indices, flexures) for indices in form.indices]
         order = np.concatenate([row.T.ravel() for row in rows])
         self._taken: Int[np.ndarray, " dynamic"] = order[~constant[order]]
