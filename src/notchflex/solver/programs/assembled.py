@@ -317,27 +317,28 @@ def chain_slopes(
 
 
 def chain_gradient(
-    robot: Robot, chain: Chain, places: Sequence[Place], weights: Float[np.ndarray, " chain"]
-) -> Float[np.ndarray, " places"] | None:
-    """Differentiate a weighted sum of the numbers of a robot's chain.
+    robot: Robot,
+    chain: Chain,
+    varied: Collection[Place],
+    weights: Float[np.ndarray, " chain"],
+    changes: Callable[[PartsForm], Float[np.ndarray, "k numbers"]],
+) -> Float[np.ndarray, " k"] | None:
+    """Differentiate a weighted sum of the numbers of a chain; see `chain_slopes`.
 
     Args:
         robot: The robot.
         chain: Its chain, for the level and the kinds of loads.
-        places: Places of the numbers of the robot by which to differentiate.
+        varied: Places of the numbers that change.
         weights: Of the numbers of the chain, packed whole.
-
-    Returns:
-        A derivative for each place; None where no program has this form.
+        changes: Gives k changes of all numbers of a form of parts.
     """
 
     def gradient_of(programs: AssembledRobots, numbers: np.ndarray) -> np.ndarray | None:
-        varied = np.array([programs.form.places.index(place) for place in places])
         packed = programs.joined.structure.pack(weights)
-        gradient, alike = programs.gradient(numbers[None], packed[None], varied)
+        gradient, alike = programs.gradient(numbers[None], packed[None], changes(programs.form))
         return gradient[0] if alike[0] else None
 
-    return _first_alike(robot, chain, places, gradient_of)
+    return _first_alike(robot, chain, varied, gradient_of)
 
 
 # Robots of one piece; more would not fit the cache.
@@ -475,29 +476,29 @@ class AssembledRobots:
         self,
         numbers: Float[np.ndarray, "robots numbers"],
         weights: Float[np.ndarray, "robots chain"],
-        varied: Int[np.ndarray, " varied"],
-    ) -> tuple[Float[np.ndarray, "robots varied"], Bool[np.ndarray, " robots"]]:
+        changes: Float[np.ndarray, "k numbers"],
+    ) -> tuple[Float[np.ndarray, "robots k"], Bool[np.ndarray, " robots"]]:
         """Differentiate weighted sums of the numbers of chains.
 
         Args:
             numbers: Those of the robots.
             weights: Of the numbers of the chains, packed for programs.
-            varied: Which numbers of the robots to differentiate by.
+            changes: Changes of the numbers of each robot.
 
         Returns:
-            The derivatives, and which of the chains are of the form of the example.
+            A derivative for each change, and which of the chains are of the form of the example.
         """
         made = self._of_notches(numbers, _built)
         back = _joined_back.rows((True,) * 3, numbers, made["flexures"], weights, self.joined)
-        gradient = back["numbers"][:, varied].ravel()
-        units = np.tile(np.eye(numbers.shape[1])[varied], (len(numbers), 1))
-        moved = np.repeat(numbers, len(varied), axis=0) + 1j * _SMALL * units
+        gradient = np.einsum("rn,kn->rk", back["numbers"], changes).ravel()
+        moved = np.repeat(numbers, len(changes), axis=0)
+        moved = moved + 1j * _SMALL * np.tile(changes, (len(numbers), 1))
         for notches in self.notches:
             table = self._table(moved, notches)
             row, notch = np.nonzero(np.imag(table).any(axis=-1))
             if len(row):
                 slopes = _differentiated(table[row, notch], notches.form)["slopes"]
-                which = (row // len(varied))[:, None], notches.packed[notch]
+                which = (row // len(changes))[:, None], notches.packed[notch]
                 np.add.at(gradient, row, (slopes * back["flexures"][which]).sum(axis=-1))
         return gradient.reshape(len(numbers), -1), made["alike"] & back["alike"]
 
