@@ -136,7 +136,9 @@ def check(data):
         arrays, by_row = [tables[2][0], tables[0], tables[1]], (False, True, True)
     example = [one[0] if by_row and by_row[at] else one for at, one in enumerate(arrays)]
     try:
-        lowered, _ = lower(function, example, (size, size + 1), by_row, carries=how == "path")
+        lowered, _ = lower(
+            function, example, (size, size + 1), by_row, how="scan" if how == "path" else how
+        )
     except UnsupportedPrimitiveError as error:
         if any(words in str(error) for words in REFUSED):
             return

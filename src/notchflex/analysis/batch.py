@@ -43,7 +43,7 @@ from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities import QUANTITIES, work_of_steps
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.compiled import number_of_cores, on_cores
+from notchflex.solver.programs.compiled import Packed, number_of_cores, on_cores
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import PytreeLayout
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
+from itertools import repeat
 from math import prod
 from typing import Any
 
@@ -15,27 +16,39 @@ from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import jax, jnp
+from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
+from notchflex.analysis.batch import BatchRows, BatchTable, FollowedRows, LoadRows
 from notchflex.analysis.forward_model import ForwardModel
-from notchflex.analysis.outputs import OutputTable, check_outputs
+from notchflex.analysis.outputs import STEPS, OutputTable, check_outputs
 from notchflex.analysis.slopes import (
     LOADS,
     SLOPING,
-    RobotRows,
     changes,
     derivatives,
     gradient_by,
+    load_units,
     start_of,
 )
 from notchflex.analysis.solve import check_refinement
-from notchflex.analysis.tangent import Kink, kinks, path_gradient
+from notchflex.analysis.tangent import (
+    Kink,
+    StepLayouts,
+    adjoint_step,
+    kinks,
+    path_gradient,
+    tangent_step,
+)
+from notchflex.analysis.varied import VariedRobots, single_chains
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
+from notchflex.loads.command import DRAWN, FOLLOWING, LOADED, SIDEWAYS
 from notchflex.loads.load import check_is_robot, short_repr
 from notchflex.loads.load_path import TIP, load_path
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.programs.compiled import Packed, number_of_cores, on_cores
 from notchflex.solver.programs.static_structure import as_kind
 
 # Largest change of a parameter in one-sided differences.
@@ -132,7 +145,6 @@ class Differentiable(Displayed):
         complete = self._complete(values)
         if any(isinstance(value, Tracer) for value in complete.values()):
             return self._traced(complete)
-        self._check(complete)
         plain = np.concatenate([np.ravel(value) for value in complete.values()])
         values = self._solver.table(plain)
         return OutputTable({name: jnp.asarray(value) for name, value in values.items()})
@@ -205,20 +217,8 @@ class Differentiable(Displayed):
 
     def _path(self, values: Mapping[str, Any]) -> EquilibriumPath:
         """Solve the path at some values."""
-        return self.model.solve(self._robot(values), self.load.commanding(values))
-
-    def _robot(self, values: Mapping[str, Any]) -> Robot:
-        return self._robots(tuple(float(values[name]) for name in self.numbers))
-
-    @cached_property
-    def _robots(self) -> Callable[[tuple[float, ...]], Robot]:
-        """Robots of some numbers; the same is asked for again for other loads."""
-
-        def made(numbers: tuple[float, ...]) -> Robot:
-            values = zip(self.numbers, numbers, strict=True)
-            return self.robot.with_values(values) if numbers else self.robot
-
-        return lru_cache(maxsize=4)(made)
+        numbers = tuple((name, float(at)) for name, at in values.items() if name not in LOADS)
+        return self.model.solve(_varied(self.robot, numbers), self.load.commanding(values))
 
     def _complete(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
         """Return values of all parameters, in their shapes."""
@@ -234,14 +234,6 @@ class Differentiable(Displayed):
             )
         return {name: self._value(name, values.get(name, at)) for name, at in self.start.items()}
 
-    def _check(self, values: dict[str, Array]) -> None:
-        """Refuse what no robot or load can have; traced values only set `converged` to false."""
-        numbers = {name: float(values[name]) for name in self.numbers}
-        if numbers != {name: float(self.start[name]) for name in self.numbers}:
-            self._robot(values)
-        if "tension" in values and not (values["tension"] >= 0.0).all():
-            raise InputError.OUT_OF_RANGE("a tendon can only pull; give tensions of 0 N or more")
-
     def _value(self, name: str, value: Any) -> Array:
         shape = self.start[name].shape
         if isinstance(value, Tracer) and (value.shape, value.dtype) == (shape, float):
@@ -255,11 +247,6 @@ class Differentiable(Displayed):
             raise InputError.WRONG_SHAPE(
                 f"`{name}` must be numbers of shape {shape}; got {short_repr(value)}"
             ) from None
-
-    @cached_property
-    def numbers(self) -> tuple[str, ...]:
-        """Names of the parameters that are numbers of the robot."""
-        return tuple(name for name in self.start if name not in LOADS)
 
     @cached_property
     def model(self) -> ForwardModel:
@@ -279,6 +266,12 @@ class Differentiable(Displayed):
         return jax.jit(
             lambda values: function(jnp.concatenate([values[name].ravel() for name in self.start]))
         )
+
+
+@lru_cache(maxsize=16)
+def _varied(robot: Robot, values: tuple[tuple[str, float], ...]) -> Robot:
+    """Return a robot with other numbers; the same is asked for again for other loads."""
+    return robot.with_values(values) if values else robot
 
 
 # A robot under loads as primitives of JAX: outputs, their change along one, and the transpose.
@@ -309,15 +302,16 @@ class VectorSolver:
         return np.concatenate([at.ravel() for at in self.start.values()])
 
     @cached_property
+    def _path(self) -> EquilibriumPath:
+        """The path at the present values."""
+        return self._path_at(self.first)
+
+    @cached_property
     def forms(self) -> dict[str, tuple[slice, tuple[int, ...], str]]:
         """Where every output is in a row of them, its shape, and its kind of numbers."""
         values = self.table(self.first)
-        ends = np.cumsum([0, *(one.size for one in values.values())]).tolist()
-        parts = map(slice, ends, ends[1:])
-        return {
-            name: (part, one.shape, one.dtype.kind)
-            for part, (name, one) in zip(parts, values.items(), strict=True)
-        }
+        parts = _slices(values)
+        return {name: (parts[name], one.shape, one.dtype.kind) for name, one in values.items()}
 
     @cached_property
     def size(self) -> int:
@@ -328,13 +322,9 @@ class VectorSolver:
     def _sloping(self) -> tuple[str, ...]:
         return tuple(name for name in self.outputs if name in SLOPING)
 
-    @cached_property
-    def _rows(self) -> RobotRows:
-        return RobotRows(self._path(self.first), self.start, self.forms, self.refinement)
-
     def table(self, at: Float[np.ndarray, " n"]) -> dict[str, np.ndarray]:
         """Return the outputs; raise `InputError` for values that no robot or load can have."""
-        path = self._path(at)
+        path = self._path_at(at)
         values = {name: np.asarray(getattr(path, name)) for name in self.outputs}
         for name in self._sloping if not path.converged.all() else ():
             values[name] = values[name].copy()
@@ -345,9 +335,13 @@ class VectorSolver:
         """Return the outputs of rows of values, as rows; NaN where values are refused."""
 
         def single(at: np.ndarray) -> np.ndarray:
-            return np.hstack([one.ravel() for one in self.table(at).values()])[None]
+            return self._packed({name: one[None] for name, one in self.table(at).items()})
 
-        return self._each(single, RobotRows.values, self.size, at)
+        def several(table: BatchTable, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            outputs, alike = table.solved(rows)
+            return self._packed(outputs), alike
+
+        return self._each(single, several, self.size, at)
 
     def along(
         self, at: Float[np.ndarray, "k n"], change: Float[np.ndarray, "j n"]
@@ -355,14 +349,11 @@ class VectorSolver:
         """Return the changes of the outputs along changes of the values."""
 
         def single(at: np.ndarray, change: np.ndarray) -> np.ndarray:
-            path = self._path(at)
-            slopes = np.zeros((len(change), self.size))
-            by = derivatives(path, changes(path, (*self.start,), change), self._sloping)
-            for name, values in by.items():
-                slopes[:, self.forms[name][0]] = values.reshape(len(change), -1)
-            return slopes
+            path = self._path_at(at)
+            directions = changes(path, (*self.start,), change)
+            return self._packed(derivatives(path, directions, self._sloping))
 
-        return self._each(single, RobotRows.along, self.size, at, change)
+        return self._each(single, self._along, self.size, at, change)
 
     def back(
         self, at: Float[np.ndarray, "k n"], weights: Float[np.ndarray, "j m"]
@@ -370,15 +361,25 @@ class VectorSolver:
         """Return the derivatives of weighted sums of the outputs by the values."""
 
         def single(at: np.ndarray, weights: np.ndarray) -> np.ndarray:
-            path = self._path(at)
-            gradients: list[np.ndarray] = []
-            for row in weights:
-                parts = {name: self.forms[name] for name in self._sloping}
-                named = {name: row[part].reshape(form) for name, (part, form, _) in parts.items()}
-                gradients.append(gradient_by(path, path_gradient(path, named), (*self.start,)))
-            return np.stack(gradients)
+            path = self._path_at(at)
+            parts = {name: self.forms[name] for name in self._sloping}
+            gradients = [
+                path_gradient(
+                    path,
+                    {name: row[part].reshape(shape) for name, (part, shape, _) in parts.items()},
+                )
+                for row in weights
+            ]
+            return np.stack([gradient_by(path, one, (*self.start,)) for one in gradients])
 
-        return self._each(single, RobotRows.back, len(self.first), at, weights)
+        return self._each(single, self._back, len(self.first), at, weights)
+
+    def _packed(self, by_name: Mapping[str, np.ndarray]) -> Float[np.ndarray, "k m"]:
+        """Return outputs or their changes side by side; 0 for what has no change."""
+        rows = np.zeros((len(next(iter(by_name.values()))), self.size))
+        for name in by_name.keys() & self.forms.keys():
+            rows[:, self.forms[name][0]] = by_name[name].reshape(len(rows), -1)
+        return rows
 
     def _each(
         self,
@@ -389,29 +390,158 @@ class VectorSolver:
         *others: np.ndarray,
     ) -> np.ndarray:
         """Evaluate one row, with some directions, or rows, which are solved at once if possible."""
-
-        def safe(*arguments: np.ndarray) -> np.ndarray:
-            try:
-                return single(*arguments)
-            except InputError:
-                return np.full((len(arguments[-1]) if others else 1, size), np.nan)
-
         if len(at) == 1:
-            return safe(at[0], *others)
-        results, solved = several(self._rows, at, *others)
+            return self._safe(single, size, at[0], *others)
+        results, solved = np.empty((len(at), size)), np.zeros(len(at), bool)
+        places = np.flatnonzero((np.isfinite(at) & (at >= self._least)).all(axis=1))
+        table = self._rows(at[places]) if len(places) else None
+        # Loads on what weighs something depend on the numbers of the robot.
+        weighs = bool(self._numbers) and self._path.chain.loaded and bool(others)
+        if table is not None and not weighs:
+            pieces = [table.rows[index] for index in table.pieces(number_of_cores())]
+            solving = on_cores(
+                lambda rows: several(table, rows, *(one[places[rows]] for one in others)), pieces
+            )
+            for rows, (values, alike) in zip(pieces, solving, strict=True):
+                results[places[rows]], solved[places[rows]] = values, alike
         for row in np.flatnonzero(~solved):
-            results[row] = safe(at[row], *(other[row : row + 1] for other in others))
+            own = (one[row : row + 1] for one in others)
+            results[row] = self._safe(single, size, at[row], *own)
         return results
 
-    def _path(self, at: Float[np.ndarray, " n"]) -> EquilibriumPath:
+    def _safe(
+        self, single: Callable[..., np.ndarray], size: int, at: np.ndarray, *others: np.ndarray
+    ) -> np.ndarray:
+        """Evaluate one row; NaN where its values are refused."""
+        try:
+            return single(at, *others)
+        except InputError:
+            return np.full((max(map(len, others), default=1), size), np.nan)
+
+    @cached_property
+    def _columns(self) -> dict[str, slice]:
+        """Where the numbers of each name are in a row of values."""
+        return _slices(self.start)
+
+    @cached_property
+    def _numbers(self) -> list[int]:
+        """Where the numbers of the robot are in a row of values."""
+        return [part.start for name, part in self._columns.items() if name not in LOADS]
+
+    @cached_property
+    def _least(self) -> Float[np.ndarray, " n"]:
+        """The least that each value may be; a tendon that is not commanded may have any."""
+        least = np.full(len(self.first), -np.inf)
+        if "tension" in self.start:
+            slack = np.isnan(self._path.load.tension).ravel()
+            least[self._columns["tension"]] = np.where(slack, -np.inf, 0.0)
+        return least
+
+    @cached_property
+    def _units(self) -> Float[np.ndarray, "n s command"]:
+        """The change of the packed loads per unit of each value."""
+        still = np.zeros((1, *self._path.commands.packed().shape))
+        units = [load_units(self._path, one) if one in LOADS else still for one in self.start]
+        return np.concatenate(units)
+
+    def _rows(self, at: Float[np.ndarray, "k n"]) -> BatchTable | None:
+        """Return values as rows of a batch, those that make robots; None if they need Python."""
+        path, every = self._path, np.arange(len(at))
+        distinct, robot_of = np.unique(at[:, self._numbers], axis=0, return_inverse=True)
+        of_robots, of_loads = dict[str, np.ndarray](), dict[str, np.ndarray]()
+        for name, start in self.start.items():
+            if name in LOADS:
+                of_loads[name] = at[:, self._columns[name]].reshape(-1, *start.shape)
+            else:
+                of_robots[name] = distinct[:, len(of_robots)]
+        robots = VariedRobots([path.robot], np.zeros(len(distinct), int), of_robots)
+        loads = LoadRows(path.load, len(path)).varied(0 * every, of_loads)
+        outputs = tuple(dict.fromkeys((*self.outputs, "converged")))
+        settings = outputs, path.settings, self.refinement
+        rows = BatchRows(robots, loads, robot_of.reshape(-1), every, *settings)
+        chain = path.chain
+        kind = (
+            LOADED * chain.loaded
+            | SIDEWAYS * (chain.level == "space")
+            | FOLLOWING * chain.follows
+            | DRAWN * path.load.draws
+        )
+        chains = single_chains({0: path.prepared})
+        if of_robots:
+            chains = next(robots.forms(np.arange(len(robots)))).chains(kind, self.refinement)
+        return chains and BatchTable(rows, np.flatnonzero(rows.valid), chains, kind)
+
+    def _steps(self, table: BatchTable, rows: np.ndarray) -> tuple[FollowedRows, StepLayouts, Any]:
+        """Follow rows; return also what programs take of every step, rows and steps as axes."""
+        followed, ready = table.followed(rows, STEPS), table.chains.ready
+        found = followed.outputs
+        rest = np.broadcast_to(ready.rest_vector, found["states"][:, :1].shape)
+        before = np.concatenate([rest, found["states"][:, :-1]], axis=1)
+        structure, varies = table.chains.structure, bool(self._numbers)
+        layouts = StepLayouts(structure, followed.layout, ready.state, self._sloping, varies)
+        return followed, layouts, (before, *(found[one] for one in STEPS), followed.commands)
+
+    def _along(
+        self, table: BatchTable, rows: np.ndarray, change: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the changes of the outputs of rows of a batch, and which are right."""
+        followed, layouts, tables = self._steps(table, rows)
+        robots = table.batch.robot_of[rows]
+        by_robot, alike = table.chains.along(robots, change[:, self._numbers])
+        tables = (*tables, np.einsum("kn,nsc->ksc", change, self._units))
+        carried, by_row = np.zeros_like(tables[0][:, 0]), followed.chains.ndim == 2
+        which = (True, by_row, by_row, *(True,) * len(tables))
+        parts: list[dict[str, np.ndarray]] = []
+        for step in range(len(self._path)):
+            vectors = (carried, followed.chains, by_robot, *(one[:, step] for one in tables))
+            carried, by = tangent_step.rows(*map(Packed, vectors, repeat(None), which), layouts)
+            parts.append(by)
+        turn = self._path.load.base_to_world
+        slopes = {
+            name: REGISTERED[name].turned(np.stack([by[name] for by in parts], axis=1), turn)
+            for name in self._sloping
+        }
+        return self._packed(slopes), alike & followed.alike
+
+    def _back(
+        self, table: BatchTable, rows: np.ndarray, weights: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivatives of weighted sums of rows of a batch, and which are right."""
+        followed, layouts, tables = self._steps(table, rows)
+        layouts = layouts._replace(chain_varies=False)
+        turn, seeds = self._path.load.base_to_world, list[np.ndarray]()
+        for name in self._sloping:
+            part, shape, _ = self.forms[name]
+            own = weights[:, part].reshape(-1, *shape)
+            own = REGISTERED[name].turned(own, None if turn is None else turn.T)
+            seeds.append(own.reshape(*own.shape[:2], -1))
+        tables = (*tables, np.concatenate(seeds, axis=2))
+        carried, by_load = np.zeros_like(tables[0][:, 0]), np.zeros_like(followed.commands)
+        by_chain = np.zeros((len(rows), layouts.chain.size))
+        by_row = (True, followed.chains.ndim == 2, *(True,) * len(tables))
+        counts = np.zeros((len(rows), 1), bool)
+        for step in reversed(range(len(self._path))):
+            vectors = carried, followed.chains, *(one[:, step] for one in tables)
+            before, by = adjoint_step.rows(*map(Packed, vectors, repeat(None), by_row), layouts)
+            # No step beyond the last that counts: one that failed there must not matter.
+            counts |= tables[-1][:, step].any(axis=1, keepdims=True)
+            carried = np.where(counts, before, 0.0)
+            by_load[:, step] = np.where(counts, by["load"], 0.0)
+            by_chain += np.where(counts, by["chain"], 0.0)
+        gradient = np.einsum("ksc,nsc->kn", by_load, self._units)
+        by_number, alike = table.chains.back(table.batch.robot_of[rows], by_chain)
+        gradient[:, self._numbers] += by_number
+        return gradient, alike & followed.alike
+
+    def _path_at(self, at: Float[np.ndarray, " n"]) -> EquilibriumPath:
         """Solve the path at some values; the last one is cached for its derivatives."""
         if not np.isfinite(at).all():  # a tension that is not a number would mean a slack tendon
             raise InputError.NOT_FINITE("values must be finite numbers")
         key = at.tobytes()
         if key not in self._last:
-            ends = np.cumsum([one.size for one in self.start.values()])[:-1]
-            pairs = zip(self.start.items(), np.split(at, ends), strict=True)
-            path = self.solve({name: part.reshape(one.shape) for (name, one), part in pairs})
+            parts = {name: at[part] for name, part in self._columns.items()}
+            shaped = {name: parts[name].reshape(one.shape) for name, one in self.start.items()}
+            path = self.solve(shaped)
             self._last.clear()
             self._last[key] = path
         return self._last[key]
@@ -419,6 +549,12 @@ class VectorSolver:
     @cached_property
     def _last(self) -> dict[bytes, EquilibriumPath]:
         return {}
+
+
+def _slices(arrays: Mapping[str, np.ndarray]) -> dict[str, slice]:
+    """Return where arrays are in a row of all their numbers."""
+    ends = np.cumsum([0, *(one.size for one in arrays.values())]).tolist()
+    return dict(zip(arrays, map(slice, ends, ends[1:]), strict=True))
 
 
 def outputs_function(solver: VectorSolver) -> Callable[[Array], OutputTable]:

@@ -12,13 +12,14 @@ from jaxtyping import Array, Float, Int
 from notchflex._jax import choose, jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex.errors import ErrorCode, InputError
+from notchflex.loads.command import Command
 from notchflex.loads.load import short_repr
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import solve_load_step
 from notchflex.solver.newton import Settings
-from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.compiled import Native
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
+from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure
 from notchflex.solver.quantities import believable, unpad_quantity
 from notchflex.solver.residual import SolverState, at_rest
 from notchflex.solver.solved_state import SolvedState

@@ -35,17 +35,16 @@ from notchflex.loads.load import (
     short_repr,
 )
 from notchflex.loads.load_path import load_path
+from notchflex.mechanics.chain import Chain
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.state import SavedState, State, check_robot, fitted, state_of
 from notchflex.robot import Robot
 from notchflex.solver.continuation import before_tendons, solve_load_step
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.compiled import native, on_cores
+from notchflex.solver.programs.compiled import Native, Packed, on_cores
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,
-    StaticStructure,
-    lane_sizes,
     pad_rows,
     padded_indices,
 )

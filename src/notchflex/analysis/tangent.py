@@ -18,7 +18,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from itertools import repeat
+from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -28,12 +29,11 @@ from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import own_entries, report_quantities, reported_shapes
 from notchflex.mechanics.chain import Chain
 from notchflex.results.path import EquilibriumPath
-from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.compiled import Native, Packed
 from notchflex.solver.programs.run import SolverRun
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,
     StaticStructure,
-    lane_sizes,
     pad_rows,
     padded_indices,
 )

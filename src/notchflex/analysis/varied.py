@@ -183,6 +183,22 @@ class Chains:
     programs: AssembledRobots | None = None
     form: RobotForm | None = None
 
+    def along(
+        self, robots: Int[np.ndarray, " k"], changes: Float[np.ndarray, "k names"]
+    ) -> tuple[np.ndarray, Bool[np.ndarray, " k"]]:
+        """Differentiate chains along changes of the named values; return also which are right."""
+        if self.programs is None or self.form is None:
+            return np.zeros(1), np.ones(len(robots), bool)
+        return self.programs.along(self.form.table(robots), changes @ self.form.units)
+
+    def back(
+        self, robots: Int[np.ndarray, " k"], weights: Float[np.ndarray, "k chain"]
+    ) -> tuple[Float[np.ndarray, "k names"], Bool[np.ndarray, " k"]]:
+        """Differentiate weighted sums of chains by the named values, as `along`."""
+        if self.programs is None or self.form is None:
+            return np.zeros((len(robots), 0)), np.ones(len(robots), bool)
+        return self.programs.gradient(self.form.table(robots), weights, 1.0 * self.form.units)
+
     def bodies(self, chains: Float[np.ndarray, "k chain"]) -> Chain:
         """Return the chain with the masses and lengths of the bodies of every robot, for loads."""
         if chains.ndim == 1 or not self.ready.chain.loaded:

@@ -22,14 +22,8 @@ from notchflex._jax import jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.linear_step import LinearisedRows, UnitRows, linearise, unit_rows
-from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.compiled import Native
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.static_structure import (
-    PytreeLayout,
-    StaticStructure,
-    lane_sizes,
-    pad_rows,
-)
 from notchflex.solver.residual import Memory, SolverState, bound_side, command_slopes, evaluate
 
 # Springs this much stiffer than the notches hold closed contacts and tendons driven by stroke;

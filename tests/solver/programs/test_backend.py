@@ -31,17 +31,17 @@ def doubled(values):
 
 def test_xla_when_asked_for(monkeypatch):
     monkeypatch.setenv(backend.BACKEND, "xla")
-    assert Native(doubled, 1, lambda: ())(np.arange(3.0)).tolist() == [0.0, 2.0, 4.0]
+    assert Native(doubled)(np.arange(3.0)).tolist() == [0.0, 2.0, 4.0]
     assert list(Native.programs.values())[-1] is None  # no program of lanewise
     monkeypatch.setenv(backend.BACKEND, "")
-    assert Native(doubled, 1, lambda: ())(np.arange(3.0)).tolist() == [0.0, 2.0, 4.0]
+    assert Native(doubled)(np.arange(3.0)).tolist() == [0.0, 2.0, 4.0]
     assert list(Native.programs.values())[-1] is not None
 
 
 def test_other_values_are_refused(monkeypatch):
     monkeypatch.setenv(backend.BACKEND, "llvm")
     with refused("UNKNOWN_NAME", backend.BACKEND, "llvm", "native, xla"):
-        Native(lambda values: values + 1.0, 1, lambda: ())(np.arange(3.0))
+        Native(lambda values: values + 1.0)(np.arange(3.0))
 
 
 def test_one_warning_for_each_primitive():
@@ -52,10 +52,10 @@ def test_one_warning_for_each_primitive():
         return -jnp.sort(-values)
 
     with pytest.warns(RuntimeWarning, match="ordered.*`sort`"):
-        Native(ordered, 1, lambda: ())(np.arange(3.0))
+        Native(ordered)(np.arange(3.0))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        Native(ordered_otherwise, 1, lambda: ())(np.arange(3.0))
+        Native(ordered_otherwise)(np.arange(3.0))
     with pytest.warns(RuntimeWarning, match="erf"):
         backend.warn_of_xla("f", UnsupportedPrimitiveError("JAX's primitive `erf`", "erf"))
 

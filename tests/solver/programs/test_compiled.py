@@ -9,7 +9,7 @@ import notchflex as nf
 from notchflex._jax import jax, jnp
 from notchflex.solver.programs import compiled as backend
 from notchflex.solver.programs import store
-from notchflex.solver.programs.compiled import Native
+from notchflex.solver.programs.compiled import Native, Packed
 from notchflex.solver.programs.prepare import prepare
 
 
@@ -53,11 +53,11 @@ def test_it_runs_without_compiling(wrist):
 
 
 def test_what_cannot_be_read_goes_to_xla():
-    function = Native(lambda values, count: jnp.sort(values)[:count], 1, lambda _: ())
+    function = Native(lambda values, count: jnp.sort(values)[:count])
     with pytest.warns(RuntimeWarning, match="sort"):
         np.testing.assert_array_equal(function(np.array([3.0, 1.0, 2.0]), 2), [1.0, 2.0])
     rows = np.array([[3.0, 1.0], [0.0, -1.0], [5.0, 6.0]])
-    found = function.rows((True,), rows, 1)  # warned of once
+    found = function.rows(Packed(rows, None, True), 1)  # warned of once
     np.testing.assert_array_equal(found, [[1.0], [-1.0], [5.0]])
 
 
@@ -74,9 +74,9 @@ def test_rows_in_order_carry_a_vector(rows):
     """By a program of ours and by XLA, for any number of rows by the same program."""
     table = np.arange(3.0 * rows).reshape(rows, 3)
     before = np.cumsum(np.vstack([np.zeros(2), table[:, :2]]), axis=0)[:-1]
-    own = Native(cumulated, 2, lambda _: ()).along((False, True), np.zeros(2), table, 2)
+    own = Native(cumulated).scan(np.zeros(2), Packed(table, None, True), 2)
     with pytest.warns(RuntimeWarning, match="sort"):
-        other = Native(growing, 2, lambda _: ()).along((False, True), np.zeros(2), table, 2)
+        other = Native(growing).scan(np.zeros(2), Packed(table, None, True), 2)
     for found in (own, other):
         np.testing.assert_array_equal(found["sum"], before.sum(axis=1))
         np.testing.assert_array_equal(found["first"], table[:, 0])
@@ -85,7 +85,7 @@ def test_rows_in_order_carry_a_vector(rows):
 def test_programs_not_used_for_longest_are_let_go(monkeypatch):
     monkeypatch.setattr(Native, "programs", OrderedDict())
     monkeypatch.setattr("notchflex.solver.programs.compiled._MAX_PROGRAMS", 2)
-    functions = [Native(lambda values, own=k: own * values, 1, lambda *_: ()) for k in range(3)]
+    functions = [Native(lambda values, own=k: own * values) for k in range(3)]
     for one in (*functions, functions[1]):
         one(np.ones(2))
     assert [key[0] for key in Native.programs] == [functions[2], functions[1]]
@@ -101,7 +101,7 @@ def test_programs_are_kept_and_what_is_no_program_is_not_taken(tmp_path, monkeyp
         return 2.0 * values
 
     def again():
-        return Native(doubled, 1, lambda: ())(np.arange(3.0)).tolist()
+        return Native(doubled)(np.arange(3.0)).tolist()
 
     assert again() == again() == [0.0, 2.0, 4.0]
     assert len(traced) == 1

@@ -27,8 +27,8 @@ from notchflex.mechanics.chain import Chain
 from notchflex.solver.block_elimination import linear_step
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
 from notchflex.solver.newton import limit_slack
-from notchflex.solver.programs.compiled import native
-from notchflex.solver.programs.static_structure import PytreeLayout, StaticStructure, lane_sizes
+from notchflex.solver.programs.compiled import Native
+from notchflex.solver.programs.static_structure import PytreeLayout
 from notchflex.solver.quantities import believable
 from notchflex.solver.residual import (
     Evaluation,
@@ -163,22 +163,16 @@ def blank_task(numbers: int, tendons: int, turn: np.ndarray) -> Task:
 
 
 class SearchLayouts(NamedTuple):
-    """Layouts of chain, load, state and task as vectors, and the reported quantities.
+    """Layout of a state, and the reported quantities.
 
     Attributes:
-        chain: Structure and layout of the chain.
-        command: Layout of one load.
         state: Layout of a state.
-        task: Layout of a task.
         first_contact: Where a packed state has the log ratios of the first contacts of all tendons,
             and their largest.
         outputs: Names of the quantities.
     """
 
-    chain: StaticStructure
-    command: PytreeLayout
     state: PytreeLayout
-    task: PytreeLayout
     first_contact: tuple[tuple[int, ...], tuple[int, ...]]
     outputs: tuple[str, ...]
 

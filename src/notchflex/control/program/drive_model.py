@@ -18,8 +18,9 @@ from notchflex import LoadPath, Robot, State, Stepper
 from notchflex.analysis.outputs import reported_shapes
 from notchflex.control.program.compiled_search import SearchLayouts, Task, blank_task, search_drives
 from notchflex.loads.command import make_commands
+from notchflex.solver.programs.compiled import Packed
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.programs.static_structure import PytreeLayout, pad_rows, padded_indices
+from notchflex.solver.programs.static_structure import PytreeLayout, padded_indices
 from notchflex.support import SavedState
 
 
@@ -147,10 +148,10 @@ class DriveModel:
     ) -> tuple[Response, np.ndarray, np.ndarray]:
         ready, own = self.prepared, self._own
         state, values, slopes, sticks, drive, status = search_drives(
-            ready.long.dynamic_vector,
-            pad_rows(before, ready.state, ready.long.state),
-            self._commands[0][0],
-            task,
+            ready.long.packed,
+            ready.packed_states(before)._replace(by_row=False),
+            self._command,
+            Packed(task, self._task_layout),
             self._numbers,
             self._layouts,
         )
@@ -218,14 +219,15 @@ class DriveModel:
         return self.stepper.entries
 
     @cached_property
-    def _commands(self) -> tuple[np.ndarray, Any]:
-        ready = self.prepared
-        return ready.padded_commands(make_commands(self.load, self.robot, ready.chain))
+    def _command(self) -> Packed:
+        commands = make_commands(self.load, self.robot, self.prepared.chain)
+        loads = self.prepared.packed_commands(commands)
+        return Packed(loads.numbers[0], loads.layout)
 
     @cached_property
     def _plain(self) -> np.ndarray:
         """The task of solving one load, of drives that are still to be put in, packed."""
-        return self._layouts.task.pack(self._blank)
+        return self._task_layout.pack(self._blank)
 
     @cached_property
     def _blank(self) -> Task:
@@ -239,18 +241,20 @@ class DriveModel:
     @cached_property
     def _fields(self) -> dict[str, slice]:
         """Positions of the fields of a task in the packed vector."""
-        numbers = zip(Task._fields, self._layouts.task.indices, strict=True)
+        numbers = zip(Task._fields, self._task_layout.indices, strict=True)
         return {name: slice(int(at.min()), int(at.max()) + 1) for name, at in numbers}
 
     @cached_property
     def _layouts(self) -> SearchLayouts:
-        long, form = self.prepared.long, PytreeLayout.of(self._blank)
+        long = self.prepared.long
         places = padded_indices(self.prepared.state, long.state)
         ratio, bound = places[self.stepper.contact_places[:2, :, 0]]
         first = tuple(ratio.tolist()), tuple(bound.tolist())
-        return SearchLayouts(
-            long.static_structure, self._commands[1], long.state, form, first, self.outputs
-        )
+        return SearchLayouts(long.state, first, self.outputs)
+
+    @cached_property
+    def _task_layout(self) -> PytreeLayout:
+        return PytreeLayout.of(self._blank)
 
     @cached_property
     def _numbers(self) -> np.ndarray:

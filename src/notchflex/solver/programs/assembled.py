@@ -25,7 +25,7 @@ from notchflex.mechanics.ring import Side
 from notchflex.robot import Robot, Tube
 from notchflex.robot.kinds import Notch
 from notchflex.robot.numbers import PartsForm, Place, parts_of, robot_of
-from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.compiled import Native, Packed
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import (
     PytreeLayout,
@@ -57,7 +57,7 @@ class _NotchForm(NamedTuple):
     flexures: tuple[StaticStructure, ...]
 
 
-@native(1, lambda *_: ())
+@Native
 def _flexures(numbers: Float[Array, " numbers"], form: _NotchForm) -> dict[str, Array]:
     """Build the flexures of a notch.
 
@@ -80,7 +80,7 @@ def _flexures(numbers: Float[Array, " numbers"], form: _NotchForm) -> dict[str, 
     return {"flexures": jnp.concatenate(packed), "alike": _all(decisions)}
 
 
-@native(2, lambda *_: ())
+@Native
 def _flexures_along(
     numbers: Float[Array, " numbers"], change: Float[Array, " numbers"], form: _NotchForm
 ) -> dict[str, Array]:
@@ -120,7 +120,7 @@ class _JoinedForm(NamedTuple):
     structure: StaticStructure
 
 
-@native(2, lambda *_: ())
+@Native
 def _joined(
     numbers: Float[Array, " numbers"], flexures: Float[Array, " packed"], form: _JoinedForm
 ) -> dict[str, Array]:
@@ -135,7 +135,7 @@ def _joined(
     return {"chain": packed, "alike": _all(decisions)}
 
 
-@native(4, lambda *_: ())
+@Native
 def _joined_along(
     numbers: Float[Array, " numbers"],
     flexures: Float[Array, " packed"],
@@ -154,7 +154,7 @@ def _joined_along(
     return {"slopes": slopes, "alike": alike}
 
 
-@native(3, lambda *_: ())
+@Native
 def _joined_back(
     numbers: Float[Array, " numbers"],
     flexures: Float[Array, " packed"],
@@ -317,27 +317,28 @@ def chain_slopes(
 
 
 def chain_gradient(
-    robot: Robot, chain: Chain, places: Sequence[Place], weights: Float[np.ndarray, " chain"]
-) -> Float[np.ndarray, " places"] | None:
-    """Differentiate a weighted sum of the numbers of a robot's chain.
+    robot: Robot,
+    chain: Chain,
+    varied: Collection[Place],
+    weights: Float[np.ndarray, " chain"],
+    changes: Callable[[PartsForm], Float[np.ndarray, "k numbers"]],
+) -> Float[np.ndarray, " k"] | None:
+    """Differentiate a weighted sum of the numbers of a chain; see `chain_slopes`.
 
     Args:
         robot: The robot.
         chain: Its chain, for the level and the kinds of loads.
-        places: Places of the numbers of the robot by which to differentiate.
+        varied: Places of the numbers that change.
         weights: Of the numbers of the chain, packed whole.
-
-    Returns:
-        A derivative for each place; None where no program has this form.
+        changes: Gives k changes of all numbers of a form of parts.
     """
 
     def gradient_of(programs: AssembledRobots, numbers: np.ndarray) -> np.ndarray | None:
-        varied = np.array([programs.form.places.index(place) for place in places])
         packed = programs.joined.structure.pack(weights)
-        gradient, alike = programs.gradient(numbers[None], packed[None], varied)
+        gradient, alike = programs.gradient(numbers[None], packed[None], changes(programs.form))
         return gradient[0] if alike[0] else None
 
-    return _first_alike(robot, chain, places, gradient_of)
+    return _first_alike(robot, chain, varied, gradient_of)
 
 
 # Robots of one piece; more would not fit the cache.
@@ -452,7 +453,7 @@ class AssembledRobots:
 
     def _piece(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         made = self._of_notches(numbers, _built)
-        joined = _joined.rows((True, True), numbers, made["flexures"], self.joined)
+        joined = _joined.rows(*map(_table, (numbers, made["flexures"])), self.joined)
         return joined["chain"], made["alike"] & joined["alike"]
 
     def along(
@@ -468,36 +469,37 @@ class AssembledRobots:
         rows = np.concatenate([numbers[:1] + 0j, numbers + 1j * _SMALL * changes])
         made = self._of_notches(rows, _differentiated)
         tables = np.real(rows), made["flexures"], np.imag(rows) / _SMALL, made["slopes"]
-        joined = _joined_along.rows((True,) * 4, *map(np.ascontiguousarray, tables), self.joined)
+        joined = _joined_along.rows(*map(_table, tables), self.joined)
         return joined["slopes"][1:], (made["alike"] & joined["alike"])[1:]
 
     def gradient(
         self,
         numbers: Float[np.ndarray, "robots numbers"],
         weights: Float[np.ndarray, "robots chain"],
-        varied: Int[np.ndarray, " varied"],
-    ) -> tuple[Float[np.ndarray, "robots varied"], Bool[np.ndarray, " robots"]]:
+        changes: Float[np.ndarray, "k numbers"],
+    ) -> tuple[Float[np.ndarray, "robots k"], Bool[np.ndarray, " robots"]]:
         """Differentiate weighted sums of the numbers of chains.
 
         Args:
             numbers: Those of the robots.
             weights: Of the numbers of the chains, packed for programs.
-            varied: Which numbers of the robots to differentiate by.
+            changes: Changes of the numbers of each robot.
 
         Returns:
-            The derivatives, and which of the chains are of the form of the example.
+            A derivative for each change, and which of the chains are of the form of the example.
         """
         made = self._of_notches(numbers, _built)
-        back = _joined_back.rows((True,) * 3, numbers, made["flexures"], weights, self.joined)
-        gradient = back["numbers"][:, varied].ravel()
-        units = np.tile(np.eye(numbers.shape[1])[varied], (len(numbers), 1))
-        moved = np.repeat(numbers, len(varied), axis=0) + 1j * _SMALL * units
+        tables = map(_table, (numbers, made["flexures"], weights))
+        back = _joined_back.rows(*tables, self.joined)
+        gradient = np.einsum("rn,kn->rk", back["numbers"], changes).ravel()
+        moved = np.repeat(numbers, len(changes), axis=0)
+        moved = moved + 1j * _SMALL * np.tile(changes, (len(numbers), 1))
         for notches in self.notches:
-            table = self._table(moved, notches)
+            table = self._numbers_of(moved, notches)
             row, notch = np.nonzero(np.imag(table).any(axis=-1))
             if len(row):
                 slopes = _differentiated(table[row, notch], notches.form)["slopes"]
-                which = (row // len(varied))[:, None], notches.packed[notch]
+                which = (row // len(changes))[:, None], notches.packed[notch]
                 np.add.at(gradient, row, (slopes * back["flexures"][which]).sum(axis=-1))
         return gradient.reshape(len(numbers), -1), made["alike"] & back["alike"]
 
@@ -511,7 +513,7 @@ class AssembledRobots:
         count, size = len(numbers), sum(one.size for one in self.joined.flexures)
         made: dict[str, Any] = {"alike": np.ones(count, bool)}
         for notches in self.notches:
-            table = self._table(numbers, notches)
+            table = self._numbers_of(numbers, notches)
             others = (table != table[:1]).any(axis=-1)
             results = program(np.concatenate([table[0], table[others]]), notches.form)
             first = np.arange(len(notches.columns))
@@ -523,7 +525,7 @@ class AssembledRobots:
                 every[:, notches.packed] = values[index]
         return made
 
-    def _table(self, numbers: np.ndarray, notches: _Notches) -> np.ndarray:
+    def _numbers_of(self, numbers: np.ndarray, notches: _Notches) -> np.ndarray:
         """Return the numbers of every notch and its rings, robots and notches as leading axes."""
         own = numbers[:, notches.columns]
         around = np.zeros((*own.shape[:2], 2 * notches.first.shape[1] + 1), own.dtype)
@@ -536,12 +538,15 @@ class AssembledRobots:
         return np.concatenate([own, around], axis=-1)
 
 
-def _built(table: np.ndarray, form: _NotchForm) -> dict[str, np.ndarray]:
+def _table(numbers: np.ndarray) -> Packed:
+    return Packed(numbers, None, True)
+
+
+def _built(numbers: np.ndarray, form: _NotchForm) -> dict[str, np.ndarray]:
     """Build flexures."""
-    return _flexures.rows((True,), table, form)
+    return _flexures.rows(_table(numbers), form)
 
 
-def _differentiated(table: np.ndarray, form: _NotchForm) -> dict[str, np.ndarray]:
+def _differentiated(numbers: np.ndarray, form: _NotchForm) -> dict[str, np.ndarray]:
     """Build flexures, and differentiate them along the imaginary parts of their numbers."""
-    own, change = np.ascontiguousarray(np.real(table)), np.imag(table) / _SMALL
-    return _flexures_along.rows((True, True), own, change, form)
+    return _flexures_along.rows(*map(_table, (numbers.real, numbers.imag / _SMALL)), form)

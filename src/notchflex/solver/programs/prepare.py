@@ -73,11 +73,6 @@ class PreparedChain:
         """Which number of the chain each dynamic number of the long chain is, from 1; or 0."""
         return _dynamic_numbers(self.chain_layout, self.long.static_structure)
 
-    @cached_property
-    def slopes(self) -> dict[Any, Float[np.ndarray, "k chain"]]:
-        """The last slopes of the chain, by the numbers and directions that they are along."""
-        return {}
-
     def with_numbers(self, numbers: Float[np.ndarray, " chain"]) -> PreparedChain:
         """Return a chain of the same form, with the same constants.
 
