@@ -137,6 +137,26 @@ def test_loops_and_conditions(size):
 
 
 @pytest.mark.parametrize("size", SIZES)
+def test_loops_that_others_do_not_change_stand_before_them(size):
+    """Loops of the argument, of constants alone, and one that the loop around it does change."""
+
+    def grown(start):
+        return jax.lax.scan(lambda one, step: (one * 0.5 + step, one), start, jnp.arange(4.0))
+
+    def function(vector):
+        table, few = parted(vector, size)
+
+        def step(total, row):
+            of_vector, of_row = grown(table[:, 0]), grown(row)
+            total = total + of_vector[0] * of_row[1][2].sum() + grown(jnp.ones(2))[0]
+            return total, (of_vector[1][1], of_row[0])
+
+        return jax.lax.scan(step, jnp.zeros((size, 2)), table[:3, 1] + few[0])
+
+    check(function, given(size), long=(size, size + 1))
+
+
+@pytest.mark.parametrize("size", SIZES)
 def test_swapping_what_is_carried(size):
     def function(vector):
         table, _ = parted(vector, size)

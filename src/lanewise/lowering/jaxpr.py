@@ -12,7 +12,15 @@ import numpy as np
 from lanewise._jax import jax
 from lanewise.elementary import ELEMENTARY
 from lanewise.ir.control_flow import Conditional, ScanLoop, Store, WhileLoop
-from lanewise.ir.graph import Block, Buffer, Graph, References, UnsupportedPrimitiveError, reference
+from lanewise.ir.graph import (
+    LANE_BITS,
+    Block,
+    Buffer,
+    Graph,
+    References,
+    UnsupportedPrimitiveError,
+    reference,
+)
 from lanewise.lowering.arrays import ArrayLowering
 from lanewise.lowering.buffers import BufferLayout, Layout
 from lanewise.lowering.data_movement import DATA_MOVEMENT
@@ -113,12 +121,25 @@ class JaxprLowering:
                 return self.function(inner, operands, scalar=scalar)
             return self._jaxpr(inner, [], operands, scalar)
         if name in _CONTROL_FLOW:
-            return _CONTROL_FLOW[name](self, operands, params)
+            block = self.graph.block if name == "cond" else self._before_loops(operands)
+            with self.inside(block):
+                return _CONTROL_FLOW[name](self, operands, params)
         if name in PRIMITIVES:
             return [PRIMITIVES[name](self.arrays, operands, params, equation)]
         raise UnsupportedPrimitiveError(f"JAX's primitive `{name}`", name)
 
     # Loops and branches
+
+    def _before_loops(self, operands: Sequence[References]) -> Block:
+        """Return the block for a loop: as a node, it stands before loops that do not change it."""
+        nodes = {int(ref) >> LANE_BITS for refs in operands for ref in refs.ravel()}
+        block = self.graph.placement(nodes)
+        if self.buffers.batched and block is self.graph.top:  # buffers there are not of rows
+            block = self.graph.block
+            while block.depth > 1:
+                assert block.parent is not None
+                block = block.parent
+        return block
 
     def _allocate(self, avals: Sequence[Any]) -> list[Layout]:
         return [self.buffers.allocate(one.shape, kind_of(one.dtype)) for one in avals]

@@ -60,8 +60,9 @@ def edge_and_brazier(radius: float, sides: Sequence[Side]) -> tuple[float, float
     # Fitted between notches: what a ring imposes at the edge, k = k0 (1 - exp(-(c / (c1 r))²)), and
     # a factor on Brazier. First and last notches of wrists are met by the same numbers (6 % to
     # closing), one notch alone between two clamped rings, as test specimens are, by others.
-    is_specimen = all(side.boundary == "clamped" for side in sides)
-    factor, decay, brazier = (0.465, 1.51, 0.74) if is_specimen else (0.207, 1.69, 0.97)
+    is_specimen = sides[0].shares[1] * sides[1].shares[1] > 0.5
+    numbers = ((0.465, 0.207), (1.51, 1.69), (0.74, 0.97))
+    factor, decay, brazier = (plain_number(xp.where(is_specimen, *pair)) for pair in numbers)
     imposed = [-factor * xp.expm1(-((side.length / (decay * radius)) ** 2)) for side in sides]
     return 0.5 * (imposed[0] + imposed[1]), brazier
 
@@ -183,7 +184,7 @@ def notch_stiffness(
     arc = arc_of(outer_radius, inner_radius, section)
     sides: list[Side] = []
     for side in (proximal, distal):  # cut where the effects of the edge have died out
-        longest = reach_of(arc) * (2.0 if side.boundary == "between" else 1.0)
+        longest = plain_number(reach_of(arc) * (1.0 + side.shares[0]))
         sides.append(side._replace(length=xp.minimum(side.length, longest)))
     added = [end_compliance(outer_radius, inner_radius, arc, side, poisson_ratio) for side in sides]
     weak, strong, axial, coupling = (sum(each) for each in zip(*added, strict=True))

@@ -36,20 +36,30 @@ from notchflex.mechanics.section import Section
 # Uncut ring beside a notch, with the boundary condition at its far edge.
 
 
+BOUNDARIES = ("between", "clamped", "free")
+
+
 class Side(NamedTuple):
     """The uncut ring beside a notch.
 
     Attributes:
         boundary: "between" two notches, "clamped" to a rigid plate (the base), or "free" (the
-            ring beyond the last notch).
+            ring beyond the last notch); or a share for each of the three, where it is traced.
         length: Uncut length c from the edge of the notch to the next notch, to the plate or to
             the free end, mm.
         turned: Whether the notch beyond the ring opens to another side of the tube.
     """
 
-    boundary: Literal["between", "clamped", "free"]
+    boundary: Literal["between", "clamped", "free"] | Array
     length: float
     turned: bool = False
+
+    @property
+    def shares(self) -> Any:
+        """1 for its boundary, 0 for the others, in the order of `BOUNDARIES`."""
+        if isinstance(self.boundary, str):
+            return np.array([self.boundary == name for name in BOUNDARIES], float)
+        return self.boundary
 
 
 HARMONICS = 41  # n = 0 ... 40
@@ -153,7 +163,7 @@ def _held(boundary: str) -> np.ndarray:
 
 
 _POWERS = np.arange(HARMONICS, dtype=float) ** np.arange(5.0)[:, None]
-_HELD = {boundary: _held(boundary) for boundary in ("between", "clamped", "free")}
+_HELD = np.array([_held(boundary) for boundary in BOUNDARIES])
 _ROW, _COLUMN = np.indices((_EDGE, _EDGE))
 _SQUARE = np.minimum(_ROW, _COLUMN), np.abs(_ROW - _COLUMN)
 
@@ -181,19 +191,17 @@ def _flexibility(by_power: Any, powers: Any, held: Any) -> Any:
 
 
 @cached(256)  # rings of one length are equal, however deep the notches beside them
-def edge_compliance(
-    radius: float, wall: float, length: float, poisson_ratio: float, boundary: str
-) -> Array:
+def edge_compliance(radius: float, wall: float, ring: Side, poisson_ratio: float) -> Array:
     """Compute the compliance of an edge to its loads, for each harmonic."""
     # Rounding errors grow as a ring gets shorter; one of a micrometre is no part of a tube.
-    length = xp.maximum(length, 1e-3 * radius)
+    length = xp.maximum(ring.length, 1e-3 * radius)
     ratio = radius / length
     # Strains of the membrane come per 1/r, those of bending per 1/r².
     parts = xp.stack([1.0, wall**2 / (12.0 * radius**2)])
     material = xp.stack([1.0, 1.0 * poisson_ratio])
     slopes = xp.stack([1.0, ratio, ratio**2, ratio**3, ratio**4])
     factors = xp.einsum("a,b,c->abc", parts, material, slopes).ravel()
-    energies, held = _energies(), _HELD[boundary]
+    energies, held = _energies(), xp.tensordot(ring.shares, _HELD, 1)
     by_power = (factors @ energies.reshape(len(factors), -1)).reshape(energies.shape[3:])
     if is_traced(by_power):  # compiled as a loop: soon, and small enough for the cache of code
         flexibility = sys.modules["jax"].lax.map(
@@ -282,11 +290,12 @@ def end_compliance(
     relaxation: Array = _RELAXED,
 ) -> EndCompliance:
     """Compute the compliance of a ring beyond that of a tube as stiff as a beam of its length."""
-    ring_length = 0.5 * side.length if side.boundary == "between" else side.length
+    ring_length = plain_number((1.0 - 0.5 * side.shares[0]) * side.length)
     if decide(ring_length == 0.0):
         return EndCompliance(0.0, 0.0, 0.0, 0.0)
     weak, strong, axial = arc_harmonics(arc)
-    flexibility = edge_compliance(arc.radius, arc.wall, ring_length, poisson_ratio, side.boundary)
+    ring = Side(side.boundary, ring_length)
+    flexibility = edge_compliance(arc.radius, arc.wall, ring, poisson_ratio)
     weights = _NORM * relaxation
 
     def energy(first: Array, second: Array) -> float:

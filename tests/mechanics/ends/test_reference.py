@@ -113,7 +113,7 @@ def test_quadrature_of_the_flattening(margin):
 def test_ring_in_other_directions(margin):
     # n = 0: a long ring under an edge moment and uniform tension, beam on elastic foundation.
     r, t, nu = 0.755, 0.11, 0.33
-    found = ring.edge_compliance(r, t, 3.0, nu, "clamped")[0]
+    found = ring.edge_compliance(r, t, Side("clamped", 3.0), nu)[0]
     stiffness = t**3 / 12 / (1 - nu**2)
     rate = (t / r**2 / (4 * stiffness)) ** 0.25
     margin.within("slope under a moment, relative", found[1, 1] * rate * stiffness - 1, 5e-9)

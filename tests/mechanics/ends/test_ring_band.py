@@ -34,11 +34,12 @@ def conditions(boundary, n, value, slope):
     return np.array([*rows, *(torsion if n == 0 else [])]).reshape(-1, 57)
 
 
-def dense(radius, wall, length, nu, boundary):
+def dense(radius, wall, side, nu):
     """Compute `ring.edge_compliance` with Legendre's polynomials and the null space of what holds.
 
     All is for radius 1; units follow from those of displacement, slope and load.
     """
+    boundary, length, _ = side
     t, c = wall / radius, length / radius
     at = np.r_[POINTS, -1.0, 1.0]
     polynomials = np.eye(DEGREE + 1)
@@ -110,10 +111,11 @@ def test_the_band_solves_the_dense_system(boundary, monkeypatch, margin):
     """Lengths are compared with what is added and the height of a notch, a third of the radius."""
     every, compliances, lengths = drawings(12), [], []
     band = [added(values, boundary) for values in every]
-    for values in every[:, :4]:
-        wanted = dense(*values, boundary)
+    for radius, wall, length, nu in every[:, :4]:
+        values = radius, wall, Side(boundary, length), nu
+        wanted = dense(*values)
         scale = np.sqrt(np.einsum("nii->ni", wanted))
-        error = ring.edge_compliance(*values, boundary) - wanted
+        error = ring.edge_compliance(*values) - wanted
         compliances.append(error / scale[:, :, None] / scale[:, None])
     monkeypatch.setattr(edge_loads, "edge_compliance", dense)
     for values, computed in zip(every, band, strict=True):
@@ -147,7 +149,7 @@ def test_compiled_by_lanewise(margin):
         return jnp.concatenate(jax.jvp(lambda of: added(of, "free"), (values,), (change,)))
 
     rows = np.hstack([every, every])
-    program, _ = lower(both, [rows[0]], (), (True,), carries=False)
+    program, _ = lower(both, [rows[0]], (), (True,))
     compiled = Program(machine_code(program.text, 2), program.sizes, program.memory, (True,))
     computed = np.asarray(compiled([rows])[0]).reshape(len(rows), -1)
     wanted = np.array(jax.jit(jax.vmap(both))(rows))
@@ -157,4 +159,4 @@ def test_compiled_by_lanewise(margin):
 @pytest.mark.parametrize("boundary", BOUNDARIES)
 def test_a_ring_that_is_no_part_has_finite_lengths(boundary):
     for length in (1e-12, 1e-6, 1e-3):
-        assert np.isfinite(ring.edge_compliance(0.755, 0.11, length, 0.3, boundary)).all()
+        assert np.isfinite(ring.edge_compliance(0.755, 0.11, Side(boundary, length), 0.3)).all()

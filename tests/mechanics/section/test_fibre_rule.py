@@ -122,7 +122,7 @@ def test_slopes_are_numbers(cut, depth):
 def test_compiled_by_lanewise(cut, margin):
     every = rows(cut, 16)
     traced = both(cut, every[0])
-    program, _ = lower(traced, [every[0]], (), (True,), carries=False)
+    program, _ = lower(traced, [every[0]], (), (True,))
     compiled = Program(machine_code(program.text, 2), program.sizes, program.memory, (True,))
     computed = np.asarray(compiled([every])[0]).reshape(len(every), 2, 2, FIBRES)
     wanted = np.array(jax.jit(jax.vmap(traced))(every))

@@ -8,7 +8,7 @@ its values decide alike.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Collection, Generator, Sequence
+from collections.abc import Callable, Collection, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,8 +22,7 @@ from notchflex._jax import jax, jnp
 from notchflex.mechanics.chain import Chain, assemble, body_lengths, flexure, sites_of
 from notchflex.mechanics.flexure import Site
 from notchflex.mechanics.ring import Side
-from notchflex.robot import Robot, Tube
-from notchflex.robot.kinds import Notch
+from notchflex.robot import Robot
 from notchflex.robot.numbers import PartsForm, Place, parts_of, robot_of
 from notchflex.solver.programs.compiled import Native, Packed
 from notchflex.solver.programs.prepare import PreparedChain
@@ -35,49 +34,55 @@ from notchflex.solver.programs.static_structure import (
 
 T = TypeVar("T")
 
-Rings = tuple[tuple[Any, bool], ...] | None
-"""Kind of each ring beside a notch, and whether the notch beyond is turned; None without rings."""
-
 
 class _NotchForm(NamedTuple):
     """What the program of a kind of notch is compiled for.
 
     Attributes:
         parts: The form of a tube and a notch.
-        rings: What is beside it, where it occurs.
+        sites: Number of places, with other rings beside it, where the notch is; 0 where its flexure
+            does not depend on them.
         options: Level, refinement and whether there are fibres, as for `flexure`.
         decisions: What the values decide.
-        flexures: Layouts of the flexures, one for each of the rings.
+        structure: Layout of a flexure.
     """
 
     parts: PartsForm
-    rings: tuple[Rings, ...]
+    sites: int
     options: tuple[str, int, bool]
     decisions: tuple[bool, ...]
-    flexures: tuple[StaticStructure, ...]
+    structure: StaticStructure
 
 
 @Native
 def _flexures(numbers: Float[Array, " numbers"], form: _NotchForm) -> dict[str, Array]:
-    """Build the flexures of a notch.
+    """Build the flexures of a notch, one for each site.
 
     Args:
-        numbers: Those of the tube and the notch, the lengths of the rings, and Poisson's ratio.
+        numbers: Those of the tube and the notch; of each site lengths and boundaries of the rings,
+            and Poisson's ratio.
         form: What the program is compiled for.
     """
-    own, beside = jnp.split(numbers, [len(form.parts.places)])
-    tube, notch = form.parts.with_numbers(own)
-    lengths = beside[:-1].reshape(-1, 2)
-    with _following(form.decisions) as decisions:
-        trees = [
-            flexure(notch, _site(rings, pair, beside[-1]), tube, *form.options)
-            for rings, pair in zip(form.rings, lengths, strict=True)
-        ]
-    packed = [
-        structure.pack(structure.form.pack(tree))
-        for structure, tree in zip(form.flexures, trees, strict=True)
-    ]
-    return {"flexures": jnp.concatenate(packed), "alike": _all(decisions)}
+    of_parts, of_sites = jnp.split(numbers, [len(form.parts.places)])
+    tube, notch = form.parts.with_numbers(of_parts)
+
+    def built(site: Site | None) -> tuple[Array, Array]:
+        with _following(form.decisions) as decisions:
+            tree = flexure(notch, site, tube, *form.options)
+        return form.structure.pack(form.structure.form.pack(tree)), _all(decisions)
+
+    def built_at(rings: Float[Array, " 9"]) -> tuple[Array, Array]:
+        sides = (
+            Side(shares, length)
+            for shares, length in zip(rings[2:8].reshape(2, 3), rings[:2], strict=True)
+        )
+        return built(Site(*sides, rings[8]))
+
+    if form.sites:  # compiled as a loop, before which is done what sites share
+        packed, alike = jax.lax.map(built_at, of_sites.reshape(form.sites, 9))
+    else:
+        packed, alike = built(None)
+    return {"flexures": packed.ravel(), "alike": alike.all()}
 
 
 @Native
@@ -92,14 +97,6 @@ def _flexures_along(
 
     values, slopes, alike = jax.jvp(flexures, (numbers,), (change,), has_aux=True)
     return {"flexures": values, "slopes": slopes, "alike": alike}
-
-
-def _site(rings: Rings, lengths: Any, poisson_ratio: Any) -> Site | None:
-    if rings is None:
-        return None
-    (kind, turned), (distal, distal_turned) = rings
-    sides = Side(kind, lengths[0], turned), Side(distal, lengths[1], distal_turned)
-    return Site(*sides, poisson_ratio)
 
 
 class _JoinedForm(NamedTuple):
@@ -185,18 +182,20 @@ def _all(decisions: Decisions) -> Array:
 
 
 class _Notches(NamedTuple):
-    """Distinct notches of robots that are made by one program, with all flexures made of them.
+    """Distinct notches of robots that are made by one program, each with its sites.
 
     Attributes:
         form: What the program is compiled for.
         columns: The numbers of each among those of the robot.
         first: First notch of the robot that each flexure stands for, from 0.
-        packed: The numbers of its flexures among those of all flexures.
+        boundaries: Shares of the boundaries of both rings of each, see `Side`.
+        packed: The numbers of the flexures among those of all flexures.
     """
 
     form: _NotchForm
     columns: Int[np.ndarray, "m numbers"]
-    first: Int[np.ndarray, "m flexures"]
+    first: Int[np.ndarray, "m sites"]
+    boundaries: Float[np.ndarray, "m sites 6"]
     packed: Int[np.ndarray, "m packed"]
 
 
@@ -208,24 +207,6 @@ def _sparse(flexure: Any) -> StaticStructure:
     for indices, kind in zip(layout.indices, layout.kinds, strict=True):
         constant[indices] |= kind != "f"
     return StaticStructure.shared(layout, 0, constant, numbers)
-
-
-def _form_of(
-    notch: Notch,
-    tube: Tube,
-    sites: Sequence[Site | None],
-    options: tuple[str, int, bool],
-    varied: Sequence[Place],
-) -> tuple[_NotchForm, list[Any]]:
-    """Build the flexures of an example; return them after the form of their program."""
-    with Decisions().deciding() as decisions:
-        made = [flexure(notch, site, tube, *options) for site in sites]
-    rings: list[Rings] = [
-        None if site is None else tuple((side.boundary, side.turned) for side in site[:2])
-        for site in sites
-    ]
-    parts, layouts = PartsForm.of((tube, notch), varied), tuple(map(_sparse, made))
-    return _NotchForm(parts, tuple(rings), options, tuple(decisions.made), layouts), made
 
 
 @contextmanager
@@ -386,18 +367,18 @@ class AssembledRobots:
             first.setdefault((id(notch), id(site)), number)
         group_of = np.repeat(np.arange(len(robot.notch)), [one.repeat for one in robot.notch])
         options = chain.level, chain.refinement, robot.material.by_fibres
-        groups, trees = dict[_NotchForm, list[Any]](), dict[int, Any]()
-        for same in dict.fromkeys(key for key, _ in first):
-            own = [number for (key, _), number in first.items() if key == same]
-            places = {0: 0, 3 + int(group_of[own[0]]): 1}
-            around = [sites[number] for number in own]
+        made, trees = dict[tuple[int, _NotchForm], list[int]](), dict[int, Any]()
+        for number in first.values():
+            notch, site = example.notches[number], sites[number]
+            places = {0: 0, 3 + int(group_of[number]): 1}
             zeros = [(places[part], key) for part, key in varied if part in places]
-            notch = example.notches[own[0]]
-            notch_form, made = _form_of(notch, example.tube, around, options, zeros)
-            columns = [k for k, (part, _) in enumerate(form.places) if part in places]
-            groups.setdefault(notch_form, []).append((columns, own))
-            trees.update(zip(own, made, strict=True))
-        given = iter([trees[number] for number in first.values()])
+            with Decisions().deciding() as decisions:
+                trees[number] = flexure(notch, site, example.tube, *options)
+            parts, decided = PartsForm.of((example.tube, notch), zeros), tuple(decisions.made)
+            sited = int(site is not None)
+            alike = _NotchForm(parts, sited, options, decided, _sparse(trees[number]))
+            made.setdefault((id(notch), alike), []).append(number)
+        given = iter(trees.values())
         loads: dict[str, Any] = {
             "level": chain.level,
             "loaded": chain.loaded,
@@ -407,20 +388,27 @@ class AssembledRobots:
         }
         with Decisions().deciding() as decisions:
             joined = assemble(example, **loads, flexures=lambda *_: next(given))
-        layouts = tuple(_sparse(trees[number]) for number in first.values())
+        layouts = tuple(map(_sparse, trees.values()))
         prepared = PreparedChain(joined)
         structure = prepared.static_structure
         made_for = form, layouts, tuple(loads.items()), tuple(decisions.made), structure
         ends = np.cumsum([0, *(layout.size for layout in layouts)]).tolist()
         packed = dict(zip(first.values(), map(np.arange, ends, ends[1:]), strict=True))
+        groups = dict[_NotchForm, list[Any]]()
+        for (_, alike), numbers in made.items():
+            part = 3 + int(group_of[numbers[0]])
+            columns = [k for k, (place, _) in enumerate(form.places) if place in (0, part)]
+            shares = [
+                [side.shares for side in site[:2]] if site else np.zeros((2, 3))
+                for site in map(sites.__getitem__, numbers)
+            ]
+            where = np.concatenate([packed[number] for number in numbers])
+            entry = columns, numbers, np.reshape(shares, (-1, 6)), where
+            sited = alike._replace(sites=alike.sites * len(numbers))
+            groups.setdefault(sited, []).append(entry)
         notches = [
-            _Notches(
-                notch_form,
-                np.array([columns for columns, _ in made]),
-                np.array([own for _, own in made]),
-                np.array([np.concatenate([packed[number] for number in own]) for _, own in made]),
-            )
-            for notch_form, made in groups.items()
+            _Notches(sited, *map(np.array, zip(*entries, strict=True)))
+            for sited, entries in groups.items()
         ]
         return cls(form, tuple(notches), _JoinedForm(*made_for), prepared)
 
@@ -527,15 +515,15 @@ class AssembledRobots:
 
     def _numbers_of(self, numbers: np.ndarray, notches: _Notches) -> np.ndarray:
         """Return the numbers of every notch and its rings, robots and notches as leading axes."""
-        own = numbers[:, notches.columns]
-        around = np.zeros((*own.shape[:2], 2 * notches.first.shape[1] + 1), own.dtype)
-        if notches.form.rings[0] is not None:
+        of_parts = numbers[:, notches.columns]
+        rings = np.zeros((len(numbers), *notches.first.shape, 9), of_parts.dtype)
+        if notches.form.sites:
             robot = robot_of(self.form.with_numbers(numbers.T))
             lengths = np.asarray(body_lengths(robot.tube, robot.notches)).T
-            beside = notches.first[..., None] + np.arange(2)
-            around[..., :-1] = lengths[..., beside.reshape(len(beside), -1)]
-            around[..., -1] = np.reshape(robot.material.poisson_ratio, (-1, 1))
-        return np.concatenate([own, around], axis=-1)
+            rings[..., :2] = lengths[..., notches.first[..., None] + np.arange(2)]
+            rings[..., 2:8] = notches.boundaries
+            rings[..., 8] = np.reshape(robot.material.poisson_ratio, (-1, 1, 1))
+        return np.concatenate([of_parts, rings.reshape(*of_parts.shape[:2], -1)], axis=-1)
 
 
 def _table(numbers: np.ndarray) -> Packed:
