@@ -26,6 +26,7 @@ NAMES = [
     "plot", "stroke_path", "solve_each", "Batch", "solve_batch", "simulate_batch",
     "uncertain", "Bands", "Band",
     "Differentiable", "differentiable", "TipResponse", "tip_response", "Step", "Stepper", "batch",
+    "PathGradient",
     "bodies_from_angles", "SharedStroke", "Closing", "ClosingStatus", "Kink",
     "ConvergenceError", "ErrorCode", "Failure", "Settings",
     "Board",

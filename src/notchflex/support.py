@@ -1,7 +1,8 @@
 """What a package built on notchflex may use besides the names of `notchflex`; all else may change.
 
 Errors and checks, summaries, loads in words, files replaced whole, tables and documents, robots as
-tables and the names of their values, the registry of quantities.  Names are loaded when first used.
+tables and the names of their values, the registry of quantities, slopes along any changes of what a
+path is computed from.  Names are loaded when first used.
 """
 
 from notchflex._lazy import loader
@@ -41,6 +42,8 @@ _HOME = {
             "short",
         ),
         "notchflex.analysis.geometry": ("FlexureShape",),
+        "notchflex.analysis.slopes": ("changes", "derivatives", "load_change"),
+        "notchflex.analysis.tangent": ("Change",),
         "notchflex.loads.load": (
             "ExternalLoad",
             "check_integer",

@@ -20,6 +20,10 @@ from notchflex._summary import Summary as Summary
 from notchflex._summary import round_number as round_number
 from notchflex._summary import short as short
 from notchflex.analysis.geometry import FlexureShape as FlexureShape
+from notchflex.analysis.slopes import changes as changes
+from notchflex.analysis.slopes import derivatives as derivatives
+from notchflex.analysis.slopes import load_change as load_change
+from notchflex.analysis.tangent import Change as Change
 from notchflex.loads.load import ExternalLoad as ExternalLoad
 from notchflex.loads.load import check_integer as check_integer
 from notchflex.loads.load import check_is_robot as check_is_robot

@@ -47,9 +47,7 @@ load = nf.Load(tension={PULL})
 state = nf.solve(robot, load)
 # The formulas are traced as well: for slopes, and for many robots.
 names = ["notch.thickness", "material.limit", "friction.loss"]
-bend = nf.differentiable(robot, load, names)
-by = bend.model.changes(robot, bend.load, names)
-slopes = bend.model.derivatives(state.path, by, ("total_angle",))["total_angle"][:, 0]
+slopes = state.path.jacobian(names, "total_angle")["total_angle"][0]
 for name, slope in zip(names, slopes, strict=True):
     at = number_at(robot, name)
     moved = [robot.with_value(name, at * part) for part in (0.999, 1.001)]

@@ -15,6 +15,7 @@ from notchflex.analysis.kinematics import (
     points_on_axis,
     tip_from_angles,
 )
+from notchflex.analysis.slopes import PathGradient
 from notchflex.analysis.solve import simulate, solve, solve_each
 from notchflex.analysis.stepping import Step, Stepper
 from notchflex.analysis.tangent import Kink

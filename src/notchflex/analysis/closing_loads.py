@@ -22,7 +22,7 @@ from notchflex.analysis.batch import BatchRows, BatchTable, LoadRows
 from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.slopes import changes, derivatives, load_change
 from notchflex.analysis.tangent import Change
-from notchflex.analysis.varied import VariedRobots
+from notchflex.analysis.varied import FEW, VariedRobots
 from notchflex.loads import LoadPath
 from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import Chain, assemble, sites_of
@@ -465,8 +465,8 @@ def closing_tensions_of(
     tension = np.full((len(robots), chain.flexures), np.nan)
     valid = np.setdiff1d(np.arange(len(robots)), [*robots.errors])
     chains = None
-    if np.isfinite(closing_angle).all() and len(valid):  # not edges of rigid pieces
-        chains = next(robots.forms(valid)).chains(0, 0, len(valid))
+    if np.isfinite(closing_angle).all() and len(valid) > FEW:  # not edges of rigid pieces
+        chains = next(robots.forms(valid)).chains(0, 0)
     if chains is None:  # few robots
         for number in valid.tolist():
             tension[number] = closing(robots[number]).tension

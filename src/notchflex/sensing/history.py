@@ -13,10 +13,11 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex import EquilibriumPath
-from notchflex.analysis.tangent import Change, PathTangents
+from notchflex.analysis.tangent import PathTangents
 from notchflex.sensing.model import SensingModel, SensingStep
 from notchflex.sensing.search import Candidate, ReadingProblem, best, best_of_all
 from notchflex.solver.residual import SolverState
+from notchflex.support import Change
 
 Progress = Callable[[int, int], None]
 

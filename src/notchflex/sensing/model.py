@@ -12,13 +12,13 @@ from jaxtyping import Float
 from notchflex import BodyForce, EquilibriumPath, InputError, LoadPath, Robot, Settings
 from notchflex._jax import constant
 from notchflex.analysis.forward_model import ForwardModel
-from notchflex.analysis.tangent import Change, PathTangents
+from notchflex.analysis.tangent import PathTangents
 from notchflex.loads.command import make_commands
 from notchflex.loads.load import NO_VECTOR
 from notchflex.mechanics.chain import bending_normal
 from notchflex.sensing.readings import Readings
 from notchflex.solver.residual import SolverState
-from notchflex.support import AXES, ExternalLoad, check_integer, short_repr
+from notchflex.support import AXES, Change, ExternalLoad, check_integer, short_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,7 @@ from jaxtyping import Float
 
 from notchflex import Closing, EquilibriumPath, InputError, LoadPath, Robot, closing
 from notchflex.analysis.forward_model import ForwardModel, slope
-from notchflex.analysis.slopes import change_along, changes, derivatives, load_change
-from notchflex.analysis.tangent import Change
+from notchflex.analysis.slopes import change_along
 from notchflex.designing.model.quantities import (
     OF_ROBOTS,
     Bodies,
@@ -33,7 +32,14 @@ from notchflex.designing.model.variables import (
     deviations_of,
 )
 from notchflex.designing.specification import TargetCurve
-from notchflex.support import REGISTERED, numbers_at
+from notchflex.support import (
+    REGISTERED,
+    Change,
+    changes,
+    derivatives,
+    load_change,
+    numbers_at,
+)
 
 CLOSINGS = "closing tensions"
 """Under what a `Point` keeps closing tensions (N) that are known without it, for values only."""

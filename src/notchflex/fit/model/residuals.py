@@ -21,12 +21,10 @@ from notchflex.analysis.kinematics import (
     axis_point_changes,
     points_on_axis,
 )
-from notchflex.analysis.slopes import changes, derivatives, load_change
-from notchflex.analysis.tangent import Change
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.constants import RobotNumber
 from notchflex.mechanics.motion import left_slope
-from notchflex.support import DEGREES
+from notchflex.support import DEGREES, Change, changes, derivatives, load_change
 
 # Probability below which means of branches differ by more than chance; the least rows of a branch.
 _UNLIKELY, _ROWS = 0.01, 3
