@@ -146,12 +146,12 @@ def test_loops_that_others_do_not_change_stand_before_them(size):
     def function(vector):
         table, few = parted(vector, size)
 
-        def step(total, row):
-            of_vector, of_row = grown(table[:, 0]), grown(row)
-            total = total + of_vector[0] * of_row[1][2].sum() + grown(jnp.ones(2))[0]
+        def step(total, factor):
+            of_vector, of_row = grown(table[:, 0]), grown(factor * table[:, 1])
+            total = total + of_vector[0] * of_row[1][2].sum() + grown(jnp.ones((1, 2)))[0]
             return total, (of_vector[1][1], of_row[0])
 
-        return jax.lax.scan(step, jnp.zeros((size, 2)), table[:3, 1] + few[0])
+        return jax.lax.scan(step, jnp.zeros((size, 2)), few[:3])
 
     check(function, given(size), long=(size, size + 1))
 
