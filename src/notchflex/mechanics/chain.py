@@ -26,7 +26,6 @@ from notchflex.mechanics.flexure import (
     flattened,
     flexure_state,
     free_pose,
-    in_space,
     rod_at,
     section_fibres,
     stack,
@@ -126,11 +125,8 @@ def flexure_states(
     chain: Chain, modes: Float[Array, "n modes"], memory: Any, *, with_pose: bool
 ) -> FlexureState:
     """Return the state of all flexures at once, after a memory of the material at every node."""
-    rods, law = chain.rods, chain.law
-    strain = in_space(jnp.einsum("nicm,nm->nic", rods.basis, modes))
-    response = law.respond_all(strain, rods.section, memory)
     state = partial(flexure_state, with_pose=with_pose)
-    return jax.vmap(state, in_axes=(0, None, 0, 0, 0))(rods, law, memory, modes, response)
+    return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, memory, modes)
 
 
 def structural(chain: Chain) -> Chain:

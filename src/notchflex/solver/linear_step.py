@@ -458,9 +458,7 @@ def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], lis
     chain, at, unit = jacobians.chain, jacobians.at, jacobians.unit
     elastic = chain.elastic
     if elastic is None:
-        elastic = jax.vmap(material_tangent, in_axes=(0, None, 0, 0))(
-            chain.rods, chain.law, jacobians.memory.material, at.flexure
-        )
+        elastic = jax.vmap(material_tangent, (0, None, 0))(chain.rods, chain.law, at.flexure)
         # Just beyond the strain where plastic hardening begins (exp(b / x) at x = 0) the law is
         # flat to the last digit. The modes are eliminated first, so their pivots must not vanish,
         # though friction makes the whole system regular. Without friction the step becomes long but

@@ -20,7 +20,7 @@ from jaxtyping import Array, Float
 from notchflex._arrays import xp
 from notchflex._jax import Pytree, jax, jnp
 from notchflex.mechanics.flexure.rod import Modes, Rod
-from notchflex.mechanics.material import SectionLaw, SectionResponse
+from notchflex.mechanics.material import SectionLaw
 from notchflex.mechanics.motion import (
     PLANE,
     Motion,
@@ -286,9 +286,7 @@ class FlexureState(Pytree):
     resultants: Float[Array, "intervals w"]
     strain: Float[Array, "intervals w"]  # Strain of each interval beyond that of the free tube
     memory: Any  # Memory of the material at every node, after these strains
-    # Change of the moment about y with the curvature at every node, where the law provides it
-    # (`SectionResponse.slope`)
-    slope: Float[Array, " nodes"] | None
+    slope: Float[Array, " nodes"]  # Change of the moment about y with the curvature at every node
     # Generalised internal force of each mode, N mm per unit of mode
     internal: Modes
     # Bending of the whole rod about x and y of its frame, of a plane about y, rad
@@ -329,7 +327,6 @@ def flexure_state(
     law: SectionLaw,
     memory: Any,
     modes: Modes,
-    response: SectionResponse | None = None,
     *,
     with_pose: bool,
 ) -> FlexureState:
@@ -340,8 +337,7 @@ def flexure_state(
         pose = relative_pose(rod, modes, configuration)
         twist = twist_slope(rod, modes, configuration)
     elastic = rod.basis @ modes
-    if response is None:
-        response = law.respond_all(in_space(elastic), rod.section, memory)
+    response = law.respond(in_space(elastic), rod.section, memory)
     resultants = of_rod(rod, response.resultants)
     # Padding modes have a stiffness of 1.
     internal = jnp.einsum("i,ic,icm->m", rod.length, resultants, rod.basis)
@@ -365,27 +361,15 @@ def flexure_state(
     )
 
 
-def material_tangent(
-    rod: Rod, law: SectionLaw, memory: Any, state: FlexureState
-) -> Float[Array, "modes modes"]:
+def material_tangent(rod: Rod, law: SectionLaw, state: FlexureState) -> Float[Array, "modes modes"]:
     """Differentiate the internal forces of the modes (`internal`) by the modes."""
 
-    def resultant_slope(
-        strain: Array, section: Any, past: Any, slope: Array | None, columns: Array
-    ) -> Array:
-        if slope is not None:
-            strains = in_space(columns.T)
-            elastic = law.elastic(strains.T, jax.tree.map(lambda leaf: leaf[..., None], section))
-            return of_rod(rod, jnp.where(xp.arange(6) == 1, slope * strains, elastic)).T
+    def resultant_slope(section: Any, slope: Array, columns: Array) -> Array:
+        strains = in_space(columns.T)
+        elastic = law.elastic(strains.T, jax.tree.map(lambda leaf: leaf[..., None], section))
+        return of_rod(rod, jnp.where(xp.arange(6) == 1, slope * strains, elastic)).T
 
-        def resultants(varied: Array) -> Array:
-            return of_rod(rod, law.respond(in_space(varied), section, past).resultants)
-
-        return jax.vmap(
-            lambda column: jax.jvp(resultants, (strain,), (column,))[1], in_axes=1, out_axes=1
-        )(columns)
-
-    slopes = jax.vmap(resultant_slope)(state.strain, rod.section, memory, state.slope, rod.basis)
+    slopes = jax.vmap(resultant_slope)(rod.section, state.slope, rod.basis)
     weighted = rod.length[:, None, None] * rod.basis
     return jnp.einsum("icm,ick->mk", weighted, slopes) + jnp.diag(rod.padding_mask)
 

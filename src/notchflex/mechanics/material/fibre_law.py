@@ -26,9 +26,8 @@ from notchflex.mechanics.material.law import (
     Fibres,
     FibreSection,
     Scalar,
+    SectionEnds,
     SectionLaw,
-    SectionResponse,
-    Strain,
     moduli,
     section_law,
 )
@@ -45,34 +44,17 @@ class FibreSums(NamedTuple):
     bending: Array  # Change of the moment with the curvature
 
 
-class SectionEnds(NamedTuple):
-    """The section between its ends: direct * k + soft * moment = s."""
-
-    direct: Array
-    soft: Array
-    reduced: Array
-
-    def beyond(self, curvature: Array, sums: FibreSums) -> Array:
-        """Return by how much section and ends bend beyond s."""
-        return self.direct * curvature + self.soft * sums.moment - self.reduced
-
-    def step(self, curvature: Array, sums: FibreSums, slopes: FibreSums) -> tuple[Array, Array]:
-        """Return Newton's step of the strain of the neutral axis and of the curvature."""
-        beyond = self.beyond(curvature, sums)
-        by_strain, by_curvature = self.soft * slopes.mixed, self.direct + self.soft * slopes.bending
-        determinant = slopes.stretch * by_curvature - slopes.mixed * by_strain
-        strain = slopes.mixed * beyond - by_curvature * sums.force
-        turn = by_strain * sums.force - slopes.stretch * beyond
-        return strain / determinant, turn / determinant
-
-    def size(self, curvature: Array, sums: FibreSums, scale: tuple[Array, Array]) -> Array:
-        """Return the imbalance of forces and of bending, as strains."""
-        return jnp.abs(sums.force) / scale[1] + scale[0] * jnp.abs(self.beyond(curvature, sums))
-
-    def slope(self, slopes: FibreSums) -> Array:
-        """Return the change of the moment with s."""
-        free = slopes.bending - slopes.mixed**2 / slopes.stretch
-        return free / (self.direct + self.soft * free)
+def _step(
+    joint: SectionEnds, curvature: Array, sums: FibreSums, slopes: FibreSums
+) -> tuple[Array, Array]:
+    """Return Newton's step of the strain of the neutral axis and of the curvature."""
+    beyond = joint.beyond(curvature, sums.moment)
+    by_strain = joint.soft * slopes.mixed
+    by_curvature = joint.direct + joint.soft * slopes.bending
+    determinant = slopes.stretch * by_curvature - slopes.mixed * by_strain
+    strain = slopes.mixed * beyond - by_curvature * sums.force
+    turn = by_strain * sums.force - slopes.stretch * beyond
+    return strain / determinant, turn / determinant
 
 
 def _settle(
@@ -96,9 +78,11 @@ def _settle(
         strain, curvature, by_strain, by_curvature, sums, imbalance, iterations = search
         trial = strain + by_strain, curvature + by_curvature
         trial_sums = law.sum_fibres(fibres, memory, *trial)
-        size = joint.size(trial[1], trial_sums, scale)
+        bends_beyond = joint.beyond(trial[1], trial_sums.moment)
+        # Of forces and of bending, as strains.
+        size = jnp.abs(trial_sums.force) / scale[1] + scale[0] * jnp.abs(bends_beyond)
         falls = size < imbalance
-        step = joint.step(trial[1], trial_sums, trial_sums)
+        step = _step(joint, trial[1], trial_sums, trial_sums)
         # With all fibres on a plateau a step would be endless.
         longest = 0.2 * bending_strain / jnp.maximum(jnp.abs(step[0]), 1e-300)
         by = [jnp.minimum(longest, 1.0) * part for part in step]
@@ -225,26 +209,20 @@ class FibreLaw(SectionLaw):
         """Return the moment halfway between loading and unloading."""
         return self.bent(curvature, dataclasses.replace(section, ends=None), ()).moment
 
-    def respond_all(self, strain: Strain, section: FibreSection, memory: Any) -> SectionResponse:
-        """Compute all sections at once: tracing them one by one takes three times as long."""
-        return self.respond(strain, section, memory)
-
     def bent(self, reduced: Float[Array, "*shape"], section: FibreSection, memory: Any) -> Bending:
         """Bend sections between their ends; only the last Newton step is differentiated."""
-        fibres, ends = section.fibres, section.compliance
+        fibres = section.fibres
         assert fibres is not None
-        none = jnp.zeros_like(reduced)
-        weak, share = none + ends.weak, none + ends.material_share
-        rigidity = self.elastic_modulus * section.second_moment_weak
-        joint = SectionEnds(1.0 + share * weak, (1.0 - share) * weak / rigidity, reduced)
-        start = reduced / (1.0 + weak)
+        joint = self.joint(reduced, section)
+        start = reduced / (1.0 + section.compliance.weak)
         scale = section.edge_near, self.elastic_modulus * section.area
         everything = self, fibres, memory, joint, scale, start
         fixed_arguments = jax.tree.map(jax.lax.stop_gradient, everything)
         strain, curvature, slopes = settle_fibres(*fixed_arguments)
         _, fixed_fibres, _, fixed, *_ = fixed_arguments
         sums = same_sums(slopes, self, fibres, memory, strain, curvature)
-        by_strain, by_curvature = joint.step(curvature, sums, slopes)
+        by_strain, by_curvature = _step(joint, curvature, sums, slopes)
+        free = slopes.bending - slopes.mixed**2 / slopes.stretch
         if not isinstance(memory, tuple):
             moves = strain, curvature, by_strain, by_curvature
             memory = self._remember(fibres, memory, fixed_fibres.arm, moves)
@@ -252,7 +230,7 @@ class FibreLaw(SectionLaw):
             curvature=curvature + by_curvature,
             moment=sums.moment + slopes.mixed * by_strain + slopes.bending * by_curvature,
             memory=memory,
-            slope=fixed.slope(slopes),
+            slope=fixed.slope(free),
             strain=strain + by_strain,
         )
 
