@@ -35,8 +35,8 @@ class Crossing(NamedTuple):
     """A group of t tendons over one gap (mm, rad)."""
 
     length: OfTendons  # Length of the way across the gap
-    exit_turning: OfTendons  # Turning angle at the edge of the body before, >= 0
-    entry_turning: OfTendons  # Turning angle at the edge of the distal body, >= 0
+    # Turning angle at the edge of the body before, and of the distal body, >= 0
+    turning: Float[Array, "t 2"]
     # Moment and force on the distal body per unit of the span's tension, reversed, about and along
     # its frame; its opposite acts on the anchor. None for a group that does not act on bodies
     wrench: Float[Array, "t w"] | None
@@ -151,7 +151,7 @@ class Straight(TendonGroup):
             # A pull turns the distal body toward the tendon's side.
             axis = direction(moment_of(channel, enters))
             turns = turning(before, gap, axis), turning(gap, onward, axis)
-            return length, *turns, wrench_at(enters, pulled)
+            return length, jnp.stack(turns), wrench_at(enters, pulled)
 
         spans = jax.vmap(span)(anchors, self.leaves, self.enters, self.along)
         return Crossing(*spans, slope=None)
@@ -210,8 +210,7 @@ class WallArc(TendonGroup):
         half_turning = 0.5 * guarded_norm(bend, self._pulls(len(flexure.bend)))
         return Crossing(
             length=self.natural_gap + (rod.length @ flexure.strain) @ weights.T,
-            exit_turning=half_turning,
-            entry_turning=half_turning,
+            turning=jnp.stack([half_turning, half_turning], axis=-1),
             wrench=None,
             slope=fibre_slope(rod, weights),
         )

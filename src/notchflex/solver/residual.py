@@ -466,7 +466,6 @@ def _spans(
     selected = select_anchors(anchors, group.back) if group.acts_on_bodies else None
     crossing = jax.vmap(type(group).cross)(group, chain.rods, flexure, selected)
     # Not written with ln T, so that a slack tendon stays regular.
-    turning = crossing.exit_turning, crossing.entry_turning
     offset = chain.friction.offset()
     at_base = of_group(point.base_tension, group)[None] + offset
     tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
@@ -483,7 +482,8 @@ def _spans(
     stiffness = of_group(chain.memory_stiffness, group)[None]
     at_exit = summed[0] + summed[1] / stiffness
     at_entry = beyond[0] + (beyond[1] + in_body) / stiffness
-    limits = chain.friction.limits(*turning, (transmitted - offset, gap_tension), log_ratio)
+    before = jnp.stack([transmitted - offset, gap_tension], axis=-1)
+    limits = chain.friction.limits(crossing.turning, before, log_ratio)
     return TendonSpans(
         crossing=crossing,
         tension_ratio=tension_ratio,
