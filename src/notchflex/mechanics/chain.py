@@ -25,7 +25,7 @@ from notchflex.mechanics.flexure import (
     fibre_stretch,
     flattened,
     flexure_state,
-    free_pose,
+    relative_pose,
     rod_at,
     section_fibres,
     stack,
@@ -355,7 +355,7 @@ def flexure(
     """Make a flexure without its factor on stiffness, and its pose in the free robot; cached."""
     rod = with_level(rod_at(site, notch, tube, refinement), level)
     rod = with_fibres(rod, notch, tube, refinement) if by_fibres else rod
-    return rod, free_pose(rod)
+    return rod, relative_pose(rod, xp.zeros(rod.modes))
 
 
 _UP = xp.array([0.0, 0.0, 1.0])

@@ -10,7 +10,7 @@ import numpy as np
 from notchflex._arrays import cached, plain_number, xp
 from notchflex.mechanics.cuts import SECTION_OF_CUT
 from notchflex.mechanics.ring import Side, WallSector, arc_of, end_compliance
-from notchflex.mechanics.section import Section, leggauss
+from notchflex.mechanics.section import Section, gauss_on
 
 # Torsion of a notch whose ends restrain warping of its section, and its shear.
 #
@@ -81,15 +81,14 @@ def flattening_numbers(
     a = outer_angle
     if cut == "off-axis":
         a = xp.arccos(xp.minimum((depth - outer) / radius, 1.0 - 1e-9))
-    nodes, weights = leggauss(24)
-    angle = 0.5 * a * (1.0 + nodes)
+    angle, weights = gauss_on(0.0, a)
     slope = xp.sin(a) / a
     bent = (
         0.5 * (xp.sin(a) ** 2 + xp.sin(angle) ** 2)
         + slope * (xp.cos(a) - xp.cos(angle))
         - slope * angle * xp.sin(angle)
     )
-    first, second = (0.5 * a * (moment @ weights) for moment in (bent, bent**2))
+    first, second = bent @ weights, bent**2 @ weights
     weak = section.second_moment_weak
     phi = 2.0 * wall * radius**3 * xp.abs(first) / weak
     brazier = 48.0 * (1.0 - poisson_ratio**2) * radius**7 * second / (wall * weak)

@@ -102,12 +102,12 @@ def weight_held(
     if law == "capstan":
         return m1 * np.exp(-mu * (a1 + a2))
     corner, turns = CornerLaw(constant(mu)[..., None]), constant(np.stack([a1, a2], axis=-1))
-    if not np.asarray(corner.valid(turns)).all():
+    if not corner.valid(turns).all():
         raise InputError.OUT_OF_RANGE(
             "an edge would hold any pull, because coefficient * tan(turn / 2) is 1 or more; give a "
             "smaller coefficient or turn"
         )
-    return m1 * np.exp(-np.asarray(corner.bounds(turns)).sum(axis=-1))
+    return m1 * np.exp(-np.sum(corner.bounds(turns), axis=-1))
 
 
 def slopes_of_coefficient(

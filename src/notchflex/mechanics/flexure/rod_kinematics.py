@@ -63,23 +63,8 @@ def integrate_rod(rod: Rod, modes: Modes) -> RodConfiguration:
         rotation = _products(rotation_about(turns))
         turning = rotations_before(rotation) @ left_slope(turns) @ slope
         from_place, turn = (turns, slope, turning), xp.cumsum(turning, axis=0)
-    stepped = _stepped(rod, rotation)
+    stepped = (rotation[:-1, ..., None] * rod.step[:, None]).sum(axis=-2)
     return RodConfiguration(rotation, turn, stepped @ hat, stepped[..., 1:], from_place)
-
-
-def free_pose(rod: Rod) -> Motion:
-    """Return the pose of the distal body in the proximal frame, of a free rod in space."""
-    # It equals `relative_pose` without modes, and omits terms that only the derivatives need.
-    assert rod.turn_pair is not None
-    turns = xp.diff(rod.turn[..., 0], axis=0, prepend=0.0) + rod.turn_pair[..., 0, 0]
-    rotation = _products(rotation_about(turns))
-    end = Motion(rotation[-1], _stepped(rod, rotation)[..., 0].sum(axis=0))
-    return Motion(rod.start_rotation, rod.start_offset).then(end).then(tail_pose(rod))
-
-
-def _stepped(rod: Rod, rotation: Float[Array, "places d d"]) -> Float[Array, "gauss d hat"]:
-    """Rotate the steps at the nodes, for (1, q)."""
-    return (rotation[:-1, ..., None] * rod.step[:, None]).sum(axis=-2)
 
 
 def _turns(

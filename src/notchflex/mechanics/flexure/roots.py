@@ -42,6 +42,8 @@ from notchflex.mechanics.flexure.notch_rod import (
     about_neutral_axis,
     course_poses,
     course_rod,
+    in_sections,
+    strains_of,
 )
 from notchflex.mechanics.flexure.rod import Rod, section_fibres
 from notchflex.mechanics.material import FibreSection, NotchEnds
@@ -136,17 +138,11 @@ def plane_compliance(
     poisson_ratio: float,
 ) -> Float[Array, "2 2"]:
     """Compute E times the compliance to forces across and along the tube at the middle, 1/mm."""
-    ends, area = section.compliance, xp.asarray(section.area)
-    bending = (1.0 + ends.weak) / xp.asarray(section.second_moment_weak)
-    across = 2.0 * (1.0 + poisson_ratio) * (1.0 + ends.push) / area
     lever = poses.translation - middle
-    # Of unit forces along x and z: moments about y, then the forces in the frames of the sections.
-    moment = xp.stack([-lever[:, 2], lever[:, 0]], axis=-1)
-    force = poses.rotation[:, [0, 2]]
-    along = (1.0 + ends.axial) / area
-    parts = (bending, moment), (across, force[..., 0]), (along, force[..., 2])
-    products = [xp.einsum("k,ki,kj->ij", length * soft, by, by) for soft, by in parts]
-    return xp.sum(xp.stack(products), axis=0)
+    forces = [(xp.cross(along, lever), along + 0.0 * lever) for along in xp.eye(3)[::2]]
+    resultants = in_sections(poses, forces)
+    strain = strains_of(section, poisson_ratio, resultants)
+    return xp.einsum("k,kic,kjc->ij", length, resultants, strain)
 
 
 def turned_compliance(

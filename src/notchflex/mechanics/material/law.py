@@ -26,7 +26,7 @@ from jaxtyping import Array, Float
 from notchflex._arrays import decide, xp
 from notchflex._jax import Pytree, constant, jax, jnp
 from notchflex._packages import unregistered
-from notchflex.mechanics.section import leggauss
+from notchflex.mechanics.section import gauss_on
 
 Scalar = Float[Array, ""]
 Each = Float[Array, "*shape"]
@@ -202,8 +202,7 @@ class FibreSection(Pytree):
 #
 # A change of e thus dissipates (K X(kappa) - H'(e)) de, which is zero without hysteresis.
 
-_GAUSS = leggauss(64)
-NODES, WEIGHTS = 0.5 + 0.5 * _GAUSS[0], 0.5 * _GAUSS[1]
+NODES, WEIGHTS = gauss_on(0.0, 1.0, 64)
 """Gauss's rule on 0 ... 1."""
 
 
