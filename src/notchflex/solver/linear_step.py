@@ -291,7 +291,7 @@ class StateJacobians:
         group, response = self.chain.contact_pairs[k], self.at.contacts[k]
         if response.slope is not None:
             return self.unit.of_modes(response.slope), None
-        slopes = self._by_relative_motion(group, type(group).gap_response)
+        slopes = self._by_relative_motion(group, type(group).cross)
         relative = select_back(self.relative, group.back)
         return (
             jnp.einsum("nlw,nlwz->nlz", slopes.gap, relative),

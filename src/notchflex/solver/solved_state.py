@@ -167,10 +167,9 @@ class SolvedState:
                 weights = of_rod(chain.rods, fibre_stretch(group.fibre))
                 acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
         for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
-            fibre = group.fibre(chain.rods)
-            if fibre is not None:
-                weights = of_rod(chain.rods, fibre_stretch(fibre))
-                acting = acting + (force * group.has_contact) * weights
+            if group.fibre is not None:
+                weights = of_rod(chain.rods, fibre_stretch(group.fibre))
+                acting = acting + jnp.einsum("nl,nlc->nc", force * group.has_contact, weights)
         required = jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)
         if at.wrenches is None:
             return required
