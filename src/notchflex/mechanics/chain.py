@@ -37,7 +37,7 @@ from notchflex.mechanics.material import Fibres, SectionLaw, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
-from notchflex.mechanics.tendon import RoutedTendons, TendonGroup, route
+from notchflex.mechanics.tendon import TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
 from notchflex.robot.kinds import Friction, Material, Notch
 from notchflex.robot.part import unchecked
@@ -392,29 +392,29 @@ def assemble(
         5
     """
     template = chain_template(robot, level, refinement, flexures)
-    rods, routed, body_length = template.rods, template.routed_tendons, template.body_length
+    rods, groups, body_length = template.rods, template.groups, template.body_length
     body_mass, body_centre = body_masses(robot, rods)
     section = rods.section.stiffened(template.stiffness_factor[:, None])
     tendons = robot.tendon
     chain = Chain(
         rods=replace(rods, section=section),
-        groups=routed.groups,
+        groups=groups,
         contact_pairs=template.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
-        free_length=routed.base_length + constant([tendon.free_length for tendon in tendons]),
+        free_length=template.base_length + constant([tendon.free_length for tendon in tendons]),
         body_length=body_length,
         body_mass=body_mass,
         body_centre=body_centre,
         frame=None,
         notch_frame=template.notch_frame,
-        tendon_entry=routed.place,
-        contacts=_contacts(routed.groups, len(tendons)),
+        tendon_entry=template.tendon_entry,
+        contacts=_contacts(groups, len(tendons)),
         level=level,
         loaded=loaded,
         follows=loaded and follows,  # unloaded chains are of one form
         refinement=refinement,
         window=max(
-            (int(xp.max(part.back)) for part in (*routed.groups, *template.contact_pairs)),
+            (int(xp.max(part.back)) for part in (*groups, *template.contact_pairs)),
             default=1,
         ),
         **laws(robot.material, template),
@@ -431,11 +431,14 @@ def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
     if isinstance(part, Friction):
         return {"friction": friction_law(part)}
     law = section_law(part)
-    elastic = _elastic(template.distinct_rods, law)[template.rod_index]
-    elastic = template.stiffness_factor[:, None, None] * elastic
+    rods = template.distinct_rods
+    weighted = rods.length[..., None, None] * (law.stiffness(rods.section) @ rods.basis)
+    elastic = xp.einsum("niam,niak->nmk", rods.basis, weighted)
+    elastic = elastic + rods.padding_mask[:, None] * xp.eye(rods.modes)
+    elastic = template.stiffness_factor[:, None, None] * elastic[template.rod_index]
     stiffness = (elastic * np.eye(elastic.shape[-1])).sum(axis=-1)
     stop = template.rods.stop_flexibility
-    linear = law.is_linear and not template.distinct_rods.section.softens
+    linear = law.is_linear and not rods.section.softens
     contact_stiffness = 1.0 / xp.sum(template.contact_motion / stiffness, axis=-1)
     return {
         "law": law,
@@ -454,7 +457,9 @@ class ChainTemplate(NamedTuple):
     distinct_rods: Rod  # The flexures, without repetitions
     rod_index: Int[Array, " n"]  # Index of every notch's flexure among them
     rods: Rod  # All flexures
-    routed_tendons: RoutedTendons  # The tendons
+    groups: tuple[TendonGroup, ...]  # The tendons
+    tendon_entry: Float[Array, "t 3"]  # Point where each of them enters the base, mm
+    base_length: Float[Array, " t"]  # Its length inside the base, mm
     contact_pairs: tuple[ContactGroup, ...]  # The contacts
     body_length: Array  # Length of each body on the tube axis, mm
     notch_frame: Array  # Rotation from the frame of every notch to the tube
@@ -512,7 +517,7 @@ def _template(
         distinct_rods,
         rod_index,
         rods,
-        route(
+        *route(
             tendons,
             notches,
             tube.outer_radius,
@@ -546,13 +551,6 @@ def _flat(chain: Chain, frame: Float[Array, "3 3"]) -> Chain:
         contact_pairs=tuple(map(planar, chain.contact_pairs)),
         frame=frame,
     )
-
-
-def _elastic(rods: Rod, law: SectionLaw) -> Float[Array, "n modes modes"]:
-    """Compute the stiffness of every flexure in the free robot, N mm; 1 for padding modes."""
-    weighted = rods.length[..., None, None] * (law.stiffness(rods.section) @ rods.basis)
-    stiffness = xp.einsum("niam,niak->nmk", rods.basis, weighted)
-    return stiffness + rods.padding_mask[:, None] * xp.eye(rods.modes)
 
 
 def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[Array, "n modes"]:

@@ -17,6 +17,7 @@ from notchflex.mechanics.tendon import (
     Crossing,
     CrossingGroup,
     fibre_lengths,
+    on_tube,
     passages,
 )
 from notchflex.robot import Tube
@@ -110,8 +111,7 @@ def build_contacts(
     sides = _sides(notches)
     if sides:
         line = passages(notches, body_length, sides)
-        angle = xp.radians(sides)
-        across = tube.outer_radius * xp.stack([xp.cos(angle), xp.sin(angle), 0.0 * angle], axis=-1)
+        across = on_tube([tube.outer_radius] * len(sides), sides)
         along = xp.array([0.0, 0.0, 1.0])
         # Keep as many contacts as close at one flexure, on any side.
         count = int(line.on_side.sum(axis=1).max(initial=1.0))

@@ -261,7 +261,7 @@ def chord_angle(shape: str, outer: Array, inner: Array, depth: Array) -> Array:
     return half_angle(outer, 2.0 * outer - depth, depth)
 
 
-def _factors(shape: str, outer: Array, inner: Array, depth: Array) -> tuple[Array, Array]:
+def _factors(shape: str, outer: Array, inner: Array, depth: Array) -> Array:
     """Interpolate the factors on the torsion constant and on the shear centre."""
     low, high = (float(xp.sqrt(1.0 - ratio)) for ratio in reversed(RATIO_RANGE))
     table = _read_table()
@@ -271,8 +271,7 @@ def _factors(shape: str, outer: Array, inner: Array, depth: Array) -> tuple[Arra
     along = _chebyshev(
         columns, chord_angle(shape, outer, inner, depth), *map(float, CHORD_RANGE[shape])
     )
-    torsion, shear = xp.einsum("kpq,p...,q...->k...", both, across, along)
-    return torsion, shear
+    return xp.einsum("kpq,p...,q...->k...", both, across, along)
 
 
 def segment_torsion(outer: Array, inner: Array, depth: Array, area: Array) -> tuple[Array, Array]:
@@ -286,23 +285,14 @@ def segment_torsion(outer: Array, inner: Array, depth: Array, area: Array) -> tu
     through = xp.where(closed | solid, outer, depth)
     deep = xp.where(solid, depth, outer + inner)
 
+    def estimated(shape: str, cut: Array, torsion: Array, shear: Array) -> Array:
+        return xp.stack([torsion, shear]) * _factors(shape, outer, inner, cut)
+
     # Of a solid segment J = A h²/3, and the top of the circle.
-    solid_estimate = area * (2.0 * outer - deep) ** 2 / 3.0, outer
-    cases = (
-        ("closed", shallow, closed_estimate(outer, inner, shallow)),
-        ("solid", deep, solid_estimate),
-        ("open", through, open_estimate(outer, inner, through, area)),
-    )
-
-    def estimated(shape: str, cut: Array, estimates: tuple[Array, Array]) -> list[Array]:
-        factors = _factors(shape, outer, inner, cut)
-        return [value * factor for value, factor in zip(estimates, factors, strict=True)]
-
-    both = zip(*(estimated(*case) for case in cases), strict=True)
-    torsion, shear = (
-        xp.where(closed, of_closed, xp.where(solid, of_solid, of_open))
-        for of_closed, of_solid, of_open in both
-    )
+    of_solid = estimated("solid", deep, area * (2.0 * outer - deep) ** 2 / 3.0, outer)
+    of_open = estimated("open", through, *open_estimate(outer, inner, through, area))
+    of_closed = estimated("closed", shallow, *closed_estimate(outer, inner, shallow))
+    torsion, shear = xp.where(closed, of_closed, xp.where(solid, of_solid, of_open))
     return torsion, shear
 
 

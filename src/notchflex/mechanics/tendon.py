@@ -310,15 +310,6 @@ def passages(
 _PULLS = {"straight": "gap", "straight-dead": "dead", "straight-follower": "follower"}
 
 
-class RoutedTendons(NamedTuple):
-    """Tendons laid through a robot."""
-
-    groups: tuple[TendonGroup, ...]  # One group per kind of path in use
-    # Where every tendon crosses a section of the tube, mm from its axis
-    place: Float[Array, "t 3"]
-    base_length: OfTendons  # Length of every tendon inside the base, mm
-
-
 def route(
     tendons: Sequence[Tendon],
     notches: Sequence[Notch],
@@ -328,12 +319,13 @@ def route(
     body_length: Float[Array, " bodies"],
     *,
     turns_with_chord: bool,
-) -> RoutedTendons:
+) -> tuple[tuple[TendonGroup, ...], Float[Array, "t 3"], OfTendons]:
     """Group the tendons by the way they run and lay them through the chain."""
-    # `free` holds the relative poses of all flexures in the free robot.
+    # `free` holds the relative poses of all flexures in the free robot. Also returned is where each
+    # tendon crosses a section of the tube, mm from its axis, and its length in the base, mm.
     directions, radii = zip(*((each.direction_deg, each.radius) for each in tendons), strict=True)
     lines = passages(notches, body_length, directions, outer_radius, radii)
-    place = xp.stack([_on_tube(*pair) for pair in zip(radii, directions, strict=True)])
+    place = on_tube(radii, directions)
     groups: list[TendonGroup] = []
     for path in ("wall-arc", *_PULLS):
         numbers = tuple(i for i, tendon in enumerate(tendons) if tendon.path == path)
@@ -343,7 +335,10 @@ def route(
         line = Passage(*(values[..., columns] for values in lines))
         masks = _masks(numbers, [tendons[i] for i in numbers], line)
         if path == "wall-arc":
-            groups.append(_wall_arc(masks, place[columns], rods))
+            across = xp.einsum("nab,tb->nta", rods.end_rotation, place[columns])
+            across = (across + rods.end_offset[:, None])[..., :2]
+            gap = fibre_lengths(rods, across, rods.reference_strain)
+            groups.append(WallArc(**masks, natural_gap=gap, across=across))
         else:
             groups.append(
                 _straight(
@@ -355,7 +350,7 @@ def route(
                     turns_with_chord=turns_with_chord,
                 )
             )
-    return RoutedTendons(tuple(groups), place, lines.base_leaves)
+    return tuple(groups), place, lines.base_leaves
 
 
 def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -> dict[str, Any]:
@@ -384,17 +379,10 @@ def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -
     }
 
 
-def _on_tube(radius: float, direction_deg: float) -> Array:
-    """Where a tendon crosses a section of the tube, mm from its axis."""
-    direction = xp.deg2rad(direction_deg)
-    return xp.stack([radius * xp.cos(direction), radius * xp.sin(direction), 0.0])
-
-
-def _wall_arc(masks: dict[str, Any], place: Array, rods: Rod) -> WallArc:
-    across = xp.einsum("nab,tb->nta", rods.end_rotation, place) + rods.end_offset[:, None]
-    across = across[..., :2]
-    gap = fibre_lengths(rods, across, rods.reference_strain)
-    return WallArc(**masks, natural_gap=gap, across=across)
+def on_tube(radii: Any, directions_deg: Any) -> Float[Array, "t 3"]:
+    """Return points of a section of the tube by their polar coordinates, mm from its axis."""
+    angle = xp.radians(constant(directions_deg))
+    return constant(radii)[:, None] * xp.stack([xp.cos(angle), xp.sin(angle), 0.0 * angle], axis=-1)
 
 
 def _straight(

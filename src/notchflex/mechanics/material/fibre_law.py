@@ -121,31 +121,10 @@ def same_sums(sums: FibreSums, *of: Any) -> FibreSums:
     return sums
 
 
-def _change_of_sums(
-    primals: tuple[Any, ...], tangents: tuple[Any, ...]
-) -> tuple[FibreSums, FibreSums]:
-    """Differentiate with respect to the varying arguments only."""
-
-    def is_still(tangent: Any) -> bool:
-        return isinstance(tangent, jax.custom_derivatives.SymbolicZero)
-
+@same_sums.defjvp
+def _(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[FibreSums, FibreSums]:
     (sums, *of), (_, *moved) = primals, tangents
-    leaves, tree = jax.tree.flatten(of)
-    slopes = jax.tree.leaves(moved, is_leaf=is_still)
-    varies = [index for index, slope in enumerate(slopes) if not is_still(slope)]
-
-    def again(*varied: Array) -> FibreSums:
-        changed = list(leaves)
-        for index, value in zip(varies, varied, strict=True):
-            changed[index] = value
-        law, *rest = jax.tree.unflatten(tree, changed)
-        return law.sum_fibres(*rest)
-
-    values, along = [leaves[index] for index in varies], [slopes[index] for index in varies]
-    return sums, jax.jvp(again, values, along)[1]
-
-
-same_sums.defjvp(_change_of_sums, symbolic_zeros=True)
+    return sums, jax.jvp(lambda law, *rest: law.sum_fibres(*rest), of, moved)[1]
 
 
 _KINKS = 8  # kinks per loop iteration: more lengthen programs, fewer slow them down
@@ -352,10 +331,6 @@ def _(material: Nitinol) -> FibreLaw:
         length = material.transformation_strain - loading
         low, high = xp.hstack([low, low - length]), xp.hstack([high, high + length])
         change = xp.append(change, -change)
-    return _law(material, low, high, change)
-
-
-def _law(material: Nitinol | StressStrain, low: Array, high: Array, change: Array) -> FibreLaw:
     return FibreLaw(*moduli(material), *map(constant, (low, high, change)))
 
 
@@ -380,7 +355,7 @@ def _(material: StressStrain) -> FibreLaw:
         xp.pad(kinks, spare, constant_values=far)[None]
         for kinks, far in ((low, -_NEVER), (high, _NEVER))
     )
-    return _law(material, low, high, xp.pad(change, spare))
+    return FibreLaw(*moduli(material), *map(constant, (low, high, xp.pad(change, spare))))
 
 
 @lru_cache(maxsize=64)
