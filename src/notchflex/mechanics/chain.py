@@ -229,18 +229,16 @@ def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[Array, " bodies"
 
 
 def body_masses(
-    robot: Robot, rods: Rod
+    robot: Robot, rods: Rod, length: Float[Array, " bodies"]
 ) -> tuple[Float[Array, " bodies"], Float[Array, "bodies 3"]]:
     """Compute mass and centre of mass of each body, with its share of the notches."""
     # A body is a piece of uncut tube: the area of the tube's wall times the body's axial length,
     # its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure
     # (area of its sections times the length of the neutral axis) is lumped: half at the start of
     # the neutral axis on the body before it, half at its end on the body after it.
-    bodies = len(robot.notches) + 1
     density = robot.material.density
     if density is None:
-        return xp.zeros(bodies), xp.zeros((bodies, 3))
-    length = body_lengths(robot.tube, robot.notches)
+        return xp.zeros(len(length)), xp.zeros((len(length), 3))
     piece = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2) * length
     half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1)
     end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
@@ -393,7 +391,7 @@ def assemble(
     """
     template = chain_template(robot, level, refinement, flexures)
     rods, groups, body_length = template.rods, template.groups, template.body_length
-    body_mass, body_centre = body_masses(robot, rods)
+    body_mass, body_centre = body_masses(robot, rods, body_length)
     section = rods.section.stiffened(template.stiffness_factor[:, None])
     tendons = robot.tendon
     chain = Chain(

@@ -374,7 +374,7 @@ def build_rod(
 # The direction of n couples stretch and shear (Gao 2017, eq. 1-5): independent polynomials for them
 # are far less accurate.
 
-_X, _Y, _Z = xp.eye(3)
+_ABOUT_X, _ABOUT_Y, _ABOUT_Z, _ALONG_X, _ALONG_Y, _ALONG_Z = xp.eye(6)
 
 
 def course_poses(
@@ -383,7 +383,7 @@ def course_poses(
     """Compute poses along a free rod in the x-z plane: z along it, y out of the plane."""
     # Along the strip and along the tube from its middle, mm; the mirror image for `hand` -1.
     position = xp.stack([-hand * along, 0.0 * along, above], axis=-1)
-    turns = rotation_about(constant((hand * (heading - 0.5 * np.pi))[:, None] * _Y))
+    turns = rotation_about(constant((hand * (heading - 0.5 * np.pi))[:, None] * _ABOUT_Y[:3]))
     return Motion(turns, constant(middle + position))
 
 
@@ -401,67 +401,53 @@ def course_rod(
     """Build the rod of a strip from wall to wall; the distal frame is `distal` mm up the tube."""
     # The poses are those at all points, at the start and at the end.
     along, start, end = map(poses.pick, (slice(-2), -2, -1))
-    basis = wrench_modes(points, along, section, middle, *mode_counts, poisson_ratio)
-    to_end = Motion(*(xp.concatenate([part[:-2], part[-1:]]) for part in poses))
-    curve, body = between(start, to_end), between(end, shifted(z=distal))
-    in_plane = mode_counts[0] + 2 * mode_counts[1]
-    modes = StrainModes(basis, (in_plane, in_plane, basis.shape[-1]))
-    return build_rod(NeutralAxis(points, start, body, curve, free), section, modes, **options)
-
-
-def wrench_modes(
-    points: RodQuadrature,
-    poses: Motion,
-    section: FibreSection,
-    middle: Float[Array, " 3"],
-    moment_modes: int,
-    force_modes: int,
-    poisson_ratio: float,
-) -> Float[Array, "nodes 6 modes"]:
-    """Compute the modes of a rod in the x-z plane, those out of the plane last."""
+    moment_modes, force_modes = mode_counts
     # In the plane the moment about y is constant, or goes with a lever along x or z, and from the
     # fourth mode on with the Legendre polynomials P_2, P_3 ... of arc length (P_1 is nearly a
     # lever); then come forces along x and along z, times P_0, P_1 ... in pairs. Out of the plane
     # come a constant moment about x, one about z and the moment of a sideways force at the middle,
     # then moments about x and z times P_2, P_3 ... as far as in the plane, and that force. A unit
     # is about 1 rad of the end for a moment, and a mean strain of 1 for a force.
-    length = points.weight
-    part = 2.0 * points.every / points.ends[-1] - 1.0
-    lever = poses.translation - middle
+    length, lever = points.weight, along.translation - middle
     reach = xp.abs(lever).max(axis=0)
-    polynomials = legendre(part, max(moment_modes - 1, force_modes))
+    polynomials = legendre(
+        2.0 * points.every / points.ends[-1] - 1.0, max(moment_modes - 1, force_modes)
+    )[..., None]
+    higher = [polynomials[:, degree] for degree in range(2, moment_modes - 1)]
+    lever_x, lever_z = lever[:, :1], lever[:, 2:]
+    sizes = [polynomials[:, 0], lever_x / reach[0], lever_z / reach[2], *higher]
+    bending = [size * _ABOUT_Y for size in sizes]
+    pulls = [polynomials[:, k] * pull for k in range(force_modes) for pull in (_ALONG_X, _ALONG_Z)]
+    sideways = [size * about for size in sizes[:1] + higher for about in (_ABOUT_X, _ABOUT_Z)]
+    sideways.insert(2, (lever_x * _ABOUT_Z - lever_z * _ABOUT_X) / reach[0])
+    wrenches = [*bending, *pulls, *sideways, polynomials[:, 0] * _ALONG_Y]
+    counts = len(bending), len(pulls), len(sideways), 1
+    of_force = np.repeat([False, True, False, True], counts)
 
-    moment = [xp.ones_like(length), lever[:, 0] / reach[0], lever[:, 2] / reach[2]]
-    moment += [polynomials[:, degree] for degree in range(2, moment_modes - 1)]
-    none = xp.zeros_like(lever)
-    wrenches = [(size[:, None] * _Y, none) for size in moment]
-    wrenches += [
-        (none, polynomials[:, k, None] * along) for k in range(force_modes) for along in (_X, _Z)
-    ]
-    sideways = xp.cross(lever, _Y) / reach[0]
-    out_of_plane = [about + none for about in (_X, _Z, sideways)]
-    out_of_plane += [
-        polynomials[:, degree, None] * about
-        for degree in range(2, moment_modes - 1)
-        for about in (_X, _Z)
-    ]
-    wrenches += [(about, none) for about in out_of_plane] + [(none, _Y + none)]
-    of_force = xp.arange(len(wrenches)) >= moment_modes
-    of_force[-len(out_of_plane) - 1 : -1] = False
+    resultants = in_sections(along, wrenches)
+    strain = strains_of(section, poisson_ratio, resultants)
+    work = xp.einsum("k,kmc,kmc->m", length, resultants, strain)
+    scaled = strain * (xp.where(of_force, length.sum(), 1.0) / work)[:, None]
+    in_plane = len(bending) + len(pulls)
+    modes = StrainModes(xp.moveaxis(scaled, 1, 2), (in_plane, in_plane, len(wrenches)))
+    to_end = Motion(*(xp.concatenate([part[:-2], part[-1:]]) for part in poses))
+    curve, body = between(start, to_end), between(end, shifted(z=distal))
+    return build_rod(NeutralAxis(points, start, body, curve, free), section, modes, **options)
 
-    in_frame = in_sections(poses, wrenches)
-    strain = strains_of(section, poisson_ratio, in_frame)
-    work = xp.einsum("k,kmc,kmc->m", length, in_frame, strain)
-    return xp.moveaxis(strain * (xp.where(of_force, length.sum(), 1.0) / work)[:, None], 1, 2)
+
+def unit_forces(poses: Motion, middle: Float[Array, " 3"]) -> Float[Array, "nodes wrenches 6"]:
+    """Compute the resultants of unit forces at the middle, along x and along z."""
+    lever = poses.translation - middle
+    forces = [_ALONG_X - lever[:, 2:] * _ABOUT_Y, _ALONG_Z + lever[:, :1] * _ABOUT_Y]
+    return in_sections(poses, forces)
 
 
 def in_sections(
-    poses: Motion, wrenches: list[tuple[Array, Array]]
+    poses: Motion, wrenches: list[Float[Array, "nodes 6"]]
 ) -> Float[Array, "nodes wrenches 6"]:
-    """Turn moments and forces on sections, each (nodes, 3), to the axes of the sections."""
-    parts = xp.stack([part for wrench in wrenches for part in wrench])
-    pairs = parts.reshape(len(wrenches), 2, -1, 3)
-    turned = xp.einsum("kji,mpkj->kmpi", poses.rotation, pairs)
+    """Turn moments and forces on sections to the axes of the sections."""
+    pairs = xp.stack(wrenches).reshape(len(wrenches), -1, 2, 3)
+    turned = xp.einsum("kji,mkpj->kmpi", poses.rotation, pairs)
     return turned.reshape(*turned.shape[:2], 6)
 
 
@@ -475,8 +461,8 @@ def strains_of(
     """Compute strains by resultants, times Young's modulus."""
     law = LinearLaw(constant(1.0), constant(0.5 / (1.0 + poisson_ratio)))
     stiffness = law.stiffness(section)
-    own = xp.diagonal(stiffness, axis1=-2, axis2=-1)
+    direct = xp.diagonal(stiffness, axis1=-2, axis2=-1)
     mixed = stiffness[:, 0, 2, None] * _COUPLED
-    part = mixed / own[:, _PARTNER]
+    part = mixed / direct[:, _PARTNER]
     free = resultants - part[:, None] * resultants[..., _PARTNER]
-    return free / (own - part * mixed)[:, None]
+    return free / (direct - part * mixed)[:, None]
