@@ -135,24 +135,16 @@ def structural(chain: Chain) -> Chain:
     # modes, counts and flags. The mask of padding flexures is not: chains of other lengths share
     # the program.
 
-    def counts(leaf: Any) -> Any:
-        return np.full(np.shape(leaf), xp.asarray(leaf).dtype.kind != "f")
-
-    def all_of_it(leaf: Array) -> Any:
-        return np.full(leaf.shape, True)
-
-    def of_modes(leaf: Array) -> Any:
-        return np.broadcast_to(np.arange(leaf.shape[-1]) > 0, leaf.shape)
-
-    def of_pairs(leaf: Array) -> Any:
-        return of_modes(leaf) & of_modes(leaf).swapaxes(-1, -2)
-
-    marks = {"basis": all_of_it, "node_reach": all_of_it, "turn_pair": of_pairs}
-    marks |= dict.fromkeys(("turn", "step", "node_turn"), of_modes)
-    marked = {name: jax.tree.map(mark, getattr(chain.rods, name)) for name, mark in marks.items()}
-    plain: Chain = jax.tree.map(counts, chain)
-    elastic = jax.tree.map(all_of_it, chain.elastic)
-    return replace(plain, rods=replace(plain.rods, **marked), elastic=elastic)
+    marks: Any = jax.tree.map(
+        lambda leaf: np.full(np.shape(leaf), xp.asarray(leaf).dtype.kind != "f"), chain
+    )
+    rods, everything, of_modes = marks.rods, np.s_[...], np.s_[..., 1:]
+    marked = [(rods.basis, everything), (rods.node_reach, everything), (marks.elastic, everything)]
+    marked += [(leaf, of_modes) for leaf in (rods.turn, rods.step, rods.node_turn)]
+    for leaf, place in [*marked, (rods.turn_pair, np.s_[..., 1:, 1:])]:
+        if leaf is not None:
+            leaf[place] = True
+    return marks
 
 
 def padded(chain: Chain, flexures: int, edges: int) -> Chain:
@@ -167,17 +159,13 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         return chain
     index = np.minimum(np.arange(flexures), chain.flexures - 1)
 
-    def longer(leaf: Any, *value: Any) -> Any:
-        """Repeat the last entry of an array, or add entries of a value."""
-        wider = leaf[index]
-        if value:
-            wider[-more:] = value[0]
-        return wider
-
-    def changed(part: Any, **values: Any) -> Any:
-        known = {name: getattr(part, name) for name in values}
-        rows = {k: longer(leaf, values[k]) for k, leaf in known.items() if leaf is not None}
-        return replace(jax.tree.map(longer, part), **rows)
+    def longer(part: Any, **values: Any) -> Any:
+        """Repeat the last entry of arrays; set the added entries of some to a value."""
+        repeated = jax.tree.map(lambda leaf: leaf[index], part)
+        for name, value in values.items():
+            if (leaf := getattr(repeated, name)) is not None:
+                leaf[-more:] = value
+        return repeated
 
     rods = chain.rods
     nothing = dict.fromkeys(
@@ -199,20 +187,24 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
     )
     rotations = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")
     unturned = dict.fromkeys(rotations, xp.eye(rods.start_rotation.shape[-1]))
-    rods = changed(rods, padding_mask=1.0, **nothing, **unturned)
+    rods = longer(rods, padding_mask=1.0, **nothing, **unturned)
     # The first added flexure begins at the tip, at the end of the last body.
     rods.start_offset[chain.flexures, -1] = chain.body_length[-1]
+    stiffness, elastic = longer((chain.stiffness, chain.elastic))
+    stiffness[-more:] = 1.0
+    if elastic is not None:
+        elastic[-more:] = np.eye(chain.rods.modes)
     idle = {"present": 0.0, "visits": 0.0, "ends": 0.0, "back": 1, "body_length": 0.0}
     bodies = {name: getattr(chain, name) for name in ("body_length", "body_mass", "body_centre")}
     return replace(
         chain,
         rods=rods,
-        groups=tuple(changed(group, **idle) for group in chain.groups),
-        contact_pairs=tuple(changed(pair, has_contact=0.0, back=1) for pair in chain.contact_pairs),
-        stiffness=longer(chain.stiffness, 1.0),
-        elastic=jax.tree.map(lambda leaf: longer(leaf, np.eye(leaf.shape[-1])), chain.elastic),
+        groups=tuple(longer(group, **idle) for group in chain.groups),
+        contact_pairs=tuple(longer(pair, has_contact=0.0, back=1) for pair in chain.contact_pairs),
+        stiffness=stiffness,
+        elastic=elastic,
         contact_stiffness=longer(chain.contact_stiffness),
-        contact_flexibility=jax.tree.map(longer, chain.contact_flexibility),
+        contact_flexibility=longer(chain.contact_flexibility),
         notch_frame=longer(chain.notch_frame),
         **{k: np.pad(v, [(0, more)] + [(0, 0)] * (v.ndim - 1)) for k, v in bodies.items()},
     )
@@ -229,14 +221,14 @@ def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[Array, " bodies"
 
 
 def body_masses(
-    robot: Robot, rods: Rod, length: Float[Array, " bodies"]
+    robot: Robot, rods: Rod
 ) -> tuple[Float[Array, " bodies"], Float[Array, "bodies 3"]]:
     """Compute mass and centre of mass of each body, with its share of the notches."""
     # A body is a piece of uncut tube: the area of the tube's wall times the body's axial length,
     # its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure
     # (area of its sections times the length of the neutral axis) is lumped: half at the start of
     # the neutral axis on the body before it, half at its end on the body after it.
-    density = robot.material.density
+    length, density = body_lengths(robot.tube, robot.notches), robot.material.density
     if density is None:
         return xp.zeros(len(length)), xp.zeros((len(length), 3))
     piece = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2) * length
@@ -287,27 +279,25 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     if not any(notch.has_elastic_ends for notch in notches):
         return (None,) * len(notches)
     lengths = [plain_number(length) for length in body_lengths(robot.tube, notches)]
-    last = len(notches) - 1
-    ratio = robot.material.poisson_ratio
+    # Ring i lies before notch i, and the last one behind all.
+    boundaries: list[Any] = ["clamped", *["between"] * (len(notches) - 1), "free"]
+    around = [notches[0], *notches, notches[-1]]
+    shared: dict[tuple[Any, ...], Site] = {}  # where all around is of the same parts
 
-    sites: dict[tuple[int | None, ...], Site] = {}  # shared where all around is of the same parts
-
-    def side(boundary: Any, notch: Notch, length: float, other: Notch) -> Side:
+    def side(ring: int, notch: Notch, other: Notch) -> Side:
         apart = (notch.direction_deg - other.direction_deg + 180.0) % 360.0 - 180.0
-        return Side(boundary, length, abs(apart) > 1e-6)  # deg: rounding of sums of angles
+        # 1e-6 deg: rounding of sums of angles
+        return Side(boundaries[ring], lengths[ring], abs(apart) > 1e-6)
 
-    def site(index: int, notch: Notch) -> Site:
-        before, after = notches[max(index - 1, 0)], notches[min(index + 1, last)]
-        is_first, is_last = index == 0, index == last
-        proximal = side("clamped" if is_first else "between", notch, lengths[index], before)
-        distal = side("free" if is_last else "between", notch, lengths[index + 1], after)
-        key = (*map(id, (before, notch, after)), is_first, is_last)
-        return sites.setdefault(key, Site(proximal, distal, ratio))
+    def site(index: int) -> Site | None:
+        before, notch, after = around[index : index + 3]
+        if not notch.has_elastic_ends:
+            return None
+        sides = side(index, notch, before), side(index + 1, notch, after)
+        key = (*map(id, (before, notch, after)), *boundaries[index : index + 2])
+        return shared.setdefault(key, Site(*sides, robot.material.poisson_ratio))
 
-    return tuple(
-        site(index, notch) if notch.has_elastic_ends else None
-        for index, notch in enumerate(notches)
-    )
+    return tuple(map(site, range(len(notches))))
 
 
 def unchecked_dimensions(robot: Robot) -> list[str]:
@@ -391,7 +381,7 @@ def assemble(
     """
     template = chain_template(robot, level, refinement, flexures)
     rods, groups, body_length = template.rods, template.groups, template.body_length
-    body_mass, body_centre = body_masses(robot, rods, body_length)
+    body_mass, body_centre = body_masses(robot, rods)
     section = rods.section.stiffened(template.stiffness_factor[:, None])
     tendons = robot.tendon
     chain = Chain(

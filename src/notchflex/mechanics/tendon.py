@@ -184,7 +184,11 @@ class Straight(TendonGroup):
             before = channel @ anchor.rotation
             onward = channel
             if chord is not None:
-                onward = jnp.where(chord > 0.0, self._onward(flexure, before), channel)
+                pose, turn = flexure.pose, flexure.chord_turn
+                assert pose is not None
+                assert turn is not None
+                goes_on = (turn @ (pose.rotation @ before)) @ pose.rotation
+                onward = jnp.where(chord > 0.0, goes_on, channel)
             pulled = {"gap": gap, "dead": before, "follower": channel}[self.pulls]
             # A pull turns the distal body toward the tendon's side.
             axis = direction(moment_of(channel, enters))
@@ -193,14 +197,6 @@ class Straight(TendonGroup):
 
         length, wrench, turns = jax.vmap(span)(anchors, self.leaves, self.enters, self.along)
         return Crossing(length, wrench, slope=None, turning=turns)
-
-    def _onward(self, flexure: FlexureState, channel: Vectors) -> Vectors:
-        """Direction in which the tendon goes on by the chord's turn, in the distal body's frame."""
-        pose, turn = flexure.pose, flexure.chord_turn
-        assert pose is not None
-        assert turn is not None
-        before = pose.rotation @ channel
-        return (turn @ before) @ pose.rotation
 
 
 def turning(before: Vectors, after: Vectors, axis: Float[Array, " a"]) -> Float[Array, ""]:
@@ -233,14 +229,12 @@ class WallArc(AlongFibres, TendonGroup):
     def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
         """Return the length and turning on the wall arc; half the turning at each edge."""
         bend = jnp.broadcast_to(flexure.bend, (len(self.across), len(flexure.bend)))
-        half_turning = 0.5 * guarded_norm(bend, self._pulls(len(flexure.bend)))
+        # Unit axes about which the tendons bend the rod: the slope of the turning at rest.
+        x, y = self.across[:, 0], self.across[:, 1]
+        pulls = direction(jnp.stack([x] if bend.shape[1] == 1 else [-y, x], axis=-1))
+        half_turning = 0.5 * guarded_norm(bend, pulls)
         turning = jnp.stack([half_turning, half_turning], axis=-1)
         return super().cross(rod, flexure, anchors)._replace(turning=turning)
-
-    def _pulls(self, axes: int) -> Float[Array, "t axes"]:
-        """Unit axes about which the tendons bend the rod, the slope of the turning at rest."""
-        x, y = self.across[:, 0], self.across[:, 1]
-        return direction(jnp.stack([x] if axes == 1 else [-y, x], axis=-1))
 
 
 # Where a line along the wall leaves one rigid piece of the tube and enters the next.

@@ -60,7 +60,7 @@ def integrate_rod(rod: Rod, modes: Modes) -> RodConfiguration:
         rotation, turn = rotation_about(rod.turn @ hat), rod.turn[..., 1:]
     else:
         turns, slope = _turns(rod, hat)
-        rotation = _products(rotation_about(turns))
+        rotation = xp.stack(list(accumulate(rotation_about(turns), operator.matmul)))
         turning = rotations_before(rotation) @ left_slope(turns) @ slope
         from_place, turn = (turns, slope, turning), xp.cumsum(turning, axis=0)
     stepped = (rotation[:-1, ..., None] * rod.step[:, None]).sum(axis=-2)
@@ -92,11 +92,6 @@ def rotation_error_estimate(rod: Rod, modes: Modes) -> Float[Array, ""]:
     turns, _ = _turns(rod, hat)
     second = _by_pair(rod, hat) @ hat
     return 0.05 * jnp.sum(jnp.linalg.norm(turns, axis=-1) * jnp.linalg.norm(second, axis=-1))
-
-
-def _products(parts: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
-    """Multiply all rotations up to each."""
-    return xp.stack(list(accumulate(parts, operator.matmul)))
 
 
 def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
