@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -272,8 +272,20 @@ def validity(
         ]
     )
     shape = outer_radius, inner_radius, cut, depth, height, 0.33
-    sentences += _short_rings(shape, (proximal, distal), diameter)
-    turned = {side.length for side in (proximal, distal) if side.turned}
+    # What short rings change against the shortest ones that were checked, 0.37 outer diameters.
+    sides, checked = (proximal, distal), 0.37
+    longer = [
+        side._replace(length=max(side.length, checked * diameter)) if side.length else side
+        for side in sides
+    ]
+    change = abs(notch_stiffness(*shape, *longer).weak / notch_stiffness(*shape, *sides).weak - 1.0)
+    if change > 0.01:
+        shortest = min(side.length for side in sides if side.length)
+        sentences.append(
+            f"ring / outer diameter is {shortest / diameter:.3g}, below {checked:g}: "
+            f"{100.0 * change:.0f} % of the stiffness follow from longer rings"
+        )
+    turned = {side.length for side in sides if side.turned}
     # With a ring of 1.9 outer diameters the chain agrees with finite elements to 2 %.
     return sentences + [
         f"a neighbour opens to another side of the tube, and the ring between them is {length:.3g} "
@@ -281,21 +293,4 @@ def validity(
         "diameters and up to 2 times with 0.4"
         for length in sorted(turned)
         if length < 1.5 * diameter
-    ]
-
-
-def _short_rings(shape: tuple[Any, ...], sides: tuple[Side, Side], diameter: float) -> list[str]:
-    """Tell of short rings by what they change against the shortest ones that were checked."""
-    checked = 0.37  # outer diameters
-    longer = [
-        side._replace(length=max(side.length, checked * diameter)) if side.length else side
-        for side in sides
-    ]
-    change = abs(notch_stiffness(*shape, *longer).weak / notch_stiffness(*shape, *sides).weak - 1.0)
-    if change <= 0.01:
-        return []
-    shortest = min(side.length for side in sides if side.length)
-    return [
-        f"ring / outer diameter is {shortest / diameter:.3g}, below {checked:g}: "
-        f"{100.0 * change:.0f} % of the stiffness follow from longer rings"
     ]

@@ -198,18 +198,17 @@ class FibreLaw(SectionLaw):
         everything = self, fibres, memory, joint, scale, start
         fixed_arguments = jax.tree.map(jax.lax.stop_gradient, everything)
         strain, curvature, slopes = settle_fibres(*fixed_arguments)
-        _, fixed_fibres, _, fixed, *_ = fixed_arguments
         sums = same_sums(slopes, self, fibres, memory, strain, curvature)
         by_strain, by_curvature = _step(joint, curvature, sums, slopes)
         free = slopes.bending - slopes.mixed**2 / slopes.stretch
         if not isinstance(memory, tuple):
             moves = strain, curvature, by_strain, by_curvature
-            memory = self._remember(fibres, memory, fixed_fibres.arm, moves)
+            memory = self._remember(fibres, memory, moves)
         return Bending(
             curvature=curvature + by_curvature,
             moment=sums.moment + slopes.mixed * by_strain + slopes.bending * by_curvature,
             memory=memory,
-            slope=fixed.slope(free),
+            slope=fixed_arguments[3].slope(free),
             strain=strain + by_strain,
         )
 
@@ -232,9 +231,7 @@ class FibreLaw(SectionLaw):
         sums = jax.lax.scan(add, none, parts)[0]
         return jax.tree.map(lambda total: self.elastic_modulus * total, sums)
 
-    def _remember(
-        self, fibres: Fibres, memory: Array, fixed_arm: Array, moves: tuple[Array, ...]
-    ) -> Array:
+    def _remember(self, fibres: Fibres, memory: Array, moves: tuple[Array, ...]) -> Array:
         """Compute the memory after the last step, linearised about the iterate before it."""
         curves = self._curves(memory)
         strain, curvature, by_strain, by_curvature = moves
@@ -245,7 +242,7 @@ class FibreLaw(SectionLaw):
             moved = _along(by_strain, by_curvature, still)
             return none, transformed + jax.lax.stop_gradient(slope) * moved
 
-        parts = jax.tree.map(_in_parts, (fibres.arm, fixed_arm, memory))
+        parts = jax.tree.map(_in_parts, (fibres.arm, jax.lax.stop_gradient(fibres.arm), memory))
         transformed = jnp.moveaxis(jax.lax.scan(some, None, parts)[1], 0, -2)
         return jnp.reshape(transformed, memory.shape)
 
