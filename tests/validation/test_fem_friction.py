@@ -48,7 +48,8 @@ def near(total_deg: float) -> list[tuple[str, float, np.ndarray, np.ndarray, np.
 def gap_tension(wrap: str, force: float, angle: np.ndarray) -> np.ndarray:
     """Gap tensions [N] while pulling: half of each angle turns the tendon at either edge."""
     law = friction_law(Capstan(COEFFICIENT, wrap=wrap))
-    exit_edge, entry_edge = (np.asarray(bound) for bound in law.bounds(angle / 2, angle / 2))
+    turning = np.stack([angle / 2, angle / 2], axis=-1)
+    exit_edge, entry_edge = np.moveaxis(law.bounds(turning), -1, 0)
     ahead = np.cumsum(exit_edge + entry_edge) - entry_edge
     return force * np.exp(-ahead)
 
@@ -76,6 +77,6 @@ def test_turning_of_the_finite_element_tendon(margin):
     assert len(every) == 20
     error = []
     for _, force, _, tension, turning in every:
-        bound, _ = law.bounds(turning, np.zeros_like(turning))
+        bound = law.bounds(np.stack([turning, 0.0 * turning], axis=-1))[..., 0]
         error.append(force * np.exp(-np.asarray(bound)) / tension - 1)
     margin.within("turning of the finite-element tendon, all levels, relative", error, 1e-3)

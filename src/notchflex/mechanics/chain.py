@@ -25,8 +25,7 @@ from notchflex.mechanics.flexure import (
     fibre_stretch,
     flattened,
     flexure_state,
-    free_pose,
-    in_space,
+    relative_pose,
     rod_at,
     section_fibres,
     stack,
@@ -38,7 +37,7 @@ from notchflex.mechanics.material import Fibres, SectionLaw, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
-from notchflex.mechanics.tendon import RoutedTendons, TendonGroup, route
+from notchflex.mechanics.tendon import TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
 from notchflex.robot.kinds import Friction, Material, Notch
 from notchflex.robot.part import unchecked
@@ -126,11 +125,8 @@ def flexure_states(
     chain: Chain, modes: Float[Array, "n modes"], memory: Any, *, with_pose: bool
 ) -> FlexureState:
     """Return the state of all flexures at once, after a memory of the material at every node."""
-    rods, law = chain.rods, chain.law
-    strain = in_space(jnp.einsum("nicm,nm->nic", rods.basis, modes))
-    response = law.respond_all(strain, rods.section, memory)
     state = partial(flexure_state, with_pose=with_pose)
-    return jax.vmap(state, in_axes=(0, None, 0, 0, 0))(rods, law, memory, modes, response)
+    return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, memory, modes)
 
 
 def structural(chain: Chain) -> Chain:
@@ -139,24 +135,16 @@ def structural(chain: Chain) -> Chain:
     # modes, counts and flags. The mask of padding flexures is not: chains of other lengths share
     # the program.
 
-    def counts(leaf: Any) -> Any:
-        return np.full(np.shape(leaf), xp.asarray(leaf).dtype.kind != "f")
-
-    def all_of_it(leaf: Array) -> Any:
-        return np.full(leaf.shape, True)
-
-    def of_modes(leaf: Array) -> Any:
-        return np.broadcast_to(np.arange(leaf.shape[-1]) > 0, leaf.shape)
-
-    def of_pairs(leaf: Array) -> Any:
-        return of_modes(leaf) & of_modes(leaf).swapaxes(-1, -2)
-
-    marks = {"basis": all_of_it, "node_reach": all_of_it, "turn_pair": of_pairs}
-    marks |= dict.fromkeys(("turn", "step", "node_turn"), of_modes)
-    marked = {name: jax.tree.map(mark, getattr(chain.rods, name)) for name, mark in marks.items()}
-    plain: Chain = jax.tree.map(counts, chain)
-    elastic = jax.tree.map(all_of_it, chain.elastic)
-    return replace(plain, rods=replace(plain.rods, **marked), elastic=elastic)
+    marks: Any = jax.tree.map(
+        lambda leaf: np.full(np.shape(leaf), xp.asarray(leaf).dtype.kind != "f"), chain
+    )
+    rods, everything, of_modes = marks.rods, np.s_[...], np.s_[..., 1:]
+    marked = [(rods.basis, everything), (rods.node_reach, everything), (marks.elastic, everything)]
+    marked += [(leaf, of_modes) for leaf in (rods.turn, rods.step, rods.node_turn)]
+    for leaf, place in [*marked, (rods.turn_pair, np.s_[..., 1:, 1:])]:
+        if leaf is not None:
+            leaf[place] = True
+    return marks
 
 
 def padded(chain: Chain, flexures: int, edges: int) -> Chain:
@@ -171,17 +159,13 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         return chain
     index = np.minimum(np.arange(flexures), chain.flexures - 1)
 
-    def longer(leaf: Any, *value: Any) -> Any:
-        """Repeat the last entry of an array, or add entries of a value."""
-        wider = leaf[index]
-        if value:
-            wider[-more:] = value[0]
-        return wider
-
-    def changed(part: Any, **values: Any) -> Any:
-        known = {name: getattr(part, name) for name in values}
-        rows = {k: longer(leaf, values[k]) for k, leaf in known.items() if leaf is not None}
-        return replace(jax.tree.map(longer, part), **rows)
+    def longer(part: Any, **values: Any) -> Any:
+        """Repeat the last entry of arrays; set the added entries of some to a value."""
+        repeated = jax.tree.map(lambda leaf: leaf[index], part)
+        for name, value in values.items():
+            if (leaf := getattr(repeated, name)) is not None:
+                leaf[-more:] = value
+        return repeated
 
     rods = chain.rods
     nothing = dict.fromkeys(
@@ -203,20 +187,24 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
     )
     rotations = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")
     unturned = dict.fromkeys(rotations, xp.eye(rods.start_rotation.shape[-1]))
-    rods = changed(rods, padding_mask=1.0, **nothing, **unturned)
+    rods = longer(rods, padding_mask=1.0, **nothing, **unturned)
     # The first added flexure begins at the tip, at the end of the last body.
     rods.start_offset[chain.flexures, -1] = chain.body_length[-1]
+    stiffness, elastic = longer((chain.stiffness, chain.elastic))
+    stiffness[-more:] = 1.0
+    if elastic is not None:
+        elastic[-more:] = np.eye(chain.rods.modes)
     idle = {"present": 0.0, "visits": 0.0, "ends": 0.0, "back": 1, "body_length": 0.0}
     bodies = {name: getattr(chain, name) for name in ("body_length", "body_mass", "body_centre")}
     return replace(
         chain,
         rods=rods,
-        groups=tuple(changed(group, **idle) for group in chain.groups),
-        contact_pairs=tuple(changed(pair, has_contact=0.0, back=1) for pair in chain.contact_pairs),
-        stiffness=longer(chain.stiffness, 1.0),
-        elastic=jax.tree.map(lambda leaf: longer(leaf, np.eye(leaf.shape[-1])), chain.elastic),
+        groups=tuple(longer(group, **idle) for group in chain.groups),
+        contact_pairs=tuple(longer(pair, has_contact=0.0, back=1) for pair in chain.contact_pairs),
+        stiffness=stiffness,
+        elastic=elastic,
         contact_stiffness=longer(chain.contact_stiffness),
-        contact_flexibility=jax.tree.map(longer, chain.contact_flexibility),
+        contact_flexibility=longer(chain.contact_flexibility),
         notch_frame=longer(chain.notch_frame),
         **{k: np.pad(v, [(0, more)] + [(0, 0)] * (v.ndim - 1)) for k, v in bodies.items()},
     )
@@ -240,11 +228,9 @@ def body_masses(
     # its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure
     # (area of its sections times the length of the neutral axis) is lumped: half at the start of
     # the neutral axis on the body before it, half at its end on the body after it.
-    bodies = len(robot.notches) + 1
-    density = robot.material.density
+    length, density = body_lengths(robot.tube, robot.notches), robot.material.density
     if density is None:
-        return xp.zeros(bodies), xp.zeros((bodies, 3))
-    length = body_lengths(robot.tube, robot.notches)
+        return xp.zeros(len(length)), xp.zeros((len(length), 3))
     piece = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2) * length
     half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1)
     end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
@@ -293,27 +279,25 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     if not any(notch.has_elastic_ends for notch in notches):
         return (None,) * len(notches)
     lengths = [plain_number(length) for length in body_lengths(robot.tube, notches)]
-    last = len(notches) - 1
-    ratio = robot.material.poisson_ratio
+    # Ring i lies before notch i, and the last one behind all.
+    boundaries: list[Any] = ["clamped", *["between"] * (len(notches) - 1), "free"]
+    around = [notches[0], *notches, notches[-1]]
+    shared: dict[tuple[Any, ...], Site] = {}  # where all around is of the same parts
 
-    sites: dict[tuple[int | None, ...], Site] = {}  # shared where all around is of the same parts
-
-    def side(boundary: Any, notch: Notch, length: float, other: Notch) -> Side:
+    def side(ring: int, notch: Notch, other: Notch) -> Side:
         apart = (notch.direction_deg - other.direction_deg + 180.0) % 360.0 - 180.0
-        return Side(boundary, length, abs(apart) > 1e-6)  # deg: rounding of sums of angles
+        # 1e-6 deg: rounding of sums of angles
+        return Side(boundaries[ring], lengths[ring], abs(apart) > 1e-6)
 
-    def site(index: int, notch: Notch) -> Site:
-        before, after = notches[max(index - 1, 0)], notches[min(index + 1, last)]
-        is_first, is_last = index == 0, index == last
-        proximal = side("clamped" if is_first else "between", notch, lengths[index], before)
-        distal = side("free" if is_last else "between", notch, lengths[index + 1], after)
-        key = (*map(id, (before, notch, after)), is_first, is_last)
-        return sites.setdefault(key, Site(proximal, distal, ratio))
+    def site(index: int) -> Site | None:
+        before, notch, after = around[index : index + 3]
+        if not notch.has_elastic_ends:
+            return None
+        sides = side(index, notch, before), side(index + 1, notch, after)
+        key = (*map(id, (before, notch, after)), *boundaries[index : index + 2])
+        return shared.setdefault(key, Site(*sides, robot.material.poisson_ratio))
 
-    return tuple(
-        site(index, notch) if notch.has_elastic_ends else None
-        for index, notch in enumerate(notches)
-    )
+    return tuple(map(site, range(len(notches))))
 
 
 def unchecked_dimensions(robot: Robot) -> list[str]:
@@ -359,7 +343,7 @@ def flexure(
     """Make a flexure without its factor on stiffness, and its pose in the free robot; cached."""
     rod = with_level(rod_at(site, notch, tube, refinement), level)
     rod = with_fibres(rod, notch, tube, refinement) if by_fibres else rod
-    return rod, free_pose(rod)
+    return rod, relative_pose(rod, xp.zeros(rod.modes))
 
 
 _UP = xp.array([0.0, 0.0, 1.0])
@@ -396,29 +380,29 @@ def assemble(
         5
     """
     template = chain_template(robot, level, refinement, flexures)
-    rods, routed, body_length = template.rods, template.routed_tendons, template.body_length
+    rods, groups, body_length = template.rods, template.groups, template.body_length
     body_mass, body_centre = body_masses(robot, rods)
     section = rods.section.stiffened(template.stiffness_factor[:, None])
     tendons = robot.tendon
     chain = Chain(
         rods=replace(rods, section=section),
-        groups=routed.groups,
+        groups=groups,
         contact_pairs=template.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
-        free_length=routed.base_length + constant([tendon.free_length for tendon in tendons]),
+        free_length=template.base_length + constant([tendon.free_length for tendon in tendons]),
         body_length=body_length,
         body_mass=body_mass,
         body_centre=body_centre,
         frame=None,
         notch_frame=template.notch_frame,
-        tendon_entry=routed.place,
-        contacts=_contacts(routed.groups, len(tendons)),
+        tendon_entry=template.tendon_entry,
+        contacts=_contacts(groups, len(tendons)),
         level=level,
         loaded=loaded,
         follows=loaded and follows,  # unloaded chains are of one form
         refinement=refinement,
         window=max(
-            (int(xp.max(part.back)) for part in (*routed.groups, *template.contact_pairs)),
+            (int(xp.max(part.back)) for part in (*groups, *template.contact_pairs)),
             default=1,
         ),
         **laws(robot.material, template),
@@ -435,11 +419,14 @@ def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
     if isinstance(part, Friction):
         return {"friction": friction_law(part)}
     law = section_law(part)
-    elastic = _elastic(template.distinct_rods, law)[template.rod_index]
-    elastic = template.stiffness_factor[:, None, None] * elastic
+    rods = template.distinct_rods
+    weighted = rods.length[..., None, None] * (law.stiffness(rods.section) @ rods.basis)
+    elastic = xp.einsum("niam,niak->nmk", rods.basis, weighted)
+    elastic = elastic + rods.padding_mask[:, None] * xp.eye(rods.modes)
+    elastic = template.stiffness_factor[:, None, None] * elastic[template.rod_index]
     stiffness = (elastic * np.eye(elastic.shape[-1])).sum(axis=-1)
     stop = template.rods.stop_flexibility
-    linear = law.is_linear and not template.distinct_rods.section.softens
+    linear = law.is_linear and not rods.section.softens
     contact_stiffness = 1.0 / xp.sum(template.contact_motion / stiffness, axis=-1)
     return {
         "law": law,
@@ -458,7 +445,9 @@ class ChainTemplate(NamedTuple):
     distinct_rods: Rod  # The flexures, without repetitions
     rod_index: Int[Array, " n"]  # Index of every notch's flexure among them
     rods: Rod  # All flexures
-    routed_tendons: RoutedTendons  # The tendons
+    groups: tuple[TendonGroup, ...]  # The tendons
+    tendon_entry: Float[Array, "t 3"]  # Point where each of them enters the base, mm
+    base_length: Float[Array, " t"]  # Its length inside the base, mm
     contact_pairs: tuple[ContactGroup, ...]  # The contacts
     body_length: Array  # Length of each body on the tube axis, mm
     notch_frame: Array  # Rotation from the frame of every notch to the tube
@@ -516,7 +505,7 @@ def _template(
         distinct_rods,
         rod_index,
         rods,
-        route(
+        *route(
             tendons,
             notches,
             tube.outer_radius,
@@ -550,13 +539,6 @@ def _flat(chain: Chain, frame: Float[Array, "3 3"]) -> Chain:
         contact_pairs=tuple(map(planar, chain.contact_pairs)),
         frame=frame,
     )
-
-
-def _elastic(rods: Rod, law: SectionLaw) -> Float[Array, "n modes modes"]:
-    """Compute the stiffness of every flexure in the free robot, N mm; 1 for padding modes."""
-    weighted = rods.length[..., None, None] * (law.stiffness(rods.section) @ rods.basis)
-    stiffness = xp.einsum("niam,niak->nmk", rods.basis, weighted)
-    return stiffness + rods.padding_mask[:, None] * xp.eye(rods.modes)
 
 
 def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[Array, "n modes"]:

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any
 
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from notchflex._arrays import decide, xp
-from notchflex._jax import Pytree, jax
-from notchflex.mechanics.flexure import (
-    FlexureState,
-    Rod,
-    fibre_slope,
-    fibre_stretch,
-    in_space,
-    of_rod,
-)
+from notchflex._jax import jax
+from notchflex.mechanics.flexure import FlexureState, Rod, in_space
 from notchflex.mechanics.motion import Motion, wrench_at
-from notchflex.mechanics.tendon import passages
+from notchflex.mechanics.tendon import (
+    AlongFibres,
+    Crossing,
+    CrossingGroup,
+    fibre_lengths,
+    on_tube,
+    passages,
+)
 from notchflex.robot import Tube
 from notchflex.robot.kinds import Notch
 
@@ -30,33 +29,10 @@ from notchflex.robot.kinds import Notch
 # edge. The gap depends on their relative pose, or on the flexure's strains alone.
 
 
-class GapResponse(NamedTuple):
-    """Contacts of one kind at one flexure (mm)."""
-
-    gap: Float[Array, " l"]  # Gap, >= 0 in a solved state
-    # Moment and force on the distal body per unit of contact force, about and along its frame; its
-    # opposite acts on the anchor. None for contacts that act only on the modes
-    wrench: Float[Array, "l w"] | None
-    # Change of the gap per unit of mode; None for contacts that act on bodies
-    slope: Float[Array, "l modes"] | None
-
-
-class ContactGroup(Pytree, ABC):
+class ContactGroup(CrossingGroup):
     """Contacts of one kind."""
 
-    # Arrays have the flexures as leading axis, then the contacts.
-
-    acts_on_bodies: ClassVar[bool]  # Whether the contact is a force on bodies
     has_contact: Float[Array, "*n l"]  # 1 where a flexure has such a contact
-    back: Int[Array, "*n l"]  # Number of bodies from the distal one back to the anchor
-
-    def fibre(self, rods: Rod) -> Float[Array, "*n 2"] | None:
-        """Locate the fibre along which the contact force acts, mm from the neutral axis."""
-        del rods
-
-    @abstractmethod
-    def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
-        """Compute the contacts at one flexure (of a group without its leading axis)."""
 
 
 # Contact of two rigid pieces across a slot or a triangular notch.
@@ -74,7 +50,7 @@ class EdgeContact(ContactGroup):
     enters: Float[Array, "*n l d"]  # Edge of the distal body, in its frame, mm
     normal: Float[Array, "*n l d"]  # Normal of the face, in the frame of the anchor
 
-    def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
+    def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
         """Compute the distance of the edge from the face, and the wrench of a unit normal force."""
         del rod, flexure
         assert anchors is not None  # acts_on_bodies asks for it
@@ -85,7 +61,7 @@ class EdgeContact(ContactGroup):
             return gap, wrench_at(enters, along)
 
         gap, wrench = jax.vmap(press)(anchors, self.leaves, self.enters, self.normal)
-        return GapResponse(gap, wrench, slope=None)
+        return Crossing(gap, wrench, slope=None)
 
 
 # Contact opposite a solid spine: it closes where its fibre between the edges has zero length.
@@ -93,30 +69,17 @@ class EdgeContact(ContactGroup):
 # On the concentric arc of Pacheco 2021 the gap is h - (r_o + ybar) theta.
 
 
-class SpineContact(ContactGroup):
+class SpineContact(AlongFibres, ContactGroup):
     """One contact at every notch that has a spine."""
-
-    acts_on_bodies = False
-
-    def fibre(self, rods: Rod) -> Float[Array, "*n 2"]:
-        """Locate the fibre between the edges, mm from the neutral axis."""
-        return rods.closure
-
-    def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
-        """Return the length of the fibre between the edges."""
-        del anchors
-        weights = of_rod(rod, fibre_stretch(rod.closure))[None]
-        strain = rod.length @ (rod.reference_strain + flexure.strain)
-        return GapResponse(gap=weights @ strain, wrench=None, slope=fibre_slope(rod, weights))
 
 
 def closing_angles(rods: Rod) -> Float[Array, " n"]:
     """Compute the elastic angle at which every notch closes, rad; infinite without a spine."""
     # It is the amplitude of the first mode at which the fibre between the edges has zero length:
     # for an arc h / (r_o + ybar) less the precurvature.
-    weights = of_rod(rods, fibre_stretch(xp.asarray(rods.closure)))
-    free = xp.einsum("nc,nic,ni->n", weights, rods.reference_strain, rods.length)
-    slope = xp.einsum("nc,nic,ni->n", weights, xp.asarray(rods.basis)[..., 0], rods.length)
+    edges, basis = rods.closure[:, None], xp.asarray(rods.basis)
+    free = fibre_lengths(rods, edges, rods.reference_strain)[:, 0]
+    slope = fibre_lengths(rods, edges, basis[..., 0])[:, 0]
     spine = xp.asarray(rods.has_closure) > 0.0
     return xp.where(spine, -free / xp.where(spine, slope, 1.0), np.inf)
 
@@ -136,13 +99,19 @@ def build_contacts(
     """Build the contacts of every kind that the notches have."""
     groups: list[ContactGroup] = []
     if decide(xp.any(rods.has_closure)):
-        has_contact = rods.has_closure[:, None]
-        groups.append(SpineContact(has_contact, xp.ones(has_contact.shape, int)))
+        has_contact, across = rods.has_closure[:, None], rods.closure[:, None]
+        groups.append(
+            SpineContact(
+                back=xp.ones(has_contact.shape, int),
+                has_contact=has_contact,
+                natural_gap=fibre_lengths(rods, across, rods.reference_strain),
+                across=across,
+            )
+        )
     sides = _sides(notches)
     if sides:
         line = passages(notches, body_length, sides)
-        angle = xp.radians(sides)
-        across = tube.outer_radius * xp.stack([xp.cos(angle), xp.sin(angle), 0.0 * angle], axis=-1)
+        across = on_tube([tube.outer_radius] * len(sides), sides)
         along = xp.array([0.0, 0.0, 1.0])
         # Keep as many contacts as close at one flexure, on any side.
         count = int(line.on_side.sum(axis=1).max(initial=1.0))

@@ -1,9 +1,7 @@
 """What each cut of an asymmetric notch leaves of a tube: its section, and the fibres of it."""
 
-from fractions import Fraction
 from functools import cache
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
 from jaxtyping import Array
@@ -16,10 +14,9 @@ from notchflex.mechanics.section import (
     Points,
     Section,
     broadcast_terms,
-    cancelling_sum,
+    gauss_on,
     gauss_rule,
     half_angle,
-    leggauss,
     of_any_shape,
 )
 
@@ -56,8 +53,7 @@ def _series_nodes() -> tuple[Array, Array, Array]:
     # rule. With it slivers (a much less than the wall over the radius) keep their accuracy,
     # where terms decay only as n⁻² up to n = L / a.
     n = xp.arange(1.0, 25.0)
-    x, weight = leggauss(12)
-    u, weight = 0.5 * (1.0 + x), 0.5 * weight
+    u, weight = gauss_on(0.0, 1.0, 12)
     index, parity, weights = [n], [(-1.0) ** n], [xp.ones(24)]
     for start, sign in ((24.0, -1.0), (25.0, 1.0)):
         index.append(start / u)
@@ -88,23 +84,6 @@ def sector_torsion(
     terms = 24.0 * weight / length * radial * around / (1.0 + rate**2)
     even = (outer**2 - inner**2) * (outer**3 - inner**3) / (3.0 * xp.log(outer / inner)) * bow
     return torsion, (even + xp.sum(terms, axis=0)) / strong
-
-
-# a − sin a cos a
-_angle_minus = cancelling_sum([(1, 1, "cos", 0), (Fraction(-1, 2), 0, "sin", 2)])
-# a² (⟨cos²⟩ − ⟨cos⟩²) over −a … a, that is a²/2 + a sin a cos a / 2 − sin² a
-_spread = cancelling_sum(
-    [
-        (Fraction(1, 2), 2, "cos", 0),
-        (Fraction(1, 4), 1, "sin", 2),
-        (Fraction(-1, 2), 0, "cos", 0),
-        (Fraction(1, 2), 0, "cos", 2),
-    ]
-)
-# sin a − a cos a
-_bow = cancelling_sum([(1, 0, "sin", 1), (-1, 1, "cos", 1)])
-# a − sin a
-_sag = cancelling_sum([(1, 1, "cos", 0), (-1, 0, "sin", 1)])
 
 
 @of_any_shape
@@ -162,16 +141,23 @@ def annular_sector(outer_radius: ArrayLike, inner_radius: ArrayLike, depth: Arra
 
     centroid = radius_mean * sine / a
     cosine_square = 0.5 * (1.0 + sine * cosine / a)
-    weak = area * (radius_spread * cosine_square + radius_mean**2 * _spread(a) / a**2)
-    strong = 0.25 * polar * _angle_minus(a)
+    # Integrals without negative terms: closed forms lose digits at small angles.
+    angle, step = gauss_on(0.0, a[..., None])
+    versine = 2.0 * xp.sin(0.5 * angle) ** 2
+    bow = xp.sum(angle * xp.sin(angle) * step, axis=-1)  # sin a − a cos a
+    sag = xp.sum(versine * step, axis=-1) / a  # 1 − sin a / a
+    # ⟨cos²⟩ − ⟨cos⟩²
+    cosine_spread = xp.sum((sag[..., None] - versine) ** 2 * step, axis=-1) / a
+    weak = area * (radius_spread * cosine_square + radius_mean**2 * cosine_spread)
+    strong = 0.5 * polar * xp.sum(xp.sin(angle) ** 2 * step, axis=-1)
 
     # The farthest fibre on the cut side: the inner edge of the cut, or the outer one past the
     # axis. Both sums below are without cancellation: ȳ − r_i cos a, and r_o − ȳ.
-    inner_edge = (wall / 2.0 + wall**2 / (12.0 * mean)) * sine / a + inner * _bow(a) / a
+    inner_edge = (wall / 2.0 + wall**2 / (12.0 * mean)) * sine / a + inner * bow / a
     outer_edge = centroid - outer * cosine
     edge_near = xp.where(cosine > 0.0, inner_edge, outer_edge)
-    edge_spine = wall / 2.0 - wall**2 / (12.0 * mean) + radius_mean * _sag(a) / a
-    torsion_constant, shear_centre = sector_torsion(outer, inner, a, _bow(a), strong)
+    edge_spine = wall / 2.0 - wall**2 / (12.0 * mean) + radius_mean * sag
+    torsion_constant, shear_centre = sector_torsion(outer, inner, a, bow, strong)
     return Section(
         area=area,
         centroid=centroid,
@@ -275,7 +261,7 @@ def chord_angle(shape: str, outer: Array, inner: Array, depth: Array) -> Array:
     return half_angle(outer, 2.0 * outer - depth, depth)
 
 
-def _factors(shape: str, outer: Array, inner: Array, depth: Array) -> tuple[Array, Array]:
+def _factors(shape: str, outer: Array, inner: Array, depth: Array) -> Array:
     """Interpolate the factors on the torsion constant and on the shear centre."""
     low, high = (float(xp.sqrt(1.0 - ratio)) for ratio in reversed(RATIO_RANGE))
     table = _read_table()
@@ -285,8 +271,7 @@ def _factors(shape: str, outer: Array, inner: Array, depth: Array) -> tuple[Arra
     along = _chebyshev(
         columns, chord_angle(shape, outer, inner, depth), *map(float, CHORD_RANGE[shape])
     )
-    torsion, shear = xp.einsum("kpq,p...,q...->k...", both, across, along)
-    return torsion, shear
+    return xp.einsum("kpq,p...,q...->k...", both, across, along)
 
 
 def segment_torsion(outer: Array, inner: Array, depth: Array, area: Array) -> tuple[Array, Array]:
@@ -300,44 +285,27 @@ def segment_torsion(outer: Array, inner: Array, depth: Array, area: Array) -> tu
     through = xp.where(closed | solid, outer, depth)
     deep = xp.where(solid, depth, outer + inner)
 
+    def estimated(shape: str, cut: Array, torsion: Array, shear: Array) -> Array:
+        return xp.stack([torsion, shear]) * _factors(shape, outer, inner, cut)
+
     # Of a solid segment J = A h²/3, and the top of the circle.
-    solid_estimate = area * (2.0 * outer - deep) ** 2 / 3.0, outer
-    cases = (
-        ("closed", shallow, closed_estimate(outer, inner, shallow)),
-        ("solid", deep, solid_estimate),
-        ("open", through, open_estimate(outer, inner, through, area)),
-    )
-
-    def estimated(shape: str, cut: Array, estimates: tuple[Array, Array]) -> list[Array]:
-        factors = _factors(shape, outer, inner, cut)
-        return [value * factor for value, factor in zip(estimates, factors, strict=True)]
-
-    both = zip(*(estimated(*case) for case in cases), strict=True)
-    torsion, shear = (
-        xp.where(closed, of_closed, xp.where(solid, of_solid, of_open))
-        for of_closed, of_solid, of_open in both
-    )
+    of_solid = estimated("solid", deep, area * (2.0 * outer - deep) ** 2 / 3.0, outer)
+    of_open = estimated("open", through, *open_estimate(outer, inner, through, area))
+    of_closed = estimated("closed", shallow, *closed_estimate(outer, inner, shallow))
+    torsion, shear = xp.where(closed, of_closed, xp.where(solid, of_solid, of_open))
     return torsion, shear
 
 
-# Moments of a segment of the unit circle beyond the chord at height cos α, w measured from the
-# chord: ∫dA, ∫w dA, ∫w² dA, ∫x² dA. (The forms about the circle's centre lose all digits for
-# small α: the last three are of order α⁵, α⁷, α⁵.)
-_area = cancelling_sum([(1, 1, "cos", 0), (Fraction(-1, 2), 0, "sin", 2)])
-_first = cancelling_sum(
-    [(Fraction(3, 4), 0, "sin", 1), (Fraction(1, 12), 0, "sin", 3), (-1, 1, "cos", 1)]
-)
-_second = cancelling_sum(
-    [
-        (Fraction(3, 4), 1, "cos", 0),
-        (Fraction(1, 2), 1, "cos", 2),
-        (Fraction(-7, 12), 0, "sin", 2),
-        (Fraction(-1, 48), 0, "sin", 4),
-    ]
-)
-_sideways = cancelling_sum(
-    [(Fraction(1, 4), 1, "cos", 0), (Fraction(-1, 6), 0, "sin", 2), (Fraction(1, 48), 0, "sin", 4)]
-)
+def segment_moments(radius: Array, angle: Array, lift: Array) -> list[Array]:
+    """Integrate 1, w, w² and x² over a segment of a circle, w from `lift` below its chord."""
+    # By strips across at r cos φ. No term is negative: closed forms lose digits at small angles.
+    radius, end = radius[..., None], angle[..., None]
+    place, width = gauss_on(0.0, end)
+    half_chord = radius * xp.sin(place)
+    above_chord = 2.0 * radius * xp.sin(0.5 * (end + place)) * xp.sin(0.5 * (end - place))
+    strips, height = 2.0 * half_chord**2 * width, lift[..., None] + above_chord
+    terms = strips, strips * height, strips * height**2, strips * half_chord**2 / 3.0
+    return [xp.sum(term, axis=-1) for term in terms]
 
 
 @of_any_shape
@@ -391,16 +359,11 @@ def annular_segment(outer_radius: ArrayLike, inner_radius: ArrayLike, depth: Arr
 
     # A bore that the plane does not reach lies this far above it.
     lift = xp.maximum(-(inner + plane), 0.0)
-    bore_area = inner**2 * _area(beta)
-    bore_first = inner**3 * _first(beta)
-    bore_second = inner**4 * _second(beta) + lift * (2.0 * bore_first + lift * bore_area)
-
-    area = outer**2 * _area(alpha) - bore_area
-    first = outer**3 * _first(alpha) - (bore_first + lift * bore_area)
-    second = outer**4 * _second(alpha) - bore_second
+    whole = segment_moments(outer, alpha, 0.0 * depth)
+    bore = segment_moments(inner, beta, lift)
+    area, first, second, strong = (x - y for x, y in zip(whole, bore, strict=True))
     from_plane = first / area
     weak = second - first * from_plane
-    strong = outer**4 * _sideways(alpha) - inner**4 * _sideways(beta)
 
     # Half chords x_o, x_i give the first moment about the tube axis, ⅔(x_o³ − x_i³), without
     # cancellation for shallow cuts; where both are there, x_o² − x_i² = r_o² − r_i².
@@ -443,8 +406,8 @@ def sector_fibres(outer: float, inner: float, depth: float, count: int = FIBRES)
     """Divide an annular sector (`annular_sector`); each piece stands for both halves."""
     numbers = outer, 2.0 * outer - depth, depth
     half = half_angle(*map(constant, numbers))
-    angles, of_angles = _between(0.0, half, 2 * count)
-    radii, of_radii = _between(inner, outer, 10)
+    angles, of_angles = gauss_on(0.0, half, 2 * count)
+    radii, of_radii = gauss_on(inner, outer, 10)
     area = 2.0 * xp.outer(of_radii * radii, of_angles)
     return xp.outer(radii, xp.cos(angles)).ravel(), area.ravel()
 
@@ -462,10 +425,10 @@ def segment_fibres(outer: float, inner: float, depth: float, count: int = FIBRES
     ends = [(0.0, beyond)] + ([(np.pi - beyond, top)] if decide(plane < -inner) else [])
     at_bore = 4 * count if decide(bottom > 0.0) else 0
     angles, of_angles = zip(
-        *(_between(*pair, (8 * count - at_bore) // len(ends)) for pair in ends), strict=True
+        *(gauss_on(*pair, (8 * count - at_bore) // len(ends)) for pair in ends), strict=True
     )
     solid, of_solid = xp.concatenate(angles), xp.concatenate(of_angles)
-    bore, of_bore = _between(0.0, bottom, at_bore) if at_bore else (xp.zeros(0), xp.zeros(0))
+    bore, of_bore = gauss_on(0.0, bottom, at_bore) if at_bore else (xp.zeros(0), xp.zeros(0))
     height = inner * xp.cos(bore)
     wall = xp.sqrt(outer**2 - height**2) - inner * xp.sin(bore)
     area = (
@@ -476,11 +439,6 @@ def segment_fibres(outer: float, inner: float, depth: float, count: int = FIBRES
 
 
 _FIBRES_OF_CUT = {"on-axis": sector_fibres, "off-axis": segment_fibres}
-
-
-def _between(first: float, last: Any, count: int) -> tuple[Array, Array]:
-    points, weights = leggauss(count)
-    return 0.5 * (first + last) + 0.5 * (last - first) * points, 0.5 * (last - first) * weights
 
 
 SECTION_OF_CUT = {"on-axis": annular_sector, "off-axis": annular_segment}

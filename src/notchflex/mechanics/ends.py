@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from notchflex._arrays import cached, plain_number, xp
 from notchflex.mechanics.cuts import SECTION_OF_CUT
 from notchflex.mechanics.ring import Side, WallSector, arc_of, end_compliance
-from notchflex.mechanics.section import Section, leggauss
+from notchflex.mechanics.section import Section, gauss_on
 
 # Torsion of a notch whose ends restrain warping of its section, and its shear.
 #
@@ -82,15 +82,14 @@ def flattening_numbers(
     a = outer_angle
     if cut == "off-axis":
         a = xp.arccos(xp.minimum((depth - outer) / radius, 1.0 - 1e-9))
-    nodes, weights = leggauss(24)
-    angle = 0.5 * a * (1.0 + nodes)
+    angle, weights = gauss_on(0.0, a)
     slope = xp.sin(a) / a
     bent = (
         0.5 * (xp.sin(a) ** 2 + xp.sin(angle) ** 2)
         + slope * (xp.cos(a) - xp.cos(angle))
         - slope * angle * xp.sin(angle)
     )
-    first, second = (0.5 * a * (moment @ weights) for moment in (bent, bent**2))
+    first, second = bent @ weights, bent**2 @ weights
     weak = section.second_moment_weak
     phi = 2.0 * wall * radius**3 * xp.abs(first) / weak
     brazier = 48.0 * (1.0 - poisson_ratio**2) * radius**7 * second / (wall * weak)
@@ -274,8 +273,20 @@ def validity(
         ]
     )
     shape = outer_radius, inner_radius, cut, depth, height, 0.33
-    sentences += _short_rings(shape, (proximal, distal), diameter)
-    turned = {side.length for side in (proximal, distal) if side.turned}
+    # What short rings change against the shortest ones that were checked, 0.37 outer diameters.
+    sides, checked = (proximal, distal), 0.37
+    longer = [
+        side._replace(length=max(side.length, checked * diameter)) if side.length else side
+        for side in sides
+    ]
+    change = abs(notch_stiffness(*shape, *longer).weak / notch_stiffness(*shape, *sides).weak - 1.0)
+    if change > 0.01:
+        shortest = min(side.length for side in sides if side.length)
+        sentences.append(
+            f"ring / outer diameter is {shortest / diameter:.3g}, below {checked:g}: "
+            f"{100.0 * change:.0f} % of the stiffness follow from longer rings"
+        )
+    turned = {side.length for side in sides if side.turned}
     # With a ring of 1.9 outer diameters the chain agrees with finite elements to 2 %.
     return sentences + [
         f"a neighbour opens to another side of the tube, and the ring between them is {length:.3g} "
@@ -283,21 +294,4 @@ def validity(
         "diameters and up to 2 times with 0.4"
         for length in sorted(turned)
         if length < 1.5 * diameter
-    ]
-
-
-def _short_rings(shape: tuple[Any, ...], sides: tuple[Side, Side], diameter: float) -> list[str]:
-    """Tell of short rings by what they change against the shortest ones that were checked."""
-    checked = 0.37  # outer diameters
-    longer = [
-        side._replace(length=max(side.length, checked * diameter)) if side.length else side
-        for side in sides
-    ]
-    change = abs(notch_stiffness(*shape, *longer).weak / notch_stiffness(*shape, *sides).weak - 1.0)
-    if change <= 0.01:
-        return []
-    shortest = min(side.length for side in sides if side.length)
-    return [
-        f"ring / outer diameter is {shortest / diameter:.3g}, below {checked:g}: "
-        f"{100.0 * change:.0f} % of the stiffness follow from longer rings"
     ]

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from fractions import Fraction
+from collections.abc import Callable
 from functools import lru_cache, wraps
-from math import factorial
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
@@ -16,7 +14,6 @@ from numpy.typing import ArrayLike
 from notchflex._arrays import cached, is_traced, xp
 from notchflex._jax import constant, jax, scan
 from notchflex._values import read_only
-from notchflex.mechanics.motion import polynomial
 
 
 @lru_cache(maxsize=64)
@@ -25,48 +22,11 @@ def leggauss(count: int) -> Any:
     return tuple(map(read_only, legendre.leggauss(count)))
 
 
-# Sums of angles, sines and cosines that stay accurate where their terms cancel.
-#
-# A cut that leaves little of the tube leaves a small angle α, and its area and moments are then
-# of order α³ to α⁷ while the terms of the closed forms are of order α: α − sin α cos α is
-# 2α³/3. Each such sum is written once, as a list of terms, and evaluated from its Taylor series
-# below one radian and as it stands above.
-
-Term = tuple[Fraction | int, int, str, int]
-"""(c, n, "sin" or "cos", m) stands for c αⁿ sin(mα) or c αⁿ cos(mα)."""
-
-
-def cancelling_sum(terms: Sequence[Term]) -> Callable[[Array], Array]:
-    """Make a function of an angle that adds up `terms` without loss at small angles."""
-    series: dict[int, Fraction] = {}
-    for factor, power, kind, multiple in terms:
-        start = 1 if kind == "sin" else 0
-        for k in range(20):
-            order = 2 * k + start
-            value = Fraction(factor) * (-1) ** k * Fraction(multiple**order, factorial(order))
-            series[power + order] = series.get(power + order, Fraction(0)) + value
-    first = min(order for order, value in series.items() if value)
-    # The first term left out is below 1e-16 of the sum at one radian; above it the closed forms
-    # lose at most two digits.
-    coefficients = [float(series[first + 2 * k]) for k in range(16)]
-
-    def evaluate(angle: Array) -> Array:
-        if isinstance(angle, np.ndarray) and angle.ndim == 0:  # of one notch: no arrays needed
-            plain: Any = float(angle)
-            return xp.asarray(near(plain) if plain < 1.0 else far(plain))  # pyright: ignore[reportReturnType]
-        return xp.where(angle < 1.0, near(angle), far(angle))
-
-    def near(angle: Any) -> Any:
-        return polynomial(coefficients, angle * angle) * angle**first
-
-    def far(angle: Any) -> Any:
-        total = 0.0
-        for factor, power, kind, multiple in terms:
-            wave = xp.sin(multiple * angle) if kind == "sin" else xp.cos(multiple * angle)
-            total = total + float(factor) * angle**power * wave
-        return total
-
-    return evaluate
+def gauss_on(low: Any, high: Any, count: int = 16) -> tuple[Array, Array]:
+    """Return Gauss's nodes and weights between two numbers, or many with an axis left for them."""
+    points, weights = leggauss(count)
+    half = 0.5 * (high - low)
+    return low + half * (1.0 + points), half * weights
 
 
 def half_angle(radius: Array, above: Array, below: Array) -> Array:
@@ -137,8 +97,7 @@ def of_any_shape(properties: Formula) -> Formula:
 
     @cached(1024)  # notches of a tube, and their sites, share sections
     def known(*numbers: ArrayLike) -> Section:
-        arrays = xp.broadcast_arrays(*map(constant, numbers))
-        return Section(*map(read_only, properties(*arrays)))
+        return Section(*map(read_only, properties(*xp.broadcast_arrays(*numbers))))
 
     @wraps(properties)
     def section(outer_radius: ArrayLike, inner_radius: ArrayLike, depth: ArrayLike) -> Section:
@@ -219,17 +178,12 @@ def clamped_torsion_constant(
     # (Vlasov 1961, Thin-Walled Elastic Beams): for short strips $12EI_\omega/GL^2$, two beams.
     free, warping = section.torsion_constant, section.second_moment_weak * constant(middle) ** 2
     u = 0.5 * length * xp.sqrt(free / (2.0 * (1.0 + poisson_ratio) * warping))
-    return free / _beyond_tanh(u)
-
-
-def _beyond_tanh(u: Array) -> Array:
-    """Compute 1 - tanh(u)/u, which is u²/3 for small u, without cancellation."""
-    small = u < 0.1
-    square = xp.where(small, u, 0.0) ** 2
-    # The series of tanh; the first term left out is below 1e-14 of the sum.
-    series = 1 / 3, -2 / 15, 17 / 315, -62 / 2835, 1382 / 155925, -21844 / 6081075
-    large = xp.where(small, 1.0, u)
-    return xp.where(small, square * polynomial(series, square), 1.0 - xp.tanh(large) / large)
+    # 1 - tanh(u)/u is the mean of tanh² up to u: where u is small, without cancellation.
+    is_small = u < 1.0
+    near, far = xp.where(is_small, u, 1.0), xp.where(is_small, 1.0, u)
+    parts, weights = gauss_on(0.0, 1.0)
+    mean = xp.tanh(near[..., None] * parts) ** 2 @ weights
+    return free / xp.where(is_small, mean, 1.0 - xp.tanh(far) / far)
 
 
 # Fibres of a section: arms from the neutral axis and areas, by Gauss's rule.

@@ -32,32 +32,80 @@ Vectors = Float[Array, "*s d"]
 
 
 class Crossing(NamedTuple):
-    """A group of t tendons over one gap (mm, rad)."""
+    """A group of t tendons or contacts over one gap (mm, rad)."""
 
-    length: OfTendons  # Length of the way across the gap
-    exit_turning: OfTendons  # Turning angle at the edge of the body before, >= 0
-    entry_turning: OfTendons  # Turning angle at the edge of the distal body, >= 0
-    # Moment and force on the distal body per unit of the span's tension, reversed, about and along
-    # its frame; its opposite acts on the anchor. None for a group that does not act on bodies
+    length: OfTendons  # Length of the way across the gap; of a contact its gap, >= 0 if solved
+    # Moment and force on the distal body per unit of a force that lengthens the way, about and
+    # along its frame; its opposite acts on the anchor. None for a group that does not act on bodies
     wrench: Float[Array, "t w"] | None
     # Change of the length per unit of mode; None for a group that acts on bodies
     slope: Float[Array, "t modes"] | None
+    # Turning angle of a tendon at the edge of the body before, and of the distal body, >= 0
+    turning: Any = None
+
+    @property
+    def gap(self) -> OfTendons:
+        """Gap of a contact."""
+        return self.length
 
 
-class TendonGroup(Pytree, ABC):
-    """Tendons of one kind of path."""
+class CrossingGroup(Pytree, ABC):
+    """Tendons or contacts of one kind: each leads from an anchor, a body before, to a body."""
 
     # Arrays carry the flexures as leading axis, then the tendons.
 
     # Whether its pull is a force on the bodies (and poses are needed), or acts on the modes of each
     # flexure alone
     acts_on_bodies: ClassVar[bool]
+    # How many bodies before the distal one its anchor is, 1 where it skips none
+    back: Int[Array, "*n t"]
+
+    @property
+    def fibre(self) -> Float[Array, "*n t 2"] | None:
+        """Where it crosses a rod's section, mm from its neutral axis; None where it does not."""
+        return None
+
+    @abstractmethod
+    def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
+        """Cross one gap (of a group without its leading axis)."""
+
+
+class AlongFibres(CrossingGroup):
+    """Those that run along a rod, as fibres of it."""
+
+    acts_on_bodies = False
+
+    natural_gap: PerTendon  # Length of its way across the gap in the free robot
+    across: Float[Array, "*n t 2"]  # Where it crosses the rod's section, from the neutral axis, mm
+
+    @property
+    def fibre(self) -> Float[Array, "*n t 2"]:
+        """Where it crosses a rod's section, mm from its neutral axis."""
+        return self.across
+
+    def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
+        """Return the length of the fibres."""
+        del anchors
+        weights = of_rod(rod, fibre_stretch(self.across))
+        length = self.natural_gap + (rod.length @ flexure.strain) @ weights.T
+        return Crossing(length, wrench=None, slope=fibre_slope(rod, weights))
+
+
+def fibre_lengths(
+    rods: Rod, across: Float[Array, "n t 2"], strain: Float[Array, "n nodes w"]
+) -> Float[Array, "n t"]:
+    """Return the lengths that fibres have by the strains of their rods, mm."""
+    weights = of_rod(rods, fibre_stretch(xp.asarray(across)))
+    return xp.einsum("ntc,nic,ni->nt", weights, strain, rods.length)
+
+
+class TendonGroup(CrossingGroup):
+    """Tendons of one kind of path."""
+
     numbers: tuple[int, ...] = static()  # Which tendons of the robot these are, from 0
     present: PerTendon  # 1 where the tendon crosses this gap
     visits: PerTendon  # 1 where it passes through (or ends in) the distal body
     ends: PerTendon  # 1 where it is fixed in the distal body
-    # How many bodies before the distal one its anchor is, 1 where it skips none
-    back: Int[Array, "*n t"]
     body_length: PerTendon  # Length of tendon inside the distal body
     natural_gap: PerTendon  # Length of its way across the gap in the free robot
 
@@ -70,16 +118,6 @@ class TendonGroup(Pytree, ABC):
     def runs(self) -> PerTendon:
         """1 where the tendon has a span that ends at the distal body."""
         return self.visits
-
-    @property
-    def fibre(self) -> Float[Array, "*n t 2"] | None:
-        """Where the tendon crosses a rod's section, mm from its neutral axis."""
-        # None for a tendon that does not run along the rod, as a fibre of it.
-        return None
-
-    @abstractmethod
-    def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
-        """Cross one gap (of a group without its leading axis)."""
 
 
 def guarded_norm(
@@ -146,23 +184,19 @@ class Straight(TendonGroup):
             before = channel @ anchor.rotation
             onward = channel
             if chord is not None:
-                onward = jnp.where(chord > 0.0, self._onward(flexure, before), channel)
+                pose, turn = flexure.pose, flexure.chord_turn
+                assert pose is not None
+                assert turn is not None
+                goes_on = (turn @ (pose.rotation @ before)) @ pose.rotation
+                onward = jnp.where(chord > 0.0, goes_on, channel)
             pulled = {"gap": gap, "dead": before, "follower": channel}[self.pulls]
             # A pull turns the distal body toward the tendon's side.
             axis = direction(moment_of(channel, enters))
             turns = turning(before, gap, axis), turning(gap, onward, axis)
-            return length, *turns, wrench_at(enters, pulled)
+            return length, wrench_at(enters, pulled), jnp.stack(turns)
 
-        spans = jax.vmap(span)(anchors, self.leaves, self.enters, self.along)
-        return Crossing(*spans, slope=None)
-
-    def _onward(self, flexure: FlexureState, channel: Vectors) -> Vectors:
-        """Direction in which the tendon goes on by the chord's turn, in the distal body's frame."""
-        pose, turn = flexure.pose, flexure.chord_turn
-        assert pose is not None
-        assert turn is not None
-        before = pose.rotation @ channel
-        return (turn @ before) @ pose.rotation
+        length, wrench, turns = jax.vmap(span)(anchors, self.leaves, self.enters, self.along)
+        return Crossing(length, wrench, slope=None, turning=turns)
 
 
 def turning(before: Vectors, after: Vectors, axis: Float[Array, " a"]) -> Float[Array, ""]:
@@ -184,18 +218,8 @@ def turning(before: Vectors, after: Vectors, axis: Float[Array, " a"]) -> Float[
 # whichever way the notch faces.
 
 
-class WallArc(TendonGroup):
+class WallArc(AlongFibres, TendonGroup):
     """Tendons along the wall."""
-
-    acts_on_bodies = False
-
-    # Where the tendon crosses the rod's section, from the neutral axis, mm
-    across: Float[Array, "*n t 2"]
-
-    @property
-    def fibre(self) -> Float[Array, "*n t 2"]:
-        """Where the tendon crosses the rod's section, mm from its neutral axis."""
-        return self.across
 
     @property
     def runs(self) -> PerTendon:
@@ -204,22 +228,13 @@ class WallArc(TendonGroup):
 
     def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
         """Return the length and turning on the wall arc; half the turning at each edge."""
-        del anchors
-        weights = of_rod(rod, fibre_stretch(self.across))
         bend = jnp.broadcast_to(flexure.bend, (len(self.across), len(flexure.bend)))
-        half_turning = 0.5 * guarded_norm(bend, self._pulls(len(flexure.bend)))
-        return Crossing(
-            length=self.natural_gap + (rod.length @ flexure.strain) @ weights.T,
-            exit_turning=half_turning,
-            entry_turning=half_turning,
-            wrench=None,
-            slope=fibre_slope(rod, weights),
-        )
-
-    def _pulls(self, axes: int) -> Float[Array, "t axes"]:
-        """Unit axes about which the tendons bend the rod, the slope of the turning at rest."""
+        # Unit axes about which the tendons bend the rod: the slope of the turning at rest.
         x, y = self.across[:, 0], self.across[:, 1]
-        return direction(jnp.stack([x] if axes == 1 else [-y, x], axis=-1))
+        pulls = direction(jnp.stack([x] if bend.shape[1] == 1 else [-y, x], axis=-1))
+        half_turning = 0.5 * guarded_norm(bend, pulls)
+        turning = jnp.stack([half_turning, half_turning], axis=-1)
+        return super().cross(rod, flexure, anchors)._replace(turning=turning)
 
 
 # Where a line along the wall leaves one rigid piece of the tube and enters the next.
@@ -289,15 +304,6 @@ def passages(
 _PULLS = {"straight": "gap", "straight-dead": "dead", "straight-follower": "follower"}
 
 
-class RoutedTendons(NamedTuple):
-    """Tendons laid through a robot."""
-
-    groups: tuple[TendonGroup, ...]  # One group per kind of path in use
-    # Where every tendon crosses a section of the tube, mm from its axis
-    place: Float[Array, "t 3"]
-    base_length: OfTendons  # Length of every tendon inside the base, mm
-
-
 def route(
     tendons: Sequence[Tendon],
     notches: Sequence[Notch],
@@ -307,12 +313,13 @@ def route(
     body_length: Float[Array, " bodies"],
     *,
     turns_with_chord: bool,
-) -> RoutedTendons:
+) -> tuple[tuple[TendonGroup, ...], Float[Array, "t 3"], OfTendons]:
     """Group the tendons by the way they run and lay them through the chain."""
-    # `free` holds the relative poses of all flexures in the free robot.
+    # `free` holds the relative poses of all flexures in the free robot. Also returned is where each
+    # tendon crosses a section of the tube, mm from its axis, and its length in the base, mm.
     directions, radii = zip(*((each.direction_deg, each.radius) for each in tendons), strict=True)
     lines = passages(notches, body_length, directions, outer_radius, radii)
-    place = xp.stack([_on_tube(*pair) for pair in zip(radii, directions, strict=True)])
+    place = on_tube(radii, directions)
     groups: list[TendonGroup] = []
     for path in ("wall-arc", *_PULLS):
         numbers = tuple(i for i, tendon in enumerate(tendons) if tendon.path == path)
@@ -322,7 +329,10 @@ def route(
         line = Passage(*(values[..., columns] for values in lines))
         masks = _masks(numbers, [tendons[i] for i in numbers], line)
         if path == "wall-arc":
-            groups.append(_wall_arc(masks, place[columns], rods))
+            across = xp.einsum("nab,tb->nta", rods.end_rotation, place[columns])
+            across = (across + rods.end_offset[:, None])[..., :2]
+            gap = fibre_lengths(rods, across, rods.reference_strain)
+            groups.append(WallArc(**masks, natural_gap=gap, across=across))
         else:
             groups.append(
                 _straight(
@@ -334,7 +344,7 @@ def route(
                     turns_with_chord=turns_with_chord,
                 )
             )
-    return RoutedTendons(tuple(groups), place, lines.base_leaves)
+    return tuple(groups), place, lines.base_leaves
 
 
 def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -> dict[str, Any]:
@@ -363,18 +373,10 @@ def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -
     }
 
 
-def _on_tube(radius: float, direction_deg: float) -> Array:
-    """Where a tendon crosses a section of the tube, mm from its axis."""
-    direction = xp.deg2rad(direction_deg)
-    return xp.stack([radius * xp.cos(direction), radius * xp.sin(direction), 0.0])
-
-
-def _wall_arc(masks: dict[str, Any], place: Array, rods: Rod) -> WallArc:
-    across = xp.einsum("nab,tb->nta", rods.end_rotation, place) + rods.end_offset[:, None]
-    across = across[..., :2]
-    stretch = fibre_stretch(across)
-    gap = xp.einsum("ntc,nic,ni->nt", stretch, rods.reference_strain, rods.length)
-    return WallArc(**masks, natural_gap=gap, across=across)
+def on_tube(radii: Any, directions_deg: Any) -> Float[Array, "t 3"]:
+    """Return points of a section of the tube by their polar coordinates, mm from its axis."""
+    angle = xp.radians(constant(directions_deg))
+    return constant(radii)[:, None] * xp.stack([xp.cos(angle), xp.sin(angle), 0.0 * angle], axis=-1)
 
 
 def _straight(

@@ -305,8 +305,8 @@ def _slack_by_loss(path: EquilibriumPath, step: int) -> tuple[int, float] | None
     """
     for tendon in np.flatnonzero(np.isfinite(path.load.stroke[step])):
         turning = path.contact_turning[step, tendon]
-        losses = path.chain.friction.constant_loss(turning, turning)
-        loss = 0.0 if losses is None else float(np.nansum(losses[0]))
+        losses = path.chain.friction.constant_loss(turning)
+        loss = 0.0 if losses is None else float(np.nansum(losses))
         tension = path.span_tension[step, tendon]
         if np.nanmin(tension) < _SLACK * loss < np.nanmax(tension):
             return int(tendon), loss

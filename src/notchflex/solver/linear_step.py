@@ -144,7 +144,7 @@ class TendonJacobian(NamedTuple):
             commanded.
     """
 
-    turning: Float[Array, "n 2 t short"]
+    turning: Float[Array, "n t 2 short"]
     wrench: Float[Array, "n t w short"] | None
     log_ratio: Float[Array, "t 2 z"]
     gap_tension: Float[Array, "n t z"]
@@ -277,15 +277,13 @@ class StateJacobians:
             slopes = self._by_relative_motion(group, type(group).cross)
             relative = select_back(self.relative, group.back)
             length.append(jnp.einsum("ntw,ntwz->ntz", slopes.length, relative))
-            both = jnp.stack([slopes.exit_turning, slopes.entry_turning], axis=1)
-            turning.append(jnp.einsum("nstw,ntwz->nstz", both, relative))
+            turning.append(jnp.einsum("ntsw,ntwz->ntsz", slopes.turning, relative))
             wrench = jnp.einsum("ntvw,ntwz->ntvz", slopes.wrench, relative)
         if group.by_modes:
             slopes = self._by_modes(group)
             if crossing.slope is not None:
                 length.append(self.unit.of_modes(crossing.slope))
-            both = jnp.stack([slopes.exit_turning, slopes.entry_turning], axis=1)
-            turning.append(self.unit.of_modes(both))
+            turning.append(self.unit.of_modes(slopes.turning))
         return sum(length), sum(turning), wrench
 
     def _contact(self, k: int) -> tuple[Array, Array | None]:
@@ -293,7 +291,7 @@ class StateJacobians:
         group, response = self.chain.contact_pairs[k], self.at.contacts[k]
         if response.slope is not None:
             return self.unit.of_modes(response.slope), None
-        slopes = self._by_relative_motion(group, type(group).gap_response)
+        slopes = self._by_relative_motion(group, type(group).cross)
         relative = select_back(self.relative, group.back)
         return (
             jnp.einsum("nlw,nlwz->nlz", slopes.gap, relative),
@@ -458,9 +456,7 @@ def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], lis
     chain, at, unit = jacobians.chain, jacobians.at, jacobians.unit
     elastic = chain.elastic
     if elastic is None:
-        elastic = jax.vmap(material_tangent, in_axes=(0, None, 0, 0))(
-            chain.rods, chain.law, jacobians.memory.material, at.flexure
-        )
+        elastic = jax.vmap(material_tangent, (0, None, 0))(chain.rods, chain.law, at.flexure)
         # Just beyond the strain where plastic hardening begins (exp(b / x) at x = 0) the law is
         # flat to the last digit. The modes are eliminated first, so their pivots must not vanish,
         # though friction makes the whole system regular. Without friction the step becomes long but
@@ -521,27 +517,22 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     log_ratio, group = jacobians.unknowns.log_ratio[k], jacobians.chain.groups[k]
     crossing, offset = span.crossing, chain.friction.offset()
     tension_before = (span.gap_tension + offset) / span.tension_ratio[..., 0] - offset
-    turning, tension = (
-        (crossing.exit_turning, crossing.entry_turning),
-        (tension_before, span.gap_tension),
-    )
-    zero, one = jnp.zeros_like(tension_before), jnp.ones_like(tension_before)
+    tension = jnp.stack([tension_before, span.gap_tension], axis=-1)
+    still = jnp.zeros_like(tension)
 
-    def slope(turning_change: tuple[Array, Array], tension_change: tuple[Array, Array]) -> Array:
+    def slope(turning_change: Array, tension_change: Array) -> Array:
         """Differentiate the limits by turning angles and tensions, where contacts can slide."""
         limits = partial(chain.friction.limits, log_ratio=log_ratio)
-        return (
-            slip_mask(group)
-            * jax.jvp(limits, (*turning, tension), (*turning_change, tension_change))[1]
-        )
+        at, change = (crossing.turning, tension), (turning_change, tension_change)
+        return slip_mask(group) * jax.jvp(limits, at, change)[1]
 
     # Edges, then the turning angles that they depend on.
-    by_turning = jnp.stack([slope(unit, (zero, zero)) for unit in ((one, zero), (zero, one))], -1)
-    limit = jacobians.unit.spread(jnp.einsum("ntes,nstz->ntez", by_turning, tendon.turning))
-    if chain.friction.constant_loss(*turning) is not None:
+    by_turning = jnp.stack([slope(still + unit[None, None], still) for unit in jnp.eye(2)], -1)
+    limit = jacobians.unit.spread(jnp.einsum("ntes,ntsz->ntez", by_turning, tendon.turning))
+    if chain.friction.constant_loss(crossing.turning) is not None:
         before = jnp.broadcast_to(jacobians.unit.tension[k][None], tendon.gap_tension.shape)
         rows = jnp.stack([before, tendon.gap_tension], axis=2)
-        limit = limit + slope((zero, zero), (one, one))[..., None] * rows
+        limit = limit + slope(still, still + 1.0)[..., None] * rows
     height = notch_heights(chain)[:, None, None, None]
     stuck = -AUGMENTATION * (
         tendon.at_edges / height - jacobians.memory.slip_per_log_ratio * tendon.log_ratio[None]

@@ -378,10 +378,10 @@ def predict_log_ratios(
             jnp.maximum(of_group(tension, group), _MIN_TENSION)
             for tension in (before, base_tension)
         )
-        zero = jnp.zeros_like(group.natural_gap)  # the loss at rest suffices for a prediction
-        losses = chain.friction.constant_loss(zero, zero)
-        if losses is not None:
-            loss, offset = slip_mask(group) * jnp.stack(losses, axis=-1), chain.friction.offset()
+        slips = slip_mask(group)
+        loss = chain.friction.constant_loss(0.0 * slips)  # at rest: it suffices for a prediction
+        if loss is not None:
+            loss, offset = slips * loss, chain.friction.offset()
             predicted.append(_predict_sequentially(old, new, offset, old_ratio, bound, loss))
             continue
         change = jnp.broadcast_to(jnp.log(new / old)[None, :, None], old_ratio.shape)

@@ -154,7 +154,7 @@ def tip_axis_angle(state: SolvedState) -> Array:
 @Quantity("solve", kind=bool)
 def friction_holds(state: SolvedState) -> Array:
     """Whether no tendon turns so sharply at an edge that its friction would hold any pull."""
-    return jnp.all(state.chain.friction.valid(*state.turning))
+    return jnp.all(state.chain.friction.valid(state.turning))
 
 
 @Quantity("state", "span tension", "T", "N", key="span_tension_N", column="tendon{tendon}_{span}_N",
@@ -164,7 +164,7 @@ def span_tension(state: SolvedState) -> Array:
 
     These are the gaps and bodies that it runs through.
     """
-    spans = state.along_edges(*state.tensions)[:, :-1]
+    spans = state.along_edges(state.tensions)[:, :-1]
     return jnp.concatenate([state.solved.point.base_tension[:, None], spans], axis=1)
 
 
@@ -228,18 +228,18 @@ def contact_log_ratio(state: SolvedState) -> Array:
 def contact_slid(state: SolvedState) -> Array:
     """Tendon length that has slid over a friction contact toward the base."""
     spans = state.at.spans
-    beyond = state.paired([(s.released_beyond, s.tension_length_beyond) for s in spans])
-    summed = state.paired([(s.released_length, s.tension_length) for s in spans])
-    in_body = state.tensions[1] * state.by_tendon("body_length")
-    at_entry = beyond[0] + (beyond[1] + in_body) * state.compliance
-    return state.along_edges(summed[0] + summed[1] * state.compliance, at_entry)[:, :-1]
+    released = state.at_edges(jnp.stack([s.released_length, s.released_beyond], -1) for s in spans)
+    lengths = (jnp.stack([s.tension_length, s.tension_length_beyond], -1) for s in spans)
+    in_body = state.tensions[..., 1] * state.by_tendon("body_length")
+    tension_length = state.at_edges(lengths) + jnp.stack([0.0 * in_body, in_body], axis=-1)
+    return state.along_edges(released + tension_length * state.compliance[..., None])[:, :-1]
 
 
 @Quantity("state", "turning at a contact", r"\beta_i", "deg", key="contacts.turning_deg",
           per=("tendon", "contact"))  # fmt: skip
 def contact_turning(state: SolvedState) -> Array:
     """Angle by which a tendon turns at a friction contact."""
-    return state.along_edges(*state.turning)[:, :-1]
+    return state.along_edges(state.turning)[:, :-1]
 
 
 @Quantity("state", "state of a contact", key="contacts.state", per=("tendon", "contact"), kind=int,
@@ -247,12 +247,12 @@ def contact_turning(state: SolvedState) -> Array:
 def contact_state(state: SolvedState) -> Array:
     """What a friction contact does: "stick", "slip toward base" or "slip toward tip"."""
     side = bound_side(state.quantity("contact_log_ratio"), state.quantity("contact_bound"))
-    losses = state.chain.friction.constant_loss(*state.turning)
-    if losses is None:
+    loss = state.chain.friction.constant_loss(state.turning)
+    if loss is None:
         return side
     # Below its loss a tension draws nothing over the contact, though none is left behind it.
     before = state.quantity("span_tension")[:, :-1]
-    return jnp.where((side > 0) & (before < state.along_edges(*losses)[:, :-1]), 0, side)
+    return jnp.where((side > 0) & (before < state.along_edges(loss)[:, :-1]), 0, side)
 
 
 @Quantity("state", "largest tension ratio over a contact", "b_i", per=("tendon", "contact"))
@@ -320,7 +320,7 @@ def stored_energy(state: SolvedState) -> Array:
     """Elastic energy held by flexures, lips that press and stretched tendons."""
     chain, base_tension = state.chain, state.solved.point.base_tension
     density, _ = state.stored_energy_density
-    in_gap, in_body = state.tensions
+    in_gap, in_body = jnp.moveaxis(state.tensions, -1, 0)
     in_tendons = in_gap**2 * state.by_tendon("natural_gap")
     in_tendons = in_tendons + in_body**2 * state.by_tendon("body_length")
     in_contacts = jnp.zeros(())

@@ -16,10 +16,10 @@ from jaxtyping import Array, Bool, Float, Shaped
 from notchflex._jax import constant, jax, jnp
 from notchflex.loads.command import BodyLoads, Command, body_wrench
 from notchflex.mechanics.chain import Chain, flexure_states
-from notchflex.mechanics.contact import ContactGroup, GapResponse, closing_angles
-from notchflex.mechanics.flexure import FlexureState, fibre_stretch, of_rod
+from notchflex.mechanics.contact import ContactGroup, closing_angles
+from notchflex.mechanics.flexure import FlexureState
 from notchflex.mechanics.motion import Motion, identity
-from notchflex.mechanics.tendon import Crossing, TendonGroup
+from notchflex.mechanics.tendon import Crossing, TendonGroup, fibre_lengths
 
 # Poses of bodies: against the base, and against those before.
 
@@ -349,7 +349,7 @@ class Evaluation(NamedTuple):
     flexure: FlexureState
     anchors: Motion | None
     spans: tuple[TendonSpans, ...]
-    contacts: tuple[GapResponse, ...]
+    contacts: tuple[Crossing, ...]
     wrenches: BodyWrenches | None
     base: BaseReaction
     residual: Unknowns
@@ -383,10 +383,10 @@ def evaluate(
     contacts = ()
     for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
         selected = select_anchors(anchors, group.back)
-        response = jax.vmap(type(group).gap_response)(group, chain.rods, flexure, selected)
+        response = jax.vmap(type(group).cross)(group, chain.rods, flexure, selected)
         if chain.contact_flexibility is not None:
             closing = chain.contact_flexibility[:, None] * force
-            response = response._replace(gap=response.gap + closing)
+            response = response._replace(length=response.gap + closing)
         contacts += (response,)
     wrenches = None
     if on_bodies:
@@ -433,7 +433,7 @@ def _balance(
     unknowns: Unknowns,
     flexure: FlexureState,
     spans: tuple[TendonSpans, ...],
-    contacts: tuple[GapResponse, ...],
+    contacts: tuple[Crossing, ...],
     wrenches: BodyWrenches | None,
 ) -> Float[Array, "n modes"]:
     """Compute the virtual work of every strain mode, N mm."""
@@ -466,7 +466,6 @@ def _spans(
     selected = select_anchors(anchors, group.back) if group.acts_on_bodies else None
     crossing = jax.vmap(type(group).cross)(group, chain.rods, flexure, selected)
     # Not written with ln T, so that a slack tendon stays regular.
-    turning = crossing.exit_turning, crossing.entry_turning
     offset = chain.friction.offset()
     at_base = of_group(point.base_tension, group)[None] + offset
     tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
@@ -483,7 +482,8 @@ def _spans(
     stiffness = of_group(chain.memory_stiffness, group)[None]
     at_exit = summed[0] + summed[1] / stiffness
     at_entry = beyond[0] + (beyond[1] + in_body) / stiffness
-    limits = chain.friction.limits(*turning, (transmitted - offset, gap_tension), log_ratio)
+    before = jnp.stack([transmitted - offset, gap_tension], axis=-1)
+    limits = chain.friction.limits(crossing.turning, before, log_ratio)
     return TendonSpans(
         crossing=crossing,
         tension_ratio=tension_ratio,
@@ -503,7 +503,7 @@ def _wrenches(
     pose: Motion,
     unknowns: Unknowns,
     spans: tuple[TendonSpans, ...],
-    contacts: tuple[GapResponse, ...],
+    contacts: tuple[Crossing, ...],
     applied: BodyLoads | None,
 ) -> BodyWrenches:
     """Compute the wrenches of spans, contacts and loads on the bodies."""
@@ -566,8 +566,7 @@ def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
         return closing
     for group in chain.groups:
         if group.fibre is not None:
-            weights = of_rod(chain.rods, fibre_stretch(constant(group.fibre)))
-            slope = np.einsum("ntc,nic,ni->nt", weights, rods.basis[..., 0], rods.length)
+            slope = fibre_lengths(rods, constant(group.fibre), rods.basis[..., 0])
             shortening = np.asarray(group.present) * -slope * travel[:, None]
             closing[list(group.numbers)] = np.where(shortening < 0.0, np.inf, shortening).sum(
                 axis=0

@@ -94,17 +94,16 @@ class SolvedState:
         )
 
     @cached_property
-    def turning(self) -> tuple[Array, Array]:
+    def turning(self) -> Float[Array, "n t 2"]:
         """Turning angles at both edges of all gaps; 0 where a tendon has no contact."""
-        visited = self.by_tendon("visits") > 0.0
-        angles = [(s.crossing.exit_turning, s.crossing.entry_turning) for s in self.at.spans]
-        first, second = self.paired(angles)
-        return jnp.where(visited, first, 0.0), jnp.where(visited, second, 0.0)
+        angles = self.at_edges(span.crossing.turning for span in self.at.spans)
+        return jnp.where(self.by_tendon("visits")[..., None] > 0.0, angles, 0.0)
 
     @cached_property
-    def tensions(self) -> tuple[Float[Array, "n t"], Float[Array, "n t"]]:
+    def tensions(self) -> Float[Array, "n t 2"]:
         """Tensions in the gaps and beside the bodies beyond them."""
-        return self.paired([(s.gap_tension, s.body_tension) for s in self.at.spans])
+        spans = self.at.spans
+        return self.at_edges(jnp.stack([s.gap_tension, s.body_tension], -1) for s in spans)
 
     @cached_property
     def contact_pairs(self) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
@@ -131,7 +130,7 @@ class SolvedState:
     @cached_property
     def compliance(self) -> Float[Array, "n t"]:
         """Strain of a tendon per tension."""
-        return jnp.broadcast_to(1.0 / self.chain.axial_stiffness, self.tensions[0].shape)
+        return jnp.broadcast_to(1.0 / self.chain.axial_stiffness, self.tensions.shape[:2])
 
     def by_tendon(self, name: str) -> Float[Array, "n t"]:
         """Return a field of the tendon groups, for every gap and tendon of the robot."""
@@ -139,29 +138,25 @@ class SolvedState:
             self.chain, tuple(getattr(group, name) for group in self.chain.groups)
         )
 
-    def paired(self, pairs: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-        """Return both values of pairs per group, each in the order of the robot's tendons."""
-        first, second = zip(*pairs, strict=True)
-        return in_tendon_order(self.chain, first), in_tendon_order(self.chain, second)
+    def at_edges(self, values: Iterable[Float[Array, "n t 2"]]) -> Float[Array, "n t 2"]:
+        """Return values per group at both edges of all gaps, in the order of the tendons."""
+        swapped = tuple(edges.swapaxes(1, 2) for edges in values)
+        return in_tendon_order(self.chain, swapped).swapaxes(1, 2)
 
-    def along_edges(
-        self, exit_value: Float[Array, "n t"], entry_value: Float[Array, "n t"]
-    ) -> Float[Array, "t edges"]:
+    def along_edges(self, values: Float[Array, "n t 2"]) -> Float[Array, "t edges"]:
         """Return the values at the edges that each tendon meets, base to tip; NaN beyond its end.
 
         The last edge, where the tendon enters its end body, is not a contact: it is fixed there.
         """
         contacts = self.chain.contacts
-        pairs = jnp.stack([exit_value, entry_value], axis=1)
-        flat = pairs.reshape(-1, pairs.shape[-1]).T
+        flat = values.swapaxes(0, 1).reshape(values.shape[1], -1)
         met = jnp.take_along_axis(flat, jnp.maximum(contacts, 0), axis=1)
         beyond = jnp.roll(contacts, -1, axis=1).at[:, -1].set(-1)
         return jnp.where(beyond >= 0, met, jnp.nan)
 
     def along_contacts(self, values: Iterable[Float[Array, "n t 2"]]) -> Float[Array, "t contacts"]:
         """Return values per group at the contacts of each tendon; NaN beyond its end."""
-        pairs = [(edges[..., 0], edges[..., 1]) for edges in values]
-        return self.along_edges(*self.paired(pairs))[:, :-1]
+        return self.along_edges(self.at_edges(values))[:, :-1]
 
     def required(self) -> Float[Array, "n nodes w"]:
         """Return the wrench that loads, tendons and contacts require at every node, in its axes."""
@@ -172,10 +167,9 @@ class SolvedState:
                 weights = of_rod(chain.rods, fibre_stretch(group.fibre))
                 acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
         for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
-            fibre = group.fibre(chain.rods)
-            if fibre is not None:
-                weights = of_rod(chain.rods, fibre_stretch(fibre))
-                acting = acting + (force * group.has_contact) * weights
+            if group.fibre is not None:
+                weights = of_rod(chain.rods, fibre_stretch(group.fibre))
+                acting = acting + jnp.einsum("nl,nlc->nc", force * group.has_contact, weights)
         required = jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)
         if at.wrenches is None:
             return required

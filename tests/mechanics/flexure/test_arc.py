@@ -47,7 +47,9 @@ def pose_and_twist(shape: Rod, modes: np.ndarray) -> tuple[Motion, np.ndarray]:
 
 def lip_gap(shape: Rod, theta: float) -> float:
     state = flexure_state(shape, LAW, (), np.array([theta]), with_pose=False)
-    return float(SpineContact(np.ones(1), np.ones(1, int)).gap_response(shape, state, None).gap[0])
+    ones, across = np.ones(1), np.asarray(shape.closure)[None]
+    natural = fibre_stretch(across) @ (shape.length @ shape.reference_strain)
+    return float(SpineContact(ones, ones, natural, across).cross(shape, state, None).gap[0])
 
 
 def pacheco_notch(theta: float, centroid: float, height: float = 0.8) -> np.ndarray:

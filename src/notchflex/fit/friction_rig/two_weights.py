@@ -101,14 +101,13 @@ def weight_held(
     m1, mu, a1, a2 = _floats(weight_1, coefficient, turn_1, turn_2)
     if law == "capstan":
         return m1 * np.exp(-mu * (a1 + a2))
-    corner = CornerLaw(constant(mu))
-    if not np.asarray(corner.valid(constant(a1), constant(a2))).all():
+    corner, turns = CornerLaw(constant(mu)[..., None]), constant(np.stack([a1, a2], axis=-1))
+    if not corner.valid(turns).all():
         raise InputError.OUT_OF_RANGE(
             "an edge would hold any pull, because coefficient * tan(turn / 2) is 1 or more; give a "
             "smaller coefficient or turn"
         )
-    first, second = corner.bounds(constant(a1), constant(a2))
-    return m1 * np.exp(-np.asarray(first) - np.asarray(second))
+    return m1 * np.exp(-np.sum(corner.bounds(turns), axis=-1))
 
 
 def slopes_of_coefficient(

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from notchflex._arrays import cached, plain_number, xp
+from notchflex._arrays import plain_number, xp
 from notchflex._jax import constant
 from notchflex.mechanics.cuts import SECTION_OF_CUT, cut_fibres
 from notchflex.mechanics.ends import NotchStiffness, notch_stiffness, validity
@@ -115,13 +115,10 @@ def _ends(
     return ends, (in_plane, sideways)
 
 
-def _fibres(notch: ArcNotch, tube: Tube) -> FibresAt:
+@section_fibres.register
+def _(notch: ArcNotch, tube: Tube) -> FibresAt:
     shape = tube.outer_radius, tube.inner_radius, notch.section_depth(tube)
     return lambda _near, _spine, count: cut_fibres(notch.cut, *shape, count)
-
-
-# All sites of a notch share the fibres.
-section_fibres.register(ArcNotch, cached(64)(_fibres))
 
 
 @validity_warnings.register

@@ -20,8 +20,9 @@ from notchflex._arrays import cached, xp
 from notchflex._jax import constant, jax
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import FibreSection
+from notchflex.mechanics.material.linear import LinearLaw
 from notchflex.mechanics.motion import Motion, outer_twists, rotation_about
-from notchflex.mechanics.section import Section, leggauss
+from notchflex.mechanics.section import Section, gauss_on, leggauss
 
 # Quadrature of a rod.
 #
@@ -32,18 +33,9 @@ from notchflex.mechanics.section import Section, leggauss
 
 def gauss_nodes(ends: Any, count: int) -> tuple[Array, Array]:
     """Return Gauss's nodes and weights in every interval between neighbouring numbers."""
-    low, half = xp.asarray(ends[:-1]), 0.5 * xp.diff(xp.asarray(ends, float))
-    points, weight = leggauss(count)
-    positions = low[:, None] + half[:, None] * (1.0 + points)
-    return positions.ravel(), (half[:, None] * weight).ravel()
-
-
-@cached(64)
-def rod_quadrature(
-    ends: tuple[float, ...], nodes: tuple[int, ...], poses: tuple[int, ...]
-) -> RodQuadrature:
-    """Return the cached quadrature of a rod; notches that only differ by site share it."""
-    return RodQuadrature(ends, nodes, poses)
+    ends = xp.asarray(ends, float)[:, None]
+    positions, weights = gauss_on(ends[:-1], ends[1:], count)
+    return positions.ravel(), weights.ravel()
 
 
 def legendre(points: Float[Array, " k"], count: int) -> Float[Array, "k count"]:
@@ -146,18 +138,12 @@ class RodQuadrature:
 
     def fields(
         self,
-        curve: Motion | None,
+        curve: Motion,
         basis: Float[Array, "every 6 modes"],
-        reference: Float[Array, "every 6"] | None = None,
+        reference: Float[Array, "every 6"],
     ) -> dict[str, Any]:
         """Return the fields of a rod for its strains and its pose."""
-        free = xp.zeros(basis.shape[:2]) if reference is None else reference
-        twists = xp.concatenate([free[..., None], basis], axis=-1)
-        if curve is None:
-            count = len(twists)
-            curve = Motion(xp.stack([xp.eye(3)] * count), xp.zeros((count, 3)))
-        else:
-            twists = outer_twists(curve, twists)
+        twists = outer_twists(curve, xp.concatenate([reference[..., None], basis], axis=-1))
         counts = [len(part[0]) for part in (self.at_nodes, self.at_poses, self.between)]
         _, steps, between, before = xp.split(twists, xp.cumsum(counts))
         turns = _grouped(between[:, :3], self.between[1])
@@ -208,6 +194,9 @@ def _pairs(
     )
     return 0.5 * (pairs + xp.swapaxes(pairs, -1, -2))
 
+
+rod_quadrature = cached(64)(RodQuadrature)
+"""The same, kept: notches that only differ by site share it."""
 
 STRAIGHT = xp.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 """Strains of a straight, unloaded rod: a stretch of 1 along z."""
@@ -343,10 +332,11 @@ def build_rod(
     # Written out, so that opposite directions are exact mirror images.
     cosine, sine = xp.cos(xp.radians(direction_deg)), xp.sin(xp.radians(direction_deg))
     turned = xp.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    curve, curve_end, reference = None, shifted(), strain
-    if axis.curve is not None:
-        curve, curve_end = axis.curve.pick(slice(-1)), axis.curve.pick(-1)
-        reference = None
+    curve, reference = axis.curve, 0.0 * strain
+    if curve is None:  # a point, so that all motion is relative to it
+        count = len(strain) + 1
+        curve, reference = Motion(xp.stack([xp.eye(3)] * count), xp.zeros((count, 3))), strain
+    curve_end = curve.pick(-1)
 
     def at_nodes(values: Array, axes: int = 0) -> Array:
         values = constant(values)
@@ -360,7 +350,7 @@ def build_rod(
         curve_offset=curve_end.translation,
         end_rotation=axis.end.rotation @ turned.T,
         end_offset=axis.end.translation,
-        **points.fields(curve, modes.basis, reference),
+        **points.fields(curve.pick(slice(-1)), modes.basis, reference),
         reference_strain=strain[:nodes],
         section=dataclasses.replace(
             jax.tree.map(at_nodes, dataclasses.replace(section, fibres=None)),
@@ -384,7 +374,7 @@ def build_rod(
 # The direction of n couples stretch and shear (Gao 2017, eq. 1-5): independent polynomials for them
 # are far less accurate.
 
-_X, _Y, _Z = xp.eye(3)
+_ABOUT_X, _ABOUT_Y, _ABOUT_Z, _ALONG_X, _ALONG_Y, _ALONG_Z = xp.eye(6)
 
 
 def course_poses(
@@ -393,7 +383,7 @@ def course_poses(
     """Compute poses along a free rod in the x-z plane: z along it, y out of the plane."""
     # Along the strip and along the tube from its middle, mm; the mirror image for `hand` -1.
     position = xp.stack([-hand * along, 0.0 * along, above], axis=-1)
-    turns = rotation_about(constant((hand * (heading - 0.5 * np.pi))[:, None] * _Y))
+    turns = rotation_about(constant((hand * (heading - 0.5 * np.pi))[:, None] * _ABOUT_Y[:3]))
     return Motion(turns, constant(middle + position))
 
 
@@ -411,83 +401,68 @@ def course_rod(
     """Build the rod of a strip from wall to wall; the distal frame is `distal` mm up the tube."""
     # The poses are those at all points, at the start and at the end.
     along, start, end = map(poses.pick, (slice(-2), -2, -1))
-    basis = wrench_modes(points, along, section, middle, *mode_counts, poisson_ratio)
-    to_end = Motion(*(xp.concatenate([part[:-2], part[-1:]]) for part in poses))
-    curve, body = between(start, to_end), between(end, shifted(z=distal))
-    in_plane = mode_counts[0] + 2 * mode_counts[1]
-    modes = StrainModes(basis, (in_plane, in_plane, basis.shape[-1]))
-    return build_rod(NeutralAxis(points, start, body, curve, free), section, modes, **options)
-
-
-def wrench_modes(
-    points: RodQuadrature,
-    poses: Motion,
-    section: FibreSection,
-    middle: Float[Array, " 3"],
-    moment_modes: int,
-    force_modes: int,
-    poisson_ratio: float,
-) -> Float[Array, "nodes 6 modes"]:
-    """Compute the modes of a rod in the x-z plane, those out of the plane last."""
+    moment_modes, force_modes = mode_counts
     # In the plane the moment about y is constant, or goes with a lever along x or z, and from the
     # fourth mode on with the Legendre polynomials P_2, P_3 ... of arc length (P_1 is nearly a
     # lever); then come forces along x and along z, times P_0, P_1 ... in pairs. Out of the plane
     # come a constant moment about x, one about z and the moment of a sideways force at the middle,
     # then moments about x and z times P_2, P_3 ... as far as in the plane, and that force. A unit
     # is about 1 rad of the end for a moment, and a mean strain of 1 for a force.
-    length = points.weight
-    part = 2.0 * points.every / points.ends[-1] - 1.0
-    rotation, lever = poses.rotation, poses.translation - middle
+    length, lever = points.weight, along.translation - middle
     reach = xp.abs(lever).max(axis=0)
-    polynomials = legendre(part, max(moment_modes - 1, force_modes))
+    polynomials = legendre(
+        2.0 * points.every / points.ends[-1] - 1.0, max(moment_modes - 1, force_modes)
+    )[..., None]
+    higher = [polynomials[:, degree] for degree in range(2, moment_modes - 1)]
+    lever_x, lever_z = lever[:, :1], lever[:, 2:]
+    sizes = [polynomials[:, 0], lever_x / reach[0], lever_z / reach[2], *higher]
+    bending = [size * _ABOUT_Y for size in sizes]
+    pulls = [polynomials[:, k] * pull for k in range(force_modes) for pull in (_ALONG_X, _ALONG_Z)]
+    sideways = [size * about for size in sizes[:1] + higher for about in (_ABOUT_X, _ABOUT_Z)]
+    sideways.insert(2, (lever_x * _ABOUT_Z - lever_z * _ABOUT_X) / reach[0])
+    wrenches = [*bending, *pulls, *sideways, polynomials[:, 0] * _ALONG_Y]
+    counts = len(bending), len(pulls), len(sideways), 1
+    of_force = np.repeat([False, True, False, True], counts)
 
-    moment = [xp.ones_like(length), lever[:, 0] / reach[0], lever[:, 2] / reach[2]]
-    moment += [polynomials[:, degree] for degree in range(2, moment_modes - 1)]
-    none = xp.zeros_like(lever)
-    wrenches = [(size[:, None] * _Y, none) for size in moment]
-    wrenches += [
-        (none, polynomials[:, k, None] * along) for k in range(force_modes) for along in (_X, _Z)
-    ]
-    sideways = xp.cross(lever, _Y) / reach[0]
-    out_of_plane = [about + none for about in (_X, _Z, sideways)]
-    out_of_plane += [
-        polynomials[:, degree, None] * about
-        for degree in range(2, moment_modes - 1)
-        for about in (_X, _Z)
-    ]
-    wrenches += [(about, none) for about in out_of_plane] + [(none, _Y + none)]
-    of_force = xp.arange(len(wrenches)) >= moment_modes
-    of_force[-len(out_of_plane) - 1 : -1] = False
-
-    parts = xp.stack([each for wrench in wrenches for each in wrench])
-    in_frame = xp.einsum("kji,mpkj->kmpi", rotation, parts.reshape(len(wrenches), 2, -1, 3))
-    in_frame = in_frame.reshape(len(length), len(wrenches), 6)
-    strain = _strains(section, poisson_ratio, in_frame)
-    work = xp.einsum("k,kmc,kmc->m", length, in_frame, strain)
-    return xp.moveaxis(strain * (xp.where(of_force, length.sum(), 1.0) / work)[:, None], 1, 2)
+    resultants = in_sections(along, wrenches)
+    strain = strains_of(section, poisson_ratio, resultants)
+    work = xp.einsum("k,kmc,kmc->m", length, resultants, strain)
+    scaled = strain * (xp.where(of_force, length.sum(), 1.0) / work)[:, None]
+    in_plane = len(bending) + len(pulls)
+    modes = StrainModes(xp.moveaxis(scaled, 1, 2), (in_plane, in_plane, len(wrenches)))
+    to_end = Motion(*(xp.concatenate([part[:-2], part[-1:]]) for part in poses))
+    curve, body = between(start, to_end), between(end, shifted(z=distal))
+    return build_rod(NeutralAxis(points, start, body, curve, free), section, modes, **options)
 
 
-def _strains(
-    section: FibreSection, poisson_ratio: float, resultants: Float[Array, "nodes modes 6"]
-) -> Float[Array, "nodes modes 6"]:
+def unit_forces(poses: Motion, middle: Float[Array, " 3"]) -> Float[Array, "nodes wrenches 6"]:
+    """Compute the resultants of unit forces at the middle, along x and along z."""
+    lever = poses.translation - middle
+    forces = [_ALONG_X - lever[:, 2:] * _ABOUT_Y, _ALONG_Z + lever[:, :1] * _ABOUT_Y]
+    return in_sections(poses, forces)
+
+
+def in_sections(
+    poses: Motion, wrenches: list[Float[Array, "nodes 6"]]
+) -> Float[Array, "nodes wrenches 6"]:
+    """Turn moments and forces on sections to the axes of the sections."""
+    pairs = xp.stack(wrenches).reshape(len(wrenches), -1, 2, 3)
+    turned = xp.einsum("kji,mkpj->kmpi", poses.rotation, pairs)
+    return turned.reshape(*turned.shape[:2], 6)
+
+
+# Only sideways bending and torsion are coupled, with each other.
+_COUPLED, _PARTNER = xp.array([1.0, 0.0, 1.0, 0.0, 0.0, 0.0]), np.array([2, 1, 0, 3, 4, 5])
+
+
+def strains_of(
+    section: FibreSection, poisson_ratio: float, resultants: Float[Array, "nodes wrenches 6"]
+) -> Float[Array, "nodes wrenches 6"]:
     """Compute strains by resultants, times Young's modulus."""
-    ratio, ends = 2.0 * (1.0 + poisson_ratio), section.compliance  # E / G
-    stiffness = [
-        section.second_moment_strong,
-        section.second_moment_weak,
-        section.torsion_constant / ratio,
-        section.area / ratio,
-        section.area / ratio,
-        section.area,
-    ]
-    added = (ends.strong, ends.weak, ends.torsion, ends.push, ends.sway, ends.axial)
-    softer = 1.0 + xp.stack(xp.broadcast_arrays(section.area, *added)[1:], axis=-1)
-    compliance = (1.0 / xp.stack(stiffness, axis=-1) * softer)[:, None]
-    strain = compliance * resultants
-    # The inverse of the stiffness of sideways bending and torsion together.
-    oblique = (ends.oblique + xp.zeros(len(compliance)))[:, None]
-    part = 1.0 - oblique**2 * compliance[..., 0] * compliance[..., 2]
-    crossed = oblique * compliance[..., 0] * compliance[..., 2]
-    about_x = (strain[..., 0] - crossed * resultants[..., 2]) / part
-    twist = (strain[..., 2] - crossed * resultants[..., 0]) / part
-    return xp.stack([about_x, strain[..., 1], twist, *xp.moveaxis(strain[..., 3:], -1, 0)], axis=-1)
+    law = LinearLaw(constant(1.0), constant(0.5 / (1.0 + poisson_ratio)))
+    stiffness = law.stiffness(section)
+    direct = xp.diagonal(stiffness, axis1=-2, axis2=-1)
+    mixed = stiffness[:, 0, 2, None] * _COUPLED
+    part = mixed / direct[:, _PARTNER]
+    free = resultants - part[:, None] * resultants[..., _PARTNER]
+    return free / (direct - part * mixed)[:, None]

@@ -162,48 +162,40 @@ def stack(rods: Sequence[Rod]) -> Rod:
     nodes = max(rod.length.shape[0] for rod in rods)
     poses = max(rod.step.shape[0] for rod in rods)
     levels = tuple(max(rod.levels[i] for rod in rods) for i in range(3))
-    if any(rod.section.ends is not None for rod in rods):
-        rods = [_with_ends(rod) for rod in rods]
-    filled = [_filled(rod, modes, nodes, poses, levels) for rod in rods]
-    stacked: Rod = jax.tree.map(lambda *leaves: xp.stack(leaves), *filled)
+    have_ends = any(rod.section.ends is not None for rod in rods)
+
+    def filled(rod: Rod) -> Rod:
+        """Pad a rod with modes, nodes of weight zero, zero steps, and rigid ends if others bend."""
+        more, further = modes - rod.modes, poses - rod.step.shape[0]
+        section, count = rod.section, rod.length.shape[0]
+        if have_ends and section.ends is None:
+            rigid = jax.tree.map(lambda _: xp.zeros(count), NotchEnds())
+            section = dataclasses.replace(section, ends=rigid)
+        index = xp.minimum(xp.arange(nodes), count - 1)
+        reached = xp.minimum(xp.arange(poses + 1), poses - further)
+        longer = _selected(rod, {"nodes": index, "places": reached})
+        added = {"modes": more, "hat": more, "gauss": further, "gaps": further}
+        padded = {
+            name: xp.pad(getattr(longer, name), [(0, added.get(axis, 0)) for axis in axes])
+            for name, axes in _AXES.items()
+            if not added.keys().isdisjoint(axes) and getattr(longer, name) is not None
+        }
+        padded["padding_mask"] = constant(xp.arange(modes) >= rod.modes)
+        return dataclasses.replace(
+            longer,
+            **padded,
+            length=longer.length * (xp.arange(nodes) < count),
+            section=jax.tree.map(lambda leaf: leaf[index], section),
+            levels=levels,
+        )
+
+    stacked: Rod = jax.tree.map(lambda *leaves: xp.stack(leaves), *map(filled, rods))
     unused: dict[str, Any] = {
         name: None
         for name in ("linear_kinematics", "chord", "stop_flexibility")
         if not decide(xp.any(getattr(stacked, name)))
     }
     return dataclasses.replace(stacked, **unused)
-
-
-def _with_ends(rod: Rod) -> Rod:
-    """Return the rod with ends, rigid ones where it has none."""
-    zeros = xp.zeros(xp.shape(rod.section.area))
-    ends = rod.section.ends or jax.tree.map(lambda _: zeros, NotchEnds())
-    return dataclasses.replace(rod, section=dataclasses.replace(rod.section, ends=ends))
-
-
-def _filled(rod: Rod, modes: int, nodes: int, poses: int, levels: tuple[int, ...]) -> Rod:
-    """Pad a rod with modes, nodes of weight zero, and zero steps."""
-    more, further = modes - rod.modes, poses - rod.step.shape[0]
-    count = rod.length.shape[0]
-    if (more, further, count, levels) == (0, 0, nodes, rod.levels):
-        return rod
-    index = xp.minimum(xp.arange(nodes), count - 1)
-    reached = xp.minimum(xp.arange(poses + 1), poses - further)
-    longer = _selected(rod, {"nodes": index, "places": reached})
-    added = {"modes": more, "hat": more, "gauss": further, "gaps": further}
-    padded = {
-        name: xp.pad(getattr(longer, name), [(0, added.get(axis, 0)) for axis in axes])
-        for name, axes in _AXES.items()
-        if not added.keys().isdisjoint(axes) and getattr(longer, name) is not None
-    }
-    padded["padding_mask"] = constant(xp.arange(modes) >= rod.modes)
-    return dataclasses.replace(
-        longer,
-        **padded,
-        length=longer.length * (xp.arange(nodes) < count),
-        section=jax.tree.map(lambda leaf: leaf[index], rod.section),
-        levels=levels,
-    )
 
 
 # From the description of a notch to its rod.

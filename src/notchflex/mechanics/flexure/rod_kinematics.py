@@ -20,7 +20,7 @@ from jaxtyping import Array, Float
 from notchflex._arrays import xp
 from notchflex._jax import Pytree, jax, jnp
 from notchflex.mechanics.flexure.rod import Modes, Rod
-from notchflex.mechanics.material import SectionLaw, SectionResponse
+from notchflex.mechanics.material import SectionLaw
 from notchflex.mechanics.motion import (
     PLANE,
     Motion,
@@ -60,26 +60,11 @@ def integrate_rod(rod: Rod, modes: Modes) -> RodConfiguration:
         rotation, turn = rotation_about(rod.turn @ hat), rod.turn[..., 1:]
     else:
         turns, slope = _turns(rod, hat)
-        rotation = _products(rotation_about(turns))
+        rotation = xp.stack(list(accumulate(rotation_about(turns), operator.matmul)))
         turning = rotations_before(rotation) @ left_slope(turns) @ slope
         from_place, turn = (turns, slope, turning), xp.cumsum(turning, axis=0)
-    stepped = _stepped(rod, rotation)
+    stepped = (rotation[:-1, ..., None] * rod.step[:, None]).sum(axis=-2)
     return RodConfiguration(rotation, turn, stepped @ hat, stepped[..., 1:], from_place)
-
-
-def free_pose(rod: Rod) -> Motion:
-    """Return the pose of the distal body in the proximal frame, of a free rod in space."""
-    # It equals `relative_pose` without modes, and omits terms that only the derivatives need.
-    assert rod.turn_pair is not None
-    turns = xp.diff(rod.turn[..., 0], axis=0, prepend=0.0) + rod.turn_pair[..., 0, 0]
-    rotation = _products(rotation_about(turns))
-    end = Motion(rotation[-1], _stepped(rod, rotation)[..., 0].sum(axis=0))
-    return Motion(rod.start_rotation, rod.start_offset).then(end).then(tail_pose(rod))
-
-
-def _stepped(rod: Rod, rotation: Float[Array, "places d d"]) -> Float[Array, "gauss d hat"]:
-    """Rotate the steps at the nodes, for (1, q)."""
-    return (rotation[:-1, ..., None] * rod.step[:, None]).sum(axis=-2)
 
 
 def _turns(
@@ -107,11 +92,6 @@ def rotation_error_estimate(rod: Rod, modes: Modes) -> Float[Array, ""]:
     turns, _ = _turns(rod, hat)
     second = _by_pair(rod, hat) @ hat
     return 0.05 * jnp.sum(jnp.linalg.norm(turns, axis=-1) * jnp.linalg.norm(second, axis=-1))
-
-
-def _products(parts: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
-    """Multiply all rotations up to each."""
-    return xp.stack(list(accumulate(parts, operator.matmul)))
 
 
 def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
@@ -286,9 +266,7 @@ class FlexureState(Pytree):
     resultants: Float[Array, "intervals w"]
     strain: Float[Array, "intervals w"]  # Strain of each interval beyond that of the free tube
     memory: Any  # Memory of the material at every node, after these strains
-    # Change of the moment about y with the curvature at every node, where the law provides it
-    # (`SectionResponse.slope`)
-    slope: Float[Array, " nodes"] | None
+    slope: Float[Array, " nodes"]  # Change of the moment about y with the curvature at every node
     # Generalised internal force of each mode, N mm per unit of mode
     internal: Modes
     # Bending of the whole rod about x and y of its frame, of a plane about y, rad
@@ -329,7 +307,6 @@ def flexure_state(
     law: SectionLaw,
     memory: Any,
     modes: Modes,
-    response: SectionResponse | None = None,
     *,
     with_pose: bool,
 ) -> FlexureState:
@@ -340,8 +317,7 @@ def flexure_state(
         pose = relative_pose(rod, modes, configuration)
         twist = twist_slope(rod, modes, configuration)
     elastic = rod.basis @ modes
-    if response is None:
-        response = law.respond_all(in_space(elastic), rod.section, memory)
+    response = law.respond(in_space(elastic), rod.section, memory)
     resultants = of_rod(rod, response.resultants)
     # Padding modes have a stiffness of 1.
     internal = jnp.einsum("i,ic,icm->m", rod.length, resultants, rod.basis)
@@ -365,27 +341,15 @@ def flexure_state(
     )
 
 
-def material_tangent(
-    rod: Rod, law: SectionLaw, memory: Any, state: FlexureState
-) -> Float[Array, "modes modes"]:
+def material_tangent(rod: Rod, law: SectionLaw, state: FlexureState) -> Float[Array, "modes modes"]:
     """Differentiate the internal forces of the modes (`internal`) by the modes."""
 
-    def resultant_slope(
-        strain: Array, section: Any, past: Any, slope: Array | None, columns: Array
-    ) -> Array:
-        if slope is not None:
-            strains = in_space(columns.T)
-            elastic = law.elastic(strains.T, jax.tree.map(lambda leaf: leaf[..., None], section))
-            return of_rod(rod, jnp.where(xp.arange(6) == 1, slope * strains, elastic)).T
+    def resultant_slope(section: Any, slope: Array, columns: Array) -> Array:
+        strains = in_space(columns.T)
+        elastic = law.elastic(strains.T, jax.tree.map(lambda leaf: leaf[..., None], section))
+        return of_rod(rod, jnp.where(xp.arange(6) == 1, slope * strains, elastic)).T
 
-        def resultants(varied: Array) -> Array:
-            return of_rod(rod, law.respond(in_space(varied), section, past).resultants)
-
-        return jax.vmap(
-            lambda column: jax.jvp(resultants, (strain,), (column,))[1], in_axes=1, out_axes=1
-        )(columns)
-
-    slopes = jax.vmap(resultant_slope)(state.strain, rod.section, memory, state.slope, rod.basis)
+    slopes = jax.vmap(resultant_slope)(rod.section, state.slope, rod.basis)
     weighted = rod.length[:, None, None] * rod.basis
     return jnp.einsum("icm,ick->mk", weighted, slopes) + jnp.diag(rod.padding_mask)
 

@@ -42,10 +42,11 @@ from notchflex.mechanics.flexure.notch_rod import (
     about_neutral_axis,
     course_poses,
     course_rod,
+    strains_of,
+    unit_forces,
 )
 from notchflex.mechanics.flexure.rod import Rod, section_fibres
 from notchflex.mechanics.material import FibreSection, NotchEnds
-from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import (
     FibresAt,
     clamped_torsion_constant,
@@ -126,27 +127,6 @@ def round_strip(notch: ULink, tube: Tube) -> RootedStrip:
 def _size(thickness: float, wall: float) -> float:
     """Compute the thickness to which the lengths of a root are proportional, mm."""
     return thickness * (thickness / wall) ** 0.152
-
-
-def plane_compliance(
-    poses: Motion,
-    length: Float[Array, " nodes"],
-    section: FibreSection,
-    middle: Float[Array, " 3"],
-    poisson_ratio: float,
-) -> Float[Array, "2 2"]:
-    """Compute E times the compliance to forces across and along the tube at the middle, 1/mm."""
-    ends, area = section.compliance, xp.asarray(section.area)
-    bending = (1.0 + ends.weak) / xp.asarray(section.second_moment_weak)
-    across = 2.0 * (1.0 + poisson_ratio) * (1.0 + ends.push) / area
-    lever = poses.translation - middle
-    # Of unit forces along x and z: moments about y, then the forces in the frames of the sections.
-    moment = xp.stack([-lever[:, 2], lever[:, 0]], axis=-1)
-    force = poses.rotation[:, [0, 2]]
-    along = (1.0 + ends.axial) / area
-    parts = (bending, moment), (across, force[..., 0]), (along, force[..., 2])
-    products = [xp.einsum("k,ki,kj->ij", length * soft, by, by) for soft, by in parts]
-    return xp.sum(xp.stack(products), axis=0)
 
 
 def turned_compliance(
@@ -269,7 +249,10 @@ def rooted_strip_rod(
     poses = course_poses(along, above, heading, middle, strip.hand)
     on_wall = above[:-2] != 0.0
     section = strip_sections(strip, tube, along[:-2], on_wall, length, poisson_ratio)
-    plane = plane_compliance(poses.pick(slice(-2)), points.weight, section, middle, poisson_ratio)
+    # E times the compliance to forces across and along the tube at the middle, 1/mm.
+    resultants = unit_forces(poses.pick(slice(-2)), middle)
+    strain = strains_of(section, poisson_ratio, resultants)
+    plane = xp.einsum("k,kic,kjc->ij", points.weight, resultants, strain)
     turned = turned_compliance(strip, tube, plane, poisson_ratio)
     section = with_sideways(section, points.weight, on_wall, turned, poisson_ratio)
     modes = 3 + 3 * refinement, 1 + 2 * refinement

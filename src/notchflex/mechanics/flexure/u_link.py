@@ -39,7 +39,7 @@ from notchflex.mechanics.flexure.roots import (
     round_strip,
     wall_ranges,
 )
-from notchflex.mechanics.section import clamped_torsion_constant, leggauss, two_walls
+from notchflex.mechanics.section import clamped_torsion_constant, gauss_on, two_walls
 from notchflex.robot import Tube, ULink
 
 
@@ -100,18 +100,15 @@ class CurvedEnd:
         second = 0.5 * (0.5 * np.pi) ** 2 * self.slot_radius
         second = second * xp.stack([xp.cos(turn), -xp.sin(turn)], axis=-1)
         cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-        return cross / xp.linalg.norm(first, axis=-1) ** 3
+        return cross / self._speed(t) ** 3
 
     def length(self, t: Any = 1.0) -> Array:
         """Compute the length of the middle line from 0 to t, mm (Gao 2017, eq. 9 for t = 1)."""
-        t = xp.asarray(t)
-        nodes, weights = leggauss(10)  # exact for this smooth integral, a third of a turn at most
-        return 0.5 * t * (self._speed(0.5 * t[..., None] * (1.0 + nodes)) @ weights)
+        parts, weights = gauss_on(0.0, xp.asarray(t, float)[..., None])
+        return xp.sum(self._speed(parts) * weights, axis=-1)
 
-    def _speed(self, t: Array) -> Array:
-        """Compute |C'|, written out: it is evaluated at some thousand points per link."""
-        inner, outer = 0.5 * np.pi * self.slot_radius, self.outer_length + self.slot_radius
-        return 0.5 * xp.sqrt(inner**2 + outer**2 + 2.0 * inner * outer * xp.sin(0.5 * np.pi * t))
+    def _speed(self, t: Any) -> Array:
+        return xp.linalg.norm(self._first_derivative(t), axis=-1)
 
     def at_length(self, length: Any) -> Array:
         """Find the parameter t where the middle line has a given length from its beginning."""
@@ -230,8 +227,6 @@ def u_link_rod(
 @validity_warnings.register
 def _(notch: ULink, tube: Tube, site: Site) -> list[str]:
     del site
-    if not notch.has_elastic_ends:  # a model of a paper
-        return []
     thickness, length = notch.strip_thickness, notch.strip_length
     outer, radius = tube.outer_diameter, notch.slot_radius
     ranges: list[Dimension] = [

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from jaxtyping import Array, Float
 
-from notchflex._jax import constant
-from notchflex.mechanics.friction.registry import Edges, FrictionLaw, Turning, friction_law
+from notchflex._jax import constant, jnp
+from notchflex.mechanics.friction.registry import AtEdges, FrictionLaw, friction_law
 from notchflex.robot import Capstan
 
 
@@ -20,19 +20,14 @@ class CapstanLaw(FrictionLaw):
     # Tension that sliding over an edge costs whatever the turning, N; None for none
     loss: Float[Array, ""] | None
 
-    def bounds(self, exit_turning: Turning, entry_turning: Turning) -> Edges:
+    def bounds(self, turning: AtEdges) -> AtEdges:
         """Return coefficient times turning at each edge."""
-        moved = self.moved_to_exit * entry_turning
-        return (
-            self.coefficient * (exit_turning + moved),
-            self.coefficient * (entry_turning - moved),
-        )
+        moved = self.moved_to_exit * turning[..., 1:]
+        return self.coefficient * (turning + jnp.concatenate([moved, -moved], axis=-1))
 
-    def constant_loss(self, exit_turning: Turning, entry_turning: Turning) -> Edges | None:
+    def constant_loss(self, turning: AtEdges) -> AtEdges | None:
         """Return the same loss at every edge."""
-        if self.loss is None:
-            return None
-        return self.loss + 0.0 * exit_turning, self.loss + 0.0 * entry_turning
+        return None if self.loss is None else self.loss + 0.0 * turning
 
 
 @friction_law.register

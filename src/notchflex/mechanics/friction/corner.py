@@ -5,7 +5,7 @@ from __future__ import annotations
 from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import constant, jnp
-from notchflex.mechanics.friction.registry import Edges, FrictionLaw, Turning, friction_law
+from notchflex.mechanics.friction.registry import AtEdges, FrictionLaw, friction_law
 from notchflex.robot import Corner
 
 # At mu tan(beta/2) = 1 a corner holds any tension. Just below, the logarithm of the ratio is
@@ -18,20 +18,17 @@ class CornerLaw(FrictionLaw):
 
     coefficient: Float[Array, ""]  # Coefficient of friction
 
-    def bounds(self, exit_turning: Turning, entry_turning: Turning) -> Edges:
+    def bounds(self, turning: AtEdges) -> AtEdges:
         """Return 2 artanh(coefficient * tan(turning / 2)) at each edge."""
         # It is ln((cos b + mu sin b) / (cos b - mu sin b)) with b = half the turning.
-        return self._bound(exit_turning), self._bound(entry_turning)
-
-    def valid(self, exit_turning: Turning, entry_turning: Turning) -> Bool[Array, "*t"]:
-        """Return where coefficient times tangent of half the turning is below 1 at both edges."""
-        return (self._slope(exit_turning) < _STEEPEST) & (self._slope(entry_turning) < _STEEPEST)
-
-    def _slope(self, turning: Turning) -> Turning:
-        return self.coefficient * jnp.tan(0.5 * turning)
-
-    def _bound(self, turning: Turning) -> Turning:
         return 2.0 * jnp.arctanh(jnp.minimum(self._slope(turning), _STEEPEST))
+
+    def valid(self, turning: AtEdges) -> Bool[Array, "*t"]:
+        """Return where coefficient times tangent of half the turning is below 1 at both edges."""
+        return jnp.all(self._slope(turning) < _STEEPEST, axis=-1)
+
+    def _slope(self, turning: AtEdges) -> AtEdges:
+        return self.coefficient * jnp.tan(0.5 * turning)
 
 
 @friction_law.register

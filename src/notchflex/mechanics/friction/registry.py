@@ -12,9 +12,7 @@ from notchflex._jax import Pytree, jnp
 from notchflex._packages import unregistered
 from notchflex.robot import Frictionless
 
-Turning = Float[Array, "*t"]
-"""Turning angle of every tendon at an edge, rad."""
-Edges = tuple[Turning, Turning]
+AtEdges = Float[Array, "*t 2"]
 """A value of every tendon at the exit edge of a gap, and at the entry edge."""
 
 
@@ -32,53 +30,41 @@ class FrictionLaw(Pytree, ABC):
     remembers: ClassVar[bool] = True
 
     @abstractmethod
-    def bounds(self, exit_turning: Turning, entry_turning: Turning) -> Edges:
-        """Return the largest |ln(base-side tension / tip-side tension)| at both edges.
+    def bounds(self, turning: AtEdges) -> AtEdges:
+        """Return the largest |ln(base-side tension / tip-side tension)| at both edges, >= 0.
 
         Args:
-            exit_turning: Angle by which the tendon turns where it leaves the proximal body, rad.
-            entry_turning: Angle by which it turns where it enters the distal body, rad.
-
-        Returns:
-            The bound at the exit edge and at the entry edge, each >= 0.
+            turning: Angle by which the tendon turns where it leaves the proximal body, and where it
+                enters the distal body, rad.
         """
 
-    def constant_loss(self, exit_turning: Turning, entry_turning: Turning) -> Edges | None:
+    def constant_loss(self, turning: AtEdges) -> AtEdges | None:
         """State the tension that sliding costs beside the ratio of `bounds`, N.
 
         Args:
-            exit_turning: As for `bounds`.
-            entry_turning: As for `bounds`.
+            turning: As for `bounds`.
 
         Returns:
-            The loss at the exit edge and at the entry edge, each >= 0; None where there is none.
+            The loss at both edges, >= 0; None where there is none.
         """
-        del exit_turning, entry_turning
+        del turning
 
     def offset(self) -> Float[Array, ""] | float:
         """Return what is added to tensions in their ratios, N: the loss at a turning of 1 rad."""
         # With a constant loss the tension beyond a contact may be 0 N, and is not 0 N beyond a
         # released one. Ratios of tensions that are raised by a loss are finite.
-        losses = self.constant_loss(jnp.ones(()), jnp.ones(()))
+        loss = self.constant_loss(jnp.ones(2))
         # Above 0 the formulas are finite where the loss is zero.
-        return 0.0 if losses is None else jnp.maximum(jnp.maximum(*losses), 1e-100)
+        return 0.0 if loss is None else jnp.maximum(jnp.max(loss), 1e-100)
 
-    def limits(
-        self,
-        exit_turning: Turning,
-        entry_turning: Turning,
-        tension: Edges,
-        log_ratio: Float[Array, "*t 2"],
-    ) -> Float[Array, "*t 2"]:
+    def limits(self, turning: AtEdges, before: AtEdges, log_ratio: AtEdges) -> AtEdges:
         """Compute the largest |ln(tension ratio)| at both edges, constant losses included."""
-        # With the tension T on the base side, T' on the tip side and the offset a, the ratio is (T
-        # + a) / (T' + a). At the limit of loading T = e^b T' + F, or T' = 0 where T is below the
-        # loss F; at that of unloading T' = e^b T + F.
-        ratio = jnp.stack(self.bounds(exit_turning, entry_turning), axis=-1)
-        losses = self.constant_loss(exit_turning, entry_turning)
-        if losses is None:
+        # With the tension T before an edge, on the base side, T' on the tip side and the offset a,
+        # the ratio is (T + a) / (T' + a). At the limit of loading T = e^b T' + F, or T' = 0 where T
+        # is below the loss F; at that of unloading T' = e^b T + F.
+        ratio, loss = self.bounds(turning), self.constant_loss(turning)
+        if loss is None:
             return ratio
-        loss, before = jnp.stack(losses, axis=-1), jnp.stack(tension, axis=-1)
         before, offset = jnp.maximum(before, 0.0), self.offset()
         lowest = jnp.exp(-ratio) * jnp.maximum(before - loss, 0.0)
         highest = jnp.exp(ratio) * before + loss
@@ -86,14 +72,13 @@ class FrictionLaw(Pytree, ABC):
         unloading = jnp.log((highest + offset) / (before + offset))
         return jnp.where(log_ratio >= 0.0, loading, unloading)
 
-    def valid(self, exit_turning: Turning, entry_turning: Turning) -> Bool[Array, "*t"]:
+    def valid(self, turning: AtEdges) -> Bool[Array, "*t"]:
         """Return where the law is valid; elsewhere `bounds` is finite but meaningless.
 
         Args:
-            exit_turning: As for `bounds`.
-            entry_turning: As for `bounds`.
+            turning: As for `bounds`.
         """
-        return jnp.ones_like(exit_turning + entry_turning, dtype=bool)
+        return jnp.ones_like(turning[..., 0], dtype=bool)
 
 
 @singledispatch
@@ -117,9 +102,9 @@ class FrictionlessLaw(FrictionLaw):
 
     remembers = False
 
-    def bounds(self, exit_turning: Turning, entry_turning: Turning) -> Edges:
+    def bounds(self, turning: AtEdges) -> AtEdges:
         """Return zero at both edges."""
-        return jnp.zeros_like(exit_turning), jnp.zeros_like(entry_turning)
+        return jnp.zeros_like(turning)
 
 
 @friction_law.register

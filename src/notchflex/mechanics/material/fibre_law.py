@@ -26,9 +26,8 @@ from notchflex.mechanics.material.law import (
     Fibres,
     FibreSection,
     Scalar,
+    SectionEnds,
     SectionLaw,
-    SectionResponse,
-    Strain,
     moduli,
     section_law,
 )
@@ -45,34 +44,17 @@ class FibreSums(NamedTuple):
     bending: Array  # Change of the moment with the curvature
 
 
-class SectionEnds(NamedTuple):
-    """The section between its ends: direct * k + soft * moment = s."""
-
-    direct: Array
-    soft: Array
-    reduced: Array
-
-    def beyond(self, curvature: Array, sums: FibreSums) -> Array:
-        """Return by how much section and ends bend beyond s."""
-        return self.direct * curvature + self.soft * sums.moment - self.reduced
-
-    def step(self, curvature: Array, sums: FibreSums, slopes: FibreSums) -> tuple[Array, Array]:
-        """Return Newton's step of the strain of the neutral axis and of the curvature."""
-        beyond = self.beyond(curvature, sums)
-        by_strain, by_curvature = self.soft * slopes.mixed, self.direct + self.soft * slopes.bending
-        determinant = slopes.stretch * by_curvature - slopes.mixed * by_strain
-        strain = slopes.mixed * beyond - by_curvature * sums.force
-        turn = by_strain * sums.force - slopes.stretch * beyond
-        return strain / determinant, turn / determinant
-
-    def size(self, curvature: Array, sums: FibreSums, scale: tuple[Array, Array]) -> Array:
-        """Return the imbalance of forces and of bending, as strains."""
-        return jnp.abs(sums.force) / scale[1] + scale[0] * jnp.abs(self.beyond(curvature, sums))
-
-    def slope(self, slopes: FibreSums) -> Array:
-        """Return the change of the moment with s."""
-        free = slopes.bending - slopes.mixed**2 / slopes.stretch
-        return free / (self.direct + self.soft * free)
+def _step(
+    joint: SectionEnds, curvature: Array, sums: FibreSums, slopes: FibreSums
+) -> tuple[Array, Array]:
+    """Return Newton's step of the strain of the neutral axis and of the curvature."""
+    beyond = joint.beyond(curvature, sums.moment)
+    by_strain = joint.soft * slopes.mixed
+    by_curvature = joint.direct + joint.soft * slopes.bending
+    determinant = slopes.stretch * by_curvature - slopes.mixed * by_strain
+    strain = slopes.mixed * beyond - by_curvature * sums.force
+    turn = by_strain * sums.force - slopes.stretch * beyond
+    return strain / determinant, turn / determinant
 
 
 def _settle(
@@ -96,9 +78,11 @@ def _settle(
         strain, curvature, by_strain, by_curvature, sums, imbalance, iterations = search
         trial = strain + by_strain, curvature + by_curvature
         trial_sums = law.sum_fibres(fibres, memory, *trial)
-        size = joint.size(trial[1], trial_sums, scale)
+        bends_beyond = joint.beyond(trial[1], trial_sums.moment)
+        # Of forces and of bending, as strains.
+        size = jnp.abs(trial_sums.force) / scale[1] + scale[0] * jnp.abs(bends_beyond)
         falls = size < imbalance
-        step = joint.step(trial[1], trial_sums, trial_sums)
+        step = _step(joint, trial[1], trial_sums, trial_sums)
         # With all fibres on a plateau a step would be endless.
         longest = 0.2 * bending_strain / jnp.maximum(jnp.abs(step[0]), 1e-300)
         by = [jnp.minimum(longest, 1.0) * part for part in step]
@@ -137,31 +121,10 @@ def same_sums(sums: FibreSums, *of: Any) -> FibreSums:
     return sums
 
 
-def _change_of_sums(
-    primals: tuple[Any, ...], tangents: tuple[Any, ...]
-) -> tuple[FibreSums, FibreSums]:
-    """Differentiate with respect to the varying arguments only."""
-
-    def is_still(tangent: Any) -> bool:
-        return isinstance(tangent, jax.custom_derivatives.SymbolicZero)
-
+@same_sums.defjvp
+def _(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[FibreSums, FibreSums]:
     (sums, *of), (_, *moved) = primals, tangents
-    leaves, tree = jax.tree.flatten(of)
-    slopes = jax.tree.leaves(moved, is_leaf=is_still)
-    varies = [index for index, slope in enumerate(slopes) if not is_still(slope)]
-
-    def again(*varied: Array) -> FibreSums:
-        changed = list(leaves)
-        for index, value in zip(varies, varied, strict=True):
-            changed[index] = value
-        law, *rest = jax.tree.unflatten(tree, changed)
-        return law.sum_fibres(*rest)
-
-    values, along = [leaves[index] for index in varies], [slopes[index] for index in varies]
-    return sums, jax.jvp(again, values, along)[1]
-
-
-same_sums.defjvp(_change_of_sums, symbolic_zeros=True)
+    return sums, jax.jvp(lambda law, *rest: law.sum_fibres(*rest), of, moved)[1]
 
 
 _KINKS = 8  # kinks per loop iteration: more lengthen programs, fewer slow them down
@@ -225,34 +188,27 @@ class FibreLaw(SectionLaw):
         """Return the moment halfway between loading and unloading."""
         return self.bent(curvature, dataclasses.replace(section, ends=None), ()).moment
 
-    def respond_all(self, strain: Strain, section: FibreSection, memory: Any) -> SectionResponse:
-        """Compute all sections at once: tracing them one by one takes three times as long."""
-        return self.respond(strain, section, memory)
-
     def bent(self, reduced: Float[Array, "*shape"], section: FibreSection, memory: Any) -> Bending:
         """Bend sections between their ends; only the last Newton step is differentiated."""
-        fibres, ends = section.fibres, section.compliance
+        fibres = section.fibres
         assert fibres is not None
-        none = jnp.zeros_like(reduced)
-        weak, share = none + ends.weak, none + ends.material_share
-        rigidity = self.elastic_modulus * section.second_moment_weak
-        joint = SectionEnds(1.0 + share * weak, (1.0 - share) * weak / rigidity, reduced)
-        start = reduced / (1.0 + weak)
+        joint = self.joint(reduced, section)
+        start = reduced / (1.0 + section.compliance.weak)
         scale = section.edge_near, self.elastic_modulus * section.area
         everything = self, fibres, memory, joint, scale, start
         fixed_arguments = jax.tree.map(jax.lax.stop_gradient, everything)
         strain, curvature, slopes = settle_fibres(*fixed_arguments)
-        _, fixed_fibres, _, fixed, *_ = fixed_arguments
         sums = same_sums(slopes, self, fibres, memory, strain, curvature)
-        by_strain, by_curvature = joint.step(curvature, sums, slopes)
+        by_strain, by_curvature = _step(joint, curvature, sums, slopes)
+        free = slopes.bending - slopes.mixed**2 / slopes.stretch
         if not isinstance(memory, tuple):
             moves = strain, curvature, by_strain, by_curvature
-            memory = self._remember(fibres, memory, fixed_fibres.arm, moves)
+            memory = self._remember(fibres, memory, moves)
         return Bending(
             curvature=curvature + by_curvature,
             moment=sums.moment + slopes.mixed * by_strain + slopes.bending * by_curvature,
             memory=memory,
-            slope=fixed.slope(slopes),
+            slope=fixed_arguments[3].slope(free),
             strain=strain + by_strain,
         )
 
@@ -275,9 +231,7 @@ class FibreLaw(SectionLaw):
         sums = jax.lax.scan(add, none, parts)[0]
         return jax.tree.map(lambda total: self.elastic_modulus * total, sums)
 
-    def _remember(
-        self, fibres: Fibres, memory: Array, fixed_arm: Array, moves: tuple[Array, ...]
-    ) -> Array:
+    def _remember(self, fibres: Fibres, memory: Array, moves: tuple[Array, ...]) -> Array:
         """Compute the memory after the last step, linearised about the iterate before it."""
         curves = self._curves(memory)
         strain, curvature, by_strain, by_curvature = moves
@@ -288,7 +242,7 @@ class FibreLaw(SectionLaw):
             moved = _along(by_strain, by_curvature, still)
             return none, transformed + jax.lax.stop_gradient(slope) * moved
 
-        parts = jax.tree.map(_in_parts, (fibres.arm, fixed_arm, memory))
+        parts = jax.tree.map(_in_parts, (fibres.arm, jax.lax.stop_gradient(fibres.arm), memory))
         transformed = jnp.moveaxis(jax.lax.scan(some, None, parts)[1], 0, -2)
         return jnp.reshape(transformed, memory.shape)
 
@@ -374,10 +328,6 @@ def _(material: Nitinol) -> FibreLaw:
         length = material.transformation_strain - loading
         low, high = xp.hstack([low, low - length]), xp.hstack([high, high + length])
         change = xp.append(change, -change)
-    return _law(material, low, high, change)
-
-
-def _law(material: Nitinol | StressStrain, low: Array, high: Array, change: Array) -> FibreLaw:
     return FibreLaw(*moduli(material), *map(constant, (low, high, change)))
 
 
@@ -402,7 +352,7 @@ def _(material: StressStrain) -> FibreLaw:
         xp.pad(kinks, spare, constant_values=far)[None]
         for kinks, far in ((low, -_NEVER), (high, _NEVER))
     )
-    return _law(material, low, high, xp.pad(change, spare))
+    return FibreLaw(*moduli(material), *map(constant, (low, high, xp.pad(change, spare))))
 
 
 @lru_cache(maxsize=64)

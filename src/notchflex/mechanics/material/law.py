@@ -19,14 +19,14 @@ import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial, singledispatch
-from typing import Any, ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple
 
 from jaxtyping import Array, Float
 
 from notchflex._arrays import decide, xp
 from notchflex._jax import Pytree, constant, jax, jnp
 from notchflex._packages import unregistered
-from notchflex.mechanics.section import leggauss
+from notchflex.mechanics.section import gauss_on
 
 Scalar = Float[Array, ""]
 Each = Float[Array, "*shape"]
@@ -35,14 +35,18 @@ Strain = Float[Array, "*shape 6"]
 
 
 def bracketed_root(
-    function: Callable[[Array], tuple[Array, Array]], start: Array, low: Array, high: Array
+    beyond: Callable[..., tuple[Array, Array]], varied: Any, start: Array, low: Array, high: Array
 ) -> Array:
-    """Find the root of a rising function by Newton's method with bisection; not differentiable."""
-    # A bilinear law takes three iterations of the 20, one with a plastic branch more.
+    """Find the root of a rising function by Newton's method with bisection."""
+    # The function of `varied` and the unknown returns its value and slope. Only a last Newton step
+    # is differentiated. A bilinear law takes three of the 20 steps, a plastic branch one more.
+    fixed, bracket = jax.tree.map(
+        jax.lax.stop_gradient, (varied, (start, low, high, 2.0 * (high - low)))
+    )
 
     def improve(_: int, search: tuple[Array, ...]) -> tuple[Array, ...]:
         root, low, high, last_step = search
-        value, slope = function(root)
+        value, slope = beyond(*fixed, root)
         low = jnp.where(value <= 0.0, root, low)
         high = jnp.where(value >= 0.0, root, high)
         step = -value / slope
@@ -51,8 +55,26 @@ def bracketed_root(
         new = jnp.where(newton_step, new, 0.5 * (low + high))
         return new, low, high, jnp.abs(new - root)
 
-    search = start, low, high, 2.0 * (high - low)
-    return jax.lax.fori_loop(0, 20, improve, search)[0]
+    root = jax.lax.fori_loop(0, 20, improve, bracket)[0]
+    value, slope = beyond(*varied, root)
+    slope = jax.lax.stop_gradient(slope)
+    return root - jnp.where(slope > 1e-9, value / jnp.where(slope > 1e-9, slope, 1.0), 0.0)
+
+
+class SectionEnds(NamedTuple):
+    """The section between its ends: direct * k + soft * moment = s."""
+
+    direct: Array
+    soft: Array
+    reduced: Array
+
+    def beyond(self, curvature: Array, moment: Array) -> Array:
+        """Return by how much section and ends bend beyond s."""
+        return self.direct * curvature + self.soft * moment - self.reduced
+
+    def slope(self, free: Array) -> Array:
+        """Return the change of the moment with s, from that with the section's own curvature."""
+        return free / (self.direct + self.soft * free)
 
 
 class NotchEnds(Pytree):
@@ -180,8 +202,7 @@ class FibreSection(Pytree):
 #
 # A change of e thus dissipates (K X(kappa) - H'(e)) de, which is zero without hysteresis.
 
-_GAUSS = leggauss(64)
-NODES, WEIGHTS = 0.5 + 0.5 * _GAUSS[0], 0.5 * _GAUSS[1]
+NODES, WEIGHTS = gauss_on(0.0, 1.0, 64)
 """Gauss's rule on 0 ... 1."""
 
 
@@ -243,9 +264,7 @@ def _middle(
         law: SectionLaw, section: FibreSection, present: Array, stiffness: Array, reduced: Array
     ) -> tuple[Array, Array]:
         bent = law.bent(reduced, section, ())
-        return reduced - bent.moment / stiffness - present, 1.0 - cast(
-            "Array", bent.slope
-        ) / stiffness
+        return reduced - bent.moment / stiffness - present, 1.0 - bent.slope / stiffness
 
     # s is largest at kappa^2 = 1 / even; the transformation is a fraction of it. Where a section
     # does not flatten, `even` is negligible, but above 0.
@@ -253,17 +272,9 @@ def _middle(
     side = jnp.where(present < 0.0, -1.0, 1.0)
     extreme = side / (2.0 * root + side * ends.odd)
     low, high = jnp.minimum(present, extreme), jnp.maximum(present, extreme)
+    bounds = jax.lax.stop_gradient((low, high))
     varied = law, section, present, stiffness
-    fixed, bounds = jax.tree.map(
-        jax.lax.stop_gradient, (varied, (jnp.clip(start, low, high), low, high))
-    )
-    reduced = bracketed_root(partial(beyond, *fixed), *bounds)
-    # Only the last Newton step is differentiated; a section that hardly transforms is elastic.
-    missing, slope = beyond(*varied, reduced)
-    slope = jax.lax.stop_gradient(slope)
-    transforms = slope > 1e-9
-    step = jnp.where(transforms, missing / jnp.where(transforms, slope, 1.0), 0.0)
-    reduced = jnp.clip(reduced - step, *bounds[1:])
+    reduced = jnp.clip(bracketed_root(beyond, varied, jnp.clip(start, *bounds), *bounds), *bounds)
     # The solution of s = kappa / q before that largest one.
     linear = 1.0 - ends.odd * reduced
     square = jnp.maximum(linear**2 - 4.0 * ends.even * reduced**2, 0.0)
@@ -275,9 +286,7 @@ class SectionResponse(NamedTuple):
 
     resultants: Strain  # Moments about x, y, z (N mm) and forces along x, y, z (N)
     memory: Any  # The memory after these strains
-    # Change of the moment about y with the curvature about y, where the law provides it and all
-    # else is elastic; None to differentiate
-    slope: Scalar | None = None
+    slope: Scalar  # Change of the moment about y with the curvature about y; the rest is elastic
 
 
 class Bending(NamedTuple):
@@ -287,8 +296,7 @@ class Bending(NamedTuple):
     curvature: Scalar
     moment: Scalar  # Its moment, N mm
     memory: Any  # The memory after it
-    # Change of the moment with s, where the law provides it; None to differentiate
-    slope: Array | None = None
+    slope: Array  # Change of the moment with s
     strain: Array | float = 0.0  # Strain of the neutral axis, for laws of fibres
 
 
@@ -332,31 +340,44 @@ class SectionLaw(Pytree, ABC):
     def bending_energy(self, curvature: Scalar, section: FibreSection, memory: Any) -> Scalar:
         """Return the energy per length of a section without ends at a curvature, N mm/mm."""
 
-    def bent(self, reduced: Scalar, section: FibreSection, memory: Any) -> Bending:
-        """Bend a section between its ends by s = kappa / q; for laws without memory."""
-        if self.is_linear or section.ends is None:
-            curvature = reduced / (1.0 + section.compliance.weak)
-        else:
-            curvature = _between_ends(self, section, reduced)
-        return Bending(curvature, self.moment(curvature, section), memory)
+    def joint(self, reduced: Each, section: FibreSection) -> SectionEnds:
+        """Join sections to their ends."""
+        ends, rigid = section.compliance, jnp.ones_like(reduced)
+        rigidity = self.elastic_modulus * section.second_moment_weak
+        direct = rigid + ends.material_share * ends.weak
+        return SectionEnds(direct, (rigid - ends.material_share) * ends.weak / rigidity, reduced)
 
-    def respond_all(self, strain: Strain, section: FibreSection, memory: Any) -> SectionResponse:
-        """Compute the resultants of many cross-sections."""
-        respond = self.respond
-        for _ in strain.shape[:-1]:
-            respond = jax.vmap(respond)
-        return respond(strain, section, memory)
+    def bent(self, reduced: Each, section: FibreSection, memory: Any) -> Bending:
+        """Bend sections between their ends by s = kappa / q; for laws without memory."""
+
+        def moment(law: SectionLaw, section: FibreSection, curvature: Array) -> tuple[Array, Array]:
+            moment_at = partial(law.moment, section=section)
+            return jax.jvp(moment_at, (curvature,), (jnp.ones_like(curvature),))
+
+        def beyond(
+            law: SectionLaw, section: FibreSection, reduced: Array, curvature: Array
+        ) -> tuple[Array, Array]:
+            joint, (bends, slope) = law.joint(reduced, section), moment(law, section, curvature)
+            return joint.beyond(curvature, bends), joint.direct + joint.soft * slope
+
+        curvature = reduced / (1.0 + section.compliance.weak)
+        joint = self.joint(reduced, section)
+        if not self.is_linear and section.ends is not None:
+            # Bound: a section without resistance, where only what follows it limits it.
+            most = reduced / joint.direct
+            bounds = jnp.minimum(most, 0.0), jnp.maximum(most, 0.0)
+            curvature = bracketed_root(beyond, (self, section, reduced), curvature, *bounds)
+        bends, slope = moment(self, section, curvature)
+        return Bending(curvature, bends, memory, joint.slope(slope))
 
     def respond(self, strain: Strain, section: FibreSection, memory: Any) -> SectionResponse:
-        """Compute resultants from strains beyond those of the free tube, N and N mm."""
-        # Laws that bend many sections at once accept many.
+        """Compute resultants from strains beyond those of the free tube, of one section or many."""
         elastic = self.elastic(jnp.moveaxis(strain, -1, 0), section)
         ends, curvature = section.compliance, strain[..., 1]
         q = ends.flattening(curvature)
         bending = self.bent(curvature / q, section, memory)
-        if (slope := bending.slope) is not None:
-            by_q = (ends.odd + 2.0 * ends.even * curvature) / q
-            slope = (slope * (1.0 - curvature * by_q) / q - bending.moment * by_q) / q
+        by_q = (ends.odd + 2.0 * ends.even * curvature) / q
+        slope = (bending.slope * (1.0 - curvature * by_q) / q - bending.moment * by_q) / q
         resultants = jnp.where(_WEAK, (bending.moment / q)[..., None], elastic)
         return SectionResponse(resultants, bending.memory, slope)
 
@@ -370,13 +391,11 @@ class SectionLaw(Pytree, ABC):
         others = 0.5 * jnp.where(_WEAK, 0.0, self.elastic(strain, section)) @ strain
         ends, curvature = section.compliance, strain[1]
         bending = self.bent(curvature / ends.flattening(curvature), section, memory)
-        stored = (1.0 + ends.material_share * ends.weak) * self.bending_energy(
-            bending.curvature, section, memory
-        )
+        joint = self.joint(bending.curvature, section)
+        stored = joint.direct * self.bending_energy(bending.curvature, section, memory)
         if section.ends is None:
             return others + stored, Flattening(*[jnp.zeros_like(curvature)] * 4)
-        rigidity = self.elastic_modulus * section.second_moment_weak
-        stored += 0.5 * (1.0 - ends.material_share) * ends.weak * bending.moment**2 / rigidity
+        stored += 0.5 * joint.soft * bending.moment**2
         flat = flattening(self, curvature, section, memory)
         return others + stored + flat.energy, flat
 
@@ -407,28 +426,6 @@ class SectionLaw(Pytree, ABC):
         plain = dataclasses.replace(section, fibres=None)
         columns = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], plain)
         return self.elastic(constant(xp.eye(6)), columns).swapaxes(-1, -2)
-
-
-def _between_ends(law: SectionLaw, section: FibreSection, reduced: Array) -> Scalar:
-    """Find the curvature of a section between its ends; the last Newton step is differentiated."""
-
-    def beyond(law: SectionLaw, section: FibreSection, reduced: Array, curvature: Array) -> Array:
-        ends, rigidity = section.compliance, law.elastic_modulus * section.second_moment_weak
-        elastic, share = law.moment(curvature, section) / rigidity, ends.material_share
-        follows = (1.0 + share * ends.weak) * curvature
-        return follows + (1.0 - share) * ends.weak * elastic - reduced
-
-    fixed = jax.tree.map(jax.lax.stop_gradient, (law, section, reduced))
-    ends, aim = fixed[1].ends, fixed[2]
-
-    def with_slope(curvature: Array) -> tuple[Array, Array]:
-        return jax.jvp(partial(beyond, *fixed), (curvature,), (jnp.ones_like(curvature),))
-
-    # Bound: a section without resistance, where only the compliance that follows it limits it.
-    soft_limit = aim / (1.0 + ends.material_share * ends.weak)
-    low, high = jnp.minimum(soft_limit, 0.0), jnp.maximum(soft_limit, 0.0)
-    root = bracketed_root(with_slope, aim / (1.0 + ends.weak), low, high)
-    return root - beyond(law, section, reduced, root) / with_slope(root)[1]
 
 
 def moduli(material: Any) -> tuple[Array, Array]:

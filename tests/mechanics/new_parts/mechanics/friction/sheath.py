@@ -10,11 +10,11 @@ class SheathLaw(FrictionLaw):
 
     loss: float
 
-    def bounds(self, exit_turning, entry_turning):
-        return jnp.zeros_like(exit_turning), jnp.zeros_like(entry_turning)
+    def bounds(self, turning):
+        return jnp.zeros_like(turning)
 
-    def constant_loss(self, exit_turning, entry_turning):
-        return self.loss + 0.0 * exit_turning, self.loss + 0.0 * entry_turning
+    def constant_loss(self, turning):
+        return self.loss + 0.0 * turning
 
 
 @friction_law.register
