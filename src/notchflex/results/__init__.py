@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath, Recorded
     from notchflex.results.quantities import QUANTITIES
     from notchflex.results.reading import read_table
-    from notchflex.results.state import Equilibrium, SavedState, State
+    from notchflex.results.state import Equilibrium, State
 
 __all__ = [
     "QUANTITIES",
@@ -21,7 +21,6 @@ __all__ = [
     "EquilibriumPath",
     "Quantity",
     "Recorded",
-    "SavedState",
     "State",
     "read_path",
     "read_table",
@@ -34,7 +33,7 @@ __getattr__ = loader(
         "Equilibrium": "notchflex.results.state",
         "EquilibriumPath": "notchflex.results.path",
         "Recorded": "notchflex.results.path",
-        **dict.fromkeys(("SavedState", "State"), "notchflex.results.state"),
+        "State": "notchflex.results.state",
         **dict.fromkeys(("read_path", "save_path"), "notchflex.results.io"),
         "read_table": "notchflex.results.reading",
         "QUANTITIES": "notchflex.results.quantities",
