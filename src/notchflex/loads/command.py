@@ -106,20 +106,12 @@ def load_slopes(load_path: LoadPath, robot: Robot, chain: Chain, change: Chain) 
     return BodyLoads(*(one - other for one, other in zip(changed, still, strict=True)))
 
 
-def in_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
-    """Reduce loads of space to the plane that x and z of a frame span."""
+def in_space(loads: BodyLoads, frame: Float[Array, "3 3"], *, reduce: bool = False) -> BodyLoads:
+    """Expand loads of the plane that x and z of a frame span to space, or reduce those of space."""
     turn = np.asarray(frame)
-    return _in_basis(loads, turn[:, IN_PLANE], turn[:, 1:2])
-
-
-def out_of_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
-    """Expand loads of the plane that x and z of a frame span to space."""
-    turn = np.asarray(frame)
-    return _in_basis(loads, turn[:, IN_PLANE].T, turn[:, 1:2].T)
-
-
-def _in_basis(loads: BodyLoads, along: np.ndarray, about: np.ndarray) -> BodyLoads:
-    """Transform loads to another basis, given by columns for forces and for moments."""
+    along, about = turn[:, IN_PLANE].T, turn[:, 1:2].T
+    if reduce:
+        along, about = along.T, about.T
     force, moment, arm, following = map(np.asarray, loads)
     axes = about.shape[0]
     turning = [following[..., :axes] @ about, following[..., axes:] @ along]

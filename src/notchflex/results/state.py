@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, overload
@@ -18,15 +18,17 @@ from notchflex._summary import Displayed, Summary, course, short, vector
 from notchflex._values import ByValue
 from notchflex.errors import ConvergenceError, InputError
 from notchflex.loads import Load
-from notchflex.loads.command import BodyLoads, in_frame, out_of_frame
+from notchflex.loads.command import in_space
 from notchflex.loads.load import short_repr
 from notchflex.loads.load_path import MOST, external_rows, load_words, tendon_rows
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
 from notchflex.results.quantities import QUANTITIES, EquilibriumQuantities
 from notchflex.robot import Robot
+from notchflex.robot.part import fields_of
 from notchflex.robot.reading import read_text, robot_from_text
 from notchflex.robot.robot import to_table
+from notchflex.robot.value_names import named_parts
 from notchflex.solver.residual import SolverState, at_rest
 
 if TYPE_CHECKING:
@@ -38,8 +40,6 @@ if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
 
 
-# Values without effect on states: name, limit of strain warnings, tolerances, title block.
-_NO_EFFECT = ("name", "material.allowed_strain", "tolerance.", "drawing.")
 _MAX_NAMED = 3
 
 
@@ -69,7 +69,7 @@ def differences(robot: Robot, other: Robot) -> list[str]:
     changed: list[str] = []
     for general, pairs in changes.items():
         for (mine, its), names in pairs.items():
-            everywhere = len(names) == sum(_general(one) == general for one in first)
+            everywhere = len(names) == sum(_general(name) == general for name in first)
             shown = [general] if everywhere else names
             changed += [f"{name} = {_text(mine)} instead of {_text(its)}" for name in shown]
     return changed
@@ -85,21 +85,13 @@ def mismatch(robot: Robot, other: Robot) -> str:
 
 
 def _values(robot: Robot) -> dict[str, Any]:
-    """Return every value of a robot by its name, notch by notch."""
-    table = to_table(robot.replace(notch=robot.notches))
-    values: dict[str, Any] = {}
-    for section, part in table.items():
-        if isinstance(part, Mapping):
-            parts = {section: part}
-        elif isinstance(part, list):
-            parts = {f"{section}[{number}]": one for number, one in enumerate(part, start=1)}
-        else:
-            values[section] = part
-            continue
-        values |= {
-            f"{name}.{key}": value for name, one in parts.items() for key, value in one.items()
-        }
-    return {name: value for name, value in values.items() if not name.startswith(_NO_EFFECT)}
+    """Return every value that has an effect on states by its name, notch by notch."""
+    return {
+        f"{named.name}.{key}": getattr(named.part, key)
+        for named in named_parts(robot.replace(notch=robot.notches))
+        for key in fields_of(type(named.part))
+        if named.section != "drawing" and key != "allowed_strain"
+    }
 
 
 def _general(name: str) -> str:
@@ -266,7 +258,7 @@ class State(ByValue, Displayed):
         solved: SolverState = tree_util.tree_unflatten(
             tree_util.tree_structure(rest), leaves.values()
         )
-        return _in_space(solved, chain, in_frame)
+        return _in_space(solved, chain, reduce=True)
 
 
 def leaves_of(solved: SolverState) -> dict[str, np.ndarray]:
@@ -281,13 +273,11 @@ def leaves_of(solved: SolverState) -> dict[str, np.ndarray]:
     }
 
 
-def _in_space(
-    solved: SolverState, chain: Chain, turn: Callable[..., BodyLoads] = out_of_frame
-) -> SolverState:
-    """Return a state with its loads as those of space, or of a flat chain with `in_frame`."""
+def _in_space(solved: SolverState, chain: Chain, *, reduce: bool = False) -> SolverState:
+    """Return a state with its loads as those of space, or as those of its chain (`reduce`)."""
     if solved.applied is None or chain.frame is None:
         return solved
-    return solved._replace(applied=turn(solved.applied, chain.frame))
+    return solved._replace(applied=in_space(solved.applied, chain.frame, reduce=reduce))
 
 
 def _array(source: str | FilePath, name: str, numbers: Any) -> np.ndarray:
