@@ -23,6 +23,7 @@ from notchflex.loads.load import (
     check_number,
     check_table,
     check_turn,
+    distinct_objects,
     entries_of,
     external_of_steps,
     one_or_several,
@@ -73,19 +74,15 @@ class LoadPath(ByValue, Displayed):
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
-        tension: Any = self.tension
-        stroke: Any = self.stroke
-        if tension is None and stroke is None:
+        given = {
+            name: np.atleast_2d(check_table(table, name))
+            for name in TENDONS
+            if (table := getattr(self, name)) is not None
+        }
+        if not given:
             raise InputError.NO_DATA("a load path needs tensions (N) or strokes (mm); got neither")
-        pairs: Any = (("tension", tension, stroke), ("stroke", stroke, tension))
-        tension, stroke = (
-            read_only(
-                np.full(np.atleast_2d(other).shape, np.nan)
-                if table is None
-                else np.atleast_2d(check_table(table, name))
-            )
-            for name, table, other in pairs
-        )
+        nothing = np.full(next(iter(given.values())).shape, np.nan)
+        tension, stroke = (read_only(given.get(name, nothing)) for name in TENDONS)
         base_rotation = read_only(check_turn(self.base_rotation))
         if tension.shape != stroke.shape or tension.ndim != 2:
             raise InputError.WRONG_SHAPE(
@@ -121,16 +118,15 @@ class LoadPath(ByValue, Displayed):
     ) -> LoadPath:
         """Make a path of valid values without checks, for control loops."""
         path = object.__new__(cls)
-        fields = vars(path)
-        fields["tension"], fields["stroke"], fields["base_rotation"] = (
-            tension,
-            stroke,
-            base_rotation,
-        )
         # Usually all steps share one object; identity is faster than equality.
-        several = external if len(external) == 1 else {id(one): one for one in external}.values()
-        fields["external"] = external
-        fields["different"] = [*several] if len(several) == 1 else [*dict.fromkeys(several)]
+        several = external if len(external) == 1 else distinct_objects(external).values()
+        vars(path).update(
+            tension=tension,
+            stroke=stroke,
+            base_rotation=base_rotation,
+            external=external,
+            different=[*several] if len(several) == 1 else [*dict.fromkeys(several)],
+        )
         return path
 
     def __len__(self) -> int:
@@ -189,10 +185,10 @@ class LoadPath(ByValue, Displayed):
     @cached_property
     def which(self) -> Int[np.ndarray, " s"]:
         """Index of the distinct load of each step."""
-        number = {one: i for i, one in enumerate(self.different)}
-        seen = {id(one): one for one in self.external}
-        by_identity = {identity: number[one] for identity, one in seen.items()}
-        return np.array([by_identity[id(one)] for one in self.external])
+        number = {load: i for i, load in enumerate(self.different)}
+        # Usually many steps share an object; identity is faster than equality.
+        by_identity = {key: number[load] for key, load in distinct_objects(self.external).items()}
+        return np.array([by_identity[id(load)] for load in self.external])
 
     def numbers(self, name: str) -> Float[np.ndarray, "s k"]:
         """Return the numbers of a name of `TENDONS` (0 where not commanded) or `TIP`, by steps.
@@ -229,12 +225,8 @@ class LoadPath(ByValue, Displayed):
             >>> len(pull(0.0, 3.0, steps=31).release())
             62
         """
-        return replace(
-            self,
-            tension=np.concatenate([self.tension, self.tension[::-1]]),
-            stroke=np.concatenate([self.stroke, self.stroke[::-1]]),
-            external=self.external + self.external[::-1],
-        )
+        steps = np.arange(len(self))
+        return self[np.concatenate([steps, steps[::-1]])]
 
     def then(self, following: LoadPath) -> LoadPath:
         """Append another path; a tendon that one of them does not name is slack in it.
@@ -303,12 +295,9 @@ class LoadPath(ByValue, Displayed):
                 f"the load commands {given} tendons, but the robot has {count}; "
                 f"give at most {count}"
             )
-        added = np.full((len(self), count - given), np.nan)
-        return replace(
-            self,
-            tension=np.concatenate([self.tension, added], axis=1),
-            stroke=np.concatenate([self.stroke, added], axis=1),
-        )
+        added = (0, 0), (0, count - given)
+        tables = (np.pad(getattr(self, name), added, constant_values=np.nan) for name in TENDONS)
+        return replace(self, **dict(zip(TENDONS, tables, strict=True)))
 
 
 def join_paths(paths: Sequence[LoadPath]) -> LoadPath:
@@ -552,7 +541,7 @@ def _ramp(what: str, start: Ends, stop: Ends, steps: int, tendon: int) -> LoadPa
     for number, ends in enumerate(zip(first, last, strict=True)):
         if ends != (None, None):
             commanded[:, number] = _column(what, ends, steps)
-    return LoadPath(commanded) if what == "tension" else LoadPath(stroke=commanded)
+    return LoadPath(**{what: commanded})
 
 
 def _is_several(value: Ends) -> TypeGuard[Sequence[float | None]]:
