@@ -298,9 +298,9 @@ _DEFAULTS = tuple((one.name, one.default) for one in fields(ExternalLoad))
 NOTHING = ExternalLoad()
 
 
-def distinct_objects(external: Iterable[ExternalLoad]) -> dict[int, ExternalLoad]:
-    """Return each object of many loads once, by its identity."""
-    return {id(load): load for load in external}
+def distinct_objects(values: Iterable[Any]) -> dict[int, Any]:
+    """Return each of many objects once, by its identity."""
+    return {id(value): value for value in values}
 
 
 def external_of_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:

@@ -541,7 +541,7 @@ def _ramp(what: str, start: Ends, stop: Ends, steps: int, tendon: int) -> LoadPa
     for number, ends in enumerate(zip(first, last, strict=True)):
         if ends != (None, None):
             commanded[:, number] = _column(what, ends, steps)
-    return LoadPath(**{what: commanded})
+    return LoadPath(commanded) if what == "tension" else LoadPath(stroke=commanded)
 
 
 def _is_several(value: Ends) -> TypeGuard[Sequence[float | None]]:
