@@ -214,12 +214,11 @@ class State(ByValue, Displayed):
                 f"{path} is not a notchflex state; give a file written by --save-state"
             )
         facts: dict[str, Any] = {name: content.get(name) for name in _FACTS}
-        arrays, robot = content.get("arrays"), content.get("description")
-        if not isinstance(facts["robot"], str) or not isinstance(arrays, dict):
-            raise _damaged(path, "the name of its robot or its numbers are missing")
-        kinds = map(type, facts.values())
-        if facts["level"] not in LEVELS or [*kinds] != [str, str, bool, int]:
-            raise _damaged(path, "what loads it is for is missing")
+        arrays: Any = content.get("arrays")
+        robot = content.get("description")
+        kinds = [type(fact) for fact in (*facts.values(), arrays)]
+        if kinds != [str, str, bool, int, dict] or facts["level"] not in LEVELS:
+            raise _damaged(path, "its robot, what loads it is for or its numbers are missing")
         if robot is not None:
             try:
                 robot = robot_from_text(str(robot))
@@ -512,10 +511,7 @@ def _converged(path: EquilibriumPath) -> str:
 
 def _few(values: np.ndarray, digits: int | None = None) -> str:
     """Format numbers as a list, of many the first and the last."""
-    texts = [
-        short(float(value)) if digits is None else f"{round(float(value), digits) + 0.0:.{digits}f}"
-        for value in values
-    ]
+    texts = [short(float(value), digits) for value in values]
     if len(texts) > 2 * MOST:
         texts = [*texts[:MOST], "…", *texts[-MOST:]]
     return ", ".join(texts)
