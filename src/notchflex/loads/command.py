@@ -245,10 +245,8 @@ def acting(
             f"a load commands more tendons than {robot.name} has: {tendons}"
         )
     kinds = DRAWN * ~np.isnan(load.stroke[steps]).all(axis=-1).ravel()
-    for number, places in _places_of_each(load.which[steps]):
-        external = load.different[number]
+    for external, places, at_tip in _each(load, steps, tip):
         _check(external, robot)
-        at_tip = () if tip is None else [*tip[steps.ravel()[places]].T]
         pushed = np.any(at_tip, axis=0)
         kinds[places] += (
             LOADED * (pushed | (not external.is_nothing))
@@ -258,11 +256,16 @@ def acting(
     return kinds.reshape(steps.shape)
 
 
-def _places_of_each(numbers: Int[np.ndarray, ...]) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield each distinct number, and its places in the flat array."""
+def _each(
+    load: LoadPath, steps: Int[np.ndarray, ...], tip: Float[np.ndarray, "s 6"] | None
+) -> Iterator[tuple[ExternalLoad, np.ndarray, list[np.ndarray]]]:
+    """Yield distinct loads, their places among steps, and what acts at the tip there besides."""
+    numbers = load.which[steps]
     order = np.argsort(numbers, axis=None, kind="stable")
     distinct, first = np.unique(numbers.ravel()[order], return_index=True)
-    return zip(distinct.tolist(), np.split(order, first[1:]), strict=True)
+    for number, places in zip(distinct.tolist(), np.split(order, first[1:]), strict=True):
+        at_tip = [] if tip is None else [*tip[steps.ravel()[places]].T]
+        yield load.different[number], places, at_tip
 
 
 def row_commands(
@@ -290,11 +293,10 @@ def row_commands(
     axes, bodies = _axes_of(load, chain), body_numbers(chain)
     by_row = bodies[2].ndim
     fields: list[np.ndarray] = []
-    for number, places in _places_of_each(load.which[steps]):
-        masses = [one[places // steps.shape[1]] for one in bodies] if by_row else bodies
-        at_tip = () if tip is None else [*tip[steps.ravel()[places]].T]
-        sums = _sums(load.different[number], axes, *masses, at_tip=at_tip)
-        shapes = [one.shape[by_row if tip is None else 1 :] for one in sums]
+    for external, places, at_tip in _each(load, steps, tip):
+        masses = [each[places // steps.shape[1]] for each in bodies] if by_row else bodies
+        sums = _sums(external, axes, *masses, at_tip=at_tip)
+        shapes = [values.shape[by_row if tip is None else 1 :] for values in sums]
         fields = fields or [np.empty((steps.size, *shape)) for shape in shapes]
         for field, values in zip(fields, sums, strict=True):
             field[places] = values

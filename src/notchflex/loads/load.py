@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import lru_cache, partial
 from math import hypot, isfinite, isnan
@@ -67,11 +68,9 @@ def check_vector(value: Any, what: str, form: str) -> tuple[float, float, float]
     several = np.asarray(value).tolist() if hasattr(value, "__array__") else value
     numbers: list[float] = []
     if isinstance(several, Sequence) and not isinstance(several, str | bytes | bytearray):
-        try:
+        with suppress(InputError):
             numbers = [check_number(entry, what) for entry in several]
-        except InputError:
-            numbers = []
-    if len(numbers) != 3 or not all(isfinite(one) for one in numbers):
+    if len(numbers) != 3 or not all(map(isfinite, numbers)):
         raise InputError.NOT_FINITE(
             f"{what} needs three finite numbers ({form}); got {short_repr(value)}"
         )

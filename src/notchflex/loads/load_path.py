@@ -150,8 +150,8 @@ class LoadPath(ByValue, Displayed):
             Load(tension=1.0)
         """
         if isinstance(step, slice | np.ndarray):
-            which = range(len(self))[step] if isinstance(step, slice) else step.tolist()
-            external = tuple([self.external[number] for number in which])
+            steps = np.arange(len(self))[step].tolist()
+            external = tuple([self.external[number] for number in steps])
             return LoadPath(self.tension[step], self.stroke[step], self.base_rotation, external)
         if not -len(self) <= step < len(self):
             raise IndexError(f"step {step} of a load path of {len(self)} steps")
@@ -414,25 +414,24 @@ def external_words(load: ExternalLoad) -> list[str]:
         >>> external_words(ExternalLoad(tip_force=(0.0, 0.1, 0.0), following=True, tip_mass=20.0))
         ['tip force (0, 0.1, 0) N following the tip', 'tip mass 20 g']
     """
-    words: list[str] = []
     turning = " following the tip" if load.following else ""
     at = f" at {vector(load.tip_point)} mm from the tip" if any(load.tip_point) else ""
-    if any(load.tip_force):
-        words.append(f"tip force {vector(load.tip_force)} N{at}{turning}")
-    if any(load.tip_moment):
-        words.append(f"tip moment {vector(load.tip_moment)} N mm{turning}")
-    if load.tip_mass:
-        words.append(f"tip mass {short(load.tip_mass)} g{'' if any(load.tip_force) else at}")
-    if load.gravity is not None and any(load.gravity):
-        words.append(f"gravity {vector(load.gravity)} m/s²")
-    for one in load.body_forces:
-        point = f" at {vector(one.point)} mm" if any(one.point) else ""
-        follows = " following it" if one.following else ""
-        for name, value, where in (("force", one.force, point), ("moment", one.moment, "")):
-            if any(value):
-                unit = "N" if name == "force" else "N mm"
-                words.append(f"{name} {vector(value)} {unit} on body {one.body}{where}{follows}")
-    return words
+    at_of_mass = "" if any(load.tip_force) else at
+    words = [
+        (any(load.tip_force), f"tip force {vector(load.tip_force)} N{at}{turning}"),
+        (any(load.tip_moment), f"tip moment {vector(load.tip_moment)} N mm{turning}"),
+        (load.tip_mass, f"tip mass {short(load.tip_mass)} g{at_of_mass}"),
+        (any(load.gravity or ()), f"gravity {vector(load.gravity or ())} m/s²"),
+    ]
+    for force in load.body_forces:
+        point = f" at {vector(force.point)} mm" if any(force.point) else ""
+        body = f"on body {force.body}"
+        follows = " following it" if force.following else ""
+        words += [
+            (any(force.force), f"force {vector(force.force)} N {body}{point}{follows}"),
+            (any(force.moment), f"moment {vector(force.moment)} N mm {body}{follows}"),
+        ]
+    return [text for acts, text in words if acts]
 
 
 def external_rows(load: LoadPath) -> Iterator[tuple[str, str]]:

@@ -24,6 +24,7 @@ from notchflex.errors import ErrorCode, InputError
 from notchflex.results.quantities import AXES, CONTACT_STATES, QUANTITIES
 from notchflex.results.state import leaves_of
 from notchflex.results.tables import path_columns, path_document, plain, write_json, write_path_csv
+from notchflex.results.writing import suffix_of
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -156,10 +157,8 @@ def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
 
 
 def _unknown_suffix(file: str | FilePath, done: str) -> InputError:
-    suffix = FilePath(file).suffix.lower()
-    got = f"the suffix {suffix}" if suffix else "no suffix"
     return InputError.FILE_FORMAT(
-        f"{file}: got {got}; a path is {done} as .json, .nc, .parquet or .csv."
+        f"{file}: got {suffix_of(file)}; a path is {done} as .json, .nc, .parquet or .csv."
     )
 
 

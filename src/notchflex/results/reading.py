@@ -27,7 +27,7 @@ from notchflex.errors import InputError
 from notchflex.results.io import read_columns
 from notchflex.results.quantities import AXES, QUANTITIES
 from notchflex.robot.part import sentences
-from notchflex.robot.reading import load_robot, parse_toml, read_text
+from notchflex.robot.reading import in_file, load_robot, parse_toml, read_text
 from notchflex.robot.robot import Robot
 
 TOLD_COLUMNS = (
@@ -385,9 +385,7 @@ def read_specification(
     try:
         return make(parse_toml(text, shown, kind, InputError))
     except InputError as error:
-        lines = str(error).splitlines()
-        named = (line if line.startswith(shown) else f"{shown}: {line}" for line in lines)
-        raise InputError("\n".join(named), error.code) from None
+        raise in_file(shown, error, InputError) from None
 
 
 def validated(kind: type[Asked], table: Mapping[str, Any]) -> Asked:

@@ -282,13 +282,12 @@ def _external(path: EquilibriumPath) -> list[dict[str, Any]]:
 
 
 def _with_units(values: dict[str, Any]) -> dict[str, Any]:
-    forces = values.pop("body_forces", None)
-    named = {
-        _LOAD_KEYS.get(name, (name,))[0].rpartition(".")[2]: value for name, value in values.items()
+    return {
+        _LOAD_KEYS.get(name, (name,))[0].rpartition(".")[2]: (
+            [_with_units(force) for force in value] if name == "body_forces" else value
+        )
+        for name, value in values.items()
     }
-    if forces is not None:
-        named["body_forces"] = [_with_units(one) for one in forces]
-    return named
 
 
 def _value(path: EquilibriumPath, quantity: Quantity, index: int) -> Any:
