@@ -65,13 +65,15 @@ _HOME = {
             "stroke_path",
         ),
         "notchflex.solver.newton": ("Settings",),
-        "notchflex.results": (
-            "Equilibrium",
-            "EquilibriumPath",
-            "State",
+        "notchflex.results.io": (
             "read_path",
-            "read_table",
             "save_path",
+        ),
+        "notchflex.results.path": ("EquilibriumPath",),
+        "notchflex.results.reading": ("read_table",),
+        "notchflex.results.state": (
+            "Equilibrium",
+            "State",
         ),
         "notchflex.analysis": (
             "Band",

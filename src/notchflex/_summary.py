@@ -79,13 +79,15 @@ class Displayed:
         return self._summary().html
 
 
-def short(value: float) -> str:
-    """Return a number with four significant digits, without a minus before a zero.
+def short(value: float, digits: int | None = None) -> str:
+    """Return a number with four significant digits or some decimals, without a minus before a zero.
 
     Example:
         >>> short(-0.0), short(153.1234), short(10_000.0), short(float("nan"))
         ('0', '153.1', '10000', 'none')
     """
+    if digits is not None:
+        return f"{round(value, digits) + 0.0:.{digits}f}"
     if value != value:
         return "none"
     # Large moduli and stiffnesses are read more easily without an exponent.
@@ -99,9 +101,7 @@ def vector(values: Iterable[float], digits: int | None = None) -> str:
         >>> vector([1.0, -1e-9, 2.5]), vector([1.0, -1e-9, 2.5], 2)
         ('(1, -1e-09, 2.5)', '(1.00, 0.00, 2.50)')
     """
-    if digits is None:
-        return f"({', '.join(map(short, values))})"
-    return f"({', '.join(f'{round(value, digits) + 0.0:.{digits}f}' for value in values)})"
+    return f"({', '.join(short(value, digits) for value in values)})"
 
 
 def course(values: Iterable[float], digits: int | None = None) -> str:
@@ -133,10 +133,6 @@ def course(values: Iterable[float], digits: int | None = None) -> str:
         direction = change
     if direction:
         ends.append(series[-1])
-
-    def shown(value: float) -> str:
-        return short(value) if digits is None else f"{round(value, digits) + 0.0:.{digits}f}"
-
     if len(ends) > _TURNS:
-        return f"between {shown(min(series))} and {shown(max(series))}"
-    return " to ".join(map(shown, ends))
+        return f"between {short(min(series), digits)} and {short(max(series), digits)}"
+    return " to ".join(short(end, digits) for end in ends)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any, cast
 
@@ -54,7 +54,6 @@ def same_values(one: Any, other: Any) -> bool:
         return np.array_equal(one, other, equal_nan=not exact)
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         return one.keys() == other.keys() and all(same_values(one[k], other[k]) for k in one)
-    if isinstance(one, Sequence) and isinstance(other, Sequence) and not isinstance(one, str):
-        pairs = zip(one, other, strict=False)
-        return len(one) == len(other) and all(same_values(*pair) for pair in pairs)
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return len(one) == len(other) and all(map(same_values, one, other))
     return one is other or bool(one == other)

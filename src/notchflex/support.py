@@ -77,10 +77,7 @@ _HOME = {
             "tendon_columns",
             "validated",
         ),
-        "notchflex.results.state": (
-            "SavedState",
-            "robot_digest",
-        ),
+        "notchflex.results.state": ("robot_digest",),
         "notchflex.results.tables": (
             "csv_text",
             "document_head",

@@ -49,7 +49,6 @@ from notchflex.results.reading import read_specification as read_specification
 from notchflex.results.reading import robot_named as robot_named
 from notchflex.results.reading import tendon_columns as tendon_columns
 from notchflex.results.reading import validated as validated
-from notchflex.results.state import SavedState as SavedState
 from notchflex.results.state import robot_digest as robot_digest
 from notchflex.results.tables import csv_text as csv_text
 from notchflex.results.tables import document_head as document_head

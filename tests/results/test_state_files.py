@@ -8,7 +8,7 @@ import pytest
 import notchflex as nf
 from notchflex.errors import ErrorCode
 from notchflex.mechanics.chain import assemble
-from notchflex.results.state import State
+from notchflex.results.state import State, leaves_of
 from notchflex.solver.residual import at_rest
 from refusals import refused
 
@@ -21,7 +21,7 @@ def chain():
 @pytest.fixture
 def file(tmp_path, chain):
     path = tmp_path / "state.json"
-    State("wrist", at_rest(chain), "tendons", loaded=False, refinement=0).save(path)
+    State("wrist", leaves_of(at_rest(chain)), "tendons", loaded=False, refinement=0).save(path)
     return path
 
 
@@ -33,7 +33,9 @@ def test_a_saved_state_is_read_back(file, chain):
 @pytest.mark.parametrize("name", ["missing/state.json", ".", "null\0"])
 def test_states_that_cannot_be_written(tmp_path, chain, name):
     with refused(ErrorCode.FILE_UNWRITABLE):
-        State("wrist", at_rest(chain), "tendons", loaded=False, refinement=0).save(tmp_path / name)
+        State("wrist", leaves_of(at_rest(chain)), "tendons", loaded=False, refinement=0).save(
+            tmp_path / name
+        )
 
 
 def test_a_state_that_fails_to_be_written_leaves_the_old_one(file, chain, monkeypatch):
@@ -44,7 +46,7 @@ def test_a_state_that_fails_to_be_written_leaves_the_old_one(file, chain, monkey
 
     monkeypatch.setattr("os.replace", full)
     with refused(ErrorCode.FILE_UNWRITABLE, "No space left"):
-        State("other", at_rest(chain), "tendons", loaded=False, refinement=0).save(file)
+        State("other", leaves_of(at_rest(chain)), "tendons", loaded=False, refinement=0).save(file)
     assert file.read_bytes() == old
     assert list(file.parent.iterdir()) == [file]
 

@@ -13,7 +13,7 @@ from notchflex.loads.load_path import load_path
 from notchflex.mechanics.chain import tendons_in_plane
 from notchflex.mechanics.flexure import LEVELS, MAX_REFINEMENT
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.state import Equilibrium, SavedState, State, check_robot, fitted
+from notchflex.results.state import Equilibrium, State, check_robot
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain, prepare
@@ -24,7 +24,7 @@ def simulate(
     robot: Robot,
     loads: Load | LoadPath | Iterable[Load],
     *,
-    from_state: State | SavedState | None = None,
+    from_state: State | None = None,
     settings: Settings | None = None,
     refinement: int = 0,
 ) -> EquilibriumPath:
@@ -58,7 +58,7 @@ def solve(
     robot: Robot,
     load: Load,
     *,
-    from_state: State | SavedState | None = None,
+    from_state: State | None = None,
     settings: Settings | None = None,
     refinement: int = 0,
 ) -> Equilibrium:
@@ -120,7 +120,7 @@ def solve_each(
 def _follow(
     robot: Robot,
     loads: Load | LoadPath | Iterable[Load],
-    from_state: State | SavedState | None,
+    from_state: State | None,
     settings: Settings,
     refinement: int,
     *,
@@ -138,14 +138,14 @@ def _follow(
 def follow_path(
     robot: Robot,
     load: LoadPath,
-    from_state: State | SavedState | None,
+    from_state: State | None,
     settings: Settings,
     refinement: int,
     each_from_rest: bool = False,
 ) -> EquilibriumPath:
     """Follow a path for the tendons of a robot, as `simulate` does, without warnings."""
     ready = prepare_for(robot, load, from_state, refinement)
-    start = None if from_state is None else fitted(from_state, ready.chain)
+    start = None if from_state is None else from_state.fitted(ready.chain)
     commands = make_commands(load, robot, ready.chain)
     states = run(ready, commands, start, settings, each_from_start=each_from_rest)
     return EquilibriumPath(robot, load, ready, states, each_from_rest, settings)
@@ -162,7 +162,7 @@ def check_refinement(refinement: int) -> None:
 def prepare_for(
     robot: Robot,
     load: LoadPath,
-    from_state: State | SavedState | None = None,
+    from_state: State | None = None,
     refinement: int = 0,
 ) -> PreparedChain:
     """Prepare a robot with modes enough for all loads of a path, and for the state before it."""

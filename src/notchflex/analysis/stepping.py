@@ -37,7 +37,7 @@ from notchflex.loads.load import (
 from notchflex.loads.load_path import load_path
 from notchflex.mechanics.chain import Chain
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.state import SavedState, State, check_robot, fitted, state_of
+from notchflex.results.state import State, check_robot, state_of
 from notchflex.robot import Robot
 from notchflex.solver.continuation import before_tendons, solve_load_step
 from notchflex.solver.newton import DEFAULT, Settings
@@ -177,7 +177,7 @@ class Stepper(Displayed):
     drives: Drive | Sequence[Drive] = "tension"
     jacobian: bool = False
     loads: Load = _NOTHING
-    from_state: State | SavedState | None = None
+    from_state: State | None = None
     settings: Settings = DEFAULT
     refinement: int = 0
     cores: int | None = None
@@ -223,7 +223,8 @@ class Stepper(Displayed):
             rows: Number of rows; a single robot where not given.
         """
         ready = self.prepared
-        return _repeated(np.asarray(ready.state.pack(fitted(self.from_state, ready.chain))), rows)
+        start = self.from_state.fitted(ready.chain) if self.from_state else ready.rest
+        return _repeated(np.asarray(ready.state.pack(start)), rows)
 
     def step(self, state: Float[np.ndarray, "*k state"], drives: Any) -> Step:
         """Move the tendons, from a state.

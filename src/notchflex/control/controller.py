@@ -18,7 +18,7 @@ from notchflex.control.search.iterative_search import search_iteratively, solve_
 from notchflex.control.search.problem import TargetSearch
 from notchflex.control.search.rate import cross_dead_bands, limit_rate
 from notchflex.control.targets import DIRECTION, LARGEST_TARGET, Targets, target_shapes
-from notchflex.support import SavedState, check_is_robot, check_number, short_repr
+from notchflex.support import check_is_robot, check_number, short_repr
 
 
 class ControlStatus(NamedTuple):
@@ -78,7 +78,7 @@ class Controller:
         robot: Robot,
         aim: str | Sequence[str] = "tip_position",
         *,
-        state: State | SavedState | None = None,
+        state: State | None = None,
         load: Load | None = None,
         drive: Drive = "tension",
         limits: Limits | None = None,

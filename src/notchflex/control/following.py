@@ -19,7 +19,6 @@ from notchflex.support import (
     DEGREES,
     QUANTITIES,
     Displayed,
-    SavedState,
     Summary,
     short,
     whole_document,
@@ -48,7 +47,7 @@ class Following(Displayed):
     load: LoadPath
     step: Int[np.ndarray, " k"]
     attempts: tuple[Attempt, ...]
-    start: State | SavedState | None = None
+    start: State | None = None
     misses: Float[np.ndarray, "k m"] = field(default_factory=lambda: np.zeros((0, 0)))
     units: tuple[str, ...] = ()
     tolerance: float = 0.0

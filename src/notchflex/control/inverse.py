@@ -15,14 +15,14 @@ from notchflex.control.search.branches import Approach, approach_target
 from notchflex.control.search.problem import Attempt, Problem, TargetSearch
 from notchflex.control.search.rate import cross_dead_bands, limit_rate
 from notchflex.control.targets import Targets, make_targets, units_of
-from notchflex.support import SavedState, check_is_robot, short_repr
+from notchflex.support import check_is_robot, short_repr
 
 
 def reach(
     robot: Robot,
     target: Any,
     *,
-    state: State | SavedState | None = None,
+    state: State | None = None,
     load: Load | None = None,
     drive: Drive = "tension",
     limits: Limits | None = None,
@@ -77,7 +77,7 @@ def follow(
     robot: Robot,
     targets: Any,
     *,
-    state: State | SavedState | None = None,
+    state: State | None = None,
     load: Load | None = None,
     drive: Drive = "tension",
     limits: Limits | None = None,

@@ -13,7 +13,7 @@ from notchflex.control.program.drive_model import DriveModel
 from notchflex.control.search.problem import Problem, TargetSearch
 from notchflex.control.targets import Aim, Targets, aim_at
 from notchflex.results.state import check_robot
-from notchflex.support import SavedState, load_path, short_repr
+from notchflex.support import load_path, short_repr
 
 # Default limit of drives, as a multiple of about the closing value of a notch.
 _MAX_FACTOR = {"tension": 4.0, "stroke": 2.0}
@@ -36,7 +36,7 @@ class ProblemOptions(NamedTuple):
         search: Tolerance and budget.
     """
 
-    state: State | SavedState | None
+    state: State | None
     load: Load | None
     drive: Drive
     limits: Limits | None
@@ -63,9 +63,9 @@ class ProblemOptions(NamedTuple):
             (self.load, Load, "load"),
             (self.limits, Limits, "limits"),
             (self.search, TargetSearch, "search"),
-            (self.state, State | SavedState, "state"),
+            (self.state, State, "state"),
         ):
-            if value is not None and not isinstance(value, kind):
+            if value is not None and not isinstance(value, kind):  # pyright: ignore
                 raise InputError.WRONG_TYPE(f"{name} cannot be {short_repr(value)}; see its help")
         if self.state is not None:
             check_robot(self.state, robot)

@@ -8,8 +8,8 @@ Forces that turn with the body are constant in its frame.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
+import operator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import hypot, pi
 from typing import Any, NamedTuple, cast
 
@@ -19,7 +19,7 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._arrays import xp
 from notchflex._jax import constant, jnp
 from notchflex.errors import InputError, InputWarning
-from notchflex.loads.load import HANGING, NO_VECTOR, NOTHING, ExternalLoad, rotation_of
+from notchflex.loads.load import HANGING, NO_VECTOR, NOTHING, ExternalLoad
 from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.chain import Chain, bending_normal
 from notchflex.mechanics.motion import IN_PLANE, turned, unskew
@@ -106,20 +106,11 @@ def load_slopes(load_path: LoadPath, robot: Robot, chain: Chain, change: Chain) 
     return BodyLoads(*(one - other for one, other in zip(changed, still, strict=True)))
 
 
-def in_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
-    """Reduce loads of space to the plane that x and z of a frame span."""
-    turn = np.asarray(frame)
-    return _in_basis(loads, turn[:, IN_PLANE], turn[:, 1:2])
-
-
-def out_of_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
-    """Expand loads of the plane that x and z of a frame span to space."""
-    turn = np.asarray(frame)
-    return _in_basis(loads, turn[:, IN_PLANE].T, turn[:, 1:2].T)
-
-
-def _in_basis(loads: BodyLoads, along: np.ndarray, about: np.ndarray) -> BodyLoads:
-    """Transform loads to another basis, given by columns for forces and for moments."""
+def in_space(loads: BodyLoads, frame: Float[Array, "3 3"], *, reduce: bool = False) -> BodyLoads:
+    """Expand loads of the plane that x and z of a frame span to space, or reduce those of space."""
+    along, about = _of_plane(frame)
+    if not reduce:
+        along, about = along.T, about.T
     force, moment, arm, following = map(np.asarray, loads)
     axes = about.shape[0]
     turning = [following[..., :axes] @ about, following[..., axes:] @ along]
@@ -221,11 +212,6 @@ def _norm(vector: Sequence[Any]) -> Any:
     return _dot(vector, vector) ** 0.5
 
 
-def _components(vector: Sequence[float], axes: tuple[Sequence[float], ...]) -> list[float]:
-    x, y, z = vector
-    return [x * a + y * b + z * c for a, b, c in axes]
-
-
 def _cross(first: Sequence[Any], second: Sequence[Any]) -> list[Any]:
     (a, b, c), (x, y, z) = first, second
     return [b * z - c * y, c * x - a * z, a * y - b * x]
@@ -259,10 +245,8 @@ def acting(
             f"a load commands more tendons than {robot.name} has: {tendons}"
         )
     kinds = DRAWN * ~np.isnan(load.stroke[steps]).all(axis=-1).ravel()
-    for number, places in _places_of_each(load.which[steps]):
-        external = load.different[number]
+    for external, places, at_tip in _each(load, steps, tip):
         _check(external, robot)
-        at_tip = () if tip is None else [*tip[steps.ravel()[places]].T]
         pushed = np.any(at_tip, axis=0)
         kinds[places] += (
             LOADED * (pushed | (not external.is_nothing))
@@ -272,11 +256,16 @@ def acting(
     return kinds.reshape(steps.shape)
 
 
-def _places_of_each(numbers: Int[np.ndarray, ...]) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield each distinct number, and its places in the flat array."""
+def _each(
+    load: LoadPath, steps: Int[np.ndarray, ...], tip: Float[np.ndarray, "s 6"] | None
+) -> Iterator[tuple[ExternalLoad, np.ndarray, list[np.ndarray]]]:
+    """Yield distinct loads, their places among steps, and what acts at the tip there besides."""
+    numbers = load.which[steps]
     order = np.argsort(numbers, axis=None, kind="stable")
     distinct, first = np.unique(numbers.ravel()[order], return_index=True)
-    return zip(distinct.tolist(), np.split(order, first[1:]), strict=True)
+    for number, places in zip(distinct.tolist(), np.split(order, first[1:]), strict=True):
+        at_tip = [] if tip is None else [*tip[steps.ravel()[places]].T]
+        yield load.different[number], places, at_tip
 
 
 def row_commands(
@@ -304,11 +293,10 @@ def row_commands(
     axes, bodies = _axes_of(load, chain), body_numbers(chain)
     by_row = bodies[2].ndim
     fields: list[np.ndarray] = []
-    for number, places in _places_of_each(load.which[steps]):
-        masses = [one[places // steps.shape[1]] for one in bodies] if by_row else bodies
-        at_tip = () if tip is None else [*tip[steps.ravel()[places]].T]
-        sums = _sums(load.different[number], axes, *masses, at_tip=at_tip)
-        shapes = [one.shape[by_row if tip is None else 1 :] for one in sums]
+    for external, places, at_tip in _each(load, steps, tip):
+        masses = [each[places // steps.shape[1]] for each in bodies] if by_row else bodies
+        sums = _sums(external, axes, *masses, at_tip=at_tip)
+        shapes = [values.shape[by_row if tip is None else 1 :] for values in sums]
         fields = fields or [np.empty((steps.size, *shape)) for shape in shapes]
         for field, values in zip(fields, sums, strict=True):
             field[places] = values
@@ -317,8 +305,20 @@ def row_commands(
 
 
 def _axes_of(load: LoadPath, chain: Chain) -> _Axes:
-    frame = None if chain.frame is None else tuple(np.asarray(chain.frame).ravel().tolist())
-    return _axes(tuple(load.base_rotation.tolist()), frame)
+    """Return axes of bodies (three, or x and z of a plane): in their frame, then in the world."""
+    along, about = np.eye(3), np.eye(3)
+    if chain.frame is not None:
+        along, about = _of_plane(chain.frame)
+    turn = load.base_to_world
+    if turn is None:
+        return along, about, along, about
+    return along, about, turn @ along, turn @ about
+
+
+def _of_plane(frame: Float[Array, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
+    """Return x and z of a frame, and the axis about which its plane turns, as columns."""
+    axes = np.asarray(frame)
+    return axes[:, IN_PLANE], axes[:, 1:2]
 
 
 def _check(external: ExternalLoad, robot: Robot) -> None:
@@ -337,7 +337,6 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
         )
 
 
-_AXIS = (0.0, 0.0, 1.0)  # of the tube, to the tip
 _Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool, bool]
 
 
@@ -358,19 +357,8 @@ def _forces(external: ExternalLoad, last: int, at_tip: Sequence[Any] = ()) -> It
         yield last, external.weight(external.tip_mass), NO_VECTOR, point, False, True
 
 
-# Axes of force and moment components in the frame of the bodies, then in the world; as plain
-# numbers, which are faster than arrays for few forces.
-_Axes = tuple[tuple[Sequence[float], ...], ...]
-
-
-@lru_cache(maxsize=64)
-def _axes(base: tuple[float, ...], frame: tuple[float, ...] | None) -> _Axes:
-    """Return the axes of a frame (all three, or x and z of a plane) on a rotated base."""
-    turn, along, about = rotation_of(base), np.eye(3), np.eye(3)
-    if frame is not None:
-        along, about = np.reshape(frame, (3, 3))[:, IN_PLANE], np.reshape(frame, (3, 3))[:, 1:2]
-    columns = (along, about, *((along, about) if turn is None else (turn @ along, turn @ about)))
-    return tuple(tuple(map(tuple, one.T.tolist())) for one in columns)
+# Axes of forces and of moments, as columns: in the frame of the bodies, then in the world.
+_Axes = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def _sums(
@@ -384,34 +372,32 @@ def _sums(
     """Return the sums for all bodies; the tip is `tip` (mm) beyond the origin of the last one."""
     along, about, world_along, world_about = axes
     *rows, count = body_mass.shape
-    rows = np.broadcast_shapes(tuple(rows), np.shape(at_tip)[1:])
-    d, a = len(along), len(about)
-    moments, arms_end = d + a, d + a + d * d
-    table = np.zeros((*rows, count, arms_end + a + d))
+    bodies = (*np.broadcast_shapes(tuple(rows), np.shape(at_tip)[1:]), count)
+    d, a = along.shape[1], about.shape[1]
+    dead_force, dead_moment = np.zeros((*bodies, d)), np.zeros((*bodies, a))
+    dead_arm, turning = np.zeros((*bodies, d, d)), np.zeros((*bodies, a + d))
     for body, force, moment, point, follows, is_at_tip in _forces(external, count - 1, at_tip):
+        x, y, z = point
+        place = (x, y, z + tip if is_at_tip else z)
         if follows:
-            turning = [one + more for one, more in zip(moment, _cross(point, force), strict=True)]
-            turning = _components(turning, about) + _components(force, along)
-            table[..., body, arms_end:] += np.array(turning).T
-            if is_at_tip:
-                by_tip = np.array(_components(_cross(_AXIS, force), about)).T
-                table[..., body, arms_end : arms_end + a] += tip[..., None] * by_tip
+            about_origin = map(operator.add, moment, _cross(place, force))
+            turning[..., body, :a] += _projected(about_origin, about)
+            turning[..., body, a:] += _projected(force, along)
         else:
-            dead = _components(force, world_along)
-            arms = [part * one for part in _components(point, along) for one in dead]
-            table[..., body, :arms_end] += np.array(
-                dead + _components(moment, world_about) + arms
-            ).T
-            if is_at_tip:
-                by_tip = [part * one for part in _components(_AXIS, along) for one in dead]
-                table[..., body, moments:arms_end] += tip[..., None] * np.array(by_tip).T
+            dead = _projected(force, world_along)
+            dead_force[..., body, :] += dead
+            dead_moment[..., body, :] += _projected(moment, world_about)
+            dead_arm[..., body, :, :] += _projected(place, along)[..., None] * dead[..., None, :]
     if external.gravity is not None:
-        weight = np.array(_components(external.weight(1.0), world_along))
-        arms = (mass_moment @ np.array(along).T)[..., None] * weight
-        table[..., :d] += body_mass[..., None] * weight
-        table[..., moments:arms_end] += arms.reshape(*arms.shape[:-2], -1)
-    arm = table[..., moments:arms_end].reshape(*rows, count, d, d)
-    return table[..., :d], table[..., d:moments], arm, table[..., arms_end:]
+        weight = _projected(external.weight(1.0), world_along)
+        dead_force += body_mass[..., None] * weight
+        dead_arm += (mass_moment @ along)[..., None] * weight
+    return dead_force, dead_moment, dead_arm, turning
+
+
+def _projected(components: Iterable[Any], axes: np.ndarray) -> np.ndarray:
+    """Return the components along other axes of vectors, whose components may be arrays."""
+    return sum(map(np.multiply.outer, components, axes), start=np.zeros(axes.shape[1]))
 
 
 class Command(NamedTuple):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import lru_cache, partial
 from math import hypot, isfinite, isnan
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -65,30 +65,20 @@ def check_vector(value: Any, what: str, form: str) -> tuple[float, float, float]
         >>> check_vector([0, 0, 1], "tip_force", "N")
         (0.0, 0.0, 1.0)
     """
-    if type(value) is tuple and len(value) == 3 and all(map(_is_finite_float, value)):
-        return value  # as most often: nothing to change
     several = np.asarray(value).tolist() if hasattr(value, "__array__") else value
     numbers: list[float] = []
     if isinstance(several, Sequence) and not isinstance(several, str | bytes | bytearray):
-        try:
+        with suppress(InputError):
             numbers = [check_number(entry, what) for entry in several]
-        except InputError:
-            numbers = []
-    if len(numbers) != 3 or not all(isfinite(one) for one in numbers):
+    if len(numbers) != 3 or not all(map(isfinite, numbers)):
         raise InputError.NOT_FINITE(
             f"{what} needs three finite numbers ({form}); got {short_repr(value)}"
         )
     return numbers[0], numbers[1], numbers[2]
 
 
-def _is_finite_float(value: Any) -> bool:
-    return type(value) is float and isfinite(value)
-
-
 def check_table(value: Any, what: str) -> np.ndarray:
     """Return numbers, steps by tendons; None within them is NaN."""
-    if type(value) is np.ndarray and value.dtype == float:
-        return value
     try:
         if value is None or np.asarray(value).dtype.kind not in "iufO":
             raise TypeError
@@ -240,11 +230,12 @@ class ExternalLoad:
     @property
     def external(self) -> ExternalLoad:
         """The external loads alone, without what else a load may command."""
-        numbers = _numbers_of(vars(self))
-        if numbers == _NOTHING:
+        given = vars(self)
+        numbers = {name: given[name] for name in EXTERNAL}
+        if numbers == vars(NOTHING):
             return NOTHING
         load = object.__new__(ExternalLoad)
-        vars(load).update(zip(EXTERNAL, numbers, strict=True))  # checked already
+        vars(load).update(numbers)  # checked already
         return load
 
     @property
@@ -304,8 +295,11 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
 EXTERNAL = tuple(one.name for one in fields(ExternalLoad))
 _DEFAULTS = tuple((one.name, one.default) for one in fields(ExternalLoad))
 NOTHING = ExternalLoad()
-_numbers_of = itemgetter(*EXTERNAL)
-_NOTHING = _numbers_of(vars(NOTHING))
+
+
+def distinct_objects(values: Iterable[Any]) -> dict[int, Any]:
+    """Return each of many objects once, by its identity."""
+    return {id(value): value for value in values}
 
 
 def external_of_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
@@ -314,8 +308,8 @@ def external_of_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
         given: tuple[Any, ...] = tuple(external)
     except TypeError:
         given = (None,)
-    different = {id(one): one for one in given}.values()
-    if not all(isinstance(one, ExternalLoad) for one in different):
+    different = distinct_objects(given).values()
+    if not all(isinstance(load, ExternalLoad) for load in different):
         raise InputError.WRONG_TYPE(
             "external of a load path must hold one ExternalLoad per step; "
             f"got {short_repr(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
@@ -325,8 +319,8 @@ def external_of_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
             f"external of a load path has {len(given)} entries, but there are {steps} steps; "
             "give one per step"
         )
-    if any(type(one) is not ExternalLoad for one in different):
-        given = tuple(one.external for one in given)
+    if any(type(load) is not ExternalLoad for load in different):
+        given = tuple(load.external for load in given)
     return given or (NOTHING,) * steps
 
 
@@ -409,8 +403,6 @@ class Load(ExternalLoad):
 
 def _commanded(value: Any, what: str) -> float | tuple[float | None, ...]:
     """Return a command as a finite number, or as one per tendon and None where there is none."""
-    if type(value) is float and isfinite(value):
-        return value  # as most often
     if hasattr(value, "__array__"):
         value = np.asarray(value).tolist()
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):

@@ -23,6 +23,7 @@ from notchflex.loads.load import (
     check_number,
     check_table,
     check_turn,
+    distinct_objects,
     entries_of,
     external_of_steps,
     one_or_several,
@@ -73,19 +74,15 @@ class LoadPath(ByValue, Displayed):
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
-        tension: Any = self.tension
-        stroke: Any = self.stroke
-        if tension is None and stroke is None:
+        given = {
+            name: np.atleast_2d(check_table(table, name))
+            for name in TENDONS
+            if (table := getattr(self, name)) is not None
+        }
+        if not given:
             raise InputError.NO_DATA("a load path needs tensions (N) or strokes (mm); got neither")
-        pairs: Any = (("tension", tension, stroke), ("stroke", stroke, tension))
-        tension, stroke = (
-            read_only(
-                np.full(np.atleast_2d(other).shape, np.nan)
-                if table is None
-                else np.atleast_2d(check_table(table, name))
-            )
-            for name, table, other in pairs
-        )
+        nothing = np.full(next(iter(given.values())).shape, np.nan)
+        tension, stroke = (read_only(given.get(name, nothing)) for name in TENDONS)
         base_rotation = read_only(check_turn(self.base_rotation))
         if tension.shape != stroke.shape or tension.ndim != 2:
             raise InputError.WRONG_SHAPE(
@@ -121,16 +118,15 @@ class LoadPath(ByValue, Displayed):
     ) -> LoadPath:
         """Make a path of valid values without checks, for control loops."""
         path = object.__new__(cls)
-        fields = vars(path)
-        fields["tension"], fields["stroke"], fields["base_rotation"] = (
-            tension,
-            stroke,
-            base_rotation,
-        )
         # Usually all steps share one object; identity is faster than equality.
-        several = external if len(external) == 1 else {id(one): one for one in external}.values()
-        fields["external"] = external
-        fields["different"] = [*several] if len(several) == 1 else [*dict.fromkeys(several)]
+        several = external if len(external) == 1 else distinct_objects(external).values()
+        vars(path).update(
+            tension=tension,
+            stroke=stroke,
+            base_rotation=base_rotation,
+            external=external,
+            different=[*several] if len(several) == 1 else [*dict.fromkeys(several)],
+        )
         return path
 
     def __len__(self) -> int:
@@ -154,8 +150,8 @@ class LoadPath(ByValue, Displayed):
             Load(tension=1.0)
         """
         if isinstance(step, slice | np.ndarray):
-            which = range(len(self))[step] if isinstance(step, slice) else step.tolist()
-            external = tuple([self.external[number] for number in which])
+            steps = np.arange(len(self))[step].tolist()
+            external = tuple([self.external[number] for number in steps])
             return LoadPath(self.tension[step], self.stroke[step], self.base_rotation, external)
         if not -len(self) <= step < len(self):
             raise IndexError(f"step {step} of a load path of {len(self)} steps")
@@ -189,10 +185,10 @@ class LoadPath(ByValue, Displayed):
     @cached_property
     def which(self) -> Int[np.ndarray, " s"]:
         """Index of the distinct load of each step."""
-        number = {one: i for i, one in enumerate(self.different)}
-        seen = {id(one): one for one in self.external}
-        by_identity = {identity: number[one] for identity, one in seen.items()}
-        return np.array([by_identity[id(one)] for one in self.external])
+        number = {load: i for i, load in enumerate(self.different)}
+        # Usually many steps share an object; identity is faster than equality.
+        by_identity = {key: number[load] for key, load in distinct_objects(self.external).items()}
+        return np.array([by_identity[id(load)] for load in self.external])
 
     def numbers(self, name: str) -> Float[np.ndarray, "s k"]:
         """Return the numbers of a name of `TENDONS` (0 where not commanded) or `TIP`, by steps.
@@ -238,12 +234,8 @@ class LoadPath(ByValue, Displayed):
             >>> len(pull(0.0, 3.0, steps=31).release())
             62
         """
-        return replace(
-            self,
-            tension=np.concatenate([self.tension, self.tension[::-1]]),
-            stroke=np.concatenate([self.stroke, self.stroke[::-1]]),
-            external=self.external + self.external[::-1],
-        )
+        steps = np.arange(len(self))
+        return self[np.concatenate([steps, steps[::-1]])]
 
     def then(self, following: LoadPath) -> LoadPath:
         """Append another path; a tendon that one of them does not name is slack in it.
@@ -312,12 +304,9 @@ class LoadPath(ByValue, Displayed):
                 f"the load commands {given} tendons, but the robot has {count}; "
                 f"give at most {count}"
             )
-        added = np.full((len(self), count - given), np.nan)
-        return replace(
-            self,
-            tension=np.concatenate([self.tension, added], axis=1),
-            stroke=np.concatenate([self.stroke, added], axis=1),
-        )
+        added = (0, 0), (0, count - given)
+        tables = (np.pad(getattr(self, name), added, constant_values=np.nan) for name in TENDONS)
+        return replace(self, **dict(zip(TENDONS, tables, strict=True)))
 
 
 def join_paths(paths: Sequence[LoadPath]) -> LoadPath:
@@ -434,25 +423,24 @@ def external_words(load: ExternalLoad) -> list[str]:
         >>> external_words(ExternalLoad(tip_force=(0.0, 0.1, 0.0), following=True, tip_mass=20.0))
         ['tip force (0, 0.1, 0) N following the tip', 'tip mass 20 g']
     """
-    words: list[str] = []
     turning = " following the tip" if load.following else ""
     at = f" at {vector(load.tip_point)} mm from the tip" if any(load.tip_point) else ""
-    if any(load.tip_force):
-        words.append(f"tip force {vector(load.tip_force)} N{at}{turning}")
-    if any(load.tip_moment):
-        words.append(f"tip moment {vector(load.tip_moment)} N mm{turning}")
-    if load.tip_mass:
-        words.append(f"tip mass {short(load.tip_mass)} g{'' if any(load.tip_force) else at}")
-    if load.gravity is not None and any(load.gravity):
-        words.append(f"gravity {vector(load.gravity)} m/s²")
-    for one in load.body_forces:
-        point = f" at {vector(one.point)} mm" if any(one.point) else ""
-        follows = " following it" if one.following else ""
-        for name, value, where in (("force", one.force, point), ("moment", one.moment, "")):
-            if any(value):
-                unit = "N" if name == "force" else "N mm"
-                words.append(f"{name} {vector(value)} {unit} on body {one.body}{where}{follows}")
-    return words
+    at_of_mass = "" if any(load.tip_force) else at
+    words = [
+        (any(load.tip_force), f"tip force {vector(load.tip_force)} N{at}{turning}"),
+        (any(load.tip_moment), f"tip moment {vector(load.tip_moment)} N mm{turning}"),
+        (load.tip_mass, f"tip mass {short(load.tip_mass)} g{at_of_mass}"),
+        (any(load.gravity or ()), f"gravity {vector(load.gravity or ())} m/s²"),
+    ]
+    for force in load.body_forces:
+        point = f" at {vector(force.point)} mm" if any(force.point) else ""
+        body = f"on body {force.body}"
+        follows = " following it" if force.following else ""
+        words += [
+            (any(force.force), f"force {vector(force.force)} N {body}{point}{follows}"),
+            (any(force.moment), f"moment {vector(force.moment)} N mm {body}{follows}"),
+        ]
+    return [text for acts, text in words if acts]
 
 
 def external_rows(load: LoadPath) -> Iterator[tuple[str, str]]:

@@ -6,8 +6,8 @@ import base64
 import contextlib
 import io
 import json
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -17,17 +17,20 @@ from numpy.typing import NDArray
 
 from notchflex import __version__
 from notchflex._extras import need
+from notchflex._jax import jax
 from notchflex._quantity import REGISTERED, Quantity
 from notchflex._replacing import replacing
-from notchflex.errors import InputError
+from notchflex.errors import ErrorCode, InputError
 from notchflex.results.quantities import AXES, CONTACT_STATES, QUANTITIES
+from notchflex.results.state import leaves_of
 from notchflex.results.tables import path_columns, path_document, plain, write_json, write_path_csv
+from notchflex.results.writing import suffix_of
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
     from notchflex.results.path import EquilibriumPath, Recorded
-    from notchflex.solver.programs.prepare import PreparedChain
+    from notchflex.solver.residual import SolverState
 
 
 READ_BACK = "read_back"
@@ -104,21 +107,20 @@ def read_path(file: str | FilePath) -> EquilibriumPath:
             "of its friction, so no path can be made of it. Read its numbers with "
             "notchflex.read_table, or write .json, .nc or .parquet."
         )
-    if suffix not in (".json", ".nc", ".parquet"):
+    readers = {".json": _read_json, ".nc": _read_netcdf, ".parquet": _read_parquet}
+    if suffix not in readers:
         raise _unknown_suffix(file, "read")
     if not FilePath(file).is_file():
         raise InputError.FILE_NOT_FOUND(f"there is no file {file}.")
-    if suffix == ".json":
-        return _from_json(file)
-    return read_netcdf(file) if suffix == ".nc" else path_of(read_head(file), str(file))
+    return readers[suffix](file)
 
 
 def whole_document(path: EquilibriumPath) -> dict[str, Any]:
     """Return a path as the JSON document that can be read back: for people, and for `read_path`."""
-    return {**path_document(path), READ_BACK: encoded(record_of(path))}
+    return {**path_document(path), READ_BACK: encoded(path)}
 
 
-def _from_json(file: str | FilePath) -> EquilibriumPath:
+def _read_json(file: str | FilePath) -> EquilibriumPath:
     try:
         document = json.loads(FilePath(file).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as problem:
@@ -129,7 +131,7 @@ def _from_json(file: str | FilePath) -> EquilibriumPath:
             f"{file} holds no path that can be read back; give a file that simulate --json or "
             "save_path wrote."
         )
-    path = path_of(decoded(document[READ_BACK], str(file)), str(file))
+    path = _decoded(document[READ_BACK], file)
     if not _same_steps(path, document.get("steps")):
         raise InputError.FILE_DAMAGED(
             f"{file}: its steps are not those that its part {READ_BACK!r} holds, so one of them "
@@ -155,10 +157,8 @@ def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
 
 
 def _unknown_suffix(file: str | FilePath, done: str) -> InputError:
-    suffix = FilePath(file).suffix.lower()
-    got = f"the suffix {suffix}" if suffix else "no suffix"
     return InputError.FILE_FORMAT(
-        f"{file}: got {got}; a path is {done} as .json, .nc, .parquet or .csv."
+        f"{file}: got {suffix_of(file)}; a path is {done} as .json, .nc, .parquet or .csv."
     )
 
 
@@ -173,35 +173,27 @@ IN_BASE = "_in_base"
 """Ends the name of an array in the frame of a base that is turned in the world."""
 
 _STATE, _START = "state", "before."
-_RUN = ("residual", "iterations", "converged", "tried", "reached")
 _HELD = ("smallest_eigenvalue", "determinant_sign")
-_ADDED = ("snapped", "overdrawn")
+_RUN = {
+    # A path counts more as not converged than the solver does.
+    "solver_converged": "converged",
+    **{name: name for name in ("residual", "iterations", "tried", "reached")},
+    **{name: name for name in ("snapped", "overdrawn")},
+}
+"""Names of arrays in files to the attributes of a run."""
 
 
-@dataclass(frozen=True)
-class Record:
-    """What a path is made of.
-
-    Attributes:
-        facts: The robot file as text, the external loads, how it was solved; plain values.
-        arrays: Everything else by name, in mm, N, rad.
-    """
-
-    facts: Mapping[str, Any]
-    arrays: Mapping[str, NDArray[Any]]
-
-
-def record_of(path: EquilibriumPath) -> Record:
-    """Return the record of a path."""
+def facts_of(path: EquilibriumPath) -> dict[str, Any]:
+    """Return the robot file as text, the external loads, how it was solved; plain values."""
     from notchflex.robot import robot_text
 
     chain = path.chain
     # The external loads: each different one, and which of them every step has.
     external = {
-        "distinct": [asdict(one) for one in path.load.different],
+        "distinct": [asdict(load) for load in path.load.different],
         "step": path.load.which.tolist(),
     }
-    facts = {
+    return {
         "format": FORMAT,
         "program": "notchflex",
         "version": __version__,
@@ -212,210 +204,139 @@ def record_of(path: EquilibriumPath) -> Record:
         "flat": chain.frame is not None,
         "each_from_rest": path.each_from_rest,
         "base_rotation_rad": path.load.base_rotation.tolist(),
-        "settings": {one.name: getattr(path.settings, one.name) for one in fields(path.settings)},
+        "settings": asdict(path.settings),
         "external": json.dumps(external),
     }
-    return Record(facts, dict(_arrays_of(path)))
 
 
-def path_of(record: Record, source: str) -> EquilibriumPath:
-    """Return the path of a record.
+def arrays_of(path: EquilibriumPath) -> dict[str, NDArray[Any]]:
+    """Return all else that a path is made of by name, in mm, N, rad."""
+    from notchflex.results.path import REPORTED
 
-    Args:
-        record: As `record_of` returns it.
-        source: Where it was read from, for messages.
-
-    Raises:
-        InputError: Something is missing or does not fit.
-    """
-    if record.facts.get("format") != FORMAT:
-        got = record.facts.get("format")
-        raise InputError.FILE_FORMAT(
-            f"{source} has the format {got!r}, not {FORMAT!r}: notchflex {__version__} cannot make "
-            "a path of it; write it again with this version."
-        )
-    try:
-        return _path_of(record)
-    except InputError as problem:
-        raise InputError.FILE_DAMAGED(f"{source} cannot be read back: {problem}") from None
-    except KeyError as problem:
-        raise InputError.FILE_DAMAGED(
-            f"{source} cannot be read back: {problem.args[0]} is missing; write it again."
-        ) from None
-    except (TypeError, ValueError, IndexError) as problem:
-        raise InputError.FILE_DAMAGED(
-            f"{source} cannot be read back: it is damaged ({problem}); write it again."
-        ) from None
+    run, turned = path.run, bool(path.load.base_rotation.any())
+    arrays = {
+        "commanded_tension": path.load.tension,
+        "commanded_stroke": path.load.stroke,
+        **{_key(name, turned): run.quantity(name) for name in REPORTED},
+        **{name: getattr(run, attribute) for name, attribute in _RUN.items()},
+        **dict(zip(_HELD, path.stability, strict=True)),
+        **{_START + name: run.before(name) for name in _before(run.solved)},
+        **{_STATE + name: leaf for name, leaf in leaves_of(run.solved).items()},
+    }
+    return {name: np.asarray(values) for name, values in arrays.items()}
 
 
-def encoded(record: Record) -> dict[str, Any]:
-    """Return a record for JSON: numbers as their bytes, so that not one digit is lost."""
+def _before(state: SolverState) -> tuple[str, ...]:
+    """Return what is needed of the state before the first: more of a material that remembers."""
+    from notchflex.results.path import BEFORE, FLATTENING, MATERIAL
+
+    return BEFORE if isinstance(state.memory.material, tuple) else (*BEFORE, MATERIAL, FLATTENING)
+
+
+def encoded(path: EquilibriumPath) -> dict[str, Any]:
+    """Return a path for JSON: numbers as their bytes, so that not one digit is lost."""
     arrays: dict[str, Any] = {}
-    for name, values in record.arrays.items():
+    for name, values in arrays_of(path).items():
         array = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<"))
         code = base64.b64encode(array.tobytes()).decode("ascii")
         arrays[name] = {"type": array.dtype.str, "shape": list(array.shape), "base64": code}
-    return {"facts": dict(record.facts), "arrays": arrays}
+    return {"facts": facts_of(path), "arrays": arrays}
 
 
-def decoded(document: Any, source: str) -> Record:
-    """Return the record of what `encoded` returned.
-
-    Raises:
-        InputError: It is damaged.
-    """
-    try:
+def _decoded(document: Any, source: str | FilePath) -> EquilibriumPath:
+    """Return the path that `encoded` was given."""
+    with _damage(source):
         arrays = {
-            str(name): np.frombuffer(base64.b64decode(one["base64"]), np.dtype(one["type"]))
-            .reshape(one["shape"])
+            name: np.frombuffer(base64.b64decode(code["base64"]), np.dtype(code["type"]))
+            .reshape(code["shape"])
             .copy()
-            for name, one in document["arrays"].items()
+            for name, code in document["arrays"].items()
         }
-        return Record(dict(document["facts"]), arrays)
-    except (AttributeError, KeyError, TypeError, ValueError) as problem:
-        raise InputError.FILE_DAMAGED(
-            f"{source} cannot be read back: what it holds for that is damaged ({problem}); "
-            "write it again."
-        ) from None
+        return _path_of(document["facts"], arrays, source)
 
 
-def _loads_from(text: str) -> tuple[Any, ...]:
-    from notchflex.loads import BodyForce, ExternalLoad
-
-    loads = json.loads(text)
-    distinct = [
-        ExternalLoad(**one | {"body_forces": [BodyForce(**force) for force in one["body_forces"]]})
-        for one in loads["distinct"]
-    ]
-    return tuple(distinct[number] for number in loads["step"])
-
-
-def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
-    import jax.tree_util as tree_util
-
-    from notchflex.results.path import BEFORE, FLATTENING, MATERIAL, REPORTED
-    from notchflex.results.state import leaf_name
-
-    run = path.run
-    turned = bool(path.load.base_rotation.any())
-    yield "commanded_tension", path.load.tension
-    yield "commanded_stroke", path.load.stroke
-    for name in REPORTED:
-        yield _key(name, turned), np.asarray(run.quantity(name))
-    for name in _RUN:
-        # A path counts more as not converged than the solver does.
-        yield ("solver_converged" if name == "converged" else name), np.asarray(getattr(run, name))
-    yield _HELD[0], path.smallest_eigenvalue
-    yield _HELD[1], path.determinant_sign
-    for name in _ADDED:
-        yield name, getattr(run, name)
-    for name in BEFORE:
-        yield _START + name, run.before(name)
-    if not isinstance(run.solved.memory.material, tuple):
-        yield _START + MATERIAL, run.before(MATERIAL)
-        yield _START + FLATTENING, run.before(FLATTENING)
-    for key, leaf in tree_util.tree_flatten_with_path(run.solved)[0]:
-        yield _STATE + leaf_name(key), np.asarray(leaf)
+@contextlib.contextmanager
+def _damage(source: str | FilePath) -> Generator[None]:
+    """Tell what prevents that a path is made of what a file holds."""
+    try:
+        yield
+    except InputError as problem:
+        if problem.code is ErrorCode.FILE_FORMAT:
+            raise
+        reason = str(problem)
+    except KeyError as problem:
+        reason = f"{problem.args[0]} is missing; write it again."
+    except (AttributeError, TypeError, ValueError, IndexError) as problem:
+        reason = f"it is damaged ({problem}); write it again."
+    else:
+        return
+    raise InputError.FILE_DAMAGED(f"{source} cannot be read back: {reason}")
 
 
-def _path_of(record: Record) -> EquilibriumPath:
-    from notchflex.loads import LoadPath
+def _path_of(
+    facts: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], source: str | FilePath
+) -> EquilibriumPath:
+    """Return the path of facts and arrays that were read from a file."""
+    from notchflex.loads import BodyForce, ExternalLoad, LoadPath
     from notchflex.results.path import EquilibriumPath
     from notchflex.robot import robot_from_text
     from notchflex.solver.newton import Settings
     from notchflex.solver.programs.prepare import prepare
 
-    facts, arrays = record.facts, record.arrays
-    robot = robot_from_text(facts["robot"])
+    if facts.get("format") != FORMAT:
+        got = facts.get("format")
+        raise InputError.FILE_FORMAT(
+            f"{source} has the format {got!r}, not {FORMAT!r}: notchflex {__version__} cannot make "
+            "a path of it; write it again with this version."
+        )
+    robot, loads = robot_from_text(facts["robot"]), json.loads(facts["external"])
+    distinct = [
+        ExternalLoad(
+            **load | {"body_forces": [BodyForce(**force) for force in load["body_forces"]]}
+        )
+        for load in loads["distinct"]
+    ]
     load = LoadPath(
         arrays["commanded_tension"],
         arrays["commanded_stroke"],
         np.array(facts["base_rotation_rad"]),
-        _loads_from(facts["external"]),
+        tuple(distinct[number] for number in loads["step"]),
     )
-    ready = prepare(
-        robot,
-        facts["level"],
-        loaded=facts["loaded"],
-        refinement=facts["refinement"],
-        flat=facts["flat"],
-    )
-    recorded = _recorded(arrays, ready, len(load), bool(load.base_rotation.any()))
+    form = {name: facts[name] for name in ("level", "loaded", "refinement", "flat")}
+    ready = prepare(robot, **form)
+    recorded = _recorded(arrays, ready.rest, len(load), bool(load.base_rotation.any()))
     return EquilibriumPath(
         robot, load, ready, recorded, facts["each_from_rest"], Settings(**facts["settings"])
     )
 
 
 def _recorded(
-    arrays: Mapping[str, NDArray[Any]], ready: PreparedChain, steps: int, turned: bool
+    arrays: Mapping[str, NDArray[Any]], rest: SolverState, steps: int, turned: bool
 ) -> Recorded:
     """Return what the solver found, of the shapes that robot and loads ask for."""
-    import jax.tree_util as tree_util
+    from notchflex.results.path import REPORTED, Recorded
 
-    from notchflex.results.path import FLATTENING, REPORTED, Recorded
-    from notchflex.results.state import leaf_name
-
-    leaves, structure = tree_util.tree_flatten_with_path(ready.rest)
-    state: list[NDArray[Any]] = []
-    for key, leaf in leaves:
-        name = _STATE + leaf_name(key)
-        state.append(_of_shape(arrays[name], (steps, *np.shape(leaf)), name))
-    notches = (steps, ready.chain.flexures)
-    # Older files do not count the loss of flattening.
-    unflattened = np.zeros((*notches, 3, 1))
-    reported = {
-        name: arrays.get(name, unflattened) if name == FLATTENING else arrays[_key(name, turned)]
-        for name in REPORTED
-    }
-    for name, values in reported.items():
-        _of_shape(values, (steps, *values.shape[1:]), name)
-    # Older files have neither, nor do those of robots that cannot snap need the first.
-    missing = dict(zip(_ADDED, (np.zeros(notches), np.zeros(steps, int)), strict=True))
-    run = {
-        name: _of_shape(arrays["solver_converged" if name == "converged" else name], (steps,), name)
-        for name in _RUN
-    }
-    added = {
-        name: _of_shape(arrays.get(name, values), values.shape, name)
-        for name, values in missing.items()
-    }
+    expected = {_STATE + name: np.shape(leaf) for name, leaf in leaves_of(rest).items()}
+    for name, values in arrays.items():
+        shape = (steps, *expected.get(name, values.shape[1:]))
+        if values.shape != shape and not name.startswith(_START):
+            raise InputError.FILE_DAMAGED(
+                f"{name} has the shape {values.shape}, and this robot and its loads ask for "
+                f"{shape}."
+            )
+    smallest, sign = (arrays[name] for name in _HELD)
     return Recorded(
-        solved=tree_util.tree_unflatten(structure, state),
-        reported=reported,
-        first=_before_the_first(arrays, ready, reported[FLATTENING].shape[1:]),
-        held=(arrays[_HELD[0]], arrays[_HELD[1]]),
-        **run,
-        **added,
+        solved=jax.tree.unflatten(jax.tree.structure(rest), [arrays[name] for name in expected]),
+        reported={name: arrays[_key(name, turned)] for name in REPORTED},
+        first={name: arrays[_START + name] for name in _before(rest)},
+        held=(smallest, sign),
+        **{attribute: arrays[name] for name, attribute in _RUN.items()},
     )
-
-
-def _before_the_first(
-    arrays: Mapping[str, NDArray[Any]], ready: PreparedChain, flattening: tuple[int, ...]
-) -> dict[str, NDArray[Any]]:
-    """Return quantities of the state before the first step; older files lack those of materials."""
-    from notchflex.results.path import BEFORE, FLATTENING, MATERIAL
-
-    first = {name: arrays[_START + name] for name in BEFORE}
-    at_rest = ready.rest.memory.material
-    if not isinstance(at_rest, tuple):
-        none = {MATERIAL: np.asarray(at_rest), FLATTENING: np.zeros(flattening)}
-        for name, missing in none.items():
-            key = _START + name
-            first[name] = _of_shape(arrays.get(key, missing), missing.shape, key)
-    return first
 
 
 def _key(name: str, turned: bool) -> str:
     """Return the name of an array of the solver, whose vectors are in the frame of the base."""
     return f"{name}{IN_BASE}" if turned and REGISTERED[name].in_world else name
-
-
-def _of_shape(array: NDArray[Any], shape: tuple[int, ...], name: str) -> NDArray[Any]:
-    if array.shape != shape:
-        raise InputError.FILE_DAMAGED(
-            f"{name} has the shape {array.shape}, and this robot and its loads ask for {shape}."
-        )
-    return array
 
 
 # A path as a data frame and as a Parquet table: the columns of the CSV, one row per step.
@@ -454,7 +375,7 @@ def write_parquet(target: str | FilePath, path: EquilibriumPath) -> None:
     """
     need("polars", "data", "Parquet")
     table = dataframe_of(path)
-    head = {_KEY: json.dumps(encoded(record_of(path)))}
+    head = {_KEY: json.dumps(encoded(path))}
     buffer = io.BytesIO()  # polars has errors of its own where a disk is full
     table.write_parquet(buffer, metadata=head)
     with replacing(target) as temporary:
@@ -471,12 +392,8 @@ def read_columns(file: str | FilePath) -> Mapping[str, Sequence[Any]]:
         return polars.read_parquet(FilePath(file)).to_dict(as_series=False)
 
 
-def read_head(file: str | FilePath) -> Record:
-    """Return the record in the head of a Parquet table.
-
-    Raises:
-        InputError: polars is not installed, the file is not a Parquet table or has no record.
-    """
+def _read_parquet(file: str | FilePath) -> EquilibriumPath:
+    """Return the path in the head of a Parquet table."""
     with _reading(file) as polars:
         head = polars.read_parquet_metadata(FilePath(file))
     if _KEY not in head:
@@ -484,13 +401,9 @@ def read_head(file: str | FilePath) -> Record:
             f"{file} has no path of notchflex in its head; give a file that --parquet or "
             "save_path wrote, or read its columns with notchflex.read_table."
         )
-    try:
+    with _damage(file):
         document = json.loads(head[_KEY])
-    except ValueError:
-        raise InputError.FILE_DAMAGED(
-            f"{file} is damaged: its head is not JSON; write it again."
-        ) from None
-    return decoded(document, str(file))
+    return _decoded(document, file)
 
 
 @contextlib.contextmanager
@@ -530,7 +443,8 @@ def dataset_of(path: EquilibriumPath) -> Dataset:
     need("xarray", "data", "to_xarray")
     import xarray
 
-    record = record_of(path)
+    from notchflex.robot import robot_text
+
     variables: dict[str, Any] = {}
     for name, quantity in QUANTITIES.items():
         values = np.asarray(getattr(path, name))
@@ -549,24 +463,10 @@ def dataset_of(path: EquilibriumPath) -> Dataset:
         },
         attrs={
             "title": path.robot.name,
-            "program": f"{record.facts['program']} {record.facts['version']}",
-            "robot_file": record.facts["robot"],
+            "program": f"notchflex {__version__}",
+            "robot_file": robot_text(path.robot),
         },
     )
-
-
-def record_dataset(path: EquilibriumPath) -> Dataset:
-    """Return the part of the record of a path that its quantities do not hold, as a data set."""
-    import xarray
-
-    record = record_of(path)
-    variables = {
-        name: (tuple(f"{name}_axis_{axis}" for axis in range(values.ndim)), values)
-        for name, values in record.arrays.items()
-        if name not in QUANTITIES
-    }
-    facts = {name: one for name, one in record.facts.items() if name != "robot"}
-    return xarray.Dataset(variables, attrs={_FACTS: json.dumps(facts)})
 
 
 def write_netcdf(target: str | FilePath, path: EquilibriumPath) -> None:
@@ -576,8 +476,16 @@ def write_netcdf(target: str | FilePath, path: EquilibriumPath) -> None:
         InputError: A library is not installed, or the file cannot be written.
     """
     _need_netcdf()
-    data, record = dataset_of(path), record_dataset(path)
-    write_groups(target, {None: data, _GROUP: record})
+    import xarray
+
+    rest = {
+        name: (tuple(f"{name}_axis_{axis}" for axis in range(values.ndim)), values)
+        for name, values in arrays_of(path).items()
+        if name not in QUANTITIES
+    }
+    facts = {name: fact for name, fact in facts_of(path).items() if name != "robot"}
+    group = xarray.Dataset(rest, attrs={_FACTS: json.dumps(facts)})
+    write_groups(target, {None: dataset_of(path), _GROUP: group})
 
 
 def write_groups(target: str | FilePath, groups: Mapping[str | None, Dataset]) -> None:
@@ -599,23 +507,13 @@ def write_groups(target: str | FilePath, groups: Mapping[str | None, Dataset]) -
         temporary.write_bytes(buffer.getbuffer())
 
 
-def read_netcdf(file: str | FilePath) -> EquilibriumPath:
-    """Return the path of a file that `write_netcdf` wrote.
-
-    Raises:
-        InputError: A library is not installed, or the file holds no path or lacks something.
-    """
+def _read_netcdf(file: str | FilePath) -> EquilibriumPath:
+    """Return the path of a file that `write_netcdf` wrote."""
     _need_netcdf()
-    import h5py
     import xarray
 
     try:
         data = xarray.load_dataset(file, engine="h5netcdf")
-        with h5py.File(file, "r") as opened:
-            has_record = _GROUP in opened
-        # Files of version 0.1.0 hold the record beside the quantities.
-        group = {"group": _GROUP} if has_record else {}
-        record = xarray.load_dataset(file, engine="h5netcdf", **group)
     except (OSError, ValueError, KeyError) as problem:
         words = " ".join(str(problem).split())
         raise InputError.FILE_UNREADABLE(f"{file} cannot be read as NetCDF: {words}.") from None
@@ -628,20 +526,19 @@ def read_netcdf(file: str | FilePath) -> EquilibriumPath:
             f"{file} holds one state, not a path: the work done before it is not in it. "
             "Write the path that it belongs to, or the state alone with state.save."
         )
-    if _FACTS not in record.attrs:
+    rest = data  # files of version 0.1.0 hold all in one group
+    with contextlib.suppress(OSError):
+        rest = xarray.load_dataset(file, engine="h5netcdf", group=_GROUP)
+    if _FACTS not in rest.attrs:
         raise InputError.FILE_FORMAT(
             f"{file} holds the quantities of a path, but not the states between its steps, so "
             "no path can be made of it; write the path with notchflex.save_path."
         )
-    try:
-        facts = {**json.loads(record.attrs[_FACTS]), "robot": data.attrs["robot_file"]}
-    except (TypeError, ValueError):
-        raise InputError.FILE_DAMAGED(
-            f"{file} is damaged: its facts are not JSON; write it again."
-        ) from None
-    both = {**data.data_vars, **record.data_vars}
-    arrays = {str(name): np.asarray(values.to_numpy()) for name, values in both.items()}
-    return path_of(Record(facts, arrays), str(file))
+    with _damage(file):
+        facts = {**json.loads(rest.attrs[_FACTS]), "robot": data.attrs["robot_file"]}
+        variables = {**data.data_vars, **rest.data_vars}
+        arrays = {str(name): np.asarray(array.to_numpy()) for name, array in variables.items()}
+        return _path_of(facts, arrays, file)
 
 
 def _need_netcdf() -> None:

@@ -27,7 +27,7 @@ from notchflex.errors import InputError
 from notchflex.results.io import read_columns
 from notchflex.results.quantities import AXES, QUANTITIES
 from notchflex.robot.part import sentences
-from notchflex.robot.reading import load_robot, parse_toml, read_text
+from notchflex.robot.reading import in_file, load_robot, parse_toml, read_text
 from notchflex.robot.robot import Robot
 
 TOLD_COLUMNS = (
@@ -48,29 +48,31 @@ class Table:
 
     Attributes:
         name: The file, for messages.
-        header: Names of the columns.
+        entries: Entries of each column by its name, without spaces around them.
         lines: Line of the file that each row stands in.
-        rows: Entries of each row, as many as columns, without spaces around them.
         decimal: What separates the decimals of its numbers, a point or a comma.
         written: Columns that have another name in the file, to that name.
         named: Columns that the caller told by their header.
     """
 
     name: str
-    header: tuple[str, ...]
+    entries: Mapping[str, tuple[str, ...]]
     lines: tuple[int, ...]
-    rows: tuple[tuple[str, ...], ...]
     decimal: str = "."
     written: Mapping[str, str] = field(default_factory=dict[str, str])
     named: Set[str] = frozenset()
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(self.lines)
+
+    @property
+    def header(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.entries)
 
     def texts(self, column: str) -> tuple[str, ...]:
         """Return the entries of a column."""
-        position = self.header.index(column)
-        return tuple(row[position] for row in self.rows)
+        return self.entries[column]
 
     def numbers(
         self, column: str, *, may_miss: bool = False, is_load: bool = False
@@ -184,7 +186,8 @@ def csv_table(source: str | os.PathLike[str]) -> Table:
             )
     lines, rows = zip(*numbered, strict=True)
     decimal = "." if separator == "," else _decimal(path, lines, rows)
-    return Table(str(source), header, lines, rows, decimal)
+    entries = dict(zip(header, zip(*rows, strict=True), strict=True))
+    return Table(str(source), entries, lines, decimal)
 
 
 def _separator(text: str) -> str:
@@ -295,25 +298,21 @@ def read_data_table(
                 f"{table.name}: there is no column {header} for {name}; {table.columns}."
             )
         named[header] = name
-    headers: list[str] = []
-    factors: list[float] = []
-    for header in table.header:
+    entries: dict[str, tuple[str, ...]] = {}
+    written: dict[str, str] = {}
+    told: set[str] = set()
+    for header, texts in table.entries.items():
         column, factor = _understood(header, named.get(header, ""))
-        is_taken = column != header and (column in table.header or column in headers)
-        if is_taken and header in named:
-            raise InputError.TABLE_COLUMNS(
-                f"{table.name}: there are two columns for {column}; rename or remove one."
-            )
-        headers.append(header if is_taken else column)
-        factors.append(1.0 if is_taken else factor)
-    rows = tuple(
-        tuple(map(_converted, row, factors, [table.decimal] * len(row))) for row in table.rows
-    )
-    renamed = {new: old for new, old in zip(headers, table.header, strict=True) if new != old}
-    told = {new for new, old in zip(headers, table.header, strict=True) if old in named}
-    return dataclasses.replace(
-        table, header=tuple(headers), rows=rows, written=renamed, named=frozenset(told)
-    )
+        if column != header and (column in table.entries or column in entries):
+            if header in named:
+                raise InputError.TABLE_COLUMNS(
+                    f"{table.name}: there are two columns for {column}; rename or remove one."
+                )
+            column, factor = header, 1.0
+        entries[column] = tuple(_converted(text, factor, table.decimal) for text in texts)
+        written |= {column: header} if column != header else {}
+        told |= {column} if header in named else set()
+    return dataclasses.replace(table, entries=entries, written=written, named=frozenset(told))
 
 
 def _understood(header: str, name: str) -> tuple[str, float]:
@@ -386,9 +385,7 @@ def read_specification(
     try:
         return make(parse_toml(text, shown, kind, InputError))
     except InputError as error:
-        lines = str(error).splitlines()
-        named = (line if line.startswith(shown) else f"{shown}: {line}" for line in lines)
-        raise InputError("\n".join(named), error.code) from None
+        raise in_file(shown, error, InputError) from None
 
 
 def validated(kind: type[Asked], table: Mapping[str, Any]) -> Asked:
@@ -451,7 +448,9 @@ def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
         ((3, 5), False)
     """
     entries: dict[str, dict[tuple[int, ...], NDArray[Any]]] = {}
-    for header, values in _columns(file).items():
+    is_parquet = FilePath(file).suffix.lower() == ".parquet"
+    columns = read_columns(file) if is_parquet else csv_table(file).entries
+    for header, values in columns.items():
         place = _place(header)
         if place is None:
             continue
@@ -468,13 +467,6 @@ def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
             "a table that --csv or --parquet wrote."
         )
     return {name: _joined(QUANTITIES[name], parts) for name, parts in entries.items()}
-
-
-def _columns(file: str | FilePath) -> Mapping[str, Sequence[Any]]:
-    if FilePath(file).suffix.lower() == ".parquet":
-        return read_columns(file)
-    table = csv_table(file)
-    return {column: table.texts(column) for column in table.header}
 
 
 def _place(header: str) -> tuple[Quantity, tuple[int, ...]] | None:
@@ -494,7 +486,7 @@ def _index(name: str, text: str | None) -> int:
         return AXES.index(str(text))
     if name == "span":  # proximal, gap 1, body 1, gap 2, ...
         kind, _, number = str(text).partition("_")
-        return 0 if not number else 2 * int(number) - (kind == "gap")
+        return 2 * int(number or 0) - (kind == "gap")
     return 0 if text is None else int(text) - 1
 
 

@@ -18,15 +18,17 @@ from notchflex._summary import Displayed, Summary, course, short, vector
 from notchflex._values import ByValue
 from notchflex.errors import ConvergenceError, InputError
 from notchflex.loads import Load
-from notchflex.loads.command import in_frame, out_of_frame
+from notchflex.loads.command import in_space
 from notchflex.loads.load import short_repr
 from notchflex.loads.load_path import MOST, external_rows, load_words, tendon_rows
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
 from notchflex.results.quantities import QUANTITIES, EquilibriumQuantities
 from notchflex.robot import Robot
-from notchflex.robot.reading import read_text
+from notchflex.robot.part import fields_of
+from notchflex.robot.reading import read_text, robot_from_text
 from notchflex.robot.robot import to_table
+from notchflex.robot.value_names import named_parts
 from notchflex.solver.residual import SolverState, at_rest
 
 if TYPE_CHECKING:
@@ -38,8 +40,6 @@ if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
 
 
-# Values without effect on states: name, limit of strain warnings, tolerances, title block.
-_NO_EFFECT = ("name", "material.allowed_strain", "tolerance.", "drawing.")
 _MAX_NAMED = 3
 
 
@@ -69,7 +69,7 @@ def differences(robot: Robot, other: Robot) -> list[str]:
     changed: list[str] = []
     for general, pairs in changes.items():
         for (mine, its), names in pairs.items():
-            everywhere = len(names) == sum(_general(one) == general for one in first)
+            everywhere = len(names) == sum(_general(name) == general for name in first)
             shown = [general] if everywhere else names
             changed += [f"{name} = {_text(mine)} instead of {_text(its)}" for name in shown]
     return changed
@@ -85,21 +85,13 @@ def mismatch(robot: Robot, other: Robot) -> str:
 
 
 def _values(robot: Robot) -> dict[str, Any]:
-    """Return every value of a robot by its name, notch by notch."""
-    table = to_table(robot.replace(notch=robot.notches))
-    values: dict[str, Any] = {}
-    for section, part in table.items():
-        if isinstance(part, Mapping):
-            parts = {section: part}
-        elif isinstance(part, list):
-            parts = {f"{section}[{number}]": one for number, one in enumerate(part, start=1)}
-        else:
-            values[section] = part
-            continue
-        values |= {
-            f"{name}.{key}": value for name, one in parts.items() for key, value in one.items()
-        }
-    return {name: value for name, value in values.items() if not name.startswith(_NO_EFFECT)}
+    """Return every value that has an effect on states by its name, notch by notch."""
+    return {
+        f"{named.name}.{key}": getattr(named.part, key)
+        for named in named_parts(robot.replace(notch=robot.notches))
+        for key in fields_of(type(named.part))
+        if named.section != "drawing" and key != "allowed_strain"
+    }
 
 
 def _general(name: str) -> str:
@@ -130,7 +122,8 @@ def robot_digest(robot: Robot) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-_MODES = ".point.unknowns.modes"
+_FACTS = ("robot", "level", "loaded", "refinement")
+_MODES, _TENSION = ".point.unknowns.modes", ".point.base_tension"
 _LOADS = ".applied"
 _MATERIAL = ".memory.material"
 _FORMAT = "notchflex state 3"
@@ -142,20 +135,26 @@ class State(ByValue, Displayed):
 
     Attributes:
         robot: Name of the robot it belongs to.
-        solved: Unknowns, base tensions (N), memory of contacts and material, stroke (mm) and
-            loads, those as of space.
+        arrays: Unknowns, base tensions (N), memory of contacts and material, stroke (mm) and
+            loads, those as of space, by name.
         level: Loads that its chain was assembled for.
         loaded: Whether loads other than the tendons' act in it.
         refinement: Number of refinements of its modes beyond those for usual loads.
-        description: The robot it belongs to; None if that is not known.
+        description: The robot it belongs to; None if an older version wrote the file: nothing then
+            shows whether the robot has changed since.
+        source: The file that it was read from.
     """
 
     robot: str
-    solved: SolverState
+    arrays: Mapping[str, np.ndarray]
     level: str
     loaded: bool
     refinement: int
     description: Robot | None = None
+    source: str = ""
+
+    def _value(self) -> Any:
+        return (self.robot, self.arrays, self.level, self.loaded, self.refinement)
 
     def save(self, path: str | FilePath) -> None:
         """Write the state to a JSON file.
@@ -166,14 +165,8 @@ class State(ByValue, Displayed):
         Raises:
             InputError: The file cannot be written.
         """
-        content = {
-            "format": _FORMAT,
-            "robot": self.robot,
-            "level": self.level,
-            "loaded": self.loaded,
-            "refinement": self.refinement,
-            "arrays": {name: array.tolist() for name, array in self.arrays.items()},
-        }
+        content = {"format": _FORMAT} | {name: getattr(self, name) for name in _FACTS}
+        content["arrays"] = {name: array.tolist() for name, array in self.arrays.items()}
         if self.description is not None:
             from notchflex.robot.writing import robot_text
 
@@ -182,23 +175,18 @@ class State(ByValue, Displayed):
             temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
     def _summary(self) -> Summary:
-
-        return state_summary(self)
+        tension, stroke = (_few(self.arrays[name]) for name in (_TENSION, ".stroke"))
+        rows = [("tendon tension", f"{tension} N"), ("tendon stroke", f"{stroke} mm")]
+        hint = "simulate(..., from_state=...) continues from it; .save(file) writes it"
+        return Summary(f"State of {self.robot}", rows, hint)
 
     @property
     def follows(self) -> bool:
         """Whether any load in it turns with a body."""
-        applied = self.solved.applied
-        return applied is not None and bool(np.any(applied.following))
-
-    @property
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Its numbers by name."""
-        leaves, _ = tree_util.tree_flatten_with_path(self.solved)
-        return {leaf_name(key): np.asarray(leaf) for key, leaf in leaves}
+        return bool(np.any(self.arrays.get(f"{_LOADS}.following", 0.0)))
 
     @classmethod
-    def load(cls, path: str | FilePath) -> SavedState:
+    def load(cls, path: str | FilePath) -> State:
         """Read a state back; it is fitted to a robot when it is continued from.
 
         Args:
@@ -225,76 +213,81 @@ class State(ByValue, Displayed):
             raise InputError.FILE_FORMAT(
                 f"{path} is not a notchflex state; give a file written by --save-state"
             )
-        robot, arrays = content.get("robot"), content.get("arrays")
-        if not isinstance(robot, str) or not isinstance(arrays, dict):
-            raise _damaged(path, "the name of its robot or its numbers are missing")
-        level, loaded = content.get("level"), content.get("loaded")
-        refinement = content.get("refinement")
-        if level not in LEVELS or not isinstance(loaded, bool) or not isinstance(refinement, int):
-            raise _damaged(path, "what loads it is for is missing")
-        description = content.get("description")
-        if description is not None:
-            from notchflex.robot.reading import robot_from_text
-
+        facts: dict[str, Any] = {name: content.get(name) for name in _FACTS}
+        arrays: Any = content.get("arrays")
+        robot = content.get("description")
+        kinds = [type(fact) for fact in (*facts.values(), arrays)]
+        if kinds != [str, str, bool, int, dict] or facts["level"] not in LEVELS:
+            raise _damaged(path, "its robot, what loads it is for or its numbers are missing")
+        if robot is not None:
             try:
-                description = robot_from_text(str(description))
+                robot = robot_from_text(str(robot))
             except InputError:
                 raise _damaged(path, "the description of its robot cannot be read") from None
-        return SavedState(robot, arrays, level, loaded, refinement, str(path), description)
-
-
-@dataclass(frozen=True)
-class SavedState:
-    """A state as read from a file, not yet fitted to a robot.
-
-    Its `description` is None where an older version wrote the file: nothing then shows whether
-    the robot has changed since.
-    """
-
-    robot: str
-    arrays: Any
-    level: str
-    loaded: bool
-    refinement: int
-    source: str
-    description: Robot | None = None
-
-    @property
-    def follows(self) -> bool:
-        """Whether any load in it may turn with a body."""
-        return self.loaded
+        read = {name: _array(path, name, numbers) for name, numbers in arrays.items()}
+        return cls(**facts, arrays=read, description=robot, source=str(path))
 
     def fitted(self, chain: Chain) -> SolverState:
-        """Return the state for a chain.
+        """Return the state for a chain, which may be assembled for more kinds of loads.
 
         Raises:
             InputError: It is damaged, or belongs to a robot of another make.
         """
-        read: dict[str, np.ndarray] = {}
-        for name, numbers in self.arrays.items():
-            try:
-                array = np.asarray(numbers, float)
-            except (TypeError, ValueError, OverflowError):
-                raise _damaged(self.source, f"{name} is not a table of numbers") from None
-            if not np.isfinite(array).all():
-                raise _damaged(self.source, f"{name} holds what is not a finite number")
-            read[name] = array
-        expected, _ = tree_util.tree_flatten_with_path(at_rest(chain))
-        for name in (leaf_name(key) for key, _ in expected):
-            if name not in read and not name.startswith(_LOADS):
+        rest = _in_space(at_rest(chain), chain)
+        leaves = leaves_of(rest)
+        for name, leaf in leaves.items():
+            if name not in self.arrays and not name.startswith(_LOADS):
                 raise _damaged(self.source, f"{name} is missing")
-        return _on_chain(read, chain, f"{self.source} holds a state of robot {self.robot!r}")
+            array = self.arrays.get(name, leaf)
+            if name == _MODES and array.ndim == leaf.ndim and array.shape[-1] < leaf.shape[-1]:
+                # The modes of every level are the first ones of the next.
+                array = np.pad(array, ((0, 0), (0, leaf.shape[-1] - array.shape[-1])))
+            if name == _MATERIAL and array.ndim == leaf.ndim and array.shape[1] == 1:
+                # A notch under tendons alone bends uniformly: it has one node.
+                array = np.repeat(array, leaf.shape[1], axis=1)
+            if array.shape != leaf.shape:
+                holder = (
+                    f"{self.source} holds a state of" if self.source else "the state belongs to"
+                )
+                raise InputError.STATE_OF_ANOTHER_ROBOT(
+                    f"{holder} robot {self.robot!r} with other notches or tendons than this robot; "
+                    "continue from a state of the same robot"
+                )
+            leaves[name] = array
+        solved: SolverState = tree_util.tree_unflatten(
+            tree_util.tree_structure(rest), leaves.values()
+        )
+        return _in_space(solved, chain, reduce=True)
 
 
-def leaf_name(key: Any) -> str:
-    """Return the name that an array of a solved state has in files.
+def leaves_of(solved: SolverState) -> dict[str, np.ndarray]:
+    """Return the arrays of a solved state by the names that they have in files.
 
     Files keep the names of their first version, whatever the fields of the solver are called.
-
-    Args:
-        key: Path of the array in the tree, as JAX gives it.
     """
-    return tree_util.keystr(key).replace("contact_force", "lip_force")
+    leaves, _ = tree_util.tree_flatten_with_path(solved)
+    return {
+        tree_util.keystr(key).replace("contact_force", "lip_force"): np.asarray(leaf)
+        for key, leaf in leaves
+    }
+
+
+def _in_space(solved: SolverState, chain: Chain, *, reduce: bool = False) -> SolverState:
+    """Return a state with its loads as those of space, or as those of its chain (`reduce`)."""
+    if solved.applied is None or chain.frame is None:
+        return solved
+    return solved._replace(applied=in_space(solved.applied, chain.frame, reduce=reduce))
+
+
+def _array(source: str | FilePath, name: str, numbers: Any) -> np.ndarray:
+    """Return numbers of a file as an array."""
+    try:
+        array = np.asarray(numbers, float)
+    except (TypeError, ValueError, OverflowError):
+        raise _damaged(source, f"{name} is not a table of numbers") from None
+    if not np.isfinite(array).all():
+        raise _damaged(source, f"{name} holds what is not a finite number")
+    return array
 
 
 def _damaged(source: str | FilePath, what: str) -> InputError:
@@ -310,7 +303,7 @@ def check_robot(state: object, robot: Robot) -> None:
         InputError: It belongs to another one, and the message names the values that differ; or it
             is not a state.
     """
-    if not isinstance(state, State | SavedState):
+    if not isinstance(state, State):
         raise InputError.WRONG_TYPE(
             "from_state must be a notchflex.State: the `state` of a result, or State.load(file); "
             f"got {short_repr(state)}"
@@ -322,56 +315,17 @@ def check_robot(state: object, robot: Robot) -> None:
         )
     differs = "" if state.description is None else mismatch(robot, state.description)
     if differs:
-        source = f"{state.source} holds" if isinstance(state, SavedState) else "this is"
+        holder = f"{state.source} holds" if state.source else "this is"
         raise InputError.STATE_OF_ANOTHER_ROBOT(
-            f"{source} a state of {robot.name!r} with other values: this robot has {differs}. "
+            f"{holder} a state of {robot.name!r} with other values: this robot has {differs}. "
             "Continue with the values of the state, or start from rest."
         )
 
 
 def state_of(robot: Robot, chain: Chain, solved: SolverState) -> State:
     """Return a solved state of a robot's chain as one to save or to continue from."""
-    if solved.applied is not None and chain.frame is not None:
-        solved = solved._replace(applied=out_of_frame(solved.applied, chain.frame))
-    return State(robot.name, solved, chain.level, chain.loaded, chain.refinement, robot)
-
-
-def fitted(state: State | SavedState | None, chain: Chain) -> SolverState:
-    """Return the start state on a chain: rest, or a given state, which must fit."""
-    if state is None:
-        return at_rest(chain)
-    if isinstance(state, SavedState):
-        return state.fitted(chain)
-    return _on_chain(state.arrays, chain, f"the state belongs to robot {state.robot!r}")
-
-
-def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> SolverState:
-    """Convert arrays to a state on a chain, which may be assembled for more kinds of loads."""
-    rest = at_rest(chain)
-    frame = chain.frame
-    if rest.applied is not None and frame is not None:  # a state holds loads as those of space
-        rest = rest._replace(applied=out_of_frame(rest.applied, frame))
-    leaves, structure = tree_util.tree_flatten_with_path(rest)
-    fitting = []
-    for key, leaf in leaves:
-        name = leaf_name(key)
-        array = arrays.get(name, np.asarray(leaf))
-        if name == _MODES and array.ndim == leaf.ndim and array.shape[-1] < leaf.shape[-1]:
-            # The modes of every level are the first ones of the next.
-            array = np.pad(array, ((0, 0), (0, leaf.shape[-1] - array.shape[-1])))
-        if name == _MATERIAL and array.ndim == leaf.ndim and array.shape[1] == 1:
-            # A notch under tendons alone bends uniformly: it has one node.
-            array = np.repeat(array, leaf.shape[1], axis=1)
-        if array.shape != leaf.shape:
-            raise InputError.STATE_OF_ANOTHER_ROBOT(
-                f"{whose} with other notches or tendons than this robot; "
-                "continue from a state of the same robot"
-            )
-        fitting.append(array)
-    solved: SolverState = tree_util.tree_unflatten(structure, fitting)
-    if solved.applied is not None and frame is not None:
-        solved = solved._replace(applied=in_frame(solved.applied, frame))
-    return solved
+    arrays = leaves_of(_in_space(solved, chain))
+    return State(robot.name, arrays, chain.level, chain.loaded, chain.refinement, robot)
 
 
 # One state of a path.
@@ -547,17 +501,6 @@ def path_summary(path: EquilibriumPath) -> Summary:
     return Summary(f"Path of {path.robot.name}, {steps}{from_rest}", rows, _HINT)
 
 
-def state_summary(state: State) -> Summary:
-    """Summarise a saved state: its robot, and the tensions and strokes of its tendons."""
-    point = state.solved.point
-    rows = [
-        ("tendon tension", f"{_few(np.asarray(point.base_tension))} N"),
-        ("tendon stroke", f"{_few(np.asarray(state.solved.stroke))} mm"),
-    ]
-    hint = "simulate(..., from_state=...) continues from it; .save(file) writes it"
-    return Summary(f"State of {state.robot}", rows, hint)
-
-
 def _converged(path: EquilibriumPath) -> str:
     converged = np.asarray(path.converged)
     if converged.all():
@@ -568,10 +511,7 @@ def _converged(path: EquilibriumPath) -> str:
 
 def _few(values: np.ndarray, digits: int | None = None) -> str:
     """Format numbers as a list, of many the first and the last."""
-    texts = [
-        short(float(value)) if digits is None else f"{round(float(value), digits) + 0.0:.{digits}f}"
-        for value in values
-    ]
+    texts = [short(float(value), digits) for value in values]
     if len(texts) > 2 * MOST:
         texts = [*texts[:MOST], "…", *texts[-MOST:]]
     return ", ".join(texts)

@@ -122,34 +122,26 @@ def is_listed(quantity: Quantity) -> bool:
 
 def entries_of(path: EquilibriumPath, quantity: Quantity) -> Iterator[CsvEntry]:
     """Yield every entry of a quantity, in the order of the CSV columns."""
-    values: Any = getattr(path, quantity.name)
+    values = np.asarray(getattr(path, quantity.name))
     if quantity.scale != 1.0:
-        values = np.asarray(values) * quantity.scale
-    several = path.tension.shape[1] > 1
-    tendons = [(i, i + 1 if several else "") for i in range(path.tension.shape[1])]
-    match quantity.per:
-        case ():
-            yield CsvEntry(quantity.header(), "", values)
-        case ("notch",):
-            for notch in range(values.shape[1]):
-                header = quantity.header(notch=notch + 1)
-                yield CsvEntry(header, f"notch {notch + 1}", values[:, notch])
-        case ("axis",):
-            for index, axis in enumerate(AXES):
-                yield CsvEntry(quantity.header(axis=axis), axis, values[:, index])
-        case ("tendon",):
-            for index, number in tendons:
-                name = f"tendon {number}" if several else ""
-                yield CsvEntry(quantity.header(tendon=number), name, values[:, index])
-        case ("tendon", "span"):
-            for index, number in tendons:
-                for span, name in enumerate(span_names(spans_of(path, index))):
-                    header = quantity.header(tendon=number, span=name)
-                    words = f"tendon {number}, " if several else ""
-                    words += name.replace("_", " ")
-                    yield CsvEntry(header, words, values[:, index, span])
-        case other:
-            raise NotImplementedError(f"no CSV columns for a quantity per {other}")
+        values = values * quantity.scale
+    names = {"axis": AXES, "span": span_names(values.shape[-1] if "span" in quantity.per else 0)}
+    for index in np.ndindex(values.shape[1:]):
+        place = dict(zip(quantity.per, index, strict=True))
+        if "span" in place and place["span"] >= spans_of(path, place["tendon"]):
+            continue
+        labels: dict[str, object] = {
+            axis: names[axis][number] if axis in names else number + 1
+            for axis, number in place.items()
+        }
+        if "tendon" in labels and path.tension.shape[1] == 1:
+            labels["tendon"] = ""  # the only one goes without its number
+        words = [
+            str(label).replace("_", " ") if axis in names else f"{axis} {label}"
+            for axis, label in labels.items()
+            if label
+        ]
+        yield CsvEntry(quantity.header(**labels), ", ".join(words), values[(slice(None), *index)])
 
 
 def _field(value: Any) -> Any:
@@ -290,13 +282,12 @@ def _external(path: EquilibriumPath) -> list[dict[str, Any]]:
 
 
 def _with_units(values: dict[str, Any]) -> dict[str, Any]:
-    forces = values.pop("body_forces", None)
-    named = {
-        _LOAD_KEYS.get(name, (name,))[0].rpartition(".")[2]: value for name, value in values.items()
+    return {
+        _LOAD_KEYS.get(name, (name,))[0].rpartition(".")[2]: (
+            [_with_units(force) for force in value] if name == "body_forces" else value
+        )
+        for name, value in values.items()
     }
-    if forces is not None:
-        named["body_forces"] = [_with_units(one) for one in forces]
-    return named
 
 
 def _value(path: EquilibriumPath, quantity: Quantity, index: int) -> Any:

@@ -139,8 +139,7 @@ def check_folder(
                 f"{option} {folder}: a file cannot be called {name!r}."
             )
         files.append(Path(folder) / name)
-    there = os.path.exists(folder) if "\0" not in folder else False
-    sources = list(inputs)
+    there, sources = "\0" not in folder and os.path.exists(folder), list(inputs)
     for target in files if there else [folder]:
         check_output(str(target), option, inputs=sources)
     return tuple(files)
@@ -171,14 +170,19 @@ def check_picture(
         )
     suffix = Path(target).suffix.lower()
     if suffix not in kinds:
-        got = f"the suffix {suffix}" if suffix else "no suffix"
         known = f"{', '.join(kinds[:-1])} or {kinds[-1]}"
         raise InputError.FILE_FORMAT(
-            f"{option} {target}: got {got}; a picture is written as {known}."
+            f"{option} {target}: got {suffix_of(target)}; a picture is written as {known}."
         )
     check_output(target, option, inputs=inputs)
     for module in _DRAWN_BY.get(suffix, ("matplotlib",)):
         need(module, "plot", option)
+
+
+def suffix_of(file: str | Path) -> str:
+    """Return what suffix a file has, in words."""
+    suffix = Path(file).suffix.lower()
+    return f"the suffix {suffix}" if suffix else "no suffix"
 
 
 def check_distinct(outputs: dict[str, str | None]) -> None:

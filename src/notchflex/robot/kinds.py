@@ -193,8 +193,8 @@ class Notch:
 
     @property
     def has_elastic_ends(self) -> bool:
-        """Whether its stiffness depends on the rings beside it."""
-        return False
+        """Whether its stiffness depends on the rings or walls beside it."""
+        return getattr(self, "ends", "rigid") != "rigid"
 
     @property
     def law_errors(self) -> tuple[float, float]:

@@ -1,6 +1,5 @@
 """What only the whole robot can tell: parts that do not fit each other, values hardly meant."""
 
-import functools
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,7 +11,7 @@ from pydantic import BeforeValidator, WithJsonSchema
 
 from notchflex.errors import InputError, InputWarning
 from notchflex.robot.kinds import Notch, Tendon, openings_along
-from notchflex.robot.part import ProblemError, Problems, fields_of, unknown_key
+from notchflex.robot.part import ProblemError, Problems, fields_of, unit_of, unknown_key
 from notchflex.robot.value_names import described_at, named_parts, numbers_at
 
 if TYPE_CHECKING:
@@ -50,8 +49,8 @@ class Tolerance:
     @property
     def written(self) -> Any:
         """What stands in a robot file: the standard deviation alone, or a table."""
-        keys = {name: getattr(self, name) for name in _KEYS}
-        table = {name: key for name, key in keys.items() if key is not None and key is not False}
+        keys = {key: getattr(self, key) for key in _KEYS}
+        table = {key: said for key, said in keys.items() if said is not None and said is not False}
         return self.sd if list(table) == ["sd"] else table
 
 
@@ -300,12 +299,12 @@ def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
     """Yield a warning for each value that was probably not meant; lengths in metres are one."""
     by_unit: dict[tuple[str, str], list[_Unusual]] = {}
     for named in named_parts(robot):
-        for key, usual, unit in _usual_values(type(named.part)):
-            value = getattr(named.part, key)
-            if value is not None and not usual[0] <= value <= usual[1]:
-                other, meant = _meant(value, usual, unit)
+        for key, field in fields_of(type(named.part)).items():
+            usual, value = (field.json_schema_extra or {}).get("usual"), getattr(named.part, key)
+            if usual and value is not None and not usual[0] <= value <= usual[1]:
+                other, meant = _meant(value, usual, unit_of(field))
                 unusual = (f"{named.name}.{key}", value, usual, meant)
-                by_unit.setdefault((unit, other), []).append(unusual)
+                by_unit.setdefault((unit_of(field), other), []).append(unusual)
     for (unit, other), values in by_unit.items():
         yield _outside(values, unit, other)
     if not by_unit:
@@ -372,17 +371,6 @@ def _remaining_depths(robot: "Robot") -> Iterator[InputWarning]:
             )
             yield InputWarning(text, name, cut[0], remains)
             return
-
-
-@functools.cache
-def _usual_values(cls: type) -> list[tuple[str, tuple[float, float], str]]:
-    """Return the keys of a part that have usual values, with these and their unit."""
-    usual = {name: field.json_schema_extra or {} for name, field in fields_of(cls).items()}
-    return [
-        (name, tuple(extra["usual"]), extra.get("unit", ""))
-        for name, extra in usual.items()
-        if "usual" in extra
-    ]
 
 
 def _shown(value: float, unit: str) -> str:

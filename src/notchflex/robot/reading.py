@@ -9,7 +9,7 @@ import stat
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from notchflex._ready import READY, ready_names
 from notchflex.errors import InputError, RobotFileError
@@ -23,6 +23,8 @@ from notchflex.robot.robot import (
     warn_unlikely,
 )
 from notchflex.robot.value_names import change_table
+
+Refused = TypeVar("Refused", bound=InputError)
 
 _LARGEST = 50_000_000
 """Bytes of the largest text file that is read."""
@@ -66,23 +68,24 @@ def load_changed(
         robot, dropped = from_table(table), ()
     except InputError as error:
         if not values:
-            raise _in_file(shown, error) from None
+            raise in_file(shown, error, RobotFileError) from None
         try:
             dropped = change_table(table, values)
             robot, values = from_table(table), ()
         except InputError as remaining:
-            raise _in_file(shown, remaining) from None
+            raise in_file(shown, remaining, RobotFileError) from None
         except (LookupError, TypeError, AttributeError):  # no table in which values can be set
-            raise _in_file(shown, error) from None
+            raise in_file(shown, error, RobotFileError) from None
     if values:
         robot, dropped = set_values(robot, values)
     return Changed(remember_source(robot, text), dropped)
 
 
-def _in_file(shown: str, error: InputError) -> RobotFileError:
-    """Name the file before each sentence of an error."""
+def in_file(shown: str, error: InputError, kind: type[Refused]) -> Refused:
+    """Name the file before each sentence of an error that does not begin with it."""
     lines = str(error).splitlines()
-    return RobotFileError("\n".join(f"{shown}: {line}" for line in lines), error.code)
+    named = (line if line.startswith(shown) else f"{shown}: {line}" for line in lines)
+    return kind("\n".join(named), error.code)
 
 
 def robot_from_text(text: str, shown: str = "robot file") -> Robot:

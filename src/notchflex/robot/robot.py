@@ -265,10 +265,8 @@ def from_table(table: Mapping[str, Any]) -> Robot:
 def _repeats(notches: Any) -> Iterator[int]:
     """Read how many notches each of `notch` stands for, which may be anything."""
     for notch in notches if isinstance(notches, list | tuple) else ():
-        table = (
-            notch if isinstance(notch, Mapping) else vars(notch) if isinstance(notch, Notch) else {}
-        )
-        repeat = table.get("repeat", 1)
+        is_table = isinstance(notch, Mapping)
+        repeat = notch.get("repeat", 1) if is_table else getattr(notch, "repeat", 1)
         yield repeat if isinstance(repeat, int) and repeat > 0 else 1
 
 

@@ -265,24 +265,25 @@ class Described(NamedTuple):
     upper: float
 
 
-def _parts_at(robot: "Robot", path: str) -> tuple[str, list[Any]]:
-    """Return the key of a path and the parts that it means."""
+def _owners(robot: "Robot", path: str) -> tuple[str, list[Any]]:
+    """Return the key of a path, and those that have it of the parts that the path means."""
     target = parse_path(path)
-    if target.number is None:
-        parts = [each.part for each in named_parts(robot) if each.section == target.section]
-        return target.key, parts
-    singles = robot.notches if target.section == "notch" else robot.tendon
-    target.check_number(len(singles))
-    return target.key, [singles[target.number - 1]]
+    target.check_number(len(robot.notches if target.section == "notch" else robot.tendon))
+    parts = [named.part for named in named_parts(robot) if named.is_meant(target)]
+    owners = [part for part in parts if target.key in fields_of(type(part))]
+    if not owners:
+        allowed = dict.fromkeys(name for part in parts for name in fields_of(type(part)))
+        raise InputError.UNKNOWN_NAME(
+            f"`{path}` is not the name of a number of this robot{nearest(target.key, allowed)}; "
+            f"{EXAMPLES}."
+        )
+    return target.key, owners
 
 
 def number_at(robot: "Robot", path: str) -> float:
     """Return a number of a robot by its name (see `Robot.with_value`), in the units of its file."""
-    key, parts = _parts_at(robot, path)
-    allowed = dict.fromkeys(name for part in parts for name in fields_of(type(part)))
-    if key not in allowed:
-        raise _no_number(path, nearest(key, allowed))
-    numbers = {getattr(part, key) for part in parts if key in fields_of(type(part))}
+    key, owners = _owners(robot, path)
+    numbers = {getattr(part, key) for part in owners}
     if len(numbers) > 1:
         raise InputError.UNSUPPORTED(
             f"`{path}` has unlike values in this robot; name one, such as [1]."
@@ -293,12 +294,6 @@ def number_at(robot: "Robot", path: str) -> float:
             f"`{path}` is {value!r} in this robot, and no number that changes smoothly."
         )
     return value
-
-
-def _no_number(path: str, near: str = "") -> InputError:
-    return InputError.UNKNOWN_NAME(
-        f"`{path}` is not the name of a number of this robot{near}; {EXAMPLES}."
-    )
 
 
 def numbers_at(robot: "Robot", path: str) -> dict[str, float]:
@@ -321,14 +316,8 @@ def numbers_at(robot: "Robot", path: str) -> dict[str, float]:
 
 def described_at(robot: "Robot", path: str) -> Described:
     """Return unit and limits of a number of a robot by its name."""
-    key, parts = _parts_at(robot, path)
-    for part in parts:
-        if field := fields_of(type(part)).get(key):
-
-            def limits(*names: str) -> Iterator[float]:
-                for rule in field.metadata:
-                    yield from (getattr(rule, name) for name in names if hasattr(rule, name))
-
-            lower, upper = max(limits("gt", "ge"), default=-math.inf), limits("lt", "le")
-            return Described(unit_of(field), lower, min(upper, default=math.inf))
-    raise _no_number(path)
+    key, owners = _owners(robot, path)
+    field = fields_of(type(owners[0]))[key]
+    below = (getattr(rule, name, -math.inf) for rule in field.metadata for name in ("gt", "ge"))
+    above = (getattr(rule, name, math.inf) for rule in field.metadata for name in ("lt", "le"))
+    return Described(unit_of(field), max(below, default=-math.inf), min(above, default=math.inf))

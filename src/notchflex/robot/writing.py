@@ -4,6 +4,7 @@ import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
@@ -78,23 +79,15 @@ def robot_text(
     """
     notes = fitted or {}
     template = source_of(robot) if template is None else template
-    if template:
-        try:
-            text = _rewritten(robot, template, notes)
-            if robot_from_text(text) == robot:
-                return text
-        except (InputError, ParseError):
-            pass  # a template laid out in an unusual way; a fresh file is right, if bare
-    return _fresh(robot, notes)
+    # A template may be laid out in an unusual way; a fresh file is right, if bare.
+    with suppress(InputError, ParseError):
+        text = _rewritten(robot, template or _fresh(robot), notes)
+        if robot_from_text(text) == robot:
+            return text
+    return _rewritten(robot, _fresh(robot), notes)
 
 
-def _notes_of(notes: _Notes, named: NamedPart) -> dict[str, str]:
-    """Return the notes of the keys of a part."""
-    targets = ((parse_path(path), note) for path, note in notes.items())
-    return {target.key: note for target, note in targets if named.is_meant(target)}
-
-
-def _fresh(robot: Robot, notes: _Notes) -> str:
+def _fresh(robot: Robot) -> str:
     """Lay out a new file, with the meaning and unit of every key as its comment."""
     lines = [
         "# A notchflex robot file. Lengths in mm, forces in N, moduli in MPa, angles in deg.",
@@ -107,7 +100,7 @@ def _fresh(robot: Robot, notes: _Notes) -> str:
             lines += ["", "[tolerance]", *_tolerance_lines(table["tolerance"])]
         if named.section in table:
             header = f"[[{named.section}]]" if named.first else f"[{named.section}]"
-            lines += ["", header, *_fresh_part(named.part, _notes_of(notes, named))]
+            lines += ["", header, *_fresh_part(named.part)]
     return "\n".join(lines) + "\n"
 
 
@@ -125,14 +118,12 @@ def _tolerance_lines(table: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _fresh_part(part: Any, notes: _Notes) -> list[str]:
+def _fresh_part(part: Any) -> list[str]:
     lines: list[str] = []
     for key, record in fields_of(type(part)).items():
         value = getattr(part, key)
         if not is_unsaid(key, value):
             comment = ", ".join(filter(None, (unit_of(record), record.description)))
-            fitted = f"{FITTED_TO} {notes[key]}" if key in notes else ""
-            comment = "; ".join(filter(None, (comment, fitted)))
             line = f"{key} = {tomlkit.item(value).as_string()}"
             lines.append(f"{line}  # {comment}" if comment else line)
     return lines
@@ -174,7 +165,9 @@ def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
     for name, pieces in blocks.items():
         for block, first, table in _matched(pieces, old.get(name), new.get(name, [])):
             named = NamedPart(name, first, table)
-            texts.append(block.text(table, _notes_of(notes, named)))
+            targets = ((parse_path(path), note) for path, note in notes.items())
+            of_keys = {target.key: note for target, note in targets if named.is_meant(target)}
+            texts.append(block.text(table, of_keys))
     return "".join(texts)
 
 

@@ -9,7 +9,6 @@ import xarray
 
 import notchflex as nf
 from notchflex.errors import ErrorCode
-from notchflex.results.io import dataset_of, record_dataset
 from notchflex.results.quantities import QUANTITIES
 from refusals import refused
 
@@ -73,7 +72,8 @@ def test_a_netcdf_file_shows_the_quantities_first(path, tmp_path):
 
 def test_netcdf_files_of_the_first_version_are_read(path, tmp_path):
     """They had the record beside the quantities, in no group."""
-    data, record = dataset_of(path), record_dataset(path)
+    nf.save_path(path, tmp_path / "new.nc")
+    data, record = (xarray.load_dataset(tmp_path / "new.nc", group=g) for g in (None, "read_back"))
     whole = data.assign(record.data_vars).assign_attrs(record.attrs)
     whole.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
     found = nf.read_path(tmp_path / "old.nc")

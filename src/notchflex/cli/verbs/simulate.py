@@ -43,8 +43,7 @@ from notchflex.support import (
 )
 
 if TYPE_CHECKING:
-    from notchflex import Bands, EquilibriumPath, LoadPath, Robot
-    from notchflex.support import SavedState
+    from notchflex import Bands, EquilibriumPath, LoadPath, Robot, State
 
 SPEC = (
     "Values or `start:stop:count` ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. "
@@ -253,7 +252,7 @@ def _print(
 def _solve(
     robots: Mapping[str, Robot],
     load: LoadPath,
-    start: SavedState | None,
+    start: State | None,
     refinement: int,
     counted: terminal.Counted,
 ) -> dict[str, EquilibriumPath]:
@@ -269,7 +268,7 @@ def _solve(
     return paths
 
 
-def _start(file: str) -> SavedState:
+def _start(file: str) -> State:
     """Read the state to continue from; warn where nothing shows which robot it belongs to."""
     from notchflex import State
 

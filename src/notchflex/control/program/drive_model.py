@@ -21,7 +21,6 @@ from notchflex.loads.command import make_commands
 from notchflex.solver.programs.compiled import Packed
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import PytreeLayout, padded_indices
-from notchflex.support import SavedState
 
 
 class Response(NamedTuple):
@@ -89,7 +88,7 @@ class DriveModel:
     robot: Robot
     load: LoadPath
     outputs: tuple[str, ...]
-    start: State | SavedState | None = None
+    start: State | None = None
 
     def solve(
         self, before: Float[np.ndarray, " state"], drive: Float[np.ndarray, " t"]

@@ -96,7 +96,7 @@ class ArcNotch(Notch):
     @property
     def has_elastic_ends(self) -> bool:
         """Whether its stiffness depends on the rings beside it."""
-        return self.ends == "shell" or self.closing == "elastic"
+        return super().has_elastic_ends or self.closing == "elastic"
 
     @property
     def law_errors(self) -> tuple[float, float]:

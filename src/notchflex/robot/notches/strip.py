@@ -88,11 +88,6 @@ class StripNotch(Notch):
         """Papers to cite for its model."""
         return (LIU,)
 
-    @property
-    def has_elastic_ends(self) -> bool:
-        """Whether its stiffness depends on the walls beside it."""
-        return self.ends == "elastic"
-
     def strip_length_in(self, tube: Tube) -> float:
         """Return the length of the strip, by default that between cables in mid-wall [mm]."""
         mean = tube.outer_radius + tube.inner_radius

@@ -83,11 +83,6 @@ class ULink(Notch):
         return (GAO,)
 
     @property
-    def has_elastic_ends(self) -> bool:
-        """Whether its stiffness depends on the walls beside it."""
-        return self.ends == "elastic"
-
-    @property
     def slots(self) -> int:
         """Number of slots of the row: one more than links."""
         return self.repeat + 1
