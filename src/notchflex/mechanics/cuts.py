@@ -261,19 +261,6 @@ def chord_angle(shape: str, outer: Array, inner: Array, depth: Array) -> Array:
     return half_angle(outer, 2.0 * outer - depth, depth)
 
 
-def _factors(shape: str, outer: Array, inner: Array, depth: Array) -> Array:
-    """Interpolate the factors on the torsion constant and on the shear centre."""
-    low, high = (float(xp.sqrt(1.0 - ratio)) for ratio in reversed(RATIO_RANGE))
-    table = _read_table()
-    both = xp.stack([table[shape, "torsion"], table[shape, "shear"]])
-    _, rows, columns = both.shape
-    across = _chebyshev(rows, xp.sqrt(1.0 - inner / outer), low, high)
-    along = _chebyshev(
-        columns, chord_angle(shape, outer, inner, depth), *map(float, CHORD_RANGE[shape])
-    )
-    return xp.einsum("kpq,p...,q...->k...", both, across, along)
-
-
 def segment_torsion(outer: Array, inner: Array, depth: Array, area: Array) -> tuple[Array, Array]:
     """Compute torsion constant and shear centre of an annular segment."""
     wall, plane = outer - inner, depth - outer
@@ -285,8 +272,18 @@ def segment_torsion(outer: Array, inner: Array, depth: Array, area: Array) -> tu
     through = xp.where(closed | solid, outer, depth)
     deep = xp.where(solid, depth, outer + inner)
 
+    low, high = (float(xp.sqrt(1.0 - ratio)) for ratio in reversed(RATIO_RANGE))
+    table = _read_table()
+
     def estimated(shape: str, cut: Array, torsion: Array, shear: Array) -> Array:
-        return xp.stack([torsion, shear]) * _factors(shape, outer, inner, cut)
+        """Multiply both estimates by the factors that the table has for them."""
+        both = xp.stack([table[shape, "torsion"], table[shape, "shear"]])
+        _, rows, columns = both.shape
+        across = _chebyshev(rows, xp.sqrt(1.0 - inner / outer), low, high)
+        chord = chord_angle(shape, outer, inner, cut)
+        along = _chebyshev(columns, chord, *map(float, CHORD_RANGE[shape]))
+        factors = xp.einsum("kpq,p...,q...->k...", both, across, along)
+        return xp.stack([torsion, shear]) * factors
 
     # Of a solid segment J = A h²/3, and the top of the circle.
     of_solid = estimated("solid", deep, area * (2.0 * outer - deep) ** 2 / 3.0, outer)

@@ -196,7 +196,12 @@ def strip_sections(
     twisting = ratio * plain_number(bar.second_moment_weak / bar.torsion_constant)
     area, root = xp.asarray(walls.area), on_wall | (xp.abs(along) > tip)
     in_root = (1.0 + 2.243 * oblique * thickness / wall) / strip.bending - 1.0
-    arch = _arch(thickness, wall, radius, tip) * area / strip.free_length
+    # Pulled, both walls straighten as arches: the stretch, times E over force, is 1/mm.
+    reach = xp.arcsin(xp.minimum(tip / radius, xp.sqrt(0.95)))
+    angle = reach + 0.818 * xp.sqrt(thickness * wall) / radius
+    spread = 0.5 + 0.25 * xp.sin(2.0 * angle) / angle - (xp.sin(angle) / angle) ** 2
+    stretch = radius**3 * 2.0 * angle * spread / (2.0 * thickness * wall**3 / 12.0)
+    arch = plain_number(stretch) * area / strip.free_length
     # Both walls sway as posts of a frame.
     post = strip.free_length + 2.0 * 0.97 * xp.sqrt(thickness * wall)
     frame = post**3 / (12.0 * 2.0 * thickness * width**3 / 12.0) / strip.free_length * area / ratio
@@ -216,14 +221,6 @@ def strip_sections(
     return dataclasses.replace(
         section, area=xp.where(on_wall, in_wall, shear_area * area), ends=ends
     )
-
-
-def _arch(thickness: float, wall: float, radius: float, tip: float) -> float:
-    """Compute the stretch of two walls that straighten as arches, times E over force, 1/mm."""
-    reach = xp.arcsin(xp.minimum(tip / radius, xp.sqrt(0.95)))
-    angle = reach + 0.818 * xp.sqrt(thickness * wall) / radius
-    spread = 0.5 + 0.25 * xp.sin(2.0 * angle) / angle - (xp.sin(angle) / angle) ** 2
-    return plain_number(radius**3 * 2.0 * angle * spread / (2.0 * thickness * wall**3 / 12.0))
 
 
 def rooted_strip_rod(
