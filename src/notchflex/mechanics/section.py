@@ -248,17 +248,26 @@ def gauss_rule(points: Array, weights: Array, count: int) -> Points:
     # A node is searched in eighths of an angle; five times, and the error is below 1e-4 rad.
     parts, widths = np.arange(1, 8)[:, None], np.pi / 8.0 ** np.arange(1, 6)
 
-    def narrow(angle: Any, width: Any) -> Any:
-        above = _polynomials(fixed, place(angle + width[0] * parts))[-1]
-        beyond = xp.sum(above >= np.arange(count, 0, -1)[None], 0, keepdims=True)
-        return angle + width[0] * beyond, ()
+    def node(order: Any) -> tuple[Any, Any]:
+        """Return nodes and areas, shape (1, k), by their order from the top."""
 
-    angle = scan(narrow, xp.zeros_like(fixed[0][None]), (widths,))[0]
-    nodes = place(angle + 0.5 * widths[-1])
-    for known in (fixed, fixed, fixed, recurrence):  # Newton's steps for the last two's ratio
-        before, last, squares, _ = _polynomials(known, nodes)
-        nodes = nodes - before * last / squares
-    return nodes[0], total / _polynomials(recurrence, nodes)[2][0]
+        def narrow(angle: Any, width: Any) -> Any:
+            above = _polynomials(fixed, place(angle + width[0] * parts))[-1]
+            beyond = xp.sum(above >= order, 0, keepdims=True)
+            return angle + width[0] * beyond, ()
+
+        angle = scan(narrow, 0.0 * order, (widths,))[0]
+        nodes = place(angle + 0.5 * widths[-1])
+        for known in (fixed, fixed, fixed, recurrence):  # Newton's steps for the last two's ratio
+            before, last, squares, _ = _polynomials(known, nodes)
+            nodes = nodes - before * last / squares
+        return nodes, total / _polynomials(recurrence, nodes)[2]
+
+    order = np.arange(count, 0.0, -1.0)[:, None, None]
+    # Compiled as a loop: soon, and small enough for the cache of code.
+    found = jax.lax.map(node, order) if is_traced(points) else node(order[..., 0].T)
+    nodes, areas = (values.ravel() for values in found)
+    return nodes, areas
 
 
 def _polynomials(recurrence: Any, places: Any) -> Any:

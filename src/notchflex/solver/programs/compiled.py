@@ -75,8 +75,8 @@ _BATCH_SIZES = (64, 256, 1024)
 # Largest number of programs in memory; the least recently used is dropped.
 _MAX_PROGRAMS = 96
 # Lines of a program for rows beyond which it is not optimised: that of a link would be a tenth
-# faster, after ten seconds.
-_OPTIMISED = 200_000
+# faster, after five seconds more.
+_OPTIMISED = 50_000
 # JAX's tracing caches are cleared after this number of programs.
 _TRACES_KEPT = 4
 _lock = threading.RLock()
