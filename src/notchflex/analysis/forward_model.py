@@ -231,7 +231,7 @@ class ForwardModel:
             return None
         loads: Any = [None] * len(slopes)
         if ready.chain.loaded:
-            by = load_slopes(load, robot, ready.chain, ready.chain_layout.unpack(slopes))
+            by = load_slopes(load, ready.chain, ready.chain_layout.unpack(slopes))
             commands = make_commands(load, robot, ready.chain)
             none: Any = np.zeros((len(slopes), *np.shape(commands.target)))
             form, long = ready.command_layout(commands), ready.long.command_layout(commands)

@@ -6,7 +6,7 @@ here what follows along a path; see `notchflex._quantity`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Generic, NoReturn, Self, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar, overload
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -260,9 +260,6 @@ class _Property(property, Generic[_Many, _One]):
         self, thing: _Quantities | None, owner: type
     ) -> Any:
         return self if thing is None else thing.quantity(self._name)
-
-    def __set__(self, thing: _Quantities, value: object) -> NoReturn:
-        raise AttributeError(f"{self._name} is a result and cannot be set")
 
 
 class Number(_Property[np.ndarray, float]):
