@@ -122,12 +122,12 @@ def in_space(loads: BodyLoads, frame: Float[Array, "3 3"], *, reduce: bool = Fal
     )
 
 
-def body_wrench(rotation: Float[Array, "d d"], one: BodyLoads) -> Float[Array, " w"]:
+def body_wrench(rotation: Float[Array, "d d"], loads: BodyLoads) -> Float[Array, " w"]:
     """Return the wrench (moment, force) of the loads on one body, about its origin, in its frame.
 
     Args:
         rotation: Rotation of the body against the base.
-        one: The sums for this body, without leading axes.
+        loads: The sums for this body, without leading axes.
 
     Returns:
         The wrench, N mm and N; plain or traced numbers as given.
@@ -138,13 +138,13 @@ def body_wrench(rotation: Float[Array, "d d"], one: BodyLoads) -> Float[Array, "
         [0.0, -2.0, 0.0, 0.0, 0.0, 1.0]
     """
     # The vector of the skew part of p f^T is minus half of p x f.
-    moment = turned(rotation.T, one.dead_moment) - 2.0 * unskew(one.dead_arm @ rotation)
-    return xp.concatenate([moment, one.dead_force @ rotation]) + one.following
+    moment = turned(rotation.T, loads.dead_moment) - 2.0 * unskew(loads.dead_arm @ rotation)
+    return xp.concatenate([moment, loads.dead_force @ rotation]) + loads.following
 
 
 def is_unloaded(load_path: LoadPath) -> bool:
     """Return whether no external load acts in any step."""
-    return all(one is NOTHING or one.is_nothing for one in load_path.different)
+    return all(load is NOTHING or load.is_nothing for load in load_path.different)
 
 
 def follows(load_path: LoadPath) -> bool:
@@ -288,9 +288,9 @@ def row_commands(
         tip: As for `acting`.
         drawn: Whether strokes are commanded.
     """
-    own = steps, slice(chain.tendons)
-    by_stroke: Any = ~np.isnan(load.stroke[own]) if drawn else None
-    target: Any = load.target[own]
+    commanded = steps, slice(chain.tendons)
+    by_stroke: Any = ~np.isnan(load.stroke[commanded]) if drawn else None
+    target: Any = load.target[commanded]
     loads = applied(load, chain, steps, tip=tip) if chain.loaded else None
     return Command(target, by_stroke, loads)
 
@@ -337,8 +337,8 @@ def _forces(external: ExternalLoad, last: int, at_tip: Sequence[Any] = ()) -> It
     Points at the tip are relative to it. Six more components of force and moment there may be
     arrays, of many loads.
     """
-    for one in external.body_forces:
-        yield one.body, one.force, one.moment, one.point, one.following, False
+    for load in external.body_forces:
+        yield load.body, load.force, load.moment, load.point, load.following, False
     point = external.tip_point
     if at_tip:
         yield last, at_tip[:3], at_tip[3:], point, external.following, True
@@ -468,14 +468,16 @@ def unlikely_loads(load: LoadPath, usual: Mapping[str, tuple[float, str]]) -> li
     }
     if load.draws:
         largest["stroke"] = max([0.0, *map(abs, load.stroke.ravel().tolist())])
-    for one in load.different:
-        if one is not NOTHING:
+    for external in load.different:
+        if external is not NOTHING:
             sizes = {
-                "tip_force": hypot(*one.tip_force),
-                "tip_moment": hypot(*one.tip_moment),
-                "body_forces": max((hypot(*each.force) for each in one.body_forces), default=0.0),
-                "tip_mass": one.tip_mass,
-                "gravity": hypot(*(one.gravity or NO_VECTOR)),
+                "tip_force": hypot(*external.tip_force),
+                "tip_moment": hypot(*external.tip_moment),
+                "body_forces": max(
+                    (hypot(*body.force) for body in external.body_forces), default=0.0
+                ),
+                "tip_mass": external.tip_mass,
+                "gravity": hypot(*(external.gravity or NO_VECTOR)),
             }
             for name, size in sizes.items():
                 largest[name] = max(largest.get(name, 0.0), size)

@@ -247,8 +247,8 @@ class _Property(property, Generic[_Many, _One]):
     """
 
     def __set_name__(self, owner: type, name: str) -> None:
-        one = QUANTITIES[name]
-        self._name, self.__doc__ = name, f"{one.summary}\n\n{one.text}"
+        quantity = QUANTITIES[name]
+        self._name, self.__doc__ = name, f"{quantity.summary}\n\n{quantity.text}"
 
     @overload
     def __get__(self, thing: None, owner: type) -> Self: ...
