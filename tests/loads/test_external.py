@@ -1,6 +1,7 @@
 """External loads: the sums that the solver takes against every force added up by hand."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,11 +11,11 @@ import notchflex as nf
 from notchflex._jax import jax
 from notchflex.loads.command import (
     BodyLoads,
-    applied,
     bending_normal,
     body_wrench,
     is_planar,
     is_unloaded,
+    make_commands,
 )
 from notchflex.loads.load_path import load_path
 from notchflex.mechanics.chain import assemble, body_masses
@@ -30,8 +31,12 @@ RNG = np.random.default_rng(4)
 def sums(load, *, robot=ROBOT, mass=None, centre=None) -> BodyLoads:
     mass = np.zeros(BODIES) if mass is None else mass
     centre = np.zeros((BODIES, 3)) if centre is None else centre
-    chain = SimpleNamespace(body_mass=mass, body_centre=centre, body_length=LENGTH, frame=None)
-    return applied(load_path(load, robot.number_of_tendons), robot, chain)
+    chain: Any = SimpleNamespace(
+        body_mass=mass, body_centre=centre, body_length=LENGTH, frame=None, loaded=True
+    )
+    command = make_commands(load_path(load, robot.number_of_tendons), robot, chain)
+    assert command.applied is not None
+    return command.applied
 
 
 def of_body(every: BodyLoads, body: int, step: int = 0) -> BodyLoads:

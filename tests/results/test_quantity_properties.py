@@ -54,7 +54,7 @@ def test_unknown_names_are_refused(path):
 
 
 def test_results_cannot_be_set(path):
-    with pytest.raises(AttributeError, match="total_angle is a result"):
+    with pytest.raises(AttributeError, match="total_angle"):
         path[0].total_angle = 0.0
 
 

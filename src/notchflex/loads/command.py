@@ -48,37 +48,37 @@ class BodyLoads(NamedTuple):
 
 
 def applied(
-    load_path: LoadPath, robot: Robot, chain: Chain, bodies: tuple[np.ndarray, ...] | None = None
+    load: LoadPath,
+    chain: Chain,
+    steps: Int[np.ndarray, "*k s"],
+    bodies: tuple[np.ndarray, ...] | None = None,
+    tip: Float[np.ndarray, "all 6"] | None = None,
 ) -> BodyLoads:
-    """Sum the external loads on each body.
+    """Sum the external loads on each body, those on the base too.
 
     Args:
-        load_path: The loads.
-        robot: Their robot.
-        chain: Its chain.
+        load: The loads.
+        chain: The chain of their robot.
+        steps: Numbers of steps of the loads; its axes are the leading ones of the sums.
         bodies: Mass (g) and moment of mass (g mm) of every body, and the distance from the last one
-            to the tip, mm; those of the chain where not given. The sums are linear in them.
+            to the tip, mm, which may have the rows of `steps` as leading axis; those of the chain
+            where not given. The sums are linear in them.
+        tip: Force and moment at the tip in every step, besides those of the loads.
 
     Returns:
-        The sums, s steps as leading axis; those on the base too. Of a flat chain those in the plane
-        that x and z of its frame span.
-
-    Raises:
-        InputError: A body that the robot does not have, or gravity where nothing has a mass.
+        The sums; of a flat chain those in the plane that x and z of its frame span.
     """
-    axes = _axes_of(load_path, chain)
-    mass, moment, tip = bodies or body_numbers(chain)
-    sums: list[tuple[np.ndarray, ...]] = []
-    for external in load_path.different:
-        _check(external, robot)
-        sums.append(_sums(external, axes, mass, moment, tip))
-    rows = tip.ndim
-    if len(load_path) == 1:
-        step = (*(slice(None),) * rows, None)
-        return BodyLoads(*(constant(field[step]) for field in sums[0]))
-    # Loads that are equal over many steps are summed once.
-    every = (np.stack(field, rows) for field in zip(*sums, strict=True))
-    return BodyLoads(*(constant(field.take(load_path.which, axis=rows)) for field in every))
+    axes, bodies = _axes_of(load, chain), bodies or body_numbers(chain)
+    by_row = bodies[2].ndim
+    fields: list[np.ndarray] = []
+    for external, places, at_tip in _each(load, steps, tip):
+        masses = [each[places // steps.shape[-1]] for each in bodies] if by_row else bodies
+        sums = _sums(external, axes, *masses, at_tip=at_tip)
+        shapes = [values.shape[by_row if tip is None else 1 :] for values in sums]
+        fields = fields or [np.empty((steps.size, *shape)) for shape in shapes]
+        for field, values in zip(fields, sums, strict=True):
+            field[places] = values
+    return BodyLoads(*(constant(field.reshape(*steps.shape, *field.shape[1:])) for field in fields))
 
 
 def body_numbers(chain: Chain) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -88,22 +88,22 @@ def body_numbers(chain: Chain) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return mass, moment, np.asarray(chain.body_length)[..., -1]
 
 
-def load_slopes(load_path: LoadPath, robot: Robot, chain: Chain, change: Chain) -> BodyLoads:
+def load_slopes(load: LoadPath, chain: Chain, change: Chain) -> BodyLoads:
     """Differentiate the external loads along changes of masses and lengths of bodies.
 
     Args:
-        load_path: The loads.
-        robot: Their robot.
-        chain: Its chain.
+        load: The loads.
+        chain: The chain of their robot.
         change: Changes of the chain, as leading axis of its masses, centres and lengths.
     """
     mass, centre = np.asarray(chain.body_mass), np.asarray(chain.body_centre)
     by_mass = np.asarray(change.body_mass)
     by_moment = by_mass[..., None] * centre + mass[:, None] * np.asarray(change.body_centre)
     by_tip = np.asarray(change.body_length)[..., -1]
-    changed = applied(load_path, robot, chain, (by_mass, by_moment, by_tip))
-    still = applied(load_path, robot, chain, (0.0 * by_mass, 0.0 * by_moment, 0.0 * by_tip))
-    return BodyLoads(*(one - other for one, other in zip(changed, still, strict=True)))
+    steps = np.broadcast_to(np.arange(len(load)), (len(by_tip), len(load)))
+    changed = applied(load, chain, steps, (by_mass, by_moment, by_tip))
+    still = applied(load, chain, steps, (0.0 * by_mass, 0.0 * by_moment, 0.0 * by_tip))
+    return BodyLoads(*map(operator.sub, changed, still))
 
 
 def in_space(loads: BodyLoads, frame: Float[Array, "3 3"], *, reduce: bool = False) -> BodyLoads:
@@ -122,12 +122,12 @@ def in_space(loads: BodyLoads, frame: Float[Array, "3 3"], *, reduce: bool = Fal
     )
 
 
-def body_wrench(rotation: Float[Array, "d d"], one: BodyLoads) -> Float[Array, " w"]:
+def body_wrench(rotation: Float[Array, "d d"], loads: BodyLoads) -> Float[Array, " w"]:
     """Return the wrench (moment, force) of the loads on one body, about its origin, in its frame.
 
     Args:
         rotation: Rotation of the body against the base.
-        one: The sums for this body, without leading axes.
+        loads: The sums for this body, without leading axes.
 
     Returns:
         The wrench, N mm and N; plain or traced numbers as given.
@@ -138,13 +138,13 @@ def body_wrench(rotation: Float[Array, "d d"], one: BodyLoads) -> Float[Array, "
         [0.0, -2.0, 0.0, 0.0, 0.0, 1.0]
     """
     # The vector of the skew part of p f^T is minus half of p x f.
-    moment = turned(rotation.T, one.dead_moment) - 2.0 * unskew(one.dead_arm @ rotation)
-    return xp.concatenate([moment, one.dead_force @ rotation]) + one.following
+    moment = turned(rotation.T, loads.dead_moment) - 2.0 * unskew(loads.dead_arm @ rotation)
+    return xp.concatenate([moment, loads.dead_force @ rotation]) + loads.following
 
 
 def is_unloaded(load_path: LoadPath) -> bool:
     """Return whether no external load acts in any step."""
-    return all(one is NOTHING or one.is_nothing for one in load_path.different)
+    return all(load is NOTHING or load.is_nothing for load in load_path.different)
 
 
 def follows(load_path: LoadPath) -> bool:
@@ -260,6 +260,9 @@ def _each(
     load: LoadPath, steps: Int[np.ndarray, ...], tip: Float[np.ndarray, "s 6"] | None
 ) -> Iterator[tuple[ExternalLoad, np.ndarray, list[np.ndarray]]]:
     """Yield distinct loads, their places among steps, and what acts at the tip there besides."""
+    if len(load.different) == 1 and tip is None:
+        yield load.different[0], np.arange(steps.size), []
+        return
     numbers = load.which[steps]
     order = np.argsort(numbers, axis=None, kind="stable")
     distinct, first = np.unique(numbers.ravel()[order], return_index=True)
@@ -285,23 +288,11 @@ def row_commands(
         tip: As for `acting`.
         drawn: Whether strokes are commanded.
     """
-    own = steps, slice(chain.tendons)
-    by_stroke: Any = ~np.isnan(load.stroke[own]) if drawn else None
-    target: Any = load.target[own]
-    if not chain.loaded:
-        return Command(target, by_stroke, None)
-    axes, bodies = _axes_of(load, chain), body_numbers(chain)
-    by_row = bodies[2].ndim
-    fields: list[np.ndarray] = []
-    for external, places, at_tip in _each(load, steps, tip):
-        masses = [each[places // steps.shape[1]] for each in bodies] if by_row else bodies
-        sums = _sums(external, axes, *masses, at_tip=at_tip)
-        shapes = [values.shape[by_row if tip is None else 1 :] for values in sums]
-        fields = fields or [np.empty((steps.size, *shape)) for shape in shapes]
-        for field, values in zip(fields, sums, strict=True):
-            field[places] = values
-    applied_loads: list[Any] = [one.reshape(*steps.shape, *one.shape[1:]) for one in fields]
-    return Command(target, by_stroke, BodyLoads(*applied_loads))
+    commanded = steps, slice(chain.tendons)
+    by_stroke: Any = ~np.isnan(load.stroke[commanded]) if drawn else None
+    target: Any = load.target[commanded]
+    loads = applied(load, chain, steps, tip=tip) if chain.loaded else None
+    return Command(target, by_stroke, loads)
 
 
 def _axes_of(load: LoadPath, chain: Chain) -> _Axes:
@@ -346,8 +337,8 @@ def _forces(external: ExternalLoad, last: int, at_tip: Sequence[Any] = ()) -> It
     Points at the tip are relative to it. Six more components of force and moment there may be
     arrays, of many loads.
     """
-    for one in external.body_forces:
-        yield one.body, one.force, one.moment, one.point, one.following, False
+    for load in external.body_forces:
+        yield load.body, load.force, load.moment, load.point, load.following, False
     point = external.tip_point
     if at_tip:
         yield last, at_tip[:3], at_tip[3:], point, external.following, True
@@ -434,7 +425,11 @@ def tension_commands(tension: Float[np.ndarray, "s t"]) -> Command:
 def make_commands(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     """Return the commands of a path; a tendon without one is slack (0 N)."""
     by_stroke = ~np.isnan(load.stroke) if load.draws else None
-    external = applied(load, robot, chain) if chain.loaded else None
+    external = None
+    if chain.loaded:
+        for distinct in load.different:
+            _check(distinct, robot)
+        external = applied(load, chain, np.arange(len(load)))
     return Command(cast("Any", load.target), cast("Any", by_stroke), external)
 
 
@@ -473,14 +468,16 @@ def unlikely_loads(load: LoadPath, usual: Mapping[str, tuple[float, str]]) -> li
     }
     if load.draws:
         largest["stroke"] = max([0.0, *map(abs, load.stroke.ravel().tolist())])
-    for one in load.different:
-        if one is not NOTHING:
+    for external in load.different:
+        if external is not NOTHING:
             sizes = {
-                "tip_force": hypot(*one.tip_force),
-                "tip_moment": hypot(*one.tip_moment),
-                "body_forces": max((hypot(*each.force) for each in one.body_forces), default=0.0),
-                "tip_mass": one.tip_mass,
-                "gravity": hypot(*(one.gravity or NO_VECTOR)),
+                "tip_force": hypot(*external.tip_force),
+                "tip_moment": hypot(*external.tip_moment),
+                "body_forces": max(
+                    (hypot(*body.force) for body in external.body_forces), default=0.0
+                ),
+                "tip_mass": external.tip_mass,
+                "gravity": hypot(*(external.gravity or NO_VECTOR)),
             }
             for name, size in sizes.items():
                 largest[name] = max(largest.get(name, 0.0), size)

@@ -163,8 +163,14 @@ class LoadPath(ByValue, Displayed):
         )
 
     def _summary(self) -> Summary:
-
-        return load_path_summary(self)
+        rows: list[tuple[str, str]] = []
+        for name, unit, values in (("tension", "N", self.tension), ("stroke", "mm", self.stroke)):
+            rows += tendon_rows(name, unit, values, commanded=True)
+        rows += external_rows(self)
+        if self.base_rotation.any():
+            rows.append(("base rotation", f"{vector(self.base_rotation)} rad"))
+        steps = f"{len(self)} step{'s' * (len(self) != 1)}"
+        return Summary(f"Load path of {steps}", rows)
 
     @property
     def base_to_world(self) -> Float[np.ndarray, "3 3"] | None:
@@ -381,18 +387,6 @@ _base_rotation = lru_cache(maxsize=64)(read_only)
 
 MOST = 4
 """Tendons, notches or outputs that have a line each; of more, the first."""
-
-
-def load_path_summary(load: LoadPath) -> Summary:
-    """Summarise a load path: what is commanded of every tendon, and the external loads."""
-    rows: list[tuple[str, str]] = []
-    for name, unit, values in (("tension", "N", load.tension), ("stroke", "mm", load.stroke)):
-        rows += tendon_rows(name, unit, values, commanded=True)
-    rows += external_rows(load)
-    if load.base_rotation.any():
-        rows.append(("base rotation", f"{vector(load.base_rotation)} rad"))
-    steps = f"{len(load)} step{'s' * (len(load) != 1)}"
-    return Summary(f"Load path of {steps}", rows)
 
 
 def load_words(load: Load) -> str:

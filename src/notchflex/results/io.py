@@ -149,9 +149,9 @@ def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
     if not isinstance(steps, list) or len(steps) != len(expected):
         return False
     return all(
-        isinstance(other, dict)
-        and one == {**other, "reason": one["reason"], "reason_code": one["reason_code"]}
-        for one, other, tried in zip(expected, steps, np.asarray(path.run.tried), strict=True)
+        isinstance(step, dict)
+        and wanted == {**step, "reason": wanted["reason"], "reason_code": wanted["reason_code"]}
+        for wanted, step, tried in zip(expected, steps, np.asarray(path.run.tried), strict=True)
         if tried
     )
 

@@ -6,7 +6,7 @@ here what follows along a path; see `notchflex._quantity`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Generic, NoReturn, Self, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar, overload
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -247,8 +247,8 @@ class _Property(property, Generic[_Many, _One]):
     """
 
     def __set_name__(self, owner: type, name: str) -> None:
-        one = QUANTITIES[name]
-        self._name, self.__doc__ = name, f"{one.summary}\n\n{one.text}"
+        quantity = QUANTITIES[name]
+        self._name, self.__doc__ = name, f"{quantity.summary}\n\n{quantity.text}"
 
     @overload
     def __get__(self, thing: None, owner: type) -> Self: ...
@@ -260,9 +260,6 @@ class _Property(property, Generic[_Many, _One]):
         self, thing: _Quantities | None, owner: type
     ) -> Any:
         return self if thing is None else thing.quantity(self._name)
-
-    def __set__(self, thing: _Quantities, value: object) -> NoReturn:
-        raise AttributeError(f"{self._name} is a result and cannot be set")
 
 
 class Number(_Property[np.ndarray, float]):

@@ -61,27 +61,17 @@ def differences(robot: Robot, other: Robot) -> list[str]:
         ['notch.depth = 1.38 instead of 1.4']
     """
     first, second = _values(robot), _values(other)
-    changes: dict[str, dict[tuple[Any, Any], list[str]]] = {}
+    changes: dict[tuple[str, Any, Any], list[str]] = {}
     for name in dict.fromkeys([*first, *second]):
-        pair = first.get(name), second.get(name)
-        if pair[0] != pair[1]:
-            changes.setdefault(_general(name), {}).setdefault(pair, []).append(name)
+        mine, its = first.get(name), second.get(name)
+        if mine != its:
+            changes.setdefault((_general(name), mine, its), []).append(name)
     changed: list[str] = []
-    for general, pairs in changes.items():
-        for (mine, its), names in pairs.items():
-            everywhere = len(names) == sum(_general(name) == general for name in first)
-            shown = [general] if everywhere else names
-            changed += [f"{name} = {_text(mine)} instead of {_text(its)}" for name in shown]
+    for (general, mine, its), names in changes.items():
+        everywhere = len(names) == sum(_general(name) == general for name in first)
+        shown = [general] if everywhere else names
+        changed += [f"{name} = {_text(mine)} instead of {_text(its)}" for name in shown]
     return changed
-
-
-def mismatch(robot: Robot, other: Robot) -> str:
-    """Describe in a few words how a robot differs from another one; "" where it does not."""
-    if robot is other:  # robots do not change
-        return ""
-    changed = differences(robot, other)
-    more = len(changed) - _MAX_NAMED
-    return ", ".join(changed[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _values(robot: Robot) -> dict[str, Any]:
@@ -313,11 +303,13 @@ def check_robot(state: object, robot: Robot) -> None:
             f"the state belongs to robot {state.robot!r}, this one is {robot.name!r}; "
             "continue from a state of the same robot"
         )
-    differs = "" if state.description is None else mismatch(robot, state.description)
+    differs = [] if state.description in (None, robot) else differences(robot, state.description)
     if differs:
+        more = f" and {len(differs) - _MAX_NAMED} more" if len(differs) > _MAX_NAMED else ""
         holder = f"{state.source} holds" if state.source else "this is"
         raise InputError.STATE_OF_ANOTHER_ROBOT(
-            f"{holder} a state of {robot.name!r} with other values: this robot has {differs}. "
+            f"{holder} a state of {robot.name!r} with other values: this robot has "
+            f"{', '.join(differs[:_MAX_NAMED])}{more}. "
             "Continue with the values of the state, or start from rest."
         )
 
@@ -331,8 +323,13 @@ def state_of(robot: Robot, chain: Chain, solved: SolverState) -> State:
 # One state of a path.
 
 
+@dataclass(frozen=True, repr=False, eq=False)
 class Equilibrium(EquilibriumQuantities, Displayed):
     """One state of a path: every quantity of `EquilibriumPath`, without the axis of steps.
+
+    Attributes:
+        path: The path that it is a state of.
+        step: Which step of the path it is, counted from 0.
 
     Example:
         >>> from notchflex import Load, load_robot, solve
@@ -347,30 +344,18 @@ class Equilibrium(EquilibriumQuantities, Displayed):
           converged       yes
     """
 
-    def __init__(self, path: EquilibriumPath, step: int) -> None:
-        """Look at one step of a path."""
-        self._path = path
-        self._step = step
-
-    @property
-    def path(self) -> EquilibriumPath:
-        """The path that it is a state of."""
-        return self._path
-
-    @property
-    def step(self) -> int:
-        """Which step of the path it is, counted from 0."""
-        return self._step
+    path: EquilibriumPath
+    step: int
 
     @property
     def robot(self) -> Robot:
         """The robot."""
-        return self._path.robot
+        return self.path.robot
 
     @property
     def load(self) -> Load:
         """The load of this step."""
-        return self._path.load[self._step]
+        return self.path.load[self.step]
 
     def quantity(self, name: str) -> Any:
         """Return a quantity by its name: a number, or an array without the axis of steps.
@@ -378,7 +363,7 @@ class Equilibrium(EquilibriumQuantities, Displayed):
         Args:
             name: Name of a property, such as "notch_angle".
         """
-        value = self._path.quantity(name)[self._step]
+        value = self.path.quantity(name)[self.step]
         return value.item() if isinstance(value, np.generic) else value
 
     @property
@@ -389,7 +374,7 @@ class Equilibrium(EquilibriumQuantities, Displayed):
     @property
     def state(self) -> State:
         """This state, to save or continue from."""
-        return self._path.state_at(self._step)
+        return self.path.state_at(self.step)
 
     @property
     def shape(self) -> RobotShape:
@@ -412,11 +397,11 @@ class Equilibrium(EquilibriumQuantities, Displayed):
         """
         from notchflex.results.tables import step_document
 
-        return step_document(self._path, self._step)
+        return step_document(self.path, self.step)
 
     def to_xarray(self) -> Dataset:
         """Convert the state to a labelled data set, as `EquilibriumPath.to_xarray` at this step."""
-        return self._path.to_xarray().isel(step=self._step)
+        return self.path.to_xarray().isel(step=self.step)
 
     @overload
     def plot(self) -> Picture: ...
@@ -447,8 +432,20 @@ class Equilibrium(EquilibriumQuantities, Displayed):
         return self
 
     def _summary(self) -> Summary:
-
-        return equilibrium_summary(self)
+        name, steps = self.robot.name, len(self.path)
+        of = f", step {self.step + 1} of {steps}" if steps > 1 else ""
+        rows = [
+            ("load", load_words(self.load)),
+            ("total angle", f"{self.total_angle * _ANGLE.scale:.2f} {_ANGLE.unit}"),
+            ("notch angles", f"{_few(self.notch_angle * _ANGLE.scale, 1)} {_ANGLE.unit}"),
+            ("tip position", f"{vector(self.tip_position, 3)} mm"),
+            ("tendon tension", f"{_few(self.tension)} N"),
+            ("tendon stroke", f"{_few(self.stroke)} mm"),
+        ]
+        if not self.converged:
+            rows.insert(1, ("not converged", self.reason))
+            return Summary(f"Last good state of {name}{of}", rows)
+        return Summary(f"Equilibrium of {name}{of}", [*rows, ("converged", "yes")])
 
 
 # Summaries of results for `repr` and notebooks.
@@ -457,24 +454,6 @@ class Equilibrium(EquilibriumQuantities, Displayed):
 
 _ANGLE = QUANTITIES["total_angle"]
 _HINT = "[step] is one state; also .plot(), .to_dataframe(), .to_xarray()"
-
-
-def equilibrium_summary(state: Equilibrium) -> Summary:
-    """Summarise one state: load, angle, tip, tendons, and whether it converged."""
-    path = state.path
-    of = f", step {state.step + 1} of {len(path)}" if len(path) > 1 else ""
-    rows = [
-        ("load", load_words(state.load)),
-        ("total angle", f"{state.total_angle * _ANGLE.scale:.2f} {_ANGLE.unit}"),
-        ("notch angles", f"{_few(state.notch_angle * _ANGLE.scale, 1)} {_ANGLE.unit}"),
-        ("tip position", f"{vector(state.tip_position, 3)} mm"),
-        ("tendon tension", f"{_few(state.tension)} N"),
-        ("tendon stroke", f"{_few(state.stroke)} mm"),
-    ]
-    if not state.converged:
-        rows.insert(1, ("not converged", state.reason))
-        return Summary(f"Last good state of {path.robot.name}{of}", rows)
-    return Summary(f"Equilibrium of {path.robot.name}{of}", [*rows, ("converged", "yes")])
 
 
 def path_summary(path: EquilibriumPath) -> Summary:

@@ -145,13 +145,10 @@ def entries_of(path: EquilibriumPath, quantity: Quantity) -> Iterator[CsvEntry]:
 
 
 def _field(value: Any) -> Any:
-    if isinstance(value, np.generic):
-        value = value.item()
+    value = plain(value)
     if isinstance(value, bool):
         return int(value)
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
-        return ""
-    return value
+    return "" if value in (None, "inf", "-inf") else value
 
 
 # Results as one JSON document: keys and units from the table of quantities, never a NaN.

@@ -5,7 +5,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import tomlkit
@@ -19,7 +19,11 @@ from notchflex.robot.reading import read_text, robot_from_text
 from notchflex.robot.robot import Robot, source_of, to_table
 from notchflex.robot.value_names import NamedPart, class_of, group_of, named_parts, parse_path
 
-_HEADER = re.compile(r"""\s*\[{1,2}\s*["']?(\w+)["']?\s*\]{1,2}\s*(#.*)?""")
+_HEADER = re.compile(
+    r"""^((?:[ \t\r]*(?:\#.*)?\n)*)"""  # blank lines and comments above it
+    r"""([ \t]*\[{1,2}[ \t]*["']?(\w+)["']?[ \t]*\]{1,2}[ \t\r]*(?:\#.*)?\n)""",
+    re.MULTILINE,
+)
 _OPTIONAL = "tolerance", "drawing"
 """Tables that a robot file may have."""
 
@@ -129,18 +133,18 @@ def _fresh_part(part: Any) -> list[str]:
     return lines
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Block:
     """A piece of a template: comments above a header, the header, the lines below it."""
 
     name: str
-    lead: list[str]
+    lead: str
     header: str
-    body: list[str] = field(default_factory=list[str])
+    body: str = ""
 
     def text(self, values: dict[str, Any], notes: _Notes) -> str:
         """Return the piece with other values, and what is to be said of them."""
-        text = "".join(self.body)
+        text = self.body
         if self.name == "tolerance":
             if read_tolerances(tomllib.loads(text)) != read_tolerances(values):
                 text = "\n".join([*_tolerance_lines(values), ""])
@@ -148,7 +152,7 @@ class _Block:
             body = tomlkit.parse(text)
             _update(body, values, self.name, notes)
             text = tomlkit.dumps(body)
-        return "".join(self.lead) + self.header + text
+        return self.lead + self.header + text
 
 
 def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
@@ -158,7 +162,7 @@ def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
     for block in _split(template):
         blocks.setdefault(block.name, []).append(block)
     for name in _OPTIONAL:
-        blocks.setdefault(name, [_Block(name, ["\n"], f"[{name}]\n")])
+        blocks.setdefault(name, [_Block(name, "\n", f"[{name}]\n")])
     # the head of the file: the name, and whatever is not under a header of its own
     new[""] = {name: table for name, table in new.items() if name not in blocks}
     texts: list[str] = []
@@ -173,22 +177,17 @@ def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
 
 def _split(template: str) -> list[_Block]:
     """Split a file at its headers; comments right above a header belong to it."""
-    blocks = [_Block("", [], "")]
-    for line in template.splitlines(keepends=True):
-        line = line if line.endswith("\n") else line + "\n"
-        match = _HEADER.fullmatch(line.rstrip("\n"))
-        if not match:
-            blocks[-1].body.append(line)
-            continue
-        lead: list[str] = []
-        body = blocks[-1].body
-        while body and (not body[-1].strip() or body[-1].lstrip().startswith("#")):
-            lead.insert(0, body.pop())
-        if not body and not blocks[-1].name:  # the comment at the head of the file stays there
-            cut = next((i for i in range(len(lead), 0, -1) if not lead[i - 1].strip()), 0)
-            body.extend(lead[:cut])
-            lead = lead[cut:]
-        blocks.append(_Block(match[1], lead, line))
+    text = template if template.endswith("\n") else f"{template}\n"
+    blocks, start = [_Block("", "", "")], 0
+    for match in _HEADER.finditer(text):
+        lead, header, name = match.groups()
+        blocks[-1].body = text[start : match.start()]
+        if match.start() == 0:  # the comment at the head of the file stays there
+            head, blank, lead = lead.rpartition("\n\n")
+            blocks[0].body = head + blank
+        blocks.append(_Block(name, lead, header))
+        start = match.end()
+    blocks[-1].body = text[start:]
     return blocks
 
 
@@ -204,7 +203,7 @@ def _matched(
         repeats = [former.get("repeat", 1) for former in old]
         block = blocks[group_of(min(first, sum(repeats)), repeats)[0]]
         # a group of equal notches that was split: its comment stands once
-        yield (replace(block, lead=["\n"]) if block is used else block), first, table
+        yield (replace(block, lead="\n") if block is used else block), first, table
         first, used = first + table.get("repeat", 1), block
 
 

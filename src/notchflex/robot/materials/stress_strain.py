@@ -85,15 +85,15 @@ class StressStrain(Material):
 
     def conflicts(self) -> Problems:
         """Find a curve that falls, and lists of unlike lengths."""
-        yield from _curve_problems(self.strain, self.stress, "")
-        strain, stress = self.compression_strain, self.compression_stress
-        if strain is not None and stress is not None:
-            yield from _curve_problems(strain, stress, "compression_")
-        elif strain is not None or stress is not None:
-            yield (
-                f"compression_{'stress' if stress is None else 'strain'}",
-                "is missing; give strains and stresses in compression, or neither.",
-            )
+        for of in ("", "compression_"):
+            strain, stress = getattr(self, f"{of}strain"), getattr(self, f"{of}stress")
+            if strain is not None and stress is not None:
+                yield from _curve_problems(strain, stress, of)
+            elif strain is not None or stress is not None:
+                yield (
+                    f"{of}{'stress' if stress is None else 'strain'}",
+                    "is missing; give strains and stresses in compression, or neither.",
+                )
 
 
 def _without_zero(strain: tuple[float, ...], stress: tuple[float, ...]) -> Points:

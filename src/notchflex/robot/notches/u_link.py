@@ -83,6 +83,11 @@ class ULink(Notch):
         return (GAO,)
 
     @property
+    def first_side_deg(self) -> float:
+        """Side of the tube from which the slot before the strip is cut [deg]."""
+        return self.direction_deg + (180.0 if self.proximal_slot == "away" else 0.0)
+
+    @property
     def slots(self) -> int:
         """Number of slots of the row: one more than links."""
         return self.repeat + 1
@@ -198,10 +203,9 @@ class ULink(Notch):
     def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
         """Return the slot before the strip and, of the last link of a row, the last slot."""
         bottom = -0.5 * self.strip_length - self.slot_radius
-        side = self.direction_deg + (180.0 if self.proximal_slot == "away" else 0.0)
-        starts = [(side, 0.0)]
+        starts = [(self.first_side_deg, 0.0)]
         if not isinstance(after, ULink):
-            starts.append((side + 180.0, self.pitch))
+            starts.append((self.first_side_deg + 180.0, self.pitch))
         cuts = tuple(
             slot(
                 to,
@@ -221,10 +225,9 @@ class ULink(Notch):
         reaches a slot and a strip beyond its own strip; on the side of the first slot it comes
         from the body before the row.
         """
-        away = self.proximal_slot == "away"
-        side = self.direction_deg + (180.0 if away else 0.0)
         leaves = before.pitch if isinstance(before, ULink) else 0.0
-        openings = (Opening(side, leaves, 0.0),)
-        if isinstance(after, ULink):
-            return openings
-        return (*openings, Opening(side + 180.0, self.pitch, self.pitch))
+        openings = (
+            Opening(self.first_side_deg, leaves, 0.0),
+            Opening(self.first_side_deg + 180.0, self.pitch, self.pitch),
+        )
+        return openings[:1] if isinstance(after, ULink) else openings
