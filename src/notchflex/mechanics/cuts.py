@@ -289,7 +289,7 @@ def segment_torsion(outer: Array, inner: Array, depth: Array, area: Array) -> tu
     of_solid = estimated("solid", deep, area * (2.0 * outer - deep) ** 2 / 3.0, outer)
     of_open = estimated("open", through, *open_estimate(outer, inner, through, area))
     of_closed = estimated("closed", shallow, *closed_estimate(outer, inner, shallow))
-    torsion, shear = xp.where(closed, of_closed, xp.where(solid, of_solid, of_open))
+    torsion, shear = xp.where(closed[None], of_closed, xp.where(solid[None], of_solid, of_open))
     return torsion, shear
 
 

@@ -24,8 +24,9 @@ def leggauss(count: int) -> Any:
 
 def gauss_on(low: Any, high: Any, count: int = 16) -> tuple[Array, Array]:
     """Return Gauss's nodes and weights between two numbers, or many with an axis left for them."""
-    points, weights = leggauss(count)
     half = 0.5 * (high - low)
+    shape = (*[1] * (xp.ndim(half) - 1), count)
+    points, weights = (values.reshape(shape) for values in leggauss(count))
     return low + half * (1.0 + points), half * weights
 
 
@@ -181,8 +182,8 @@ def clamped_torsion_constant(
     # 1 - tanh(u)/u is the mean of tanh² up to u: where u is small, without cancellation.
     is_small = u < 1.0
     near, far = xp.where(is_small, u, 1.0), xp.where(is_small, 1.0, u)
-    parts, weights = gauss_on(0.0, 1.0)
-    mean = xp.tanh(near[..., None] * parts) ** 2 @ weights
+    parts, weights = gauss_on(0.0, near[..., None])
+    mean = xp.sum(xp.tanh(parts) ** 2 * weights, axis=-1) / near
     return free / xp.where(is_small, mean, 1.0 - xp.tanh(far) / far)
 
 
