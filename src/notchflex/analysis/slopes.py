@@ -261,7 +261,7 @@ def _along(
     loads: Any = [None] * len(slopes)
     if path.chain.loaded:
         change = path.prepared.chain_layout.unpack(slopes)
-        loads = _packed(path, load_slopes(path.load, robot, path.chain, change))
+        loads = _packed(path, load_slopes(path.load, path.chain, change))
     return [Change(*both) for both in zip(loads, slopes, strict=True)]
 
 

@@ -302,9 +302,13 @@ def _path_of(
         np.array(facts["base_rotation_rad"]),
         tuple(distinct[number] for number in loads["step"]),
     )
+    # Files of older versions have neither.
+    notches, steps = robot.number_of_notches, len(load)
+    added = {"snapped": np.zeros((steps, notches)), "overdrawn": np.zeros(steps, int)}
     form = {name: facts[name] for name in ("level", "loaded", "refinement", "flat")}
     ready = prepare(robot, **form)
-    recorded = _recorded(arrays, ready.rest, len(load), bool(load.base_rotation.any()))
+    turned = bool(load.base_rotation.any())
+    recorded = _recorded({**added, **arrays}, ready.rest, steps, turned)
     return EquilibriumPath(
         robot, load, ready, recorded, facts["each_from_rest"], Settings(**facts["settings"])
     )
