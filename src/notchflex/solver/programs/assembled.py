@@ -72,11 +72,11 @@ def _flexures(numbers: Float[Array, " numbers"], form: _NotchForm) -> dict[str, 
         return form.structure.pack(form.structure.form.pack(tree)), _all(decisions)
 
     def built_at(rings: Float[Array, " 9"]) -> tuple[Array, Array]:
-        sides = (
+        proximal, distal = (
             Side(shares, length)
             for shares, length in zip(rings[2:8].reshape(2, 3), rings[:2], strict=True)
         )
-        return built(Site(*sides, rings[8]))
+        return built(Site(proximal, distal, rings[8]))
 
     if form.sites:  # compiled as a loop, before which is done what sites share
         packed, alike = jax.lax.map(built_at, of_sites.reshape(form.sites, 9))
@@ -537,4 +537,4 @@ def _built(numbers: np.ndarray, form: _NotchForm) -> dict[str, np.ndarray]:
 
 def _differentiated(numbers: np.ndarray, form: _NotchForm) -> dict[str, np.ndarray]:
     """Build flexures, and differentiate them along the imaginary parts of their numbers."""
-    return _flexures_along.rows(*map(_table, (numbers.real, numbers.imag / _SMALL)), form)
+    return _flexures_along.rows(_table(np.real(numbers)), _table(np.imag(numbers) / _SMALL), form)
