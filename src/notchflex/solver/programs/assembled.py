@@ -71,7 +71,7 @@ def _flexures(numbers: Float[Array, " numbers"], form: _NotchForm) -> dict[str, 
             tree = flexure(notch, site, tube, *form.options)
         return form.structure.pack(form.structure.form.pack(tree)), _all(decisions)
 
-    def built_at(rings: Float[Array, " 9"]) -> tuple[Array, Array]:
+    def built_at(rings: Any) -> tuple[Array, Array]:
         proximal, distal = (
             Side(shares, length)
             for shares, length in zip(rings[2:8].reshape(2, 3), rings[:2], strict=True)
