@@ -40,7 +40,7 @@ def levels(total_deg: float) -> list[Level]:
 def falls(wrap: str, angle: np.ndarray) -> np.ndarray:
     """Return gap tension over pull: each notch turns the tendon by half its angle at each edge."""
     law = friction_law(nf.Capstan(COEFFICIENT, wrap=wrap))
-    leaving, entering = (np.asarray(bound) for bound in law.bounds(angle / 2, angle / 2))
+    leaving, entering = np.moveaxis(law.bounds(np.stack([angle / 2, angle / 2], -1)), -1, 0)
     return np.exp(-(np.cumsum(leaving + entering) - entering))
 
 
