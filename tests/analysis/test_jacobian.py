@@ -81,6 +81,12 @@ def test_slopes_by_every_number_of_every_ready_robot(name, margin):
     function = nf.differentiable(robot, [load], ["tension"])
     assert not function.kinks()
     names = list(numbers_of(robot))
+    if path.chain.frame is not None:  # a planar robot; such a turn makes it another one
+        turns = [number for number in names if number.endswith("direction_deg")]
+        for number in turns:
+            with refused("OUT_OF_RANGE", "another form"):
+                path.jacobian([number], outputs)
+        names = [number for number in names if number not in turns]
     assert len(names) > 8
     slopes = path.jacobian(names, outputs)
     gradient = path.gradient({"total_angle": 1.0})
