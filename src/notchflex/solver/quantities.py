@@ -103,9 +103,10 @@ def total_angle(state: SolvedState) -> Array:
     """
     side = state.chain.notch_frame[:, :, 0]
     cosine = side @ side[0]
-    whole = jnp.round(cosine)  # 1 or -1 to rounding where all notches lie in one plane
-    weight = jnp.where(jnp.abs(cosine - whole) < _ROUNDING, whole, cosine)
-    return state.quantity("notch_angle") @ weight
+    # 1, 0 or -1 to rounding where notches open to equal, perpendicular or opposite sides.
+    error = cosine - jnp.round(cosine)
+    rounding = jnp.where(jnp.abs(error) < _ROUNDING, error, 0.0)
+    return state.quantity("notch_angle") @ (cosine - jax.lax.stop_gradient(rounding))
 
 
 @Quantity("solve", "body position", "p_b", "mm", per=("body", "axis"), in_world=True)
