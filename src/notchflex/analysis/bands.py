@@ -118,21 +118,21 @@ class Bands(Displayed, Mapping[str, Band]):
         if not len(values) or not np.ptp(values):
             return {}
         levels: dict[str, np.ndarray] = {}
-        for one, numbers in self.drawn.items():
+        for parameter, numbers in self.drawn.items():
             if np.ptp(numbers[known]) > 0.0:
                 level = (numbers[known] - numbers[known].mean()) / numbers[known].std()
                 # Notches that deviate together are one number.
                 if not any(np.allclose(level, other) for other in levels.values()):
-                    levels[one] = level
+                    levels[parameter] = level
         if len(values) < 4 * len(levels):
             return {}
         table = np.stack(list(levels.values()), axis=1)
         slopes = np.linalg.lstsq(table, values - values.mean(), rcond=None)[0]
         shares = dict.fromkeys(("material", "friction", "cuts", "law", "other"), 0.0)
-        for one, slope in zip(levels, slopes.tolist(), strict=True):
-            section = one.partition(".")[0].partition("[")[0]
+        for parameter, slope in zip(levels, slopes.tolist(), strict=True):
+            section = parameter.partition(".")[0].partition("[")[0]
             group = {"notch": "cuts"}.get(section, section)
-            if one.endswith(".stiffness_factor"):
+            if parameter.endswith(".stiffness_factor"):
                 group = "law"
             shares[group if group in shares else "other"] += slope**2 / values.var()
         total = sum(shares.values())
@@ -178,8 +178,8 @@ class Bands(Displayed, Mapping[str, Band]):
         for name in ("total_angle", "notch_angle", "tension"):
             quantity = QUANTITIES[name]
             if name in self and self.samples[name].ndim == 2:
-                one = self[name]
-                low, high = (course(end * quantity.scale) for end in (one.low, one.high))
+                ends = self[name].low, self[name].high
+                low, high = (course(end * quantity.scale) for end in ends)
                 rows.append((quantity.title, f"{low} {quantity.unit}; {high} {quantity.unit}"))
         rows.append(("bands of", ", ".join(self)))
         rows.append(("assumed", ", ".join(self.assumed) or "nothing"))
@@ -205,7 +205,7 @@ def band(samples: Float[np.ndarray, "draws ..."]) -> Band:
     with np.errstate(invalid="ignore"):
         empty = np.isnan(samples).all(axis=0)
         low, median, high = np.nanquantile(np.where(empty, 0.0, samples), LEVELS, axis=0)
-    return Band(*(np.where(empty, np.nan, one) for one in (low, median, high)))
+    return Band(*(np.where(empty, np.nan, percentile) for percentile in (low, median, high)))
 
 
 def uncertain(
@@ -262,12 +262,12 @@ def uncertain(
     else:
         chosen, assumed = robot.replace(tolerance=tolerances).tolerance, ()
     path = simulate(robot, loads, settings=settings, refinement=refinement)
-    asked = check_outputs(USUAL if outputs is None else outputs)
-    names = [name for name in asked if _has_band(name) and holds(path, QUANTITIES[name])]
-    drawn = draw_robots(robot, chosen, draws, check_integer(seed, "seed"))
+    names = check_outputs(USUAL if outputs is None else outputs)
+    names = [name for name in names if _has_band(name) and holds(path, QUANTITIES[name])]
+    sample = draw_robots(robot, chosen, draws, check_integer(seed, "seed"))
     results = batch(
-        drawn.robot if drawn.values else [drawn.robot] * draws,
-        drawn.values,
+        sample.robot if sample.values else [sample.robot] * draws,
+        sample.values,
         path.load,
         outputs=names,
         settings=settings,
@@ -278,7 +278,7 @@ def uncertain(
     converged = results["converged"]
     samples = {name: results[name] for name in names}
     return Bands(
-        path, chosen, assumed, samples, drawn.values, converged.sum(axis=0), drawn.redrawn, seed
+        path, chosen, assumed, samples, sample.values, converged.sum(axis=0), sample.redrawn, seed
     )
 
 
@@ -344,15 +344,15 @@ def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
         return None
     first = int(np.nanargmin(table.tension))
     tendon = int(table.tendon[first])
-    own = np.flatnonzero(np.isfinite(table.tension) & (table.tendon == tendon))
+    notches = np.flatnonzero(np.isfinite(table.tension) & (table.tendon == tendon))
     load = 0.5 * float(table.tension[first])
-    loads = np.linspace(0.0, _BEYOND * table.tension[own].max(), _STEPS)
+    loads = np.linspace(0.0, _BEYOND * table.tension[notches].max(), _STEPS)
     loads = np.sort(np.append(loads, load))
     names = ("total_angle", "notch_angle", "gap", "contact_force")
     bands = uncertain(robot, _pull(robot, tendon, loads), outputs=names, draws=_DRAWS)
-    gaps, forces = (bands.samples[name][:, :, own] for name in ("gap", "contact_force"))
-    stiffness = np.asarray(bands.path.chain.contact_stiffness)[own]
-    angles = bands.samples["notch_angle"][:, :, own]
+    gaps, forces = (bands.samples[name][:, :, notches] for name in ("gap", "contact_force"))
+    stiffness = np.asarray(bands.path.chain.contact_stiffness)[notches]
+    angles = bands.samples["notch_angle"][:, :, notches]
     tension, angle = _closing(loads, gaps, forces > gaps * stiffness, angles)
     step = int(np.searchsorted(loads, load))
     total = band(bands.samples["total_angle"][:, step])
@@ -362,14 +362,16 @@ def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
     finite = band(np.minimum(tension, _NEVER))
     ends = (finite.low, finite.median, finite.high)
     closing = Band(*(np.where(end < _NEVER, end, np.inf) for end in ends)), band(angle)
-    return ClosingBands(bands, own + 1, *closing, load, tendon, total, by_depth, shares)
+    return ClosingBands(bands, notches + 1, *closing, load, tendon, total, by_depth, shares)
 
 
 def closing_document(closing_bands: ClosingBands) -> dict[str, Any]:
     """Return the document of `notchflex show --json` on tolerances, in output units."""
     return {
         "draws": closing_bands.bands.draws,
-        "tolerances": {one.value: one.written for one in closing_bands.bands.tolerances},
+        "tolerances": {
+            tolerance.value: tolerance.written for tolerance in closing_bands.bands.tolerances
+        },
         "assumed": list(closing_bands.bands.assumed),
         "tendon": closing_bands.tendon,
         "notches": closing_bands.notches,
@@ -382,8 +384,8 @@ def closing_document(closing_bands: ClosingBands) -> dict[str, Any]:
     }
 
 
-def _ends(one: Band, scale: float = 1.0) -> dict[str, Any]:
-    ends = {"low": one.low, "median": one.median, "high": one.high}
+def _ends(percentiles: Band, scale: float = 1.0) -> dict[str, Any]:
+    ends = {"low": percentiles.low, "median": percentiles.median, "high": percentiles.high}
     return {name: np.where(np.isfinite(end), end * scale, np.nan) for name, end in ends.items()}
 
 
@@ -429,8 +431,8 @@ def _by_depth(robot: Robot, load: LoadPath) -> float:
     except InputError:  # no depth
         return float("nan")
     values = {name: depth + DEPTH * np.array([1.0, -1.0]) for name, depth in depths.items()}
-    found = batch(robot.replace(tolerance=None), values, load, outputs=("total_angle",))
-    deeper, shallower = found["total_angle"][:, 0]  # NaN where the spine is thinner than that
+    states = batch(robot.replace(tolerance=None), values, load, outputs=("total_angle",))
+    deeper, shallower = states["total_angle"][:, 0]  # NaN where the spine is thinner than that
     return 0.5 * float(deeper - shallower)
 
 
@@ -448,8 +450,8 @@ def band_columns(bands: Bands) -> dict[str, Sequence[Any]]:
             ends = [list(entries_of(bands.end(end), quantity)) for end in ENDS]
             for entries in zip(*ends, strict=True):
                 columns |= {
-                    f"{one.header}_{end}": one.values
-                    for one, end in zip(entries, ENDS, strict=True)
+                    f"{entry.header}_{end}": entry.values
+                    for entry, end in zip(entries, ENDS, strict=True)
                 }
     return columns
 
@@ -461,7 +463,7 @@ def band_document(bands: Bands) -> dict[str, Any]:
         "draws": bands.draws,
         "seed": bands.seed,
         "percentiles": [100.0 * level for level in LEVELS],
-        "tolerances": {one.value: one.written for one in bands.tolerances},
+        "tolerances": {tolerance.value: tolerance.written for tolerance in bands.tolerances},
         "assumed": list(bands.assumed),
         "redrawn": bands.redrawn,
         "steps": [
@@ -469,12 +471,12 @@ def band_document(bands: Bands) -> dict[str, Any]:
                 "step": step + 1,
                 "converged": converged,
                 **{
-                    one.key: {
-                        end: np.asarray(getattr(bands[one.name], end)[step]) * one.scale
+                    quantity.key: {
+                        end: np.asarray(getattr(bands[quantity.name], end)[step]) * quantity.scale
                         for end in ENDS
                     }
-                    for one in quantities
-                    if one.key
+                    for quantity in quantities
+                    if quantity.key
                 },
             }
             for step, converged in enumerate(bands.converged)

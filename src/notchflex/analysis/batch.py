@@ -108,7 +108,7 @@ class Batch(ByValue, Displayed, Mapping[str, np.ndarray]):
         """Why a row or step did not converge, in the shape of `converged`; empty where it did."""
         converged = self["converged"]
         reasons = np.full(converged.shape, "", object)
-        table, states = (one.reshape(len(converged), -1) for one in (reasons, converged))
+        table, states = (array.reshape(len(converged), -1) for array in (reasons, converged))
         for row in np.flatnonzero(~states.all(axis=1)).tolist():
             texts = [text for _, text in self._failures(row)]
             table[row] = np.where(states[row], "", texts)
@@ -223,11 +223,11 @@ def batch(
     several = _robots(robots)
     message = "a batch needs a notchflex.Load or LoadPath, or some in order"
     listed = [loads] if isinstance(loads, Load) else one_or_several(loads, LoadPath, message)
-    paths = [load_path(one, _tendons(several)) for one in listed]
+    paths = [load_path(load, _tendons(several)) for load in listed]
     if not paths or len({len(path) for path in paths}) > 1:
         raise InputError.WRONG_SHAPE("a batch needs one path or more, all of equally many steps")
     joined = LoadRows(paths[0] if len(paths) == 1 else join_paths(paths), len(paths[0]))
-    single = all(isinstance(one, Load) for one in listed)
+    single = all(isinstance(load, Load) for load in listed)
     return _solved(_rows(several, values, joined, product, options), options, single)
 
 
@@ -316,20 +316,22 @@ def _rows(
 
     def distinct(names: list[str]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """Return which combination of some names each row has, and the places of each."""
-        own = {name: sizes[name] for name in names}
-        number, own_places = _places(own, product)
+        axes = {name: sizes[name] for name in names}
+        number, combinations = _places(axes, product)
         if not product:
-            return np.arange(count) % number, own_places
+            return np.arange(count) % number, combinations
         index = [places[name] for name in names]
-        return np.ravel_multi_index(index, tuple(own.values())), own_places
+        return np.ravel_multi_index(index, tuple(axes.values())), combinations
 
     of_loads = [name for name in numbers if name in (*TENDONS, *TIP)]
     robot_of, of_robot = distinct(["robots", *(name for name in numbers if name not in of_loads)])
     path_of, of_path = distinct([*of_loads, "loads"])
     which = of_robot.pop("robots")
-    varied = VariedRobots(robots, which, {name: numbers[name][at] for name, at in of_robot.items()})
+    varied = VariedRobots(
+        robots, which, {name: numbers[name][index] for name, index in of_robot.items()}
+    )
     which = of_path.pop("loads")
-    paths = loads.varied(which, {name: numbers[name][at] for name, at in of_path.items()})
+    paths = loads.varied(which, {name: numbers[name][index] for name, index in of_path.items()})
     names = check_outputs(options.get("outputs", DEFAULT_OUTPUTS), (*OUTPUTS, *WORKS))
     outputs = tuple(dict.fromkeys([*names, "converged"]))
     check_refinement(refinement := options.get("refinement", 0))
@@ -436,10 +438,10 @@ class LoadRows:
         tables = {
             name: self._table(name, each, load.numbers(name)) for name, each in values.items()
         }
-        load = load.commanding({one: tables[one] for one in TENDONS if one in tables})
+        load = load.commanding({name: tables[name] for name in TENDONS if name in tables})
         if not any(name in TIP for name in tables):
             return replace(self, load=load)
-        tip = np.hstack([tables[one] if one in tables else load.numbers(one) for one in TIP])
+        tip = np.hstack([tables[name] if name in tables else load.numbers(name) for name in TIP])
         load = load.loaded(tip_force=NO_VECTOR, tip_moment=NO_VECTOR)
         return replace(self, load=load, tip=tip)
 
@@ -510,8 +512,8 @@ class BatchRows:
         if compiled and len(self.robots) > FEW:
             few = [rows[:0]]
             for form in self.robots.forms(np.unique(self.robot_of[rows])):
-                own = rows[np.isin(self.robot_of[rows], form.members)]
-                for kind, part in self._by_kind(form.example, own):
+                of_form = rows[np.isin(self.robot_of[rows], form.members)]
+                for kind, part in self._by_kind(form.example, of_form):
                     several = len(np.unique(self.robot_of[part])) > FEW
                     chains = form.chains(kind, self.refinement) if several else None
                     if chains is None:
@@ -534,9 +536,9 @@ class BatchRows:
         groups: dict[Any, tuple[list[np.ndarray], dict[int, PreparedChain]]] = {}
         rows = rows[np.argsort(self.robot_of[rows], kind="stable")]
         numbers, first = np.unique(self.robot_of[rows], return_index=True)
-        for number, own in zip(numbers.tolist(), np.split(rows, first)[1:], strict=True):
+        for number, of_robot in zip(numbers.tolist(), np.split(rows, first)[1:], strict=True):
             robot = self.robots[number]
-            for kind, part in self._by_kind(robot, own):
+            for kind, part in self._by_kind(robot, of_robot):
                 ready = prepare_kind(robot, kind, self.refinement)
                 parts, chains = groups.setdefault((ready.static_structure, kind), ([], {}))
                 parts.append(part)
@@ -554,7 +556,7 @@ class BatchRows:
         arrays: dict[str, np.ndarray] = {}
         count, done = len(self.robot_of), int((~self.valid).sum())
         work = [(table, index) for table in tables for index in table.pieces(threads)]
-        solving = on_cores(lambda one: one[0].run(one[1]), work, threads)
+        solving = on_cores(lambda task: task[0].run(task[1]), work, threads)
         with closing(solving) as pieces:
             for (table, index), piece in zip(work, pieces, strict=True):
                 rows = table.rows[index]
@@ -606,10 +608,10 @@ class BatchTable:
     ) -> tuple[dict[str, np.ndarray], Bool[np.ndarray, " k"]]:
         """Solve some rows: quantities as `run` returns them, and which rows are right."""
         names, turn = self.batch.outputs, self.batch.loads.load.base_to_world
-        every = (one for name in names for one in WORKS.get(name, (name,)))
-        followed = self.followed(rows, (*dict.fromkeys(every),))
-        found = followed.outputs
-        outputs = found | {name: _work(found, name) for name in names if name in WORKS}
+        needed = (source for name in names for source in WORKS.get(name, (name,)))
+        followed = self.followed(rows, (*dict.fromkeys(needed),))
+        quantities = followed.outputs
+        outputs = quantities | {name: _work(quantities, name) for name in names if name in WORKS}
         outputs = {name: outputs[name] for name in sorted(names)}
         failed = ~outputs["converged"]
         for name, values in outputs.items():
@@ -624,14 +626,14 @@ class BatchTable:
         batch = self.batch
         chains, alike = self.chains.packed(batch.robot_of[rows])
         steps, bodies = batch.loads.steps_of(batch.path_of[rows]), self.chains.bodies(chains)
-        drawn = bool(self.kind & DRAWN)
-        acting = row_commands(batch.loads.load, steps, bodies, batch.loads.tip, drawn=drawn)
+        load, tip = batch.loads.load, batch.loads.tip
+        acting = row_commands(load, steps, bodies, tip, drawn=bool(self.kind & DRAWN))
         layout = self.chains.ready.command_layout(acting)
         commands = np.asarray(layout.pack(acting, leading=2))
         packed = Packed(chains, self.chains.structure, chains.ndim == 2)
         numbers = np.array(batch.settings.numbers)
-        found = follow_row.rows(packed, Packed(commands, layout, True), numbers, names)
-        return FollowedRows(chains, alike, commands, layout, found)
+        outputs = follow_row.rows(packed, Packed(commands, layout, True), numbers, names)
+        return FollowedRows(chains, alike, commands, layout, outputs)
 
 
 class FollowedRows(NamedTuple):
@@ -652,11 +654,11 @@ class FollowedRows(NamedTuple):
     outputs: dict[str, np.ndarray]
 
 
-def _work(found: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+def _work(outputs: Mapping[str, np.ndarray], name: str) -> np.ndarray:
     """Return the work since rest, where force and length are 0, rows and steps as leading axes."""
     force, length = (
         (np.concatenate([np.zeros_like(after[:, :1]), after[:, :-1]], axis=1), after)
-        for after in (found[one] for one in WORKS[name])
+        for after in (outputs[quantity] for quantity in WORKS[name])
     )
     return np.cumsum(work_of_steps(force, length), axis=1)
 

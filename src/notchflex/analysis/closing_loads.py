@@ -408,7 +408,7 @@ def _by_one_tendon(
     closes = touching.any(axis=0)
     after = np.maximum(touching.argmax(axis=0), 1)
 
-    def at(tension: Float[np.ndarray, " m"]) -> tuple[np.ndarray, np.ndarray]:
+    def evaluate(tension: Float[np.ndarray, " m"]) -> tuple[np.ndarray, np.ndarray]:
         """Compute overlap and angle of every notch, each at its own tension, on one path."""
         order = np.argsort(tension)
         back = np.argsort(order)
@@ -416,8 +416,8 @@ def _by_one_tendon(
         return overlap[back, notches], angle[back, notches]
 
     low, high = (np.where(closes, steps[step], steps[-1]) for step in (after - 1, after))
-    tension, precise = find_roots(lambda tension, _: at(tension)[0], low, high)
-    _, angle = at(tension)
+    tension, precise = find_roots(lambda tension, _: evaluate(tension)[0], low, high)
+    _, angle = evaluate(tension)
     closed = closes & precise & np.isfinite(angle)
     failed = ~np.isfinite(overlap[:, notches]).all(axis=0)
     status = statuses(closed, np.asarray(~closes & ~failed))
@@ -457,10 +457,10 @@ def closing_tensions_of(
     Returns:
         Base tensions, N; NaN where none was found, or where the numbers make no valid robot.
     """
-    own = closing(robot)
+    nominal = closing(robot)
     chain = assemble(robot, flat=False)
     closing_angle, arm = closing_angles(chain.rods), moment_arms(chain)
-    unit = np.eye(chain.tendons)[own.tendon - 1]
+    unit = np.eye(chain.tendons)[nominal.tendon - 1]
     robots = VariedRobots.of(robot, values)
     tension = np.full((len(robots), chain.flexures), np.nan)
     valid = np.setdiff1d(np.arange(len(robots)), [*robots.errors])
@@ -471,11 +471,11 @@ def closing_tensions_of(
         for number in valid.tolist():
             tension[number] = closing(robots[number]).tension
         return tension
-    longest = arm[np.arange(len(arm)), own.tendon - 1]
+    longest = arm[np.arange(len(arm)), nominal.tendon - 1]
     notches = np.flatnonzero((longest > 0.0) & (np.asarray(closing_angle) > 0.0))
     with np.errstate(divide="ignore"):
         linear = np.asarray(chain.stiffness)[:, 0] * np.asarray(closing_angle) / longest
-    guess = np.where(np.isfinite(own.tension), _FIRST * own.tension, linear)[notches]
+    guess = np.where(np.isfinite(nominal.tension), _FIRST * nominal.tension, linear)[notches]
     # The root does not depend on the stiffness: that of one robot serves for all.
     stiffness = np.asarray(chain.contact_stiffness)[notches]
     table, alike = chains.packed(valid)
@@ -569,13 +569,13 @@ def named_values(notch: Notch) -> dict[str, Any]:
 
 
 def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
-    one = rod_at(site, notch, tube)
-    section = one.section
+    rod = rod_at(site, notch, tube)
+    section = rod.section
     weakest = int(np.argmin(section.second_moment_weak))
     values: dict[str, Any] = {
         "area_mm2": float(section.area[weakest]),
         "second_moment_mm4": float(section.second_moment_weak[weakest]),
     }
-    if float(one.has_closure) > 0.0:  # opposite a spine
+    if float(rod.has_closure) > 0.0:  # opposite a spine
         values["centroid_mm"] = tube.outer_radius - float(section.edge_spine[weakest])
     return named_values(notch) | values

@@ -53,7 +53,8 @@ class ToleranceSource(NamedTuple):
     def values(self, level: Any) -> dict[str, Any]:
         """Return the values at levels of the distribution, each between 0 and 1."""
         return {
-            name: one + deviation(self.tolerance, one, level) for name, one in self.nominal.items()
+            name: value + deviation(self.tolerance, value, level)
+            for name, value in self.nominal.items()
         }
 
 
@@ -101,7 +102,7 @@ def moments(tolerance: Tolerance, value: float) -> tuple[float, float]:
     part = ndtr(b) - ndtr(a)
     low, high = (math.exp(-0.5 * end**2) / math.sqrt(2.0 * math.pi) for end in (a, b))
     mean = (low - high) / part
-    ends = sum(end * one for end, one in ((a, low), (-b, high)) if one)
+    ends = sum(end * density for end, density in ((a, low), (-b, high)) if density)
     return float(sd * mean), float(sd * math.sqrt(1.0 + ends / part - mean**2))
 
 
@@ -159,10 +160,10 @@ def values_at(
     sources: Sequence[ToleranceSource], levels: Float[np.ndarray, "... d"]
 ) -> dict[str, Any]:
     """Return the values of robots by name, at levels of the sources between 0 and 1."""
-    drawn: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for source, level in zip(sources, np.moveaxis(levels, -1, 0), strict=True):
-        drawn |= source.values(level)
-    return drawn
+        values |= source.values(level)
+    return values
 
 
 def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[ToleranceSource]:
@@ -173,23 +174,27 @@ def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[ToleranceS
         tolerances: What deviates.
     """
     sources: list[ToleranceSource] = []
-    alone = {one.value for one in tolerances if "[" in one.value}
-    for one in tolerances:
-        numbers = numbers_at(robot, one.value)
+    alone = {tolerance.value for tolerance in tolerances if "[" in tolerance.value}
+    for tolerance in tolerances:
+        numbers = numbers_at(robot, tolerance.value)
         others = {name: value for name, value in numbers.items() if name not in alone}
-        if one.value not in alone and len(others) < len(numbers):
-            names = [[name] for name in others] if one.per_notch else [list(others)]
+        if tolerance.value not in alone and len(others) < len(numbers):
+            names = [[name] for name in others] if tolerance.per_notch else [list(others)]
             sources += [
-                ToleranceSource(one, {name: others[name] for name in each})
+                ToleranceSource(tolerance, {name: others[name] for name in each})
                 for each in names
                 if each
             ]
-        elif one.per_notch:
-            sources += [ToleranceSource(one, {name: value}) for name, value in numbers.items()]
+        elif tolerance.per_notch:
+            sources += [
+                ToleranceSource(tolerance, {name: value}) for name, value in numbers.items()
+            ]
         elif len(set(numbers.values())) == 1:  # by one name: equal notches stay a group
-            sources.append(ToleranceSource(one, {one.value: number_at(robot, one.value)}))
+            sources.append(
+                ToleranceSource(tolerance, {tolerance.value: number_at(robot, tolerance.value)})
+            )
         else:
-            sources.append(ToleranceSource(one, numbers))
+            sources.append(ToleranceSource(tolerance, numbers))
     return sources
 
 
@@ -235,9 +240,13 @@ def tolerances_of(robot: Robot) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]
         >>> tolerances_of(wrist)[1][0]
         'notch.height'
     """
-    given = {one.value: one for one in robot.tolerance}
-    assumed = {one.value: one for one in _assumed(robot) if one.value not in given}
-    return (*given.values(), *assumed.values()), tuple(assumed)
+    of_file = {tolerance.value: tolerance for tolerance in robot.tolerance}
+    assumed = {
+        tolerance.value: tolerance
+        for tolerance in _assumed(robot)
+        if tolerance.value not in of_file
+    }
+    return (*of_file.values(), *assumed.values()), tuple(assumed)
 
 
 def _assumed(robot: Robot) -> Iterator[Tolerance]:

@@ -140,8 +140,8 @@ class ForwardModel:
         """
         ready = self._prepared(robot)
         commands = make_commands(load, robot, ready.chain)
-        came = run(ready, commands, start, self.settings, each_from_start=self.from_rest)
-        return EquilibriumPath(robot, load, ready, came, settings=self.settings)
+        states = run(ready, commands, start, self.settings, each_from_start=self.from_rest)
+        return EquilibriumPath(robot, load, ready, states, settings=self.settings)
 
     @cached_property
     def _prepared(self) -> Callable[[Robot], PreparedChain]:
@@ -256,7 +256,7 @@ def tip_response(
     changes = [Change(loads, None) for loads in _unit_loads(path)]
     # Each state is varied alone: what the contacts remember of the state before stays.
     columns = PathTangents(path, _POSE, remembers=False).along(changes)
-    by_loads = {name: np.stack([one[name] for one in columns]) for name in _POSE}
+    by_loads = {name: np.stack([column[name] for column in columns]) for name in _POSE}
     # Rotation vectors and displacements of the tip, in the world.
     spin = by_loads["tip_rotation"] @ np.swapaxes(path.tip_rotation, -1, -2)
     turned = [0.5 * (spin[..., b, a] - spin[..., a, b]) for a, b in ((1, 2), (2, 0), (0, 1))]

@@ -105,7 +105,7 @@ class Geometry:
         Raises:
             InputError: A kind of notch does not know its cuts.
         """
-        tube, at = self.robot.tube, self.robot.tube.base_length
+        tube, start = self.robot.tube, self.robot.tube.base_length
         neighbours, layouts = (None, *self.robot.notches, None), list[CutLayout]()
         for number, notch in enumerate(self.robot.notches):
             layout = notch.cut_layout(tube, neighbours[number], neighbours[number + 2])
@@ -114,8 +114,8 @@ class Geometry:
                     f'a notch of kind = "{notch.kind}" has no definition of its cuts, so there is '
                     "no drawing, pattern or solid of it; give its class a method `cut_layout`."
                 )
-            layouts.append(layout._replace(cuts=tuple(cut.moved(at) for cut in layout.cuts)))
-            at += layout.length
+            layouts.append(layout._replace(cuts=tuple(cut.moved(start) for cut in layout.cuts)))
+            start += layout.length
         return tuple(layouts)
 
     @lru_cache(maxsize=256)  # noqa: B019

@@ -134,8 +134,8 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
         >>> print(f"{np.degrees(shared.notch_angle[0, 0]):.8f} deg, {shared.stroke_lost[1]:.3f} mm")
         2.06615233 deg, 0.294 mm
     """
-    drawn = np.atleast_1d(np.asarray(stroke, float))
-    if not np.isfinite(drawn).all():
+    strokes = np.atleast_1d(np.asarray(stroke, float))
+    if not np.isfinite(strokes).all():
         raise InputError.NOT_FINITE("a stroke is not finite; give strokes in mm")
     chain = assemble(robot, flat=False)
     first = next(group for group in chain.groups if 0 in group.numbers)
@@ -151,7 +151,7 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
             "the kinematic model needs a first tendon that crosses every notch on the side to "
             f"which it bends; that of {robot.name} does not"
         )
-    share = drawn[:, None] / chain.flexures
+    share = strokes[:, None] / chain.flexures
     free, closing = robot.geometry.free_angle, robot.geometry.closing_angle
     angle = np.clip(free + share / arm, free, closing)
     lost = np.maximum(share - arm * (angle - free), 0.0)
@@ -208,19 +208,19 @@ def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
         >>> axis_places(load_robot("pacheco2021-a"), [0.4, 1.3]).fraction.round(9).tolist()
         [0.5, -1.0]
     """
-    at = np.atleast_1d(np.asarray(axis_at, float))
+    distance = np.atleast_1d(np.asarray(axis_at, float))
     start, length = robot.geometry.body_start, robot.geometry.body_length
     tip = float(start[-1] + length[-1])
-    wrong = at[~((at >= -_BEYOND * tip) & (at <= (1.0 + _BEYOND) * tip))]
+    wrong = distance[~((distance >= -_BEYOND * tip) & (distance <= (1.0 + _BEYOND) * tip))]
     if len(wrong):
         raise InputError.OUT_OF_RANGE(
             f"there is no point on the axis {wrong[0]:g} mm from the base: {robot.name} is "
             f"{tip:.6g} mm long; give 0 to {tip:.6g} mm"
         )
     # A point on a face belongs to the body, in spite of rounding.
-    body = np.searchsorted(start - _BEYOND * tip, at, side="right") - 1
+    body = np.searchsorted(start - _BEYOND * tip, distance, side="right") - 1
     body = np.maximum(body, 0)
-    along = at - start[body]
+    along = distance - start[body]
     after = np.minimum(body + 1, len(start) - 1)
     gap = start[after] - start[body] - length[body]
     across = along - length[body]

@@ -24,12 +24,14 @@ from notchflex.solver.quantities import believable, unpad_quantity
 from notchflex.solver.residual import SolverState, at_rest
 from notchflex.solver.solved_state import SolvedState
 
-OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]
+OF_STATE = [
+    name for name, quantity in REGISTERED.items() if quantity.title and quantity.source != "path"
+]
 """What is reported of a state alone, without its path."""
 DEFAULT_OUTPUTS = ("total_angle", "notch_angle", "tip_position", "tip_rotation", "converged")
 OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *OF_STATE]),)
 """What can be asked of a batch or of a function that can be differentiated."""
-WORKS = {name: one.work_of for name, one in REGISTERED.items() if one.work_of}
+WORKS = {name: quantity.work_of for name, quantity in REGISTERED.items() if quantity.work_of}
 """What can be asked of a batch besides: works, with what they are integrated of."""
 
 
@@ -61,7 +63,7 @@ class OutputTable(dict[str, Array]):
 
     def tree_flatten_with_keys(self) -> tuple[list[Any], tuple[str, ...]]:
         """Return keys and values, and the names, for JAX."""
-        return [(jax.tree_util.DictKey(name), one) for name, one in self.items()], tuple(self)
+        return [(jax.tree_util.DictKey(name), value) for name, value in self.items()], tuple(self)
 
     @classmethod
     def tree_unflatten(cls, names: tuple[str, ...], values: Iterable[Any]) -> OutputTable:
@@ -100,7 +102,7 @@ def reported_shapes(
     def report(numbers: Array, packed: Array) -> dict[str, Array]:
         return report_quantities(chain.unpack(numbers), state.unpack(packed), outputs)
 
-    vectors = (jax.ShapeDtypeStruct((one.size,), float) for one in (chain, state))
+    vectors = (jax.ShapeDtypeStruct((layout.size,), float) for layout in (chain, state))
     reported = jax.eval_shape(report, *vectors)
     return {name: reported[name].shape for name in outputs}
 
@@ -154,7 +156,7 @@ def follow_row(
         if STEPS[0] in outputs:
             known = reached & believable(quantity)
             how = [result.fraction_before, result.substeps, known, True]
-            packed = [PytreeLayout.of(one).pack(one) for one in (solved, result.between)]
+            packed = [PytreeLayout.of(pytree).pack(pytree) for pytree in (solved, result.between)]
             values |= dict(zip(STEPS, [*packed, jnp.array(how, float)], strict=True))
         return (solved, reached), {name: values[name] for name in outputs}
 

@@ -380,8 +380,8 @@ class Stepper(Displayed):
         """Return one load, with its commands."""
         commanded = {
             word: [
-                float(one) if own == word else None
-                for own, one in zip(self.drives, drives, strict=True)
+                float(value) if drive == word else None
+                for drive, value in zip(self.drives, drives, strict=True)
             ]
             for word in get_args(Drive)
         }
@@ -394,8 +394,8 @@ class Stepper(Displayed):
     @cached_property
     def _drive_places(self) -> Int[np.ndarray, " t"]:
         layout = self.prepared.state
-        at: Any = jax.tree.unflatten(layout.structure, layout.indices)
-        return np.where(self._by_stroke, at.stroke, at.point.base_tension)
+        indices: Any = jax.tree.unflatten(layout.structure, layout.indices)
+        return np.where(self._by_stroke, indices.stroke, indices.point.base_tension)
 
     @cached_property
     def _one_load(self) -> LoadPath:
@@ -418,7 +418,7 @@ class Stepper(Displayed):
     @cached_property
     def entries(self) -> Int[np.ndarray, " m"]:
         """Where a program of the padded chain reports the values."""
-        return np.concatenate([one.ravel() for one in self._indices.values()])
+        return np.concatenate([index.ravel() for index in self._indices.values()])
 
     @cached_property
     def contact_places(self) -> Int[np.ndarray, "3 t contacts"]:
@@ -431,7 +431,7 @@ class Stepper(Displayed):
             for column, tendon in enumerate(group.numbers):
                 met = edges[tendon] >= 0
                 flexure, edge = np.divmod(edges[tendon, met], 2)
-                places[:, tendon, met] = [one[flexure, column, edge] for one in numbers]
+                places[:, tendon, met] = [indices[flexure, column, edge] for indices in numbers]
         return places
 
 

@@ -82,8 +82,8 @@ class Change:
         pairs = (self.loads, other.loads), (self.chain, other.chain)
         return Change(
             *(
-                own if more is None else size * more + (0.0 if own is None else own)
-                for own, more in pairs
+                present if more is None else size * more + (0.0 if present is None else present)
+                for present, more in pairs
             )
         )
 
@@ -111,34 +111,34 @@ class PathTangents:
             from a step on that did not converge, or was so hard that its derivatives are not known.
         """
         ready = self.path.prepared
-        varies = any(one.chain is not None for one in directions)
+        varies = any(direction.chain is not None for direction in directions)
         layouts = self.layouts._replace(chain_varies=varies)
         start = np.zeros(ready.long.state.size)
         by_row = (*(False,) * 3, *(True,) * (len(self.steps) + 2))
         turn = self.path.load.base_to_world
-        every: list[dict[str, np.ndarray]] = []
-        for one in directions:
+        by_direction: list[dict[str, np.ndarray]] = []
+        for direction in directions:
             change = np.zeros(layouts.chain.size if varies else 1)
-            if one.chain is not None:
-                change = np.append(0.0, one.chain)[ready.own_numbers]
+            if direction.chain is not None:
+                change = np.append(0.0, direction.chain)[ready.own_numbers]
             load_change = np.zeros_like(self.loads)
-            if one.loads is not None:
-                load_change[:, self.own_loads] = one.loads
+            if direction.loads is not None:
+                load_change[:, self.own_loads] = direction.loads
             vectors = (start, ready.long.dynamic_vector, change, *self.steps, self.loads)
             packed = map(Packed, (*vectors, load_change), repeat(None), by_row)
             by_name = tangent_step.scan(*packed, layouts)
             for name, values in by_name.items():
-                own = unpad_quantity(self.path.chain, name, values)
-                by_name[name] = REGISTERED[name].turned(own, turn)
-            every.append(by_name)
-        return every
+                unpadded = unpad_quantity(self.path.chain, name, values)
+                by_name[name] = REGISTERED[name].turned(unpadded, turn)
+            by_direction.append(by_name)
+        return by_direction
 
     @property
     def own_loads(self) -> Int[np.ndarray, " command"]:
         """Where the numbers of a load are among those of a load for the long chain."""
         ready, commands = self.path.prepared, self.path.commands
-        own, long = ready.command_layout(commands), ready.long.command_layout(commands)
-        return padded_indices(own, long)
+        short, long = ready.command_layout(commands), ready.long.command_layout(commands)
+        return padded_indices(short, long)
 
     @cached_property
     def layouts(self) -> StepLayouts:
@@ -165,8 +165,8 @@ class PathTangents:
         ready, run = self.path.prepared, self.path.run
         assert isinstance(run, SolverRun)
         states = (
-            pad_rows(one, ready.state, ready.long.state)
-            for one in (run.states_before, run.states, run.between)
+            pad_rows(state, ready.state, ready.long.state)
+            for state in (run.states_before, run.states, run.between)
         )
         remembers = self.remembers & (run.from_start[:, 0] == 0.0)
         how = np.stack([run.fraction_before, run.substeps, self.path.converged, remembers], axis=1)
@@ -224,11 +224,11 @@ def tangent_step(
     def packed(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
         return step(layouts.chain.unpack(varied), load, before)
 
-    at = (load, before)
+    point = (load, before)
     changes = (load_change, jnp.where(how[3] > 0.0, last_change, 0.0))
     if layouts.chain_varies:
-        at, changes = (*at, chain), (*changes, chain_change)
-    return jax.jvp(packed, at, changes)[1]
+        point, changes = (*point, chain), (*changes, chain_change)
+    return jax.jvp(packed, point, changes)[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,7 +269,7 @@ def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> G
     seeds = _packed(path, weights)
     # No step beyond the last that counts: one that failed there must not matter.
     backwards = slice(int(np.flatnonzero(seeds.any(axis=1)).max(initial=0)), None, -1)
-    steps = [one[backwards] for one in (*tangents.steps, tangents.loads, seeds)]
+    steps = [array[backwards] for array in (*tangents.steps, tangents.loads, seeds)]
     by_row = (False, False, *(True,) * len(steps))
     start = (np.zeros(long.state.size), long.dynamic_vector)
     packed = map(Packed, (*start, *steps), repeat(None), by_row)
@@ -277,9 +277,9 @@ def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> G
     loads = np.zeros_like(tangents.loads)
     loads[backwards] = result["load"]
     loads = loads[:, tangents.own_loads]
-    by_chain, own = result["chain"].sum(axis=0), path.prepared.own_numbers
+    by_chain, numbers = result["chain"].sum(axis=0), path.prepared.own_numbers
     size = path.prepared.chain_layout.size + 1
-    return Gradient(loads, np.bincount(own, by_chain, size)[1:])
+    return Gradient(loads, np.bincount(numbers, by_chain, size)[1:])
 
 
 def _packed(
@@ -314,19 +314,21 @@ def adjoint_step(
 
     def packed(load: Array, before: Array, numbers: list[Array]) -> tuple[Array, Array]:
         rest = iter(numbers)
-        every = [next(rest) if one else leaf for one, leaf in zip(varies, leaves, strict=True)]
-        solved, values = step(jax.tree.unflatten(structure, every), load, before)
-        return solved, jnp.concatenate([values[one].ravel() for one in layouts.outputs])
+        varied = [
+            next(rest) if varying else leaf for varying, leaf in zip(varies, leaves, strict=True)
+        ]
+        solved, values = step(jax.tree.unflatten(structure, varied), load, before)
+        return solved, jnp.concatenate([values[name].ravel() for name in layouts.outputs])
 
-    numbers = [jnp.asarray(leaf) for one, leaf in zip(varies, leaves, strict=True) if one]
+    numbers = [jnp.asarray(leaf) for varying, leaf in zip(varies, leaves, strict=True) if varying]
     pull_back = jax.vjp(packed, load, before, numbers)[1]
     by_load, by_before, by_numbers = pull_back((seed, weights))
     rest = iter(by_numbers)
-    every = [
-        next(rest).ravel() if one else jnp.zeros(leaf.size)
-        for one, leaf in zip(varies, leaves, strict=True)
+    by_leaves = [
+        next(rest).ravel() if varying else jnp.zeros(leaf.size)
+        for varying, leaf in zip(varies, leaves, strict=True)
     ]
-    by_chain = layouts.chain.pack(jnp.concatenate(every))
+    by_chain = layouts.chain.pack(jnp.concatenate(by_leaves))
     return jnp.where(how[3] > 0.0, by_before, 0.0), {"load": by_load, "chain": by_chain}
 
 
@@ -364,9 +366,9 @@ def kinks(path: EquilibriumPath, within: float = 1e-6) -> list[Kink]:
     if not isinstance(path.run, SolverRun):
         return []
     solved, before = path.run.solved, path.prepared.state.unpack(path.run.between)
-    every = [*_contacts(path.chain, solved, before, within), *_notches(path, within)]
+    switches = [*_contacts(path.chain, solved, before, within), *_notches(path, within)]
     converged = np.asarray(path.converged)
-    return sorted((one for one in every if converged[one.step]), key=lambda one: one.step)
+    return sorted((kink for kink in switches if converged[kink.step]), key=lambda kink: kink.step)
 
 
 def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: float) -> list[Kink]:
@@ -375,7 +377,7 @@ def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: fl
     contacts: list[Kink] = []
     for k, group in enumerate(chain.groups):
         ratio, bound = (
-            np.asarray(one[k]) for one in (solved.memory.log_ratio, solved.memory.bound)
+            np.asarray(field[k]) for field in (solved.memory.log_ratio, solved.memory.bound)
         )
         slip = np.abs(np.asarray(solved.memory.slid[k]) - np.asarray(before.memory.slid[k]))
         left = np.maximum(bound - np.abs(ratio), 0.0)

@@ -82,7 +82,7 @@ class VariedRobots:
         for number in np.unique(self.which[numbers]).tolist():
             robot, places = places_by_name(self.robots[number], [*self.values])
             pairs = zip(self.values, places, strict=True)
-            columns = {place: name for name, own in pairs for place in own}
+            columns = {place: name for name, named in pairs for place in named}
             form = PartsForm.of(parts_of(robot), columns)
             of_form = forms.setdefault(form, RobotForm(self, numbers, form, {}, columns))
             of_form.bases[number] = robot
@@ -105,11 +105,11 @@ def _errors(
     """
     notches = [parse_path(name).number if "notch" in name else None for name in names]
     cliques = tuple(
-        tuple(place for place, notch in enumerate(notches) if notch in (None, own))
-        for own in dict.fromkeys(one for one in notches if one is not None) or [None]
+        tuple(place for place, notch in enumerate(notches) if notch in (None, single))
+        for single in dict.fromkeys(notch for notch in notches if notch is not None) or [None]
     )
     numbers = table[rows]
-    if sum(2 ** len(one) for one in cliques) <= len(rows):
+    if sum(2 ** len(clique) for clique in cliques) <= len(rows):
         low, high = numbers.min(axis=0), numbers.max(axis=0)
         known, wider = _known_box(robot, names), _WIDER * (high - low)
         if known and (known[0] <= low).all() and (high <= known[1]).all():
@@ -214,7 +214,7 @@ class Chains:
 def single_chains(prepared: Mapping[int, PreparedChain]) -> Chains:
     """Return chains of one structure that were assembled one by one, by the robots' numbers."""
     ready = next(iter(prepared.values()))
-    table = np.stack([one.dynamic_vector for one in prepared.values()])
+    table = np.stack([chain.dynamic_vector for chain in prepared.values()])
     rows = np.zeros(max(prepared) + 1, int)
     rows[list(prepared)] = np.arange(len(prepared))
 
@@ -256,8 +256,9 @@ class RobotForm(NamedTuple):
     def table(self, numbers: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k numbers"]:
         """Return the numbers of some robots, as `PartsForm.numbers_of` does."""
         bases = np.zeros((len(self.robots.robots), len(self.form.places)))
-        own = [self.form.numbers_of(parts_of(one)) for one in self.bases.values()]
-        bases[list(self.bases)] = own
+        bases[list(self.bases)] = [
+            self.form.numbers_of(parts_of(robot)) for robot in self.bases.values()
+        ]
         rows = bases[self.robots.which[numbers]]
         for place, name in self.columns.items():
             rows[:, self.form.places.index(place)] = self.robots.values[name][numbers]

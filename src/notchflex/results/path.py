@@ -93,9 +93,11 @@ class Recorded:
         start = np.arange(len(self.converged))[some][0]
         first = dict(self.first)
         if start:
-            every = {**self.reported, MATERIAL: self.solved.memory.material}
-            first = {name: np.asarray(every[name])[start - 1] for name in first}
-        cut = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "first"}
+            known = {**self.reported, MATERIAL: self.solved.memory.material}
+            first = {name: np.asarray(known[name])[start - 1] for name in first}
+        cut = {
+            field.name: getattr(self, field.name) for field in fields(self) if field.name != "first"
+        }
         return Recorded(first=first, **jax.tree.map(lambda values: np.asarray(values)[some], cut))
 
     def before(self, name: str) -> np.ndarray:
@@ -245,8 +247,8 @@ def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
             return _said(Failure.TOO_FEW_MODES, percent=100 * path.moment_error[step])
         return _said(Failure.FRICTION_LOCKS)
     tension = ", ".join(f"{value:.4g}" for value in path.tension[step])
-    drawn = ", ".join(f"{value:.4g}" for value in path.stroke[step])
-    last = f"; the last good state has tension {tension} N and stroke {drawn} mm"
+    stroke = ", ".join(f"{value:.4g}" for value in path.stroke[step])
+    last = f"; the last good state has tension {tension} N and stroke {stroke} mm"
     opening = np.asarray(path.chain.rods.length).sum(axis=-1)
     all_closed = (path.gap[step] < _CLOSED_TOLERANCE * opening).all()
     if (all_closed or _past_closing(path, step)) and not np.isnan(path.load.stroke[step]).all():
@@ -287,14 +289,14 @@ def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None
     for group in chain.groups:
         if not isinstance(group, Straight):
             continue
-        leaves, enters = (_in_space(chain, one) for one in (group.leaves, group.enters))
+        leaves, enters = (_in_space(chain, points) for points in (group.leaves, group.enters))
         runs, natural = np.asarray(group.runs), np.asarray(group.natural_gap)
-        for (notch, one), before in np.ndenumerate(np.asarray(group.back)):
-            at, anchor = notch + 1, notch + 1 - int(before)
-            entered = position[at] + rotation[at] @ enters[notch, one]
-            left = position[anchor] + rotation[anchor] @ leaves[notch, one]
-            if runs[notch, one] and norm(entered - left) < _EDGES_MEET * natural[notch, one]:
-                return group.numbers[one], notch
+        for (notch, column), before in np.ndenumerate(np.asarray(group.back)):
+            body, anchor = notch + 1, notch + 1 - int(before)
+            entered = position[body] + rotation[body] @ enters[notch, column]
+            left = position[anchor] + rotation[anchor] @ leaves[notch, column]
+            if runs[notch, column] and norm(entered - left) < _EDGES_MEET * natural[notch, column]:
+                return group.numbers[column], notch
     return None
 
 
@@ -373,9 +375,9 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
         Args:
             name: Name of a property, such as "notch_angle".
         """
-        kept = vars(self).setdefault("_kept", {})
-        if name in kept:
-            return kept[name]
+        cache = vars(self).setdefault("_cache", {})
+        if name in cache:
+            return cache[name]
         if name not in QUANTITIES:
             names = ", ".join(QUANTITIES)
             raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {names}")
@@ -384,8 +386,8 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
             values = quantity.formula(self)
         else:  # vectors and rotations of the solver are in the frame of the base
             values = quantity.turned(self.solver_quantity(name), self.load.base_to_world)
-        kept[name] = frozen(values)
-        return kept[name]
+        cache[name] = frozen(values)
+        return cache[name]
 
     def _value(self) -> Any:
         solved = tuple(self.solver_quantity(name) for name in Shape._fields)

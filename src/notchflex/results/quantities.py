@@ -217,8 +217,8 @@ def friction_front(
     let_go = np.nansum(ratio, axis=-1, keepdims=True) < 0.0
     nothing = ~counts.any(axis=-1, keepdims=True)
     waits = np.where(nothing, rubs & ~let_go, counts & ~turned)
-    every = np.where(rubs.any(axis=-1), exists.sum(axis=-1), 0)
-    count = np.where(waits.any(axis=-1), waits.argmax(axis=-1), every)
+    all_turned = np.where(rubs.any(axis=-1), exists.sum(axis=-1), 0)
+    count = np.where(waits.any(axis=-1), waits.argmax(axis=-1), all_turned)
     at_front = np.minimum(count, ratio.shape[-1] - 1)[..., None]
     at_contact, largest = (
         np.take_along_axis(value, at_front, axis=-1)[..., 0] for value in (ratio, bound)
@@ -233,7 +233,7 @@ def friction_front(
 #
 # Their documentation and their values come from the registry (`notchflex._quantity`).
 
-QUANTITIES = {name: one for name, one in REGISTERED.items() if one.title}
+QUANTITIES = {name: quantity for name, quantity in REGISTERED.items() if quantity.title}
 """Every quantity of a solved state, by the attribute that holds it."""
 
 _Many = TypeVar("_Many")

@@ -98,20 +98,20 @@ class Table:
 
     def _number(self, text: str, column: str, line: int, hint: str) -> float:
         column = self.written.get(column, column)
-        at = f"{self.name}, line {line}: {column} is {text}"
+        place = f"{self.name}, line {line}: {column} is {text}"
         try:
             value = float(text.replace(self.decimal, ".", 1))
         except ValueError:
             got = repr(text) if text else "nothing"
-            at = f"{self.name}, line {line}: {column} is {got}"
-            raise InputError.NOT_A_NUMBER(f"{at}; give a number{hint}.") from None
+            place = f"{self.name}, line {line}: {column} is {got}"
+            raise InputError.NOT_A_NUMBER(f"{place}; give a number{hint}.") from None
         if not math.isfinite(value):
-            raise InputError.NOT_FINITE(f"{at}; give a finite number{hint}.")
+            raise InputError.NOT_FINITE(f"{place}; give a finite number{hint}.")
         if abs(value) > LARGEST:
-            raise InputError.OUT_OF_RANGE(f"{at}; give at most {LARGEST:g}.")
+            raise InputError.OUT_OF_RANGE(f"{place}; give at most {LARGEST:g}.")
         return value
 
-    def at(self, row: int) -> str:
+    def place_of(self, row: int) -> str:
         """Return where a row (from 0) stands, as messages begin: file and line."""
         return f"{self.name}, line {self.lines[row]}"
 
@@ -300,7 +300,7 @@ def read_data_table(
         named[header] = name
     entries: dict[str, tuple[str, ...]] = {}
     written: dict[str, str] = {}
-    told: set[str] = set()
+    named_columns: set[str] = set()
     for header, texts in table.entries.items():
         column, factor = _understood(header, named.get(header, ""))
         if column != header and (column in table.entries or column in entries):
@@ -311,8 +311,10 @@ def read_data_table(
             column, factor = header, 1.0
         entries[column] = tuple(_converted(text, factor, table.decimal) for text in texts)
         written |= {column: header} if column != header else {}
-        told |= {column} if header in named else set()
-    return dataclasses.replace(table, entries=entries, written=written, named=frozenset(told))
+        named_columns |= {column} if header in named else set()
+    return dataclasses.replace(
+        table, entries=entries, written=written, named=frozenset(named_columns)
+    )
 
 
 def _understood(header: str, name: str) -> tuple[str, float]:
@@ -505,7 +507,7 @@ def _joined(quantity: Quantity, parts: Mapping[tuple[int, ...], NDArray[Any]]) -
     first = next(iter(parts.values()))
     shape = np.max(list(parts), axis=0) + 1
     empty = np.nan if first.dtype.kind == "f" else 0
-    whole = np.full((len(first), *shape), empty, first.dtype)
+    array = np.full((len(first), *shape), empty, first.dtype)
     for index, values in parts.items():
-        whole[(slice(None), *index)] = values
-    return whole
+        array[(slice(None), *index)] = values
+    return array

@@ -43,7 +43,7 @@ def path_columns(path: EquilibriumPath) -> dict[str, Sequence[Any]]:
     columns: dict[str, Sequence[Any]] = {"step": range(1, len(path) + 1)}
     for quantity in QUANTITIES.values():
         if quantity.column and holds(path, quantity):
-            columns.update({one.header: one.values for one in entries_of(path, quantity)})
+            columns.update({entry.header: entry.values for entry in entries_of(path, quantity)})
     return columns
 
 
@@ -273,9 +273,9 @@ def _step(path: EquilibriumPath, index: int, external: list[dict[str, Any]]) -> 
 
 def _external(path: EquilibriumPath) -> list[dict[str, Any]]:
     """External loads of every step; nothing at all where no step has any."""
-    if all(one.is_nothing for one in path.load.external):
+    if all(load.is_nothing for load in path.load.external):
         return []
-    return [_with_units(asdict(one)) for one in path.load.external]
+    return [_with_units(asdict(load)) for load in path.load.external]
 
 
 def _with_units(values: dict[str, Any]) -> dict[str, Any]:
