@@ -303,43 +303,21 @@ _NEVER = 1e12
 
 
 class ClosingBands(NamedTuple):
-    """Results of `notchflex show` on tolerances.
-
-    Attributes:
-        bands: The bands that the others were taken from.
-        notches: Numbers of the notches, from 1, that the tendon closes that closes one first.
-        tension: Tension that closes each of them, N, (n,); infinite beyond 1.6 times the tension
-            that closes all of the robot of the drawing.
-        angle: Angle at which it closes, rad, (n,).
-        load: Half the tension that closes the first notch, N.
-        tendon: That tendon, from 1.
-        total_angle: Total angle at that load, rad.
-        by_depth: Change of the total angle at that load if all notches are cut 10 µm deeper, rad;
-            NaN for notches without a depth.
-        shares: Parts of the variance of that angle, by `Bands.variance_shares`.
-    """
+    """Results of `notchflex show` on tolerances, n notches."""
 
     bands: Bands
-    notches: Int[np.ndarray, " n"]
-    tension: Band
-    angle: Band
-    load: float
-    tendon: int
-    total_angle: Band
-    by_depth: float
-    shares: dict[str, float]
+    notches: Int[np.ndarray, " n"]  # from 1: those that `tendon` closes
+    tension: Band  # N; infinite beyond 1.6 times what closes all notches of the drawing
+    angle: Band  # at which they close, rad
+    load: float  # half the tension that closes the first notch, N
+    tendon: int  # from 1: the one that closes a notch first
+    total_angle: Band  # at that load, rad
+    by_depth: float  # its change if all notches are cut 10 µm deeper, rad; NaN without a depth
+    shares: dict[str, float]  # of its variance; see `Bands.variance_shares`
 
 
 def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
-    """Propagate the tolerances of a robot to the closing of its notches.
-
-    Args:
-        robot: The robot, n notches.
-        table: Result of `closing` for it.
-
-    Returns:
-        The bands; None where no notch closes.
-    """
+    """Propagate the tolerances of a robot to the closing of its notches; None if none closes."""
     if not np.isfinite(table.tension).any():
         return None
     first = int(np.nanargmin(table.tension))
@@ -402,11 +380,9 @@ def _closing(
     closed: Bool[np.ndarray, "d s n"],
     angles: Float[np.ndarray, "d s n"],
 ) -> tuple[Float[np.ndarray, "d n"], Float[np.ndarray, "d n"]]:
-    """Compute tension and angle at which each notch of each draw closes.
-
-    The gap falls almost evenly until it is closed and stands still then, so the last two open
-    steps are continued.
-    """
+    """Compute tension and angle at which each notch of each draw closes."""
+    # The gap falls almost evenly until it is closed and stands still then, so the last two open
+    # steps are continued.
     step = np.argmax(closed, axis=1)[:, None]
     near, far = (
         np.take_along_axis(gaps, np.maximum(step - back, 0), axis=1)[:, 0] for back in (1, 2)

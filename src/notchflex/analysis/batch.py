@@ -394,17 +394,11 @@ def _solved(rows: BatchRows, options: BatchOptions, single: bool) -> Batch:
 
 @dataclass(frozen=True, eq=False)
 class LoadRows:
-    """Paths of loads of equally many steps.
+    """Paths of loads of equally many steps."""
 
-    Attributes:
-        load: All steps of all paths.
-        steps: Number of steps of a path.
-        tip: Force and moment at the tip in every step, where they are not those of `load`.
-    """
-
-    load: LoadPath
-    steps: int
-    tip: Float[np.ndarray, "s 6"] | None = None
+    load: LoadPath  # all steps of all paths
+    steps: int  # of each path
+    tip: Float[np.ndarray, "s 6"] | None = None  # force and moment, if not those of `load`
 
     def __len__(self) -> int:
         """Return the number of paths."""
@@ -423,15 +417,7 @@ class LoadRows:
         return load.commanding(dict(zip(TIP, np.split(self.tip[steps], 2, axis=1), strict=True)))
 
     def varied(self, which: Int[np.ndarray, " n"], values: Mapping[str, np.ndarray]) -> LoadRows:
-        """Return paths made of some of these and of numbers of their own.
-
-        Args:
-            which: Which of these each is made of.
-            values: Numbers of each by name.
-
-        Raises:
-            InputError: Numbers of another shape, that are not finite, or that no load can have.
-        """
+        """Return paths made of some of these and of numbers of their own by name."""
         if not values and np.array_equal(which, np.arange(len(self))):
             return self
         load = self.load[self.steps_of(which).ravel()]
@@ -470,22 +456,12 @@ class LoadRows:
 
 @dataclass(frozen=True, eq=False)
 class BatchRows:
-    """Rows of a batch: robots and paths of loads.
-
-    Attributes:
-        robots: All robots.
-        loads: All paths.
-        robot_of: Number of the robot of each row.
-        path_of: Number of the path of each row.
-        outputs: Names of what is returned.
-        settings: Tolerance and limits of the solver.
-        refinement: More strain modes, as for `simulate`.
-    """
+    """Rows of a batch: robots and paths of loads."""
 
     robots: VariedRobots
     loads: LoadRows
-    robot_of: Int[np.ndarray, " rows"]
-    path_of: Int[np.ndarray, " rows"]
+    robot_of: Int[np.ndarray, " rows"]  # number of the robot of each row
+    path_of: Int[np.ndarray, " rows"]  # number of its path
     outputs: tuple[str, ...]
     settings: Settings
     refinement: int
@@ -503,11 +479,7 @@ class BatchRows:
         return follow_path(robot, load, None, self.settings, self.refinement)
 
     def tables(self, compiled: bool) -> Iterator[BatchTable]:
-        """Yield the valid rows by the programs that they run through.
-
-        Args:
-            compiled: Whether programs may make the chains of many robots.
-        """
+        """Yield the valid rows by their programs, which may make the chains if `compiled`."""
         rows = np.flatnonzero(self.valid)
         if compiled and len(self.robots) > FEW:
             few = [rows[:0]]
@@ -570,19 +542,12 @@ class BatchRows:
 
 @dataclass(frozen=True, eq=False)
 class BatchTable:
-    """Rows of a batch that run through one program.
-
-    Attributes:
-        batch: The batch.
-        rows: Numbers of these rows, ascending.
-        chains: Chains of their robots.
-        kind: What acts, as bits; see `acting`.
-    """
+    """Rows of a batch that run through one program."""
 
     batch: BatchRows
-    rows: Int[np.ndarray, " k"]
+    rows: Int[np.ndarray, " k"]  # their numbers, ascending
     chains: Chains
-    kind: int
+    kind: int  # what acts, as bits; see `acting`
 
     def pieces(self, cores: int) -> Iterator[slice]:
         """Return the rows of each call of the program: equal pieces, balanced over the cores."""
@@ -637,20 +602,12 @@ class BatchTable:
 
 
 class FollowedRows(NamedTuple):
-    """Rows of a batch that were followed along their paths.
+    """Rows of a batch that were followed along their paths."""
 
-    Attributes:
-        chains: Their chains, packed; one where all have the same.
-        alike: Which of the chains are right.
-        commands: Their loads, packed, rows and steps as leading axes.
-        layout: Layout of one load.
-        outputs: What was asked for, by name.
-    """
-
-    chains: np.ndarray
-    alike: Bool[np.ndarray, " k"]
-    commands: Float[np.ndarray, "k s command"]
-    layout: PytreeLayout
+    chains: np.ndarray  # packed; one where all have the same
+    alike: Bool[np.ndarray, " k"]  # which of the chains are right
+    commands: Float[np.ndarray, "k s command"]  # packed loads
+    layout: PytreeLayout  # of one load
     outputs: dict[str, np.ndarray]
 
 

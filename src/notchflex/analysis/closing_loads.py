@@ -77,16 +77,7 @@ _ROUNDS = 200
 def closing_tensions(
     overlap: Overlap, guess: Float[np.ndarray, " m"], precision: float = PRECISION
 ) -> tuple[Float[np.ndarray, " m"], np.ndarray]:
-    """Find the tension that closes each notch, and a status for each.
-
-    Args:
-        overlap: The overlap of all notches, each at its own tension.
-        guess: Tensions to begin from, N; 2 ** 6 times that is the largest one tried.
-        precision: Relative precision of a tension.
-
-    Returns:
-        Tensions (N), NaN where none was found, and statuses (`ClosingStatus`).
-    """
+    """Find the tension that closes each notch, N, NaN where none was found; and its status."""
     low, high, failed = _bracket(overlap, guess)
     bracketed = np.isfinite(high)
     tension, precise = find_roots(overlap, low, np.where(bracketed, high, low), precision)
@@ -129,20 +120,9 @@ def find_roots(
     high: Float[np.ndarray, " m"],
     precision: float = PRECISION,
 ) -> tuple[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
-    """Find roots by false position, bisecting where that stalls.
-
-    After a failed solve the next trials are elsewhere in the bracket, ever closer to its lower end.
-
-    Args:
-        overlap: The overlap of all notches, each at its own tension.
-        low: Tensions (N) that leave the notches open; of one that is not searched, `high`.
-        high: Tensions (N) that close them.
-        precision: Relative precision of a root.
-
-    Returns:
-        The roots, and whether each is known: to that precision, or to 1e-3 where the solver
-        fails nearby.
-    """
+    """Find roots by false position, bisecting where that stalls, and whether each is precise."""
+    # `low` leaves a notch open, `high` closes it; both are the same for one that is not searched.
+    # After a failed solve the next trials are elsewhere in the bracket, ever closer to its low end.
     # `scipy.optimize.elementwise.find_root` gives a notch up at its first NaN. Of 9 ready robots it
     # solves 2221 states for the same roots, this one 1274 (wrist A: 281 and 67; York: 242 and 433).
     searched = low < high
@@ -331,11 +311,8 @@ def _strains(law: SectionLaw, sections: FibreSection, curvature: Any, memory: An
 
 
 def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
-    """Compute the moment arm of every tendon about the neutral axis of every notch at rest, mm.
-
-    Positive where it bends the notch toward its direction; 0 where it does not run. The chain must
-    be assembled with `flat=False`.
-    """
+    """Return the arm of every tendon about each neutral axis at rest, mm; 0 where none runs."""
+    # Positive where the tendon bends the notch toward its direction; needs a chain of `flat=False`.
     entry_x = np.einsum("nba,tb->nta", chain.notch_frame, chain.tendon_entry)[..., 0]
     spine = np.where(np.asarray(chain.rods.has_closure) > 0.0, chain.rods.end_offset[:, 0], 0.0)
     arm = np.zeros((chain.flexures, chain.tendons))
@@ -379,10 +356,8 @@ def _tensions(
 def _edge_closing(
     ready: PreparedChain, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], np.ndarray]:
-    """Find tension, angle and status of closing for notches with edges on rigid pieces.
-
-    The tendon is pulled in steps from rest, which brackets the tension where an edge touches.
-    """
+    """Find tension, angle and status of closing for notches with edges on rigid pieces."""
+    # The tendon is pulled in steps from rest, which brackets the tension where an edge touches.
     tension, angle = (np.full(ready.chain.flexures, np.nan) for _ in range(2))
     status = np.full(ready.chain.flexures, ClosingStatus.NEVER, dtype=object)
     for number in np.unique(tendon):
@@ -448,15 +423,7 @@ _OUTPUTS = ("contact_force", "gap", "converged")
 def closing_tensions_of(
     robot: Robot, values: Mapping[str, Float[np.ndarray, " robots"]]
 ) -> Float[np.ndarray, "robots n"]:
-    """Find the tension that closes every notch of many robots, as `closing` does for one.
-
-    Args:
-        robot: The robot that is varied.
-        values: Numbers of the robots by name.
-
-    Returns:
-        Base tensions, N; NaN where none was found, or where the numbers make no valid robot.
-    """
+    """Find the tensions (N) that close the notches of many robots, as `closing` does for one."""
     nominal = closing(robot)
     chain = assemble(robot, flat=False)
     closing_angle, arm = closing_angles(chain.rods), moment_arms(chain)
@@ -506,31 +473,7 @@ def closing_tensions_of(
 
 
 def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict[str, Any]]:
-    """Return geometry, section and closing of every notch, base to tip.
-
-    Args:
-        robot: The robot, n notches, t tendons.
-        closing_table: What `closing` returned of it; found anew where not given.
-
-    Returns:
-        n rows with the values of the robot file, their units in their names, and
-
-        * `area_mm2` and `second_moment_mm4` of the section that the cut leaves, where it is
-          weakest; `centroid_mm` (from the tube axis toward the spine) where there is a spine,
-        * `moment_arm_mm`, t numbers: how far each tendon runs from the neutral axis, positive
-          where it bends the notch toward its direction, 0 where it does not go,
-        * `closing_angle_deg`, `closing_tendon` (from 1: the one with the longest arm),
-          `closing_tension_N` (of that tendon, pulled from rest; NaN if none was found),
-          `closing_status` ("closes", "never", or "not found" where the solver failed),
-          `closing_outer_strain` (Pacheco 2021, eq. 16) and `closing_peak_strain` (farthest fibre),
-          both NaN without a spine.
-
-    Example:
-        >>> from notchflex import load_robot
-        >>> row = notch_table(load_robot("pacheco2021-a"))[0]
-        >>> round(row["closing_angle_deg"], 2), round(row["moment_arm_mm"][0], 3)
-        (30.63, 1.387)
-    """
+    """Return geometry, section and closing of every notch as a row, units in the names."""
     table = closing(robot) if closing_table is None else closing_table
     arms = moment_arms(assemble(robot, flat=False))
     placed = list(zip(robot.notches, sites_of(robot), strict=True))
@@ -539,8 +482,10 @@ def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict
         {
             "notch": index + 1,
             **described[each],
+            # Of every tendon, positive where it bends the notch toward itself, 0 where none runs.
             "moment_arm_mm": arms[index].tolist(),
             "closing_angle_deg": float(table.angle[index]) * DEGREES,
+            # The tendon with the longest arm, from 1; its tension, pulled from rest.
             "closing_tendon": int(table.tendon[index]),
             "closing_tension_N": float(table.tension[index]),
             "closing_status": str(table.status[index]),
@@ -552,13 +497,7 @@ def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict
 
 
 def named_values(notch: Notch) -> dict[str, Any]:
-    """Return the values of a notch as in a robot file, their units in their names.
-
-    Example:
-        >>> from notchflex import load_robot
-        >>> list(named_values(load_robot("pacheco2021-a").notches[0]))[:3]
-        ['kind', 'cut', 'depth_mm']
-    """
+    """Return the values of a notch as in a robot file, their units in their names."""
     values: dict[str, Any] = {}
     for name, field in fields_of(type(notch)).items():
         unit = unit_of(field)
@@ -572,10 +511,10 @@ def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
     rod = rod_at(site, notch, tube)
     section = rod.section
     weakest = int(np.argmin(section.second_moment_weak))
-    values: dict[str, Any] = {
+    values: dict[str, Any] = {  # of the weakest section
         "area_mm2": float(section.area[weakest]),
         "second_moment_mm4": float(section.second_moment_weak[weakest]),
     }
-    if float(rod.has_closure) > 0.0:  # opposite a spine
+    if float(rod.has_closure) > 0.0:  # opposite a spine; from the tube axis toward it
         values["centroid_mm"] = tube.outer_radius - float(section.edge_spine[weakest])
     return named_values(notch) | values

@@ -286,18 +286,11 @@ def _varied(robot: Robot, values: tuple[tuple[str, float], ...]) -> Robot:
 
 @dataclass(frozen=True, eq=False)
 class VectorSolver:
-    """Outputs and their derivatives by compiled programs, for rows of plain values.
+    """Outputs and their derivatives by compiled programs, for rows of plain values."""
 
-    Attributes:
-        start: Present values of the parameters, by name.
-        outputs: Names of the outputs.
-        solve: Solves the path at named values; raises `InputError` for invalid values.
-        refinement: More strain modes.
-    """
-
-    start: Mapping[str, np.ndarray]
+    start: Mapping[str, np.ndarray]  # present values of the parameters
     outputs: tuple[str, ...]
-    solve: Callable[[Mapping[str, Any]], EquilibriumPath]
+    solve: Callable[[Mapping[str, Any]], EquilibriumPath]  # raises `InputError` for invalid values
     refinement: int
 
     @cached_property
@@ -565,16 +558,8 @@ def _slices(arrays: Mapping[str, np.ndarray]) -> dict[str, slice]:
 
 
 def outputs_function(solver: VectorSolver) -> Callable[[Array], OutputTable]:
-    """Wrap a solver as a function of JAX.
-
-    Invalid values give NaN for numbers and false for flags, as a program of JAX cannot raise.
-
-    Args:
-        solver: Gives outputs and derivatives.
-
-    Returns:
-        A function of a vector of values that JAX traces, differentiable once, forward and reverse.
-    """
+    """Return a function of a vector of values that JAX traces, differentiable once, both ways."""
+    # Invalid values give NaN for numbers and false for flags, as a program of JAX cannot raise.
 
     def function(point: Array) -> OutputTable:
         flat = _VALUES.bind(point, solver=solver)

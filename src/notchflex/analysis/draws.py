@@ -21,29 +21,18 @@ _TRIES = 100
 
 
 class Draws(NamedTuple):
-    """Robots within tolerances.
+    """Robots within tolerances."""
 
-    Attributes:
-        robot: The robot of the drawing, without tolerances.
-        values: The numbers that were drawn, by name, one per robot.
-        redrawn: How many draws made no valid robot and were drawn again.
-    """
-
-    robot: Robot
+    robot: Robot  # of the drawing, without tolerances
     values: Mapping[str, Float[np.ndarray, " draws"]]
-    redrawn: int
+    redrawn: int  # draws that made no valid robot at first
 
 
 class ToleranceSource(NamedTuple):
-    """One number drawn, and the values that follow it.
-
-    Attributes:
-        tolerance: How it deviates.
-        nominal: The values of the drawing by name.
-    """
+    """One number drawn, and the values that follow it."""
 
     tolerance: Tolerance
-    nominal: dict[str, float]
+    nominal: dict[str, float]  # values of the drawing by name
 
     @property
     def name(self) -> str:
@@ -59,17 +48,7 @@ class ToleranceSource(NamedTuple):
 
 
 def deviation(tolerance: Tolerance, value: float, level: Any) -> Any:
-    """Return the deviation from a value that a part `level` of all deviations stays below.
-
-    Args:
-        tolerance: How the value deviates.
-        value: The value of the drawing.
-        level: Between 0 and 1; an array gives an array.
-
-    Example:
-        >>> deviation(Tolerance("material.elastic_modulus", plus="20 %", minus="10 %"), 4e4, 0.5)
-        2000.0
-    """
+    """Return the deviation from a value that a part `level` (0 to 1) of all stays below."""
     sd = amount(tolerance.sd, value)
     plus, minus = amount(tolerance.plus, value), amount(tolerance.minus, value)
     if tolerance.sd is None:
@@ -83,12 +62,7 @@ def deviation(tolerance: Tolerance, value: float, level: Any) -> Any:
 
 
 def moments(tolerance: Tolerance, value: float) -> tuple[float, float]:
-    """Return mean and standard deviation of the deviation from a value.
-
-    Example:
-        >>> moments(Tolerance("notch.depth", plus=0.03, minus=0.03), 1.4)
-        (0.0, 0.017320508075688773)
-    """
+    """Return mean and standard deviation of the deviation from a value."""
     sd = amount(tolerance.sd, value)
     plus, minus = amount(tolerance.plus, value), amount(tolerance.minus, value)
     if tolerance.sd is None:
@@ -107,17 +81,7 @@ def moments(tolerance: Tolerance, value: float) -> tuple[float, float]:
 
 
 def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed: int) -> Draws:
-    """Draw robots within tolerances, as a Latin hypercube.
-
-    Args:
-        robot: The robot with the values of the drawing.
-        tolerances: What deviates; one of a single notch replaces that of all notches there.
-        draws: How many robots.
-        seed: The same seed makes the same robots.
-
-    Raises:
-        InputError: Hardly any draw makes a valid robot.
-    """
+    """Draw robots within tolerances, as a Latin hypercube."""
     exact = robot.replace(tolerance=None)
     sources = sources_of(exact, tolerances)
     random = np.random.default_rng(seed)
@@ -141,11 +105,9 @@ def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed:
 def _levels(
     draws: int, count: int, random: np.random.Generator
 ) -> Float[np.ndarray, "draws count"]:
-    """Draw a Latin hypercube whose columns do not correlate (Iman and Conover 1982).
-
-    In every column one draw lies in each of as many equal parts. Their random pairing alone would
-    make spreads wrong by 4 % at 256 draws; without its correlations it is 0.5 %.
-    """
+    """Draw a Latin hypercube whose columns do not correlate (Iman and Conover 1982)."""
+    # In every column one draw lies in each of as many equal parts. Their random pairing alone would
+    # make spreads wrong by 4 % at 256 draws; without its correlations it is 0.5 %.
     part = random.permuted(np.tile(np.arange(draws), (count, 1)), axis=1).T
     if draws > count + 1 > 2:
         from scipy.special import ndtri
@@ -167,12 +129,7 @@ def values_at(
 
 
 def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[ToleranceSource]:
-    """Return what is drawn; the tolerance of a single notch replaces that of all notches there.
-
-    Args:
-        robot: The robot with the values of the drawing.
-        tolerances: What deviates.
-    """
+    """Return what is drawn; the tolerance of a single notch replaces that of all notches there."""
     sources: list[ToleranceSource] = []
     alone = {tolerance.value for tolerance in tolerances if "[" in tolerance.value}
     for tolerance in tolerances:
@@ -229,17 +186,7 @@ _LEFT_OUT = ("plastic_modulus",)
 
 
 def tolerances_of(robot: Robot) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]:
-    """Return the tolerances of a robot, those that its file lacks assumed.
-
-    Returns:
-        The tolerances, and the names of the values whose tolerance is assumed.
-
-    Example:
-        >>> from notchflex import load_robot
-        >>> wrist = load_robot("pacheco2021-a").replace(tolerance={"notch.depth": 0.005})
-        >>> tolerances_of(wrist)[1][0]
-        'notch.height'
-    """
+    """Return the tolerances of a robot, and the names of those that its file lacks: assumed."""
     of_file = {tolerance.value: tolerance for tolerance in robot.tolerance}
     assumed = {
         tolerance.value: tolerance
@@ -287,10 +234,8 @@ def _tendon_radius(robot: Robot) -> Iterator[Tolerance]:
 
 
 def _law(robot: Robot) -> Iterator[Tolerance]:
-    """Yield the error of the law of notches with elastic ends, larger for the last notch.
-
-    Papers' laws of rigid ends come with constants that were fitted by them, error included.
-    """
+    """Yield the error of the law of notches with elastic ends, larger for the last notch."""
+    # Papers' laws of rigid ends come with constants that were fitted by them, error included.
     notches = robot.notches
     all_of_them = max(notch.law_errors[0] for notch in notches)
     last = notches[-1].law_errors[1]

@@ -41,19 +41,9 @@ _WIDTHS = {2: 5e-6, 6: 1.3e-3}
 def slope(
     vector_of: Callable[[float], Float[np.ndarray, "*m"]], value: float, *, order: int = 6
 ) -> Float[np.ndarray, "*m"]:
-    """Differentiate by a number.
-
-    Args:
-        vector_of: The arrays of a value; entries may be infinite, and count as constant.
-        value: Where. At the end of its range, such as a friction of 0, the derivative is inward.
-        order: Order of accuracy: 6, or 2 with a third of the evaluations, for plain formulas.
-
-    Returns:
-        The derivative, accurate to about 1e-10.
-
-    Raises:
-        InputError: The number cannot be varied.
-    """
+    """Differentiate arrays by a number to about 1e-10; at an end of its range, inward."""
+    # Infinite entries count as constant. Order 2, for plain formulas, takes a third of the
+    # evaluations of order 6.
     width, reason = _width(value, order), ""
     for side in (0, 1, -1):
         points, weights = _stencil(order, side)
@@ -69,11 +59,7 @@ def slope(
 
 
 def nearby(robot_at: Callable[[float], T], value: float, order: int = 6) -> T:
-    """Return what a function gives beside a number, to the side where it gives something.
-
-    Raises:
-        InputError: The number cannot be varied.
-    """
+    """Return what a function gives next to a number, on the side where it gives something."""
     width, reason = _width(value, order), ""
     for moved in (value + width, value - width):
         try:
@@ -100,23 +86,14 @@ def _stencil(order: int, side: int) -> tuple[Float[np.ndarray, " p"], Float[np.n
 
 @dataclass(frozen=True, eq=False)
 class ForwardModel:
-    """A robot under loads as a function of its numbers and of the loads.
+    """A robot under loads as a function of its numbers and of the loads."""
 
-    Attributes:
-        robot: The nominal robot.
-        load: The nominal loads.
-        settings: Tolerance and limits of the solver.
-        refinement: More strain modes, as for `simulate`.
-        from_rest: Which steps start from rest, (s,); the others from the step before.
-        any_load: Whether loads on the bodies may vary, and so may point anywhere.
-    """
-
-    robot: Robot
-    load: LoadPath
+    robot: Robot  # the nominal one
+    load: LoadPath  # the nominal loads
     settings: Settings = DEFAULT
     refinement: int = 0
-    from_rest: bool | Bool[np.ndarray, " s"] = False
-    any_load: bool = False
+    from_rest: bool | Bool[np.ndarray, " s"] = False  # which steps start from rest
+    any_load: bool = False  # whether loads on the bodies vary, and may point anywhere
 
     @cached_property
     def ready(self) -> PreparedChain:
@@ -128,16 +105,7 @@ class ForwardModel:
     def solve(
         self, robot: Robot, load: LoadPath, start: SolverState | None = None
     ) -> EquilibriumPath:
-        """Solve loads with a robot that has other numbers.
-
-        Args:
-            robot: The robot.
-            load: Loads of the same kind as those of the model.
-            start: The state to start from; rest where not given.
-
-        Raises:
-            InputError: The arrays of the robot have another form than those of the model's.
-        """
+        """Solve loads of the model's kind with a robot of its form, from `start` or from rest."""
         ready = self._prepared(robot)
         commands = make_commands(load, robot, ready.chain)
         states = run(ready, commands, start, self.settings, each_from_start=self.from_rest)
@@ -157,11 +125,7 @@ class ForwardModel:
 
 
 def prepared_like(robot: Robot, like: PreparedChain) -> PreparedChain:
-    """Prepare a robot for the same loads as another one.
-
-    Raises:
-        InputError: Its arrays have another form.
-    """
+    """Prepare a robot for the same loads as another one; raise where its form differs."""
     chain = like.chain
     options = chain.level, chain.loaded, chain.follows, chain.refinement, chain.frame is not None
     ready = prepare(robot, *options)

@@ -72,11 +72,7 @@ class OutputTable(dict[str, Array]):
 
 
 def check_outputs(outputs: Sequence[str], allowed: Sequence[str] = OUTPUTS) -> tuple[str, ...]:
-    """Return the names of outputs, checked.
-
-    Raises:
-        InputError: There is no such output, or none is asked.
-    """
+    """Return the names of outputs, at least one, all of them allowed."""
     names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     wrong = [name for name in names if name not in allowed]
     if wrong or not names:
@@ -108,10 +104,8 @@ def reported_shapes(
 
 
 def own_entries(ready: PreparedChain, outputs: Sequence[str]) -> dict[str, Int[np.ndarray, ...]]:
-    """Return where programs of the padded chain report the numbers of a robot's own quantities.
-
-    The index is -1 for numbers beyond the end of a tendon.
-    """
+    """Return where programs of the padded chain report the numbers of a robot's own quantities."""
+    # -1 stands for numbers beyond the end of a tendon.
     long, begin, indices = ready.long, 1, {}
     shapes = reported_shapes(long.static_structure, long.state, tuple(outputs))
     for name, shape in shapes.items():
@@ -125,21 +119,10 @@ def own_entries(ready: PreparedChain, outputs: Sequence[str]) -> dict[str, Int[n
 def follow_row(
     robot: Chain, loads: Command, numbers: Float[Array, " settings"], outputs: tuple[str, ...]
 ) -> dict[str, Array]:
-    """Follow the path of one row of a batch from rest.
-
-    Beside `run` this is a second loop over a path, and stays one: `run` continues or starts anew,
-    skips what comes after a failure (a branch that rows side by side would both take), and packs
-    all that a path may be asked for later; here only what is asked for is kept.
-
-    Args:
-        robot: The robot.
-        loads: Its loads, step by step.
-        numbers: Tolerance and limits of the solver.
-        outputs: Names of the outputs.
-
-    Returns:
-        By name, steps as leading axis; after a load that failed the last good state.
-    """
+    """Follow the path of a batch row from rest; the last good state stays after a failure."""
+    # Beside `run` this is a second loop over a path, and stays one: `run` continues or starts
+    # anew, skips what comes after a failure (a branch that rows side by side would both take),
+    # and packs all that a path may be asked for later; here only what is asked for is kept.
     settings = Settings.of(numbers)
 
     def step(state: tuple[SolverState, Array], command: Any) -> tuple[Any, dict[str, Array]]:

@@ -119,11 +119,7 @@ def _checked(path: EquilibriumPath, names: str | Sequence[str]) -> tuple[str, ..
 
 
 def start_of(robot: Robot, load: LoadPath, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Return the present values of numbers and loads by name.
-
-    Raises:
-        InputError: There is no such number, or it cannot be varied.
-    """
+    """Return the present values of numbers and loads by name; raise for one that cannot vary."""
     numbers = tuple(name for name in names if name not in LOADS)
     values = dict(zip(numbers, _variable(robot, numbers), strict=True))
     return {name: load.numbers(name) if name in LOADS else np.array(values[name]) for name in names}
@@ -229,17 +225,8 @@ def _units(places: Sequence[list[Place]], form: PartsForm) -> Float[np.ndarray, 
 def change_along(
     path: EquilibriumPath, robot_at: Callable[[float], Robot], value: float, *, order: int = 6
 ) -> Change:
-    """Differentiate arrays and loads of a path along a family of robots.
-
-    Args:
-        path: The path, of the robot at the number.
-        robot_at: The robot of a number; only its geometry and loads on its mass may vary.
-        value: The number at which to differentiate.
-        order: Order of accuracy of the slopes of the robot's numbers, as for `slope`.
-
-    Raises:
-        InputError: The number cannot be varied.
-    """
+    """Differentiate arrays and loads of a path along a family of robots, at a number."""
+    # Only the geometry and the loads on the mass may vary; `order` is that of `slope`.
     robot = robot_at(value)
 
     def difference(form: PartsForm) -> Float[np.ndarray, "1 numbers"]:

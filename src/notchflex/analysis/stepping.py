@@ -436,14 +436,7 @@ class Stepper(Displayed):
 
 
 def dead_band(drive: Any, ratio: Any, bound: Any, by_stroke: Any) -> tuple[Any, Any]:
-    """Return between which drives nothing moves, as the first contact of a tendon sticks.
-
-    Args:
-        drive: The drives, N or mm, (t,), of NumPy or JAX.
-        ratio: Log ratios of the first contacts, (t,).
-        bound: Their largest, (t,).
-        by_stroke: Which drives are strokes, (t,).
-    """
+    """Return the drives (N or mm) between which the first contact of each tendon sticks."""
     # The ratio of a contact that slides misses its bound by rounding, to either side.
     still = by_stroke | (xp.abs(ratio) > (1.0 + _ROUNDING) * bound)
     low, high = (drive * xp.exp(-ratio + side * bound) for side in (-1.0, 1.0))
@@ -472,12 +465,9 @@ def _step(
     outputs: tuple[str, ...],
     jacobian: bool,
 ) -> tuple[Array, Array, Array]:
-    """Solve one load from a state.
-
-    Returns:
-        The state, that before after a failure; the outputs and, as further rows, their change by
-        every drive, and in a last column NaN; and whether it converged.
-    """
+    """Solve one load from a state; return state, table of outputs, and whether it converged."""
+    # After a failure the state is that before. Further rows of the table are changes of the outputs
+    # by every drive; its last column is NaN.
     command = command._replace(target=drives)
     result = solve_load_step(robot, command, last, Settings.of(numbers))
     converged = result.converged & believable(SolvedState(robot, result.solved).quantity)

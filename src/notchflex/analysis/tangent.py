@@ -43,21 +43,13 @@ from notchflex.solver.sensitivity import attach_derivatives
 
 
 class StepLayouts(NamedTuple):
-    """How a program takes chain, load and state as vectors, and what it reports.
-
-    Attributes:
-        chain: Structure and layout of the chain.
-        command: Layout of one load.
-        state: Layout of a state.
-        outputs: Names of the quantities.
-        chain_varies: Whether a change of the chain is followed.
-    """
+    """How a program takes chain, load and state as vectors, and what it reports."""
 
     chain: StaticStructure
-    command: PytreeLayout
+    command: PytreeLayout  # of one load
     state: PytreeLayout
     outputs: tuple[str, ...]
-    chain_varies: bool = False
+    chain_varies: bool = False  # whether its change is followed
 
     @property
     def lanes(self) -> tuple[int, int]:
@@ -90,26 +82,16 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class PathTangents:
-    """Directional derivatives of a solved path.
-
-    Attributes:
-        path: The path, as solved.
-        outputs: Names of what is differentiated: quantities of `EquilibriumPath` that the solver
-            reports as floats.
-        remembers: Whether changes pass from state to state through the memory of the contacts.
-    """
+    """Directional derivatives of a solved path."""
 
     path: EquilibriumPath
-    outputs: tuple[str, ...]
-    remembers: bool = True
+    outputs: tuple[str, ...]  # quantities that the solver reports as floats
+    remembers: bool = True  # whether changes pass on through the memory of contacts
 
     def along(self, directions: Sequence[Change]) -> list[dict[str, np.ndarray]]:
-        """Differentiate along some directions, by one program.
-
-        Returns:
-            For each the change of every output by name, in the world, steps as leading axis. NaN
-            from a step on that did not converge, or was so hard that its derivatives are not known.
-        """
+        """Differentiate the outputs, in the world, along each of some directions."""
+        # NaN from a step on that did not converge, or was so hard that its derivatives are not
+        # known.
         ready = self.path.prepared
         varies = any(direction.chain is not None for direction in directions)
         layouts = self.layouts._replace(chain_varies=varies)
@@ -157,11 +139,9 @@ class PathTangents:
 
     @cached_property
     def steps(self) -> tuple[np.ndarray, ...]:
-        """What programs take of every step beside its load, for the long chain.
-
-        The states before and at the load and between, and how it was found: parts of the substeps,
-        whether it converged, and whether a change of the state before passes on.
-        """
+        """What programs take of every step but its load, for the long chain."""
+        # The states before and at the load and between, and how it was found: parts of the
+        # substeps, whether it converged, and whether a change of the state before passes on.
         ready, run = self.path.prepared, self.path.run
         assert isinstance(run, SolverRun)
         states = (
@@ -179,18 +159,8 @@ def step_function(
     how: Float[Array, " 4"],
     layouts: StepLayouts,
 ) -> Callable[[Chain, Array, Array], tuple[Array, dict[str, Array]]]:
-    """Return a solved step as a function that can be differentiated.
-
-    Args:
-        state: The solved state, packed.
-        between: The state before its last part, packed.
-        how: How it was found, as `PathTangents.steps` has it.
-        layouts: How things are packed, and what is reported.
-
-    Returns:
-        A function of a chain, a packed load and the packed state before; it returns the packed
-        state and the outputs.
-    """
+    """Return a solved step as a function of chain, load and state before, for derivatives."""
+    # `between` is the state before its last part, `how` that of `PathTangents.steps`.
     solved, halfway = layouts.state.unpack(state), layouts.state.unpack(between)
     history = halfway, how[0], how[1].astype(int), how[2] > 0.0
 
@@ -215,10 +185,8 @@ def tangent_step(
     load_change: Float[Array, " command"],
     layouts: StepLayouts,
 ) -> tuple[Float[Array, " state"], dict[str, Array]]:
-    """Compute the change of a solved state, carried to the next, and of its reported quantities.
-
-    The program for loads alone, where the chain does not vary, is a fifth shorter.
-    """
+    """Compute the change of a solved state, carried to the next, and of its reported quantities."""
+    # The program for loads alone, where the chain does not vary, is a fifth shorter.
     step = step_function(state, between, how, layouts)
 
     def packed(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
@@ -233,15 +201,10 @@ def tangent_step(
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """Derivatives of a number by all that a path is computed from.
-
-    Attributes:
-        loads: By the loads, packed, steps as leading axis.
-        chain: By the chain, packed whole.
-    """
+    """Derivatives of a number by all that a path is computed from."""
 
     loads: Float[np.ndarray, "s command"]
-    chain: Float[np.ndarray, " chain"]
+    chain: Float[np.ndarray, " chain"]  # packed, all of it
 
     def along(self, change: Change) -> float:
         """Return the derivative of the number along a change."""
@@ -252,17 +215,9 @@ class Gradient:
 
 
 def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradient:
-    """Differentiate a weighted sum of quantities by all loads and by all numbers of the chain.
-
-    Args:
-        path: The path, as solved.
-        weights: By name of quantities that the solver reports as floats, in the world, the weight
-            of each number of a quantity, steps as leading axis.
-
-    Returns:
-        Its derivatives. NaN if a step of any weight, or one before it, did not converge, or was so
-        hard that its derivatives are not known.
-    """
+    """Differentiate a weighted sum of quantities in the world by all loads and by the chain."""
+    # NaN if a step of any weight, or one before it, did not converge, or was so hard that its
+    # derivatives are not known.
     long = path.prepared.long
     tangents = PathTangents(path, tuple(weights))
     layouts = tangents.layouts
@@ -354,15 +309,7 @@ class Kink:
 
 
 def kinks(path: EquilibriumPath, within: float = 1e-6) -> list[Kink]:
-    """List the contacts and notches of a path that lie at a switch, or nearly so.
-
-    Args:
-        path: The path, as solved (not as read from a file).
-        within: Distance from the switch up to which they count.
-
-    Returns:
-        One record each, by step; none where a step did not converge.
-    """
+    """List the contacts and notches of a solved path within a distance of a switch, by step."""
     if not isinstance(path.run, SolverRun):
         return []
     solved, before = path.run.solved, path.prepared.state.unpack(path.run.between)

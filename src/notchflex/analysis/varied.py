@@ -32,17 +32,11 @@ _WIDER = 0.25
 
 @dataclass(frozen=True, eq=False)
 class VariedRobots:
-    """Robots made of some robots and numbers of their own; each is made when asked for.
+    """Robots made of some robots and numbers of their own; each is made when asked for."""
 
-    Attributes:
-        robots: What they are made of.
-        which: Which of these each is made of.
-        values: Numbers of each by name, as for `Robot.with_value`.
-    """
-
-    robots: Sequence[Robot]
-    which: Int[np.ndarray, " n"]
-    values: Mapping[str, Float[np.ndarray, " n"]]
+    robots: Sequence[Robot]  # what they are made of
+    which: Int[np.ndarray, " n"]  # of these each is made of
+    values: Mapping[str, Float[np.ndarray, " n"]]  # numbers of each by name
 
     @classmethod
     def of(cls, robot: Robot, values: Mapping[str, Float[np.ndarray, " n"]]) -> VariedRobots:
@@ -54,11 +48,7 @@ class VariedRobots:
         return len(self.which)
 
     def __getitem__(self, number: int) -> Robot:
-        """Make one of the robots.
-
-        Raises:
-            InputError: The numbers make no valid robot.
-        """
+        """Make one of the robots; raise where the numbers make none."""
         robot = self.robots[self.which[number]]
         values = {name: float(each[number]) for name, each in self.values.items()}
         return robot.with_values(values) if values else robot
@@ -97,12 +87,10 @@ def _errors(
     table: Float[np.ndarray, "n d"],
     rows: Int[np.ndarray, " k"],
 ) -> Iterator[tuple[int, InputError]]:
-    """Yield rows of a table whose numbers make no valid robot, with the reason.
-
-    Rules tie a number to its limits, to the tube, a tendon or another number of the same notch,
-    each of them monotonic: if all corners of a box are valid, so is all inside. Other boxes are
-    halved.
-    """
+    """Yield rows of a table whose numbers make no valid robot, with the reason."""
+    # Rules tie a number to its limits, to the tube, a tendon or another number of the same notch,
+    # each of them monotonic: if all corners of a box are valid, so is all inside. Other boxes are
+    # halved.
     notches = [parse_path(name).number if "notch" in name else None for name in names]
     cliques = tuple(
         tuple(place for place, notch in enumerate(notches) if notch in (None, single))
@@ -166,21 +154,12 @@ def _error(
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Chains of robots, packed for programs.
+    """Chains of robots, packed for programs."""
 
-    Attributes:
-        ready: One of the chains.
-        structure: Layout of all.
-        packed: Returns the chains of some robots by their numbers (one where all have the same),
-            and which are right.
-        programs: What makes the chains from numbers of the robots; None where nothing does.
-        form: The form of those robots.
-    """
-
-    ready: PreparedChain
-    structure: StaticStructure
+    ready: PreparedChain  # one of the chains
+    structure: StaticStructure  # layout of all
     packed: Callable[[Int[np.ndarray, " k"]], tuple[np.ndarray, Bool[np.ndarray, " k"]]]
-    programs: AssembledRobots | None = None
+    programs: AssembledRobots | None = None  # what makes chains from numbers of the form
     form: RobotForm | None = None
 
     def along(
@@ -226,21 +205,13 @@ def single_chains(prepared: Mapping[int, PreparedChain]) -> Chains:
 
 
 class RobotForm(NamedTuple):
-    """Robots whose parts have one form.
+    """Robots whose parts have one form."""
 
-    Attributes:
-        robots: All robots of the batch.
-        members: Numbers of those of this form.
-        form: The form.
-        bases: What they are made of, by numbers; notches that have a name stand alone.
-        columns: Names of the numbers that vary, by their places.
-    """
-
-    robots: VariedRobots
-    members: Int[np.ndarray, " k"]
+    robots: VariedRobots  # all of the batch
+    members: Int[np.ndarray, " k"]  # numbers of those of this form
     form: PartsForm
-    bases: dict[int, Robot]
-    columns: dict[Place, str]
+    bases: dict[int, Robot]  # robots by number; notches that have a name stand alone
+    columns: dict[Place, str]  # names of the numbers that vary, by place
 
     @property
     def example(self) -> Robot:
@@ -265,12 +236,7 @@ class RobotForm(NamedTuple):
         return rows
 
     def chains(self, kind: int, refinement: int) -> Chains | None:
-        """Return the chains for a kind of loads; None where no program makes them.
-
-        Args:
-            kind: Bits of `loads.command.acting`.
-            refinement: More strain modes.
-        """
+        """Return the chains for a kind of loads (`acting`); None where no program makes them."""
         # A direction, or no finite number, is no number of a form.
         if not set(self.columns) <= set(self.form.places):
             return None

@@ -55,34 +55,19 @@ MATERIAL = "material"
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """States of many loads, loads as leading axis, as `SolverRun` has them.
+    """States of many loads, loads as leading axis, as `SolverRun` has them."""
 
-    Attributes:
-        solved: The last solved state at each load.
-        reported: What is reported of each state, by the names of `REPORTED`.
-        first: What is reported of the state before the first load, by the names of `BEFORE`;
-            the memory of the material, as `MATERIAL`, and `FLATTENING`.
-        held: Smallest eigenvalue of every stiffness, and the sign of its determinant.
-        residual: Largest scaled imbalance of the last attempt.
-        iterations: Newton iterations.
-        converged: Whether the load was reached.
-        tried: Whether it was tried at all.
-        reached: Part of the way from the load before that was reached.
-        overdrawn: Sum of 2**k over the tendons k, from 0, whose strokes no shape allows.
-        snapped: Notches that snapped shut (1) or open (-1).
-    """
-
-    solved: SolverState
-    reported: Mapping[str, np.ndarray]
-    first: Mapping[str, np.ndarray]
-    held: tuple[np.ndarray, np.ndarray]
+    solved: SolverState  # the last solved states
+    reported: Mapping[str, np.ndarray]  # by the names of `REPORTED`
+    first: Mapping[str, np.ndarray]  # state before the first load: `BEFORE` and others
+    held: tuple[np.ndarray, np.ndarray]  # smallest eigenvalue, sign of determinant
     residual: Float[np.ndarray, " s"]
     iterations: Int[np.ndarray, " s"]
     converged: Bool[np.ndarray, " s"]
     tried: Bool[np.ndarray, " s"]
-    reached: Float[np.ndarray, " s"]
-    overdrawn: Int[np.ndarray, " s"]
-    snapped: Float[np.ndarray, "s n"]
+    reached: Float[np.ndarray, " s"]  # part of the way from the load before
+    overdrawn: Int[np.ndarray, " s"]  # bit k: no shape allows the stroke of tendon k
+    snapped: Float[np.ndarray, "s n"]  # notches that snapped shut (1) or open (-1)
 
     def quantity(self, name: str) -> np.ndarray:
         """Return a quantity of each state by its name in the registry."""
@@ -122,16 +107,7 @@ MOMENT_ERROR = 0.01
 
 
 def path_warnings(path: EquilibriumPath) -> list[str]:
-    """Return one sentence for each reason to doubt a path.
-
-    Args:
-        path: Solved path.
-
-    Returns:
-        Sentences on dimensions outside the range that was checked, on strains beyond what the
-        material is allowed or its law is known for, on unstable equilibria, and on too few strain
-        modes; none if there is nothing to warn of.
-    """
+    """Return one sentence for each reason to doubt a path."""
     outside = unchecked_dimensions(path.robot)
     return [*outside, *_snaps(path), *_strains(path), *_unstable(path), *_coarse(path)]
 
@@ -279,11 +255,9 @@ def _past_closing(path: EquilibriumPath, step: int) -> bool:
 
 
 def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None:
-    """Return a straight tendon and a notch, from 0, where its free span vanishes.
-
-    Where the edges of its channel meet before those of the notch, the span between them has no
-    direction. A compliant contact lets a closed notch reach that state.
-    """
+    """Return a straight tendon and a notch, from 0, where its free span vanishes."""
+    # Where the edges of its channel meet before those of the notch, the span between them has no
+    # direction. A compliant contact lets a closed notch reach that state.
     chain = path.chain
     position, rotation = path.body_position[step], path.body_rotation[step]
     for group in chain.groups:
@@ -301,10 +275,8 @@ def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None
 
 
 def _slack_by_loss(path: EquilibriumPath, step: int) -> tuple[int, float] | None:
-    """Return a tendon driven by stroke, from 0, that its constant losses leave slack; their sum, N.
-
-    While the slack passes from a closed notch to the next, the tension rises at the same stroke.
-    """
+    """Return a tendon driven by stroke, from 0, that constant losses leave slack; their sum, N."""
+    # While the slack passes from a closed notch to the next, the tension rises at the same stroke.
     for tendon in np.flatnonzero(np.isfinite(path.load.stroke[step])):
         turning = path.contact_turning[step, tendon]
         losses = path.chain.friction.constant_loss(turning)

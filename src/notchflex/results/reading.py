@@ -136,18 +136,7 @@ class Table:
 
 
 def csv_table(source: str | os.PathLike[str]) -> Table:
-    """Read a table.
-
-    Args:
-        source: Path of the file.
-
-    Returns:
-        Its header and rows, at least one.
-
-    Raises:
-        InputError: No such file, not a CSV, empty, two columns of one name, or a row that has
-            more or fewer entries than the header.
-    """
+    """Read a table of at least one row, as it stands in a file."""
     path, text = Path(source), read_text(source, "CSV file")
     separator = _separator(text)
     reader = csv.reader(text.splitlines(), strict=True, delimiter=separator)
@@ -198,11 +187,8 @@ def _separator(text: str) -> str:
 
 
 def _decimal(path: Path, lines: Sequence[int], rows: Sequence[Sequence[str]]) -> str:
-    """Return the decimal separator of a table with semicolons, whose numbers may have either.
-
-    Raises:
-        InputError: Some numbers have a comma and others a point: one of them separates thousands.
-    """
+    """Return the decimal separator of a table with semicolons, whose numbers may have either."""
+    # A table with commas and points has separators of thousands: it is refused.
     first: dict[str, tuple[int, str]] = {}
     for line, row in zip(lines, rows, strict=True):
         for entry in row:
@@ -318,12 +304,7 @@ def read_data_table(
 
 
 def _understood(header: str, name: str) -> tuple[str, float]:
-    """Return the usual name of a column, and what its numbers are multiplied by.
-
-    Args:
-        header: As it stands in the file.
-        name: What the reader says it is; "" for what its own words say.
-    """
+    """Return the usual name of a column, and the factor of its numbers; `name` may say it."""
     if _PLAIN.fullmatch(name):
         return name, 1.0
     words, unit = _name_and_unit(header)

@@ -44,22 +44,7 @@ _MAX_NAMED = 3
 
 
 def differences(robot: Robot, other: Robot) -> list[str]:
-    """List the values in which two robots differ, by their names in a robot file.
-
-    Args:
-        robot: The robot whose values are given first.
-        other: The robot that it is compared with.
-
-    Returns:
-        One text for each value, such as `notch.depth = 1.38 instead of 1.4`; a value that differs
-        in all notches in the same way is listed once.
-
-    Example:
-        >>> from notchflex.robot import load_robot
-        >>> wrist = load_robot("pacheco2021-a")
-        >>> differences(wrist.with_value("notch.depth", 1.38), wrist)
-        ['notch.depth = 1.38 instead of 1.4']
-    """
+    """List the values in which two robots differ, by their names in a robot file."""
     first, second = _values(robot), _values(other)
     changes: dict[tuple[str, Any, Any], list[str]] = {}
     for name in dict.fromkeys([*first, *second]):
@@ -251,10 +236,8 @@ class State(ByValue, Displayed):
 
 
 def leaves_of(solved: SolverState) -> dict[str, np.ndarray]:
-    """Return the arrays of a solved state by the names that they have in files.
-
-    Files keep the names of their first version, whatever the fields of the solver are called.
-    """
+    """Return the arrays of a solved state by the names that they have in files."""
+    # Files keep the names of their first version, whatever the fields of the solver are called.
     leaves, _ = tree_util.tree_flatten_with_path(solved)
     return {
         tree_util.keystr(key).replace("contact_force", "lip_force"): np.asarray(leaf)
@@ -287,12 +270,7 @@ def _damaged(source: str | FilePath, what: str) -> InputError:
 
 
 def check_robot(state: object, robot: Robot) -> None:
-    """Check that a state belongs to a robot.
-
-    Raises:
-        InputError: It belongs to another one, and the message names the values that differ; or it
-            is not a state.
-    """
+    """Raise if a state belongs to another robot; the message names the values that differ."""
     if not isinstance(state, State):
         raise InputError.WRONG_TYPE(
             "from_state must be a notchflex.State: the `state` of a result, or State.load(file); "

@@ -102,16 +102,10 @@ def csv_text(header: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
 
 @dataclass(frozen=True)
 class CsvEntry:
-    """One entry of a quantity along a path, such as the angle of one notch.
+    """One entry of a quantity along a path, such as the angle of one notch."""
 
-    Attributes:
-        header: The CSV column; "" where the quantity has none.
-        name: Which entry it is, such as "notch 3"; "" for a quantity with one number.
-        values: A value per step, at the edge units.
-    """
-
-    header: str
-    name: str
+    header: str  # the CSV column; "" where there is none
+    name: str  # such as "notch 3"; "" for one number
     values: Any
 
 
@@ -172,17 +166,7 @@ LOAD_UNITS = {f"load.{key}": unit for key, unit in _LOAD_KEYS.values()}
 
 
 def path_document(path: EquilibriumPath) -> dict[str, Any]:
-    """Return a path as a document of plain lists, numbers, strings and None.
-
-    Args:
-        path: Solved path, S steps.
-
-    Returns:
-        `name`, `version`, `robot` (its whole description), `units` (JSON key to unit),
-        `converged`, `reason`, `reason_code` (name of a `Failure`) and `steps`, a list of S
-        objects. None stands where there is no number. Angles in deg, lengths in mm, forces in N.
-        Where external loads act in any step, `load` holds those of every step.
-    """
+    """Return a path as a JSON document of plain values, angles in deg, None for no number."""
     external = _external(path)
     failed = next((step for step, good in enumerate(path.converged) if not good), None)
     steps = [_step(path, index, external) for index in range(len(path))]
@@ -212,18 +196,7 @@ def document_head(robot: Robot) -> dict[str, Any]:
 
 
 def json_text(document: Any) -> str:
-    r"""Return a document as JSON text that ends with a newline.
-
-    Args:
-        document: Nested dicts and lists; numpy arrays and numbers are allowed.
-
-    Returns:
-        Strict JSON: NaN becomes null.
-
-    Example:
-        >>> json_text({"angle_deg": [1.5, float("nan")]})
-        '{"angle_deg": [1.5, null]}\n'
-    """
+    """Return a document as strict JSON text that ends with a newline; NaN becomes null."""
     return json.dumps(plain(document), ensure_ascii=False, allow_nan=False) + "\n"
 
 

@@ -227,10 +227,8 @@ def write_text(target: str | Path, text: str) -> None:
 
 
 def _folder_takes_files(folder: Path) -> bool:
-    """Say whether a file can be made in `folder`, by making one without a name and dropping it.
-
-    Asking for permissions is not enough: a read-only file system or a full quota grants them.
-    """
+    """Say whether a file can be made in a folder, by making one without a name and dropping it."""
+    # Asking for permissions is not enough: a read-only file system or a full quota grants them.
     try:
         with tempfile.TemporaryFile(dir=folder):
             return True
