@@ -30,9 +30,6 @@ from notchflex.solver.newton import Settings
 
 LEVELS = (0.05, 0.50, 0.95)
 """Quantiles of the draws at the low end, the middle and the high end of a band."""
-_FEWEST = 20
-"""Draws of which 5 % is one at each end."""
-
 DRAWS = 256
 
 USUAL = ("total_angle", "tip_position", "notch_angle", "peak_strain", "tension", "stroke")
@@ -118,9 +115,10 @@ class Bands(Displayed, Mapping[str, Band]):
         if not len(values) or not np.ptp(values):
             return {}
         levels: dict[str, np.ndarray] = {}
-        for parameter, numbers in self.drawn.items():
-            if np.ptp(numbers[known]) > 0.0:
-                level = (numbers[known] - numbers[known].mean()) / numbers[known].std()
+        for parameter, draws in self.drawn.items():
+            numbers = draws[known]
+            if np.ptp(numbers) > 0.0:
+                level = (numbers - numbers.mean()) / numbers.std()
                 # Notches that deviate together are one number.
                 if not any(np.allclose(level, other) for other in levels.values()):
                     levels[parameter] = level
@@ -166,10 +164,11 @@ class Bands(Displayed, Mapping[str, Band]):
                 f"{self.redrawn} of {self.draws} draws made no valid robot and were drawn again: "
                 "the tolerances reach beyond what the tube allows."
             )
-        if self.draws < _FEWEST:
+        fewest = round(1.0 / LEVELS[0])  # one of them lies at each end
+        if self.draws < fewest:
             sentences.append(
                 f"{self.draws} draws have no 5 in a hundred at an end: the bands are narrower than "
-                f"5 to 95 %; give {_FEWEST} draws or more."
+                f"5 to 95 %; give {fewest} draws or more."
             )
         return sentences
 
@@ -299,7 +298,6 @@ DEPTH = 0.010
 """The change of depth whose effect is reported, mm."""
 
 _DRAWS, _STEPS, _BEYOND = 128, 32, 1.6
-_NEVER = 1e12
 
 
 class ClosingBands(NamedTuple):
@@ -336,10 +334,9 @@ def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
     total = band(bands.samples["total_angle"][:, step])
     shares = bands.variance_shares("total_angle", step)
     by_depth = _by_depth(robot, _pull(robot, tendon, np.array([load])))
-    # Of tensions of which some are infinite.
-    finite = band(np.minimum(tension, _NEVER))
-    ends = (finite.low, finite.median, finite.high)
-    closing = Band(*(np.where(end < _NEVER, end, np.inf) for end in ends)), band(angle)
+    # Of tensions of which some are infinite: huge numbers in their place have quantiles.
+    ends = vars(band(np.nan_to_num(tension, nan=np.nan))).values()
+    closing = Band(*(np.where(end <= loads[-1], end, np.inf) for end in ends)), band(angle)
     return ClosingBands(bands, notches + 1, *closing, load, tendon, total, by_depth, shares)
 
 
@@ -363,8 +360,8 @@ def closing_document(closing_bands: ClosingBands) -> dict[str, Any]:
 
 
 def _ends(percentiles: Band, scale: float = 1.0) -> dict[str, Any]:
-    ends = {"low": percentiles.low, "median": percentiles.median, "high": percentiles.high}
-    return {name: np.where(np.isfinite(end), end * scale, np.nan) for name, end in ends.items()}
+    ends = vars(percentiles).items()
+    return {name: np.where(np.isfinite(end), end * scale, np.nan) for name, end in ends}
 
 
 def _pull(robot: Robot, tendon: int, loads: Float[np.ndarray, " s"]) -> LoadPath:
@@ -383,17 +380,16 @@ def _closing(
     """Compute tension and angle at which each notch of each draw closes."""
     # The gap falls almost evenly until it is closed and stands still then, so the last two open
     # steps are continued.
-    step = np.argmax(closed, axis=1)[:, None]
-    near, far = (
-        np.take_along_axis(gaps, np.maximum(step - back, 0), axis=1)[:, 0] for back in (1, 2)
+    first = np.argmax(closed, axis=1)
+    steps = [np.maximum(first - back, 0) for back in range(3)]
+    after, before, earlier = (loads[step] for step in steps)
+    angle, near, far = (
+        np.take_along_axis(values, step[:, None], axis=1)[:, 0]
+        for values, step in zip((angles, gaps, gaps), steps, strict=True)
     )
-    step = step[:, 0]
-    before, after = loads[np.maximum(step - 1, 0)], loads[step]
-    earlier = loads[np.maximum(step - 2, 0)]
     with np.errstate(divide="ignore", invalid="ignore"):
         extrapolated = before + near * (before - earlier) / (far - near)
-    tension = np.where(step > 1, np.clip(extrapolated, before, after), 0.5 * (before + after))
-    angle = np.take_along_axis(angles, step[:, None], axis=1)[:, 0]
+    tension = np.where(first > 1, np.clip(extrapolated, before, after), 0.5 * (before + after))
     closes = closed.any(axis=1)
     failed = np.isnan(gaps).any(axis=1)
     never = np.where(failed, np.nan, np.inf)

@@ -26,6 +26,7 @@ from notchflex._summary import Displayed, Summary, short
 from notchflex._values import ByValue, frozen
 from notchflex.analysis.outputs import (
     DEFAULT_OUTPUTS,
+    LOADS,
     OUTPUTS,
     WORKS,
     UnknownOutputError,
@@ -309,29 +310,27 @@ def _rows(
     options: BatchOptions,
 ) -> BatchRows:
     """Return the rows of a batch."""
-    numbers = {name: _numbers(name, each) for name, each in values.items()}
-    sizes = {"robots": len(robots)} | {name: len(each) for name, each in numbers.items()}
-    sizes["loads"] = len(loads)
+    columns = {"robots": np.arange(len(robots))}
+    columns |= {name: _numbers(name, array) for name, array in values.items()}
+    columns["loads"] = np.arange(len(loads))
+    sizes = {name: len(column) for name, column in columns.items()}
     count, places = _places(sizes, product)
 
     def distinct(names: list[str]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """Return which combination of some names each row has, and the places of each."""
+        """Return which combination of some names each row has, and the numbers of each."""
         axes = {name: sizes[name] for name in names}
         number, combinations = _places(axes, product)
+        numbers = {name: columns[name][index] for name, index in combinations.items()}
         if not product:
-            return np.arange(count) % number, combinations
+            return np.arange(count) % number, numbers
         index = [places[name] for name in names]
-        return np.ravel_multi_index(index, tuple(axes.values())), combinations
+        return np.ravel_multi_index(index, tuple(axes.values())), numbers
 
-    of_loads = [name for name in numbers if name in (*TENDONS, *TIP)]
-    robot_of, of_robot = distinct(["robots", *(name for name in numbers if name not in of_loads)])
+    of_loads = [name for name in values if name in LOADS]
+    robot_of, of_robot = distinct(["robots", *(name for name in values if name not in LOADS)])
     path_of, of_path = distinct([*of_loads, "loads"])
-    which = of_robot.pop("robots")
-    varied = VariedRobots(
-        robots, which, {name: numbers[name][index] for name, index in of_robot.items()}
-    )
-    which = of_path.pop("loads")
-    paths = loads.varied(which, {name: numbers[name][index] for name, index in of_path.items()})
+    varied = VariedRobots(robots, of_robot.pop("robots"), of_robot)
+    paths = loads.varied(of_path.pop("loads"), of_path)
     names = check_outputs(options.get("outputs", DEFAULT_OUTPUTS), (*OUTPUTS, *WORKS))
     outputs = tuple(dict.fromkeys([*names, "converged"]))
     check_refinement(refinement := options.get("refinement", 0))
@@ -345,11 +344,11 @@ def _numbers(name: str, values: ArrayLike) -> np.ndarray:
         numbers = np.asarray(values, float)
     except (TypeError, ValueError):
         numbers = np.zeros(())
-    if numbers.ndim == 0 or (numbers.ndim > 1 and name not in (*TENDONS, *TIP)):
+    if numbers.ndim == 0 or (numbers.ndim > 1 and name not in LOADS):
         raise InputError.WRONG_SHAPE(
             f"`{name}` needs numbers, one for each row; got {short_repr(values)}"
         )
-    if not np.isfinite(numbers).all() and name in (*TENDONS, *TIP):
+    if not np.isfinite(numbers).all() and name in LOADS:
         raise InputError.NOT_FINITE(f"`{name}` needs finite numbers; got {short_repr(values)}")
     return numbers
 
@@ -386,7 +385,7 @@ def _solved(rows: BatchRows, options: BatchOptions, single: bool) -> Batch:
         raise InputError.NO_DATA("a batch needs one row or more")
     if not rows.valid.any():
         raise next(iter(rows.robots.errors.values()))
-    arrays = rows.solved(threads, rows.tables(compiled=True), options.get("progress"))
+    arrays = rows.solved(threads, rows.tables(), options.get("progress"))
     if single:
         arrays = {name: array[:, 0] for name, array in arrays.items()}
     return Batch(arrays, rows)
@@ -478,10 +477,10 @@ class BatchRows:
         load = replace(load, tension=load.tension[:, tendons], stroke=load.stroke[:, tendons])
         return follow_path(robot, load, None, self.settings, self.refinement)
 
-    def tables(self, compiled: bool) -> Iterator[BatchTable]:
-        """Yield the valid rows by their programs, which may make the chains if `compiled`."""
+    def tables(self) -> Iterator[BatchTable]:
+        """Yield the valid rows by their programs, which make the chains of many robots."""
         rows = np.flatnonzero(self.valid)
-        if compiled and len(self.robots) > FEW:
+        if len(self.robots) > FEW:
             few = [rows[:0]]
             for form in self.robots.forms(np.unique(self.robot_of[rows])):
                 of_form = rows[np.isin(self.robot_of[rows], form.members)]
@@ -493,7 +492,7 @@ class BatchRows:
                     else:
                         yield BatchTable(self, part, chains, kind)
             rows = np.concatenate(few)
-        yield from self._one_by_one(rows)
+        yield from self.one_by_one(rows)
 
     def _by_kind(
         self, robot: Robot, rows: Int[np.ndarray, " k"]
@@ -503,7 +502,7 @@ class BatchRows:
         for kind in np.unique(kinds).tolist():
             yield kind, rows[kinds == kind]
 
-    def _one_by_one(self, rows: Int[np.ndarray, " k"]) -> Iterator[BatchTable]:
+    def one_by_one(self, rows: Int[np.ndarray, " k"]) -> Iterator[BatchTable]:
         """Yield rows whose robots are assembled in Python, by the structures of their chains."""
         groups: dict[Any, tuple[list[np.ndarray], dict[int, PreparedChain]]] = {}
         rows = rows[np.argsort(self.robot_of[rows], kind="stable")]
@@ -564,7 +563,7 @@ class BatchTable:
         if not alike.all():
             wrong = rows[~alike]
             alone = replace(batch, robot_of=batch.robot_of[wrong], path_of=batch.path_of[wrong])
-            for name, values in alone.solved(1, alone.tables(compiled=False)).items():
+            for name, values in alone.solved(1, alone.one_by_one(np.arange(len(wrong)))).items():
                 outputs[name][~alike] = values
         return outputs
 

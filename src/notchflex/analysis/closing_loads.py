@@ -279,14 +279,13 @@ def closing(robot: Robot) -> Closing:
     height = np.asarray(rods.length.sum(-1))
     section = rods.section
     arm = moment_arms(chain)
-    tendon = np.argmax(arm, axis=1)
-    longest = arm[np.arange(len(arm)), tendon]
-    if np.isfinite(closing_angle).all():
+    tendon, longest = arm.argmax(axis=1), arm.max(axis=1)
+    has_spine = np.isfinite(closing_angle)
+    if has_spine.all():
         tension, status = _tensions(prepare(robot), tendon, longest, closing_angle)
         contact_angle = closing_angle
     else:
         tension, contact_angle, status = _edge_closing(prepare(robot), tendon, longest)
-    has_spine = np.isfinite(closing_angle)
     elastic = np.where(has_spine, closing_angle / height, np.nan)
     first = jax.tree.map(lambda leaf: leaf[:, 0], section)
     outer, peak = _strains(chain.law, first, elastic, chain.law.rest(first))
@@ -426,7 +425,7 @@ def closing_tensions_of(
     """Find the tensions (N) that close the notches of many robots, as `closing` does for one."""
     nominal = closing(robot)
     chain = assemble(robot, flat=False)
-    closing_angle, arm = closing_angles(chain.rods), moment_arms(chain)
+    closing_angle = np.asarray(closing_angles(chain.rods))
     unit = np.eye(chain.tendons)[nominal.tendon - 1]
     robots = VariedRobots.of(robot, values)
     tension = np.full((len(robots), chain.flexures), np.nan)
@@ -438,10 +437,10 @@ def closing_tensions_of(
         for number in valid.tolist():
             tension[number] = closing(robots[number]).tension
         return tension
-    longest = arm[np.arange(len(arm)), nominal.tendon - 1]
-    notches = np.flatnonzero((longest > 0.0) & (np.asarray(closing_angle) > 0.0))
+    longest = moment_arms(chain).max(axis=1)
+    notches = np.flatnonzero((longest > 0.0) & (closing_angle > 0.0))
     with np.errstate(divide="ignore"):
-        linear = np.asarray(chain.stiffness)[:, 0] * np.asarray(closing_angle) / longest
+        linear = np.asarray(chain.stiffness)[:, 0] * closing_angle / longest
     guess = np.where(np.isfinite(nominal.tension), _FIRST * nominal.tension, linear)[notches]
     # The root does not depend on the stiffness: that of one robot serves for all.
     stiffness = np.asarray(chain.contact_stiffness)[notches]

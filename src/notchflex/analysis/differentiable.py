@@ -20,9 +20,8 @@ from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.batch import BatchRows, BatchTable, FollowedRows, LoadRows
 from notchflex.analysis.forward_model import ForwardModel
-from notchflex.analysis.outputs import STEPS, OutputTable, check_outputs
+from notchflex.analysis.outputs import LOADS, STEPS, OutputTable, check_outputs, slices_of
 from notchflex.analysis.slopes import (
-    LOADS,
     SLOPING,
     changes,
     derivatives,
@@ -266,10 +265,19 @@ class Differentiable(Displayed):
     @cached_property
     def _traced(self) -> Callable[[dict[str, Array]], OutputTable]:
         """The function of named values for JAX, as one program: JAX compiles each step else."""
-        function = outputs_function(self._solver)
-        return jax.jit(
-            lambda values: function(jnp.concatenate([values[name].ravel() for name in self.start]))
-        )
+        # Invalid values give NaN for numbers and false for flags, as a program cannot raise.
+        solver = self._solver
+
+        def function(named: dict[str, Array]) -> OutputTable:
+            point = jnp.concatenate([named[name].ravel() for name in self.start])
+            flat = _VALUES.bind(point, solver=solver)
+            table = OutputTable()
+            for name, (part, shape, kind) in solver.forms.items():
+                values = flat[part].reshape(shape)
+                table[name] = values if kind == "f" else as_kind(jnp.nan_to_num(values), kind)
+            return table
+
+        return jax.jit(function)
 
 
 @lru_cache(maxsize=16)
@@ -307,7 +315,7 @@ class VectorSolver:
     def forms(self) -> dict[str, tuple[slice, tuple[int, ...], str]]:
         """Where every output is in a row of them, its shape, and its kind of numbers."""
         values = self.table(self.first)
-        parts = _slices(values)
+        parts = slices_of(values)
         return {
             name: (parts[name], array.shape, array.dtype.kind) for name, array in values.items()
         }
@@ -421,7 +429,7 @@ class VectorSolver:
     @cached_property
     def _columns(self) -> dict[str, slice]:
         """Where the numbers of each name are in a row of values."""
-        return _slices(self.start)
+        return slices_of(self.start)
 
     @cached_property
     def _numbers(self) -> list[int]:
@@ -549,27 +557,6 @@ class VectorSolver:
     @cached_property
     def _last(self) -> dict[bytes, EquilibriumPath]:
         return {}
-
-
-def _slices(arrays: Mapping[str, np.ndarray]) -> dict[str, slice]:
-    """Return where arrays are in a row of all their numbers."""
-    ends = np.cumsum([0, *(array.size for array in arrays.values())]).tolist()
-    return dict(zip(arrays, map(slice, ends, ends[1:]), strict=True))
-
-
-def outputs_function(solver: VectorSolver) -> Callable[[Array], OutputTable]:
-    """Return a function of a vector of values that JAX traces, differentiable once, both ways."""
-    # Invalid values give NaN for numbers and false for flags, as a program of JAX cannot raise.
-
-    def function(point: Array) -> OutputTable:
-        flat = _VALUES.bind(point, solver=solver)
-        table = OutputTable()
-        for name, (part, shape, kind) in solver.forms.items():
-            values = flat[part].reshape(shape)
-            table[name] = values if kind == "f" else as_kind(jnp.nan_to_num(values), kind)
-        return table
-
-    return function
 
 
 def _primitive(name: str, method: Callable[..., np.ndarray], size: Callable[..., int]) -> Primitive:

@@ -135,23 +135,16 @@ def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[ToleranceS
     for tolerance in tolerances:
         numbers = numbers_at(robot, tolerance.value)
         others = {name: value for name, value in numbers.items() if name not in alone}
-        if tolerance.value not in alone and len(others) < len(numbers):
-            names = [[name] for name in others] if tolerance.per_notch else [list(others)]
+        nominal = numbers if tolerance.value in alone else others
+        if tolerance.per_notch:
             sources += [
-                ToleranceSource(tolerance, {name: others[name] for name in each})
-                for each in names
-                if each
+                ToleranceSource(tolerance, {name: value}) for name, value in nominal.items()
             ]
-        elif tolerance.per_notch:
-            sources += [
-                ToleranceSource(tolerance, {name: value}) for name, value in numbers.items()
-            ]
-        elif len(set(numbers.values())) == 1:  # by one name: equal notches stay a group
-            sources.append(
-                ToleranceSource(tolerance, {tolerance.value: number_at(robot, tolerance.value)})
-            )
-        else:
-            sources.append(ToleranceSource(tolerance, numbers))
+        elif nominal == numbers and len(set(numbers.values())) == 1:  # equal notches stay a group
+            value = number_at(robot, tolerance.value)
+            sources.append(ToleranceSource(tolerance, {tolerance.value: value}))
+        elif nominal:
+            sources.append(ToleranceSource(tolerance, nominal))
     return sources
 
 
@@ -187,13 +180,9 @@ _LEFT_OUT = ("plastic_modulus",)
 
 def tolerances_of(robot: Robot) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]:
     """Return the tolerances of a robot, and the names of those that its file lacks: assumed."""
-    of_file = {tolerance.value: tolerance for tolerance in robot.tolerance}
-    assumed = {
-        tolerance.value: tolerance
-        for tolerance in _assumed(robot)
-        if tolerance.value not in of_file
-    }
-    return (*of_file.values(), *assumed.values()), tuple(assumed)
+    specified = {tolerance.value for tolerance in robot.tolerance}
+    assumed = [tolerance for tolerance in _assumed(robot) if tolerance.value not in specified]
+    return (*robot.tolerance, *assumed), tuple(tolerance.value for tolerance in assumed)
 
 
 def _assumed(robot: Robot) -> Iterator[Tolerance]:

@@ -25,8 +25,6 @@ from notchflex.robot.cuts import CutLayout
 Array = NDArray[np.float64]
 Wall = tuple[float, float] | None
 
-_UP = np.array([0.0, 0.0, 1.0])
-
 
 @dataclass(frozen=True)
 class Geometry:
@@ -212,7 +210,7 @@ class RobotShape:
     @property
     def tip(self) -> Array:
         """The tip, on the tube axis."""
-        return self.on_body(-1, self.robot.geometry.body_length[-1] * _UP)
+        return self.on_body(-1, [0.0, 0.0, self.robot.geometry.body_length[-1]])
 
     def on_body(self, body: int, points: ArrayLike) -> Array:
         """Return points that are given in the frame of a body, (..., 3)."""
@@ -250,15 +248,17 @@ class RobotShape:
         """Yield the pieces of a tendon, and whether each lies on a body or crosses a notch."""
         tendon, walls = self.robot.tendon[number], self.robot.geometry.walls
         angle, last = np.radians(tendon.direction_deg), tendon.end_body or len(self.flexures)
-        across = np.array([np.cos(angle), np.sin(angle), 0.0])
+        across = np.array([np.cos(angle), np.sin(angle)])
         across *= tendon.radius if radius is None else radius
         for body, wall in enumerate(walls(tendon.direction_deg)[: last + 1]):
             if body and tendon.path == "wall-arc":  # the fibre that meets the body here
                 flexure = self.flexures[body - 1]
-                place = (self.on_body(body, across) - flexure.position[-1]) @ flexure.rotation[-1]
+                place = (
+                    self.on_body(body, [*across, 0.0]) - flexure.position[-1]
+                ) @ flexure.rotation[-1]
                 yield flexure.fibre(*place[:2]), False
             if wall is not None:
-                yield self.on_body(body, [across + end * _UP for end in sorted(wall)]), True
+                yield self.on_body(body, [[*across, end] for end in sorted(wall)]), True
 
     def from_base(self) -> RobotShape:
         """Return the same shape in the frame of its base."""

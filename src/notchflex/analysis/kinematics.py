@@ -186,7 +186,7 @@ def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
     """Locate points on the axis of the straight robot by their distances from the base, mm."""
     distance = np.atleast_1d(np.asarray(axis_at, float))
     start, length = robot.geometry.body_start, robot.geometry.body_length
-    tip = float(start[-1] + length[-1])
+    tip = robot.geometry.length
     wrong = distance[~((distance >= -_BEYOND * tip) & (distance <= (1.0 + _BEYOND) * tip))]
     if len(wrong):
         raise InputError.OUT_OF_RANGE(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NoReturn
 
@@ -14,6 +14,7 @@ from notchflex._quantity import REGISTERED
 from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.command import Command
 from notchflex.loads.load import short_repr
+from notchflex.loads.load_path import TENDONS, TIP
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import solve_load_step
 from notchflex.solver.newton import Settings
@@ -31,6 +32,8 @@ OF_STATE = [
 DEFAULT_OUTPUTS = ("total_angle", "notch_angle", "tip_position", "tip_rotation", "converged")
 OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *OF_STATE]),)
 """What can be asked of a batch or of a function that can be differentiated."""
+LOADS = (*TENDONS, *TIP)
+"""Names of the loads that batches vary and that slopes are taken by."""
 WORKS = {name: quantity.work_of for name, quantity in REGISTERED.items() if quantity.work_of}
 """What can be asked of a batch besides: works, with what they are integrated of."""
 
@@ -103,7 +106,15 @@ def reported_shapes(
     return {name: reported[name].shape for name in outputs}
 
 
-def own_entries(ready: PreparedChain, outputs: Sequence[str]) -> dict[str, Int[np.ndarray, ...]]:
+def slices_of(arrays: Mapping[str, np.ndarray]) -> dict[str, slice]:
+    """Return where arrays are in a row of all their numbers."""
+    ends = np.cumsum([0, *(array.size for array in arrays.values())]).tolist()
+    return dict(zip(arrays, map(slice, ends, ends[1:]), strict=True))
+
+
+def unpadded_entries(
+    ready: PreparedChain, outputs: Sequence[str]
+) -> dict[str, Int[np.ndarray, ...]]:
     """Return where programs of the padded chain report the numbers of a robot's own quantities."""
     # -1 stands for numbers beyond the end of a tendon.
     long, begin, indices = ready.long, 1, {}
@@ -131,14 +142,14 @@ def follow_row(
         solved = choose(alive, result.solved, last)
         reached = alive & result.converged
         quantity = SolvedState(robot, solved).quantity
+        converged = reached & believable(quantity)
         values = {name: quantity(name) for name in outputs if name in OF_STATE} | {
             "residual": result.residual,
             "iterations": result.iterations,
-            "converged": reached & believable(quantity),
+            "converged": converged,
         }
         if STEPS[0] in outputs:
-            known = reached & believable(quantity)
-            how = [result.fraction_before, result.substeps, known, True]
+            how = [result.fraction_before, result.substeps, converged, True]
             packed = [PytreeLayout.of(pytree).pack(pytree) for pytree in (solved, result.between)]
             values |= dict(zip(STEPS, [*packed, jnp.array(how, float)], strict=True))
         return (solved, reached), {name: values[name] for name in outputs}

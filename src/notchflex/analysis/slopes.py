@@ -18,11 +18,11 @@ from jaxtyping import Float
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.forward_model import nearby, prepared_like, slope
-from notchflex.analysis.outputs import OUTPUTS, check_outputs
+from notchflex.analysis.outputs import LOADS, OUTPUTS, check_outputs
 from notchflex.analysis.tangent import Change, Gradient, PathTangents, path_gradient
 from notchflex.errors import InputError
 from notchflex.loads.command import BodyLoads, Command, load_slopes, make_commands
-from notchflex.loads.load_path import TENDONS, TIP, LoadPath
+from notchflex.loads.load_path import LoadPath
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.numbers import PartsForm, Place, differing, parts_of, places_by_name
@@ -30,8 +30,6 @@ from notchflex.robot.value_names import number_at, parse_path
 from notchflex.solver.programs.assembled import chain_gradient, chain_slopes
 from notchflex.solver.programs.run import SolverRun
 
-LOADS = (*TENDONS, *TIP)
-"""Names of the loads that slopes are taken by."""
 SLOPING = tuple(name for name in OUTPUTS if name in REGISTERED and REGISTERED[name].kind is float)
 """Quantities that have slopes."""
 
@@ -134,11 +132,6 @@ def _variable(robot: Robot, names: tuple[str, ...]) -> list[float]:
     return values
 
 
-def _sizes(load: LoadPath, names: Sequence[str]) -> list[int]:
-    """Return how many numbers every name stands for."""
-    return [load.numbers(name).size if name in LOADS else 1 for name in names]
-
-
 def load_units(path: EquilibriumPath, name: str) -> Float[np.ndarray, "n s command"]:
     """Return the change of all packed loads per unit of each of the n numbers of a load."""
     steps, size = path.load.numbers(name).shape
@@ -173,7 +166,7 @@ def changes(
     Raises:
         InputError: A number cannot be varied.
     """
-    sizes = _sizes(path.load, names)
+    sizes = [path.load.numbers(name).size if name in LOADS else 1 for name in names]
     along = np.eye(sum(sizes)) if along is None else along
     first = np.cumsum([0, *sizes])[:-1].tolist()
     columns = [column for column, name in zip(first, names, strict=True) if name not in LOADS]

@@ -21,7 +21,13 @@ from notchflex._jax import choose, jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.batch import number_of_threads, range_of
-from notchflex.analysis.outputs import OF_STATE, check_outputs, own_entries, report_quantities
+from notchflex.analysis.outputs import (
+    OF_STATE,
+    check_outputs,
+    report_quantities,
+    slices_of,
+    unpadded_entries,
+)
 from notchflex.analysis.solve import prepare_for, simulate
 from notchflex.errors import Failure, InputError
 from notchflex.loads import Load, LoadPath
@@ -301,10 +307,8 @@ class Stepper(Displayed):
     @cached_property
     def places(self) -> dict[str, tuple[slice, tuple[int, ...]]]:
         """Where in `Step.flat_values` the numbers of each output are, and their shape."""
-        ends = np.cumsum([0, *(index.size for index in self._indices.values())]).tolist()
-        parts = map(slice, ends[:-1], ends[1:])
-        shaped = zip(parts, self._indices.items(), strict=True)
-        return {name: (part, index.shape) for part, (name, index) in shaped}
+        parts = slices_of(self._indices)
+        return {name: (parts[name], index.shape) for name, index in self._indices.items()}
 
     def _summary(self) -> Summary:
         rows = [("outputs", ", ".join(self.outputs)), ("drives", ", ".join(self.drives))]
@@ -413,7 +417,7 @@ class Stepper(Displayed):
 
     @cached_property
     def _indices(self) -> dict[str, Int[np.ndarray, ...]]:
-        return own_entries(self.prepared, self.outputs)
+        return unpadded_entries(self.prepared, self.outputs)
 
     @cached_property
     def entries(self) -> Int[np.ndarray, " m"]:

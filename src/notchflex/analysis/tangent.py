@@ -26,7 +26,7 @@ from jaxtyping import Array, Float, Int
 
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
-from notchflex.analysis.outputs import own_entries, report_quantities, reported_shapes
+from notchflex.analysis.outputs import report_quantities, reported_shapes, unpadded_entries
 from notchflex.mechanics.chain import Chain
 from notchflex.results.path import EquilibriumPath
 from notchflex.solver.programs.compiled import Native, Packed
@@ -105,7 +105,7 @@ class PathTangents:
                 change = np.append(0.0, direction.chain)[ready.own_numbers]
             load_change = np.zeros_like(self.loads)
             if direction.loads is not None:
-                load_change[:, self.own_loads] = direction.loads
+                load_change[:, self.unpadded_loads] = direction.loads
             vectors = (start, ready.long.dynamic_vector, change, *self.steps, self.loads)
             packed = map(Packed, (*vectors, load_change), repeat(None), by_row)
             by_name = tangent_step.scan(*packed, layouts)
@@ -116,7 +116,7 @@ class PathTangents:
         return by_direction
 
     @property
-    def own_loads(self) -> Int[np.ndarray, " command"]:
+    def unpadded_loads(self) -> Int[np.ndarray, " command"]:
         """Where the numbers of a load are among those of a load for the long chain."""
         ready, commands = self.path.prepared, self.path.commands
         short, long = ready.command_layout(commands), ready.long.command_layout(commands)
@@ -231,7 +231,7 @@ def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> G
     result = adjoint_step.scan(*packed, layouts)
     loads = np.zeros_like(tangents.loads)
     loads[backwards] = result["load"]
-    loads = loads[:, tangents.own_loads]
+    loads = loads[:, tangents.unpadded_loads]
     by_chain, numbers = result["chain"].sum(axis=0), path.prepared.own_numbers
     size = path.prepared.chain_layout.size + 1
     return Gradient(loads, np.bincount(numbers, by_chain, size)[1:])
@@ -245,7 +245,7 @@ def _packed(
     back = None if turn is None else turn.T
     shapes = reported_shapes(long.static_structure, long.state, tuple(weights))
     seeds = np.zeros((len(path), sum(int(np.prod(shape)) for shape in shapes.values()) + 1))
-    for name, index in own_entries(path.prepared, [*weights]).items():
+    for name, index in unpadded_entries(path.prepared, [*weights]).items():
         seeds[:, index] = REGISTERED[name].turned(weights[name], back)
     return seeds[:, :-1]  # the last column takes what is beyond the end of a tendon
 

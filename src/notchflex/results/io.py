@@ -175,8 +175,10 @@ _HELD = ("smallest_eigenvalue", "determinant_sign")
 _RUN = {
     # A path counts more as not converged than the solver does.
     "solver_converged": "converged",
-    **{name: name for name in ("residual", "iterations", "tried", "reached")},
-    **{name: name for name in ("snapped", "overdrawn")},
+    **{
+        name: name
+        for name in ("residual", "iterations", "tried", "reached", "snapped", "overdrawn")
+    },
 }
 """Names of arrays in files to the attributes of a run."""
 

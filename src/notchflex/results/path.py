@@ -20,9 +20,10 @@ from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import LoadPath
 from notchflex.loads.command import Command, make_commands
 from notchflex.mechanics.chain import Chain, unchecked_dimensions
+from notchflex.mechanics.flexure import MAX_REFINEMENT
 from notchflex.mechanics.tendon import Straight
 from notchflex.results.quantities import QUANTITIES, PathQuantities, friction_front
-from notchflex.results.state import Equilibrium, State, state_of
+from notchflex.results.state import Equilibrium, State, path_summary, state_of
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain
@@ -178,9 +179,6 @@ def _coarse(path: EquilibriumPath) -> Iterator[str]:
     if not (error > MOMENT_ERROR).any():
         return
     step = int(np.argmax(error))
-    # Not at the head of the file: what only reads this table needs no solver.
-    from notchflex.mechanics.flexure import MAX_REFINEMENT
-
     refinement = path.chain.refinement
     remedy = (
         f"simulate with --refinement {refinement + 1} (in Python refinement={refinement + 1}) "
@@ -222,9 +220,8 @@ def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
         if path.run.quantity("friction_holds")[step]:
             return _said(Failure.TOO_FEW_MODES, percent=100 * path.moment_error[step])
         return _said(Failure.FRICTION_LOCKS)
-    tension = ", ".join(f"{value:.4g}" for value in path.tension[step])
     stroke = ", ".join(f"{value:.4g}" for value in path.stroke[step])
-    last = f"; the last good state has tension {tension} N and stroke {stroke} mm"
+    last = f"; the last good state has tension {_load(path, step)} and stroke {stroke} mm"
     opening = np.asarray(path.chain.rods.length).sum(axis=-1)
     all_closed = (path.gap[step] < _CLOSED_TOLERANCE * opening).all()
     if (all_closed or _past_closing(path, step)) and not np.isnan(path.load.stroke[step]).all():
@@ -372,8 +369,6 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
         Steps that were not tried repeat the last one that was: their rows are empty.
         """
         values = self.run.quantity(name)
-        if len(values) == 1:  # always tried
-            return values
         tried = self.run.tried
         if tried.all():
             return values
@@ -550,8 +545,6 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
         return plot(self, x, y, ax=ax)
 
     def _summary(self) -> Summary:
-        from notchflex.results.state import path_summary
-
         return path_summary(self)
 
     def raise_if_failed(self) -> EquilibriumPath:

@@ -15,7 +15,6 @@ import re
 from collections.abc import Callable, Container, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from pathlib import Path
-from pathlib import Path as FilePath
 from typing import Any, TypeVar
 
 import numpy as np
@@ -403,7 +402,7 @@ _PATTERNS = {
 }
 
 
-def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
+def read_table(file: str | Path) -> dict[str, NDArray[Any]]:
     """Read a table that was written of a path, as its quantities in mm, N and rad.
 
     A table holds every step as it was printed, so angles come back to the last digit or two. What
@@ -431,7 +430,7 @@ def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
         ((3, 5), False)
     """
     entries: dict[str, dict[tuple[int, ...], NDArray[Any]]] = {}
-    is_parquet = FilePath(file).suffix.lower() == ".parquet"
+    is_parquet = Path(file).suffix.lower() == ".parquet"
     columns = read_columns(file) if is_parquet else csv_table(file).entries
     for header, values in columns.items():
         place = _place(header)

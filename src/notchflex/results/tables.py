@@ -28,6 +28,7 @@ from notchflex.results.quantities import (
     spans_of,
     units,
 )
+from notchflex.results.writing import write_text
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from pathlib import Path as FilePath
 
     from notchflex.results.path import EquilibriumPath
-from notchflex.results.writing import write_text
 
 
 def path_columns(path: EquilibriumPath) -> dict[str, Sequence[Any]]:
