@@ -110,13 +110,13 @@ class Bands(Displayed, Mapping[str, Band]):
             "interactions"; none where too few draws converged.
         """
         values = self.samples[name][:, step]
-        known = np.isfinite(values)
-        values = values[known]
+        finite = np.isfinite(values)
+        values = values[finite]
         if not len(values) or not np.ptp(values):
             return {}
         levels: dict[str, np.ndarray] = {}
         for parameter, draws in self.drawn.items():
-            numbers = draws[known]
+            numbers = draws[finite]
             if np.ptp(numbers) > 0.0:
                 level = (numbers - numbers.mean()) / numbers.std()
                 # Notches that deviate together are one number.

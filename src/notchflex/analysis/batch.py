@@ -221,15 +221,15 @@ def batch(
         >>> np.degrees(found["total_angle"].reshape(2, 3)).round(1).tolist()
         [[25.5, 49.8, 106.5], [26.4, 51.5, 111.6]]
     """
-    several = _robots(robots)
+    checked = _checked_robots(robots)
     message = "a batch needs a notchflex.Load or LoadPath, or some in order"
     listed = [loads] if isinstance(loads, Load) else one_or_several(loads, LoadPath, message)
-    paths = [load_path(load, _tendons(several)) for load in listed]
+    paths = [load_path(load, _tendons(checked)) for load in listed]
     if not paths or len({len(path) for path in paths}) > 1:
         raise InputError.WRONG_SHAPE("a batch needs one path or more, all of equally many steps")
     joined = LoadRows(paths[0] if len(paths) == 1 else join_paths(paths), len(paths[0]))
     single = all(isinstance(load, Load) for load in listed)
-    return _solved(_rows(several, values, joined, product, options), options, single)
+    return _solved(_rows(checked, values, joined, product, options), options, single)
 
 
 def solve_batch(
@@ -256,9 +256,9 @@ def solve_batch(
         >>> found["total_angle"].shape
         (100,)
     """
-    several = _robots(robots)
-    each = LoadRows(load_path(loads, _tendons(several)), 1)
-    return _solved(_rows(several, {}, each, False, options), options, True)
+    checked = _checked_robots(robots)
+    single_loads = LoadRows(load_path(loads, _tendons(checked)), 1)
+    return _solved(_rows(checked, {}, single_loads, False, options), options, True)
 
 
 def simulate_batch(
@@ -289,13 +289,13 @@ def simulate_batch(
     return batch(robots, {}, loads, **options)
 
 
-def _robots(robots: Any) -> list[Robot]:
+def _checked_robots(robots: Any) -> list[Robot]:
     """Return the robots that a caller gives, checked."""
     message = "a batch needs a notchflex.Robot, or some of them"
-    several = one_or_several(robots, Robot, message)
-    if not several or not all(isinstance(robot, Robot) for robot in several):
+    listed = one_or_several(robots, Robot, message)
+    if not listed or not all(isinstance(robot, Robot) for robot in listed):
         raise InputError.WRONG_TYPE(f"{message}; got {short_repr(robots)}")
-    return several
+    return listed
 
 
 def _tendons(robots: Sequence[Robot]) -> int:
@@ -421,7 +421,7 @@ class LoadRows:
             return self
         load = self.load[self.steps_of(which).ravel()]
         tables = {
-            name: self._table(name, each, load.numbers(name)) for name, each in values.items()
+            name: self._table(name, numbers, load.numbers(name)) for name, numbers in values.items()
         }
         load = load.commanding({name: tables[name] for name in TENDONS if name in tables})
         if not any(name in TIP for name in tables):
@@ -481,17 +481,17 @@ class BatchRows:
         """Yield the valid rows by their programs, which make the chains of many robots."""
         rows = np.flatnonzero(self.valid)
         if len(self.robots) > FEW:
-            few = [rows[:0]]
+            singly = [rows[:0]]
             for form in self.robots.forms(np.unique(self.robot_of[rows])):
                 of_form = rows[np.isin(self.robot_of[rows], form.members)]
                 for kind, part in self._by_kind(form.example, of_form):
-                    several = len(np.unique(self.robot_of[part])) > FEW
-                    chains = form.chains(kind, self.refinement) if several else None
+                    many = len(np.unique(self.robot_of[part])) > FEW
+                    chains = form.chains(kind, self.refinement) if many else None
                     if chains is None:
-                        few.append(part)
+                        singly.append(part)
                     else:
                         yield BatchTable(self, part, chains, kind)
-            rows = np.concatenate(few)
+            rows = np.concatenate(singly)
         yield from self.one_by_one(rows)
 
     def _by_kind(
@@ -552,8 +552,8 @@ class BatchTable:
         """Return the rows of each call of the program: equal pieces, balanced over the cores."""
         rows = len(self.rows)
         max_size = max(size for limit, size in _PIECE_SIZES.items() if rows >= limit)
-        each = -(-rows // (max_size * cores))
-        size = -(-rows // (each * cores * WIDTH)) * WIDTH
+        rounds = -(-rows // (max_size * cores))
+        size = -(-rows // (rounds * cores * WIDTH)) * WIDTH
         return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
 
     def run(self, index: slice) -> dict[str, np.ndarray]:

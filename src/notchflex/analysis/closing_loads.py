@@ -336,15 +336,15 @@ def _tensions(
         return tension, status
     stiffness = np.asarray(chain.contact_stiffness)
     # As many rows as notches, whichever are searched: one compiled program.
-    which, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
+    searched, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
 
     def overlap(tension: Float[np.ndarray, " m"], _: Bool[np.ndarray, " m"]) -> np.ndarray:
         value = np.zeros((chain.flexures, chain.tendons))
-        value[rows, tendon[which]] = np.resize(tension, chain.flexures)
+        value[rows, tendon[searched]] = np.resize(tension, chain.flexures)
         force, gap, converged = solve_contacts(
             ready, tension_commands(value), ready.rest, Settings()
         )
-        overlap = force[rows, which] / stiffness[which] - gap[rows, which]
+        overlap = force[rows, searched] / stiffness[searched] - gap[rows, searched]
         return np.where(converged, overlap, np.nan)[: len(notches)]
 
     linear = np.asarray(chain.stiffness)[notches, 0] * closing_angle[notches] / arm[notches]
@@ -445,8 +445,10 @@ def closing_tensions_of(
     # The root does not depend on the stiffness: that of one robot serves for all.
     stiffness = np.asarray(chain.contact_stiffness)[notches]
     table, alike = chains.packed(valid)
-    known = replace(chains, packed=lambda numbers: (table[numbers], alike[numbers]))
-    some = VariedRobots.of(robot, {name: each[valid] for name, each in values.items()})
+    packed_chains = replace(chains, packed=lambda numbers: (table[numbers], alike[numbers]))
+    valid_robots = VariedRobots.of(
+        robot, {name: numbers[valid] for name, numbers in values.items()}
+    )
 
     def overlap(
         tension: Float[np.ndarray, " rows"], mask: Bool[np.ndarray, " rows"]
@@ -454,10 +456,10 @@ def closing_tensions_of(
         """Compute contact force / stiffness - gap of the masked rows: robots by notches."""
         places = np.flatnonzero(mask)
         numbers, notch = np.divmod(places, len(notches))
-        load, each = LoadPath(tension[places, None] * unit[notch]), np.arange(len(places))
-        rows = BatchRows(some, LoadRows(load, 1), numbers, each, _OUTPUTS, DEFAULT, 0)
-        solved = rows.solved(number_of_cores(), [BatchTable(rows, each, known, 0)])
-        force, gap = (solved[name][each, 0, notches[notch]] for name in ("contact_force", "gap"))
+        load, trials = LoadPath(tension[places, None] * unit[notch]), np.arange(len(places))
+        rows = BatchRows(valid_robots, LoadRows(load, 1), numbers, trials, _OUTPUTS, DEFAULT, 0)
+        solved = rows.solved(number_of_cores(), [BatchTable(rows, trials, packed_chains, 0)])
+        force, gap = (solved[name][trials, 0, notches[notch]] for name in ("contact_force", "gap"))
         overlaps = np.full(len(tension), np.nan)
         overlaps[places] = force / stiffness[notch] - gap
         return overlaps
@@ -476,11 +478,14 @@ def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict
     table = closing(robot) if closing_table is None else closing_table
     arms = moment_arms(assemble(robot, flat=False))
     placed = list(zip(robot.notches, sites_of(robot), strict=True))
-    described = {each: _description(*each, robot.tube) for each in dict.fromkeys(placed)}
+    described = {
+        placed_notch: _description(*placed_notch, robot.tube)
+        for placed_notch in dict.fromkeys(placed)
+    }
     return [
         {
             "notch": index + 1,
-            **described[each],
+            **described[placed_notch],
             # Of every tendon, positive where it bends the notch toward itself, 0 where none runs.
             "moment_arm_mm": arms[index].tolist(),
             "closing_angle_deg": float(table.angle[index]) * DEGREES,
@@ -491,7 +496,7 @@ def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict
             "closing_outer_strain": float(table.outer_strain[index]),
             "closing_peak_strain": float(table.peak_strain[index]),
         }
-        for index, each in enumerate(placed)
+        for index, placed_notch in enumerate(placed)
     ]
 
 

@@ -344,11 +344,11 @@ class VectorSolver:
         def single(point: np.ndarray) -> np.ndarray:
             return self._packed({name: array[None] for name, array in self.table(point).items()})
 
-        def several(table: BatchTable, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def batched(table: BatchTable, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             outputs, alike = table.solved(rows)
             return self._packed(outputs), alike
 
-        return self._each(single, several, self.size, points)
+        return self._each(single, batched, self.size, points)
 
     def along(
         self, points: Float[np.ndarray, "k n"], change: Float[np.ndarray, "j n"]
@@ -391,7 +391,7 @@ class VectorSolver:
     def _each(
         self,
         single: Callable[..., np.ndarray],
-        several: Callable[..., tuple[np.ndarray, Bool[np.ndarray, " k"]]],
+        batched: Callable[..., tuple[np.ndarray, Bool[np.ndarray, " k"]]],
         size: int,
         points: np.ndarray,
         *others: np.ndarray,
@@ -407,7 +407,7 @@ class VectorSolver:
         if table is not None and not weighs:
             pieces = [table.rows[index] for index in table.pieces(number_of_cores())]
             solving = on_cores(
-                lambda rows: several(table, rows, *(vectors[places[rows]] for vectors in others)),
+                lambda rows: batched(table, rows, *(vectors[places[rows]] for vectors in others)),
                 pieces,
             )
             for rows, (values, alike) in zip(pieces, solving, strict=True):
@@ -498,11 +498,11 @@ class VectorSolver:
         by_robot, alike = table.chains.along(robots, change[:, self._numbers])
         tables = (*tables, np.einsum("kn,nsc->ksc", change, self._units))
         carried, by_row = np.zeros_like(tables[0][:, 0]), followed.chains.ndim == 2
-        which = (True, by_row, by_row, *(True,) * len(tables))
+        have_rows = (True, by_row, by_row, *(True,) * len(tables))
         parts: list[dict[str, np.ndarray]] = []
         for step in range(len(self._path)):
             vectors = (carried, followed.chains, by_robot, *(array[:, step] for array in tables))
-            carried, by = tangent_step.rows(*map(Packed, vectors, repeat(None), which), layouts)
+            carried, by = tangent_step.rows(*map(Packed, vectors, repeat(None), have_rows), layouts)
             parts.append(by)
         turn = self._path.load.base_to_world
         slopes = {

@@ -231,8 +231,8 @@ def _law(robot: Robot) -> Iterator[Tolerance]:
     names = ("notch", all_of_them), (f"notch[{len(notches)}]", last)
     for name, error in names if all_of_them != last else names[:1]:
         if error:
-            both = math.hypot(error, _LAW_OF_FIBRES * robot.material.by_fibres)
-            yield Tolerance(f"{name}.stiffness_factor", sd=f"{100 * both:.2g} %")
+            total = math.hypot(error, _LAW_OF_FIBRES * robot.material.by_fibres)
+            yield Tolerance(f"{name}.stiffness_factor", sd=f"{100 * total:.2g} %")
 
 
 def _rounded(size: float) -> float:

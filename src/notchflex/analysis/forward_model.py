@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from notchflex._jax import constant
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.solve import check_refinement, prepare_for
 from notchflex.analysis.tangent import Change, Kink, PathTangents, kinks
 from notchflex.errors import InputError
 from notchflex.loads import Load
-from notchflex.loads.command import BodyLoads, Command, make_commands
+from notchflex.loads.command import make_commands
 from notchflex.loads.load import check_is_robot
 from notchflex.loads.load_path import LoadPath, load_path
 from notchflex.results.path import EquilibriumPath
@@ -217,7 +216,7 @@ def tip_response(
         robot, load, settings or DEFAULT, refinement, from_rest=each_from_rest, any_load=True
     )
     path = model.solve(robot, load)
-    changes = [Change(loads, None) for loads in _unit_loads(path)]
+    changes = [Change(np.tile(unit, (len(path), 1)), None) for unit in _unit_loads(path)]
     # Each state is varied alone: what the contacts remember of the state before stays.
     columns = PathTangents(path, _POSE, remembers=False).along(changes)
     by_loads = {name: np.stack([column[name] for column in columns]) for name in _POSE}
@@ -232,28 +231,15 @@ def tip_response(
     return TipResponse(path, by_drive, in_world.reshape(by_wrench.shape))
 
 
-def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"]]:
+def _unit_loads(path: EquilibriumPath) -> Float[np.ndarray, "k command"]:
     """Pack unit changes of the loads: of every drive, then of tip moment and force."""
-    form = path.prepared.command_layout(path.commands)
-    none: Command = form.unpack(np.zeros(form.size))
-    assert none.applied is not None  # the chain is assembled for loads
-    units = [none._replace(target=constant(row)) for row in np.eye(path.chain.tendons)]
-    for row in np.eye(6):
-        applied = _with_tip(none.applied, row, np.asarray(path.chain.body_length)[-1])
-        units.append(none._replace(applied=applied))
-    for unit in units:
-        yield np.broadcast_to(np.asarray(form.pack(unit)), (len(path), form.size))
-
-
-def _with_tip(applied: BodyLoads, wrench: Float[np.ndarray, " 6"], length: float) -> BodyLoads:
-    """Add a moment and a force at the tip to loads, dead in the base frame."""
-    moment, force = wrench[:3], wrench[3:]
-    last = np.zeros(len(applied.dead_force))
-    last[-1] = 1.0
-    arm = np.zeros((3, 3))
-    arm[2] = length * force
-    return applied._replace(
-        dead_force=constant(applied.dead_force + np.multiply.outer(last, force)),
-        dead_moment=constant(applied.dead_moment + np.multiply.outer(last, moment)),
-        dead_arm=constant(applied.dead_arm + np.multiply.outer(last, arm)),
-    )
+    layout, tendons = path.prepared.command_layout(path.commands), path.chain.tendons
+    indices: Any = layout.unpack_indices()
+    units = np.zeros((tendons + 6, layout.size))
+    drives, moments, forces = np.split(np.arange(len(units)), [tendons, tendons + 3])
+    units[drives, indices.target] = 1.0
+    units[moments, indices.applied.dead_moment[-1]] = 1.0
+    units[forces, indices.applied.dead_force[-1]] = 1.0
+    # The tip lies on the axis of the last body, at its end.
+    units[forces, indices.applied.dead_arm[-1, 2]] = np.asarray(path.chain.body_length)[-1]
+    return units

@@ -131,10 +131,11 @@ class Geometry:
         robot, lengths = self.robot, constant(self.body_length)
         line = passage(robot.notches, lengths, side_deg, robot.tube.outer_radius, radius)
         ends = np.stack([line.enters, line.leaves], axis=1).tolist()
-        there = (
-            tuple(both) if visits else None for visits, both in zip(line.visits, ends, strict=True)
+        body_walls = (
+            tuple(interval) if visits else None
+            for visits, interval in zip(line.visits, ends, strict=True)
         )
-        return ((0.0, float(line.base_leaves)), *there)
+        return ((0.0, float(line.base_leaves)), *body_walls)
 
     def shape(self, notch_angle: ArrayLike, level: str = "tendons") -> RobotShape:
         """Return the shape that notch angles give, in the frame of the base.
@@ -302,8 +303,8 @@ def _shape(robot: Robot, chain: Chain, modes: Any, position: Array, rotation: Ar
     line = np.concatenate([along, end[:, None]], axis=1)
     flexures: list[FlexureShape] = []
     for notch, length in enumerate(rods.length):
-        used = np.flatnonzero(length)  # others fill up the arrays
-        shown, ends = np.pad(used + 1, 1, constant_values=(0, -1)), np.pad(used, 1, "edge")
+        segments = np.flatnonzero(length)  # others fill up the arrays
+        shown, ends = np.pad(segments + 1, 1, constant_values=(0, -1)), np.pad(segments, 1, "edge")
         edges = rods.section.edge_spine, rods.section.edge_near, rods.section.area
         values = (edge[notch, ends] for edge in edges)
         flexures.append(FlexureShape(axes[notch, shown], line[notch, shown], *values))

@@ -170,17 +170,18 @@ def changes(
     along = np.eye(sum(sizes)) if along is None else along
     first = np.cumsum([0, *sizes])[:-1].tolist()
     columns = [column for column, name in zip(first, names, strict=True) if name not in LOADS]
-    made = [Change(None, None)] * len(along)
+    by_direction = [Change(None, None)] * len(along)
     if along[:, columns].any():
         numbers = [name for name in names if name not in LOADS]
-        made = _by_numbers(path, numbers, along[:, columns])
+        by_direction = _by_numbers(path, numbers, along[:, columns])
     for column, size, name in zip(first, sizes, names, strict=True):
         if name in LOADS:
             loads = np.tensordot(along[:, column : column + size], load_units(path, name), 1)
-            made = [
-                change.plus(Change(load, None)) for change, load in zip(made, loads, strict=True)
+            by_direction = [
+                change.plus(Change(load, None))
+                for change, load in zip(by_direction, loads, strict=True)
             ]
-    return made
+    return by_direction
 
 
 def _by_numbers(
@@ -190,17 +191,19 @@ def _by_numbers(
     robot, places = places_by_name(path.robot, names)
     traced, varied = _traced(robot, places)
     traced_places = [places[number] for number in traced]
-    made = _along(path, robot, varied, lambda form: along[:, traced] @ _units(traced_places, form))
-    others = set(range(len(names))).difference([] if made is None else traced)
-    made = made or [Change(None, None)] * len(along)
-    for number in sorted(others):
+    by_direction = _along(
+        path, robot, varied, lambda form: along[:, traced] @ _units(traced_places, form)
+    )
+    untraced = set(range(len(names))).difference([] if by_direction is None else traced)
+    by_direction = by_direction or [Change(None, None)] * len(along)
+    for number in sorted(untraced):
         name = names[number]
         by = differences(path, _moved(path.robot, name, names), number_at(path.robot, name))
-        made = [
+        by_direction = [
             change.plus(by, size) if size else change
-            for change, size in zip(made, along[:, number].tolist(), strict=True)
+            for change, size in zip(by_direction, along[:, number].tolist(), strict=True)
         ]
-    return made
+    return by_direction
 
 
 def _traced(robot: Robot, places: Sequence[list[Place]]) -> tuple[list[int], list[Place]]:

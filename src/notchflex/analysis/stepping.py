@@ -397,8 +397,7 @@ class Stepper(Displayed):
 
     @cached_property
     def _drive_places(self) -> Int[np.ndarray, " t"]:
-        layout = self.prepared.state
-        indices: Any = jax.tree.unflatten(layout.structure, layout.indices)
+        indices: Any = self.prepared.state.unpack_indices()
         return np.where(self._by_stroke, indices.stroke, indices.point.base_tension)
 
     @cached_property
@@ -427,8 +426,8 @@ class Stepper(Displayed):
     @cached_property
     def contact_places(self) -> Int[np.ndarray, "3 t contacts"]:
         """Where a state has log ratio, bound and slid length of all contacts; -1 beyond the end."""
-        layout, edges = self.prepared.state, np.asarray(self.prepared.chain.contacts)
-        memory: Any = jax.tree.unflatten(layout.structure, layout.indices).memory
+        edges = np.asarray(self.prepared.chain.contacts)
+        memory: Any = self.prepared.state.unpack_indices().memory
         places = np.full((3, *edges.shape), -1)
         fields = memory.log_ratio, memory.bound, memory.slid
         for group, *numbers in zip(self.prepared.chain.groups, *fields, strict=True):

@@ -50,7 +50,7 @@ class VariedRobots:
     def __getitem__(self, number: int) -> Robot:
         """Make one of the robots; raise where the numbers make none."""
         robot = self.robots[self.which[number]]
-        values = {name: float(each[number]) for name, each in self.values.items()}
+        values = {name: float(column[number]) for name, column in self.values.items()}
         return robot.with_values(values) if values else robot
 
     @cached_property
@@ -59,7 +59,7 @@ class VariedRobots:
         errors = dict[int, InputError]()
         for number, robot in enumerate(self.robots if self.values else ()):
             members = np.flatnonzero(self.which == number)
-            table = np.stack([each[members] for each in self.values.values()], axis=1)
+            table = np.stack([column[members] for column in self.values.values()], axis=1)
             names = tuple(self.values)
             with np.errstate(invalid="ignore"):  # numbers may be infinite, or none
                 for row, error in _errors(robot, names, table, np.arange(len(members))):
@@ -99,12 +99,12 @@ def _errors(
     numbers = table[rows]
     if sum(2 ** len(clique) for clique in cliques) <= len(rows):
         low, high = numbers.min(axis=0), numbers.max(axis=0)
-        known, wider = _known_box(robot, names), _WIDER * (high - low)
-        if known and (known[0] <= low).all() and (high <= known[1]).all():
+        known_box, wider = _known_box(robot, names), _WIDER * (high - low)
+        if known_box and (known_box[0] <= low).all() and (high <= known_box[1]).all():
             return
         for box in ((low - wider, high + wider), (low, high)):
             if _corners_are_valid(robot, names, cliques, np.array(box)):
-                known[:] = box
+                known_box[:] = box
                 return
         spread = np.nan_to_num((high - low) / np.ptp(table, axis=0))
         order = np.argsort(numbers[:, np.argmax(spread)], kind="stable")

@@ -147,9 +147,9 @@ def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
     if not isinstance(steps, list) or len(steps) != len(expected):
         return False
     return all(
-        isinstance(step, dict)
-        and wanted == {**step, "reason": wanted["reason"], "reason_code": wanted["reason_code"]}
-        for wanted, step, tried in zip(expected, steps, np.asarray(path.run.tried), strict=True)
+        isinstance(written, dict)
+        and step == {**written, "reason": step["reason"], "reason_code": step["reason_code"]}
+        for step, written, tried in zip(expected, steps, np.asarray(path.run.tried), strict=True)
         if tried
     )
 

@@ -79,8 +79,8 @@ class Recorded:
         start = np.arange(len(self.converged))[some][0]
         first = dict(self.first)
         if start:
-            known = {**self.reported, MATERIAL: self.solved.memory.material}
-            first = {name: np.asarray(known[name])[start - 1] for name in first}
+            recorded = {**self.reported, MATERIAL: self.solved.memory.material}
+            first = {name: np.asarray(recorded[name])[start - 1] for name in first}
         cut = {
             field.name: getattr(self, field.name) for field in fields(self) if field.name != "first"
         }
@@ -115,12 +115,12 @@ def path_warnings(path: EquilibriumPath) -> list[str]:
 
 def _snaps(path: EquilibriumPath) -> Iterator[str]:
     """Warn of notches that pass a limit point under tension."""
-    for what, side in (("snaps shut", 1), ("snaps open", -1)):
+    for event, side in (("snaps shut", 1), ("snaps open", -1)):
         steps, notches = np.nonzero(path.snap == side)
         if len(steps):
             names = ", ".join(str(notch + 1) for notch in dict.fromkeys(notches.tolist()))
             yield (
-                f"notch {names} {what}, first at step {steps[0] + 1} "
+                f"notch {names} {event}, first at step {steps[0] + 1} "
                 f"({_load(path, int(steps[0]))}): it passes a limit point, where it softens as it "
                 "closes, so that no shape between is in equilibrium under this tension; prescribe "
                 "the stroke to pass through the shapes between."
@@ -130,7 +130,7 @@ def _snaps(path: EquilibriumPath) -> Iterator[str]:
 def _strains(path: EquilibriumPath) -> Iterator[str]:
     material = path.robot.material
     # The law is fitted in the outer strain of eq. 16, which therefore selects its branch.
-    for strain, limit, what, so in (
+    for strain, limit, description, consequence in (
         (
             "peak strain",
             material.allowed_strain,
@@ -154,24 +154,24 @@ def _strains(path: EquilibriumPath) -> Iterator[str]:
         notches = [str(notch + 1) for notch in np.flatnonzero(beyond.any(axis=0))]
         step = int(np.flatnonzero(beyond.any(axis=1))[0])
         yield (
-            f"the {strain} passes {what.format(100 * limit)} in notch"
+            f"the {strain} passes {description.format(100 * limit)} in notch"
             f"{'es' if len(notches) > 1 else ''} {', '.join(notches)}, first at step {step + 1} "
-            f"({_load(path, step)}), at most {100 * size.max():.3g} %: {so}."
+            f"({_load(path, step)}), at most {100 * size.max():.3g} %: {consequence}."
         )
 
 
 def _unstable(path: EquilibriumPath) -> Iterator[str]:
-    bad = np.flatnonzero(np.asarray(path.converged) & ~np.asarray(path.stable))
-    fixed = path.determinant_sign[bad] != 0.0 if len(bad) else np.zeros(0, bool)
-    snaps, many = "a real robot would snap to another shape", Failure.INDETERMINATE_TENSIONS
-    for steps, what, why in (
-        (bad[fixed], "unstable", snaps),
-        (bad[~fixed], "not determined", f"{many.text}; {many.remedy}"),
+    unstable = np.flatnonzero(np.asarray(path.converged) & ~np.asarray(path.stable))
+    determined = path.determinant_sign[unstable] != 0.0 if len(unstable) else np.zeros(0, bool)
+    indeterminate = Failure.INDETERMINATE_TENSIONS
+    for steps, verdict, reason in (
+        (unstable[determined], "unstable", "a real robot would snap to another shape"),
+        (unstable[~determined], "not determined", f"{indeterminate.text}; {indeterminate.remedy}"),
     ):
         if len(steps):
             plural = "s are" if len(steps) > 1 else " is"
             first = f"first step {steps[0] + 1} ({_load(path, steps[0])})"
-            yield f"{len(steps)} step{plural} {what}, {first}: {why}."
+            yield f"{len(steps)} step{plural} {verdict}, {first}: {reason}."
 
 
 def _coarse(path: EquilibriumPath) -> Iterator[str]:

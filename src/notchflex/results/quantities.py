@@ -226,11 +226,11 @@ def friction_front(
 QUANTITIES = {name: quantity for name, quantity in REGISTERED.items() if quantity.title}
 """Every quantity of a solved state, by the attribute that holds it."""
 
-_Many = TypeVar("_Many")
-_One = TypeVar("_One")
+_OfPath = TypeVar("_OfPath")
+_OfState = TypeVar("_OfState")
 
 
-class _Property(property, Generic[_Many, _One]):
+class _Property(property, Generic[_OfPath, _OfState]):
     """A quantity as property: values of every step of a path, or the value of one equilibrium."""
 
     def __set_name__(self, owner: type, name: str) -> None:
@@ -238,15 +238,15 @@ class _Property(property, Generic[_Many, _One]):
         self._name, self.__doc__ = name, f"{quantity.summary}\n\n{quantity.text}"
 
     @overload
-    def __get__(self, thing: None, owner: type) -> Self: ...
+    def __get__(self, instance: None, owner: type) -> Self: ...
     @overload
-    def __get__(self, thing: PathQuantities, owner: type) -> _Many: ...
+    def __get__(self, instance: PathQuantities, owner: type) -> _OfPath: ...
     @overload
-    def __get__(self, thing: EquilibriumQuantities, owner: type) -> _One: ...
+    def __get__(self, instance: EquilibriumQuantities, owner: type) -> _OfState: ...
     def __get__(  # pyright: ignore[reportIncompatibleMethodOverride]
-        self, thing: _Quantities | None, owner: type
+        self, instance: _Quantities | None, owner: type
     ) -> Any:
-        return self if thing is None else thing.quantity(self._name)
+        return self if instance is None else instance.quantity(self._name)
 
 
 class Number(_Property[np.ndarray, float]):

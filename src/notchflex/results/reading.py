@@ -223,10 +223,10 @@ def tendon_columns(header: Sequence[str], quantity: str, tendons: int) -> dict[i
 def no_tendon_column(table: Table, tendons: int) -> InputError:
     """Return what is raised where a table has no column for any tendon."""
     label = "" if tendons == 1 else 1
-    wanted = [QUANTITIES[q].header(tendon=label) for q in ("tension", "stroke")]
+    columns = [QUANTITIES[q].header(tendon=label) for q in ("tension", "stroke")]
     more = "" if tendons == 1 else f" (and so on to tendon {tendons})"
     return InputError.TABLE_COLUMNS(
-        f"{table.name}: there is no column {wanted[0]} or {wanted[1]}{more}; {table.columns}. "
+        f"{table.name}: there is no column {columns[0]} or {columns[1]}{more}; {table.columns}. "
         f'Say which it is: --column tension="{_likely(table)}".'
     )
 
@@ -316,9 +316,9 @@ def _understood(header: str, name: str) -> tuple[str, float]:
     numbers = re.findall(r"\d+", words)
     key = " ".join(re.findall(r"[^\W\d_]+", words.lower()))
     if key in _WORDS:
-        column, wanted = _WORDS[key]
-        if base in ("", wanted) and len(numbers) <= 1:
-            return f"{column.format(n=''.join(f'_{n}' for n in numbers))}_{wanted}", factor
+        column, usual_unit = _WORDS[key]
+        if base in ("", usual_unit) and len(numbers) <= 1:
+            return f"{column.format(n=''.join(f'_{n}' for n in numbers))}_{usual_unit}", factor
     if name and (key in _WORDS or not base):
         raise InputError.UNKNOWN_NAME(
             f"--column {name}={header}: {TOLD_COLUMNS}, for a column in its unit."

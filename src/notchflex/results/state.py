@@ -48,14 +48,14 @@ def differences(robot: Robot, other: Robot) -> list[str]:
     first, second = _values(robot), _values(other)
     changes: dict[tuple[str, Any, Any], list[str]] = {}
     for name in dict.fromkeys([*first, *second]):
-        mine, its = first.get(name), second.get(name)
-        if mine != its:
-            changes.setdefault((_general(name), mine, its), []).append(name)
+        value, compared = first.get(name), second.get(name)
+        if value != compared:
+            changes.setdefault((_general(name), value, compared), []).append(name)
     changed: list[str] = []
-    for (general, mine, its), names in changes.items():
+    for (general, value, compared), names in changes.items():
         everywhere = len(names) == sum(_general(name) == general for name in first)
         shown = [general] if everywhere else names
-        changed += [f"{name} = {_text(mine)} instead of {_text(its)}" for name in shown]
+        changed += [f"{name} = {_text(value)} instead of {_text(compared)}" for name in shown]
     return changed
 
 

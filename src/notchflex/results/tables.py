@@ -168,7 +168,7 @@ LOAD_UNITS = {f"load.{key}": unit for key, unit in _LOAD_KEYS.values()}
 def path_document(path: EquilibriumPath) -> dict[str, Any]:
     """Return a path as a JSON document of plain values, angles in deg, None for no number."""
     external = _external(path)
-    failed = next((step for step, good in enumerate(path.converged) if not good), None)
+    failed = next((step for step, converged in enumerate(path.converged) if not converged), None)
     steps = [_step(path, index, external) for index in range(len(path))]
     return {
         **document_head(path.robot),

@@ -139,8 +139,8 @@ def check_folder(
                 f"{option} {folder}: a file cannot be called {name!r}."
             )
         files.append(Path(folder) / name)
-    there, sources = "\0" not in folder and os.path.exists(folder), list(inputs)
-    for target in files if there else [folder]:
+    exists, sources = "\0" not in folder and os.path.exists(folder), list(inputs)
+    for target in files if exists else [folder]:
         check_output(str(target), option, inputs=sources)
     return tuple(files)
 
@@ -170,9 +170,9 @@ def check_picture(
         )
     suffix = Path(target).suffix.lower()
     if suffix not in kinds:
-        known = f"{', '.join(kinds[:-1])} or {kinds[-1]}"
+        listed = f"{', '.join(kinds[:-1])} or {kinds[-1]}"
         raise InputError.FILE_FORMAT(
-            f"{option} {target}: got {suffix_of(target)}; a picture is written as {known}."
+            f"{option} {target}: got {suffix_of(target)}; a picture is written as {listed}."
         )
     check_output(target, option, inputs=inputs)
     for module in _DRAWN_BY.get(suffix, ("matplotlib",)):
