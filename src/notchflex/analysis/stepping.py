@@ -190,10 +190,8 @@ class Stepper(Displayed):
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        count, form = (
-            check_is_robot(self.robot).number_of_tendons,
-            'drives are "tension" or "stroke"',
-        )
+        count = check_is_robot(self.robot).number_of_tendons
+        form = 'drives are "tension" or "stroke"'
         words = one_or_several(self.drives, str, form)
         words = tuple(count * words if len(words) == 1 else words)
         if len(words) != count or not set(words) <= set(get_args(Drive)):

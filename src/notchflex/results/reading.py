@@ -97,17 +97,16 @@ class Table:
 
     def _number(self, text: str, column: str, line: int, hint: str) -> float:
         column = self.written.get(column, column)
-        place = f"{self.name}, line {line}: {column} is {text}"
+        place = f"{self.name}, line {line}: {column} is"
         try:
             value = float(text.replace(self.decimal, ".", 1))
         except ValueError:
             got = repr(text) if text else "nothing"
-            place = f"{self.name}, line {line}: {column} is {got}"
-            raise InputError.NOT_A_NUMBER(f"{place}; give a number{hint}.") from None
+            raise InputError.NOT_A_NUMBER(f"{place} {got}; give a number{hint}.") from None
         if not math.isfinite(value):
-            raise InputError.NOT_FINITE(f"{place}; give a finite number{hint}.")
+            raise InputError.NOT_FINITE(f"{place} {text}; give a finite number{hint}.")
         if abs(value) > LARGEST:
-            raise InputError.OUT_OF_RANGE(f"{place}; give at most {LARGEST:g}.")
+            raise InputError.OUT_OF_RANGE(f"{place} {text}; give at most {LARGEST:g}.")
         return value
 
     def place_of(self, row: int) -> str:
