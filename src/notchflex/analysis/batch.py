@@ -447,11 +447,6 @@ class LoadRows:
                 f"got numbers of shape {values.shape}"
             ) from None
 
-    def kinds(self, robot: Robot, paths: Int[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
-        """Return what acts on a robot along some paths, as bits; see `acting`."""
-        kinds = acting(self.load, robot, self.steps_of(paths), self.tip)
-        return np.bitwise_or.reduce(kinds, axis=1)
-
 
 @dataclass(frozen=True, eq=False)
 class BatchRows:
@@ -498,7 +493,8 @@ class BatchRows:
         self, robot: Robot, rows: Int[np.ndarray, " k"]
     ) -> Iterator[tuple[int, Int[np.ndarray, " m"]]]:
         """Yield what acts, and rows where it does: no row changes the modes of another."""
-        kinds = self.loads.kinds(robot, self.path_of[rows])
+        loads, steps = self.loads, self.loads.steps_of(self.path_of[rows])
+        kinds = np.bitwise_or.reduce(acting(loads.load, robot, steps, loads.tip), axis=1)
         for kind in np.unique(kinds).tolist():
             yield kind, rows[kinds == kind]
 
@@ -526,11 +522,10 @@ class BatchRows:
         """Solve the rows of tables, on several cores."""
         arrays: dict[str, np.ndarray] = {}
         count, done = len(self.robot_of), int((~self.valid).sum())
-        work = [(table, index) for table in tables for index in table.pieces(threads)]
+        work = [(table, rows) for table in tables for rows in table.pieces(threads)]
         solving = on_cores(lambda task: task[0].run(task[1]), work, threads)
         with closing(solving) as pieces:
-            for (table, index), piece in zip(work, pieces, strict=True):
-                rows = table.rows[index]
+            for (_, rows), piece in zip(work, pieces, strict=True):
                 for name, values in piece.items():
                     _store(arrays, name, rows, values, count)
                 done += len(rows)
@@ -548,17 +543,17 @@ class BatchTable:
     chains: Chains
     kind: int  # what acts, as bits; see `acting`
 
-    def pieces(self, cores: int) -> Iterator[slice]:
-        """Return the rows of each call of the program: equal pieces, balanced over the cores."""
-        rows = len(self.rows)
-        max_size = max(size for limit, size in _PIECE_SIZES.items() if rows >= limit)
-        rounds = -(-rows // (max_size * cores))
-        size = -(-rows // (rounds * cores * WIDTH)) * WIDTH
-        return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
+    def pieces(self, cores: int) -> Iterator[Int[np.ndarray, " m"]]:
+        """Yield the rows of each call of the program: equal pieces, balanced over the cores."""
+        count = len(self.rows)
+        max_size = max(size for limit, size in _PIECE_SIZES.items() if count >= limit)
+        rounds = -(-count // (max_size * cores))
+        size = -(-count // (rounds * cores * WIDTH)) * WIDTH
+        return (self.rows[start : start + size] for start in range(0, count, size))
 
-    def run(self, index: slice) -> dict[str, np.ndarray]:
+    def run(self, rows: Int[np.ndarray, " m"]) -> dict[str, np.ndarray]:
         """Solve a piece of the rows: quantities in the world, NaN where they are not known."""
-        batch, rows = self.batch, self.rows[index]
+        batch = self.batch
         outputs, alike = self.solved(rows)
         if not alike.all():
             wrong = rows[~alike]
@@ -575,8 +570,10 @@ class BatchTable:
         needed = (source for name in names for source in WORKS.get(name, (name,)))
         followed = self.followed(rows, (*dict.fromkeys(needed),))
         quantities = followed.outputs
-        outputs = quantities | {name: _work(quantities, name) for name in names if name in WORKS}
-        outputs = {name: outputs[name] for name in sorted(names)}
+        outputs = {
+            name: _work(quantities, name) if name in WORKS else quantities[name]
+            for name in sorted(names)
+        }
         failed = ~outputs["converged"]
         for name, values in outputs.items():
             if name in REGISTERED and values.dtype.kind == "f":
@@ -591,13 +588,16 @@ class BatchTable:
         chains, alike = self.chains.packed(batch.robot_of[rows])
         steps, bodies = batch.loads.steps_of(batch.path_of[rows]), self.chains.bodies(chains)
         load, tip = batch.loads.load, batch.loads.tip
-        acting = row_commands(load, steps, bodies, tip, drawn=bool(self.kind & DRAWN))
-        layout = self.chains.ready.command_layout(acting)
-        commands = np.asarray(layout.pack(acting, leading=2))
-        packed = Packed(chains, self.chains.structure, chains.ndim == 2)
-        numbers = np.array(batch.settings.numbers)
-        outputs = follow_row.rows(packed, Packed(commands, layout, True), numbers, names)
-        return FollowedRows(chains, alike, commands, layout, outputs)
+        commands = row_commands(load, steps, bodies, tip, drawn=bool(self.kind & DRAWN))
+        layout = self.chains.ready.command_layout(commands)
+        packed_commands = np.asarray(layout.pack(commands, leading=2))
+        outputs = follow_row.rows(
+            Packed(chains, self.chains.structure, chains.ndim == 2),
+            Packed(packed_commands, layout, True),
+            np.array(batch.settings.numbers),
+            names,
+        )
+        return FollowedRows(chains, alike, packed_commands, layout, outputs)
 
 
 class FollowedRows(NamedTuple):

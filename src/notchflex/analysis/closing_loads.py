@@ -61,7 +61,7 @@ class ClosingStatus(StrEnum):
     NOT_FOUND = "not found"
 
 
-# A tension of this many times the first guess that leaves a notch open is taken as "never".
+# A notch that stays open after the first guess was doubled so often never closes.
 _DOUBLINGS = 6
 # Trials between a tension that leaves a notch open and one where the solver fails.
 _TRIALS = 12
@@ -136,7 +136,7 @@ def find_roots(
         with np.errstate(divide="ignore", invalid="ignore"):
             part = at_low / (at_low - at_high)
         part = np.where((slow > 3) | ~((part > 0.0) & (part < 1.0)), 0.5, part)
-        part = np.where(misses > 0, 0.6 ** np.maximum(misses, 1), part)
+        part = np.where(misses > 0, 0.6**misses, part)
         trial = low + part * (high - low)
         value = np.where(open_still, overlap(trial, open_still), np.nan)
         up, down = value > 0.0, value <= 0.0

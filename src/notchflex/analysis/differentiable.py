@@ -405,7 +405,7 @@ class VectorSolver:
         # Loads on what weighs something depend on the numbers of the robot.
         weighs = bool(self._numbers) and self._path.chain.loaded and bool(others)
         if table is not None and not weighs:
-            pieces = [table.rows[index] for index in table.pieces(number_of_cores())]
+            pieces = list(table.pieces(number_of_cores()))
             solving = on_cores(
                 lambda rows: batched(table, rows, *(vectors[places[rows]] for vectors in others)),
                 pieces,

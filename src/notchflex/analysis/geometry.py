@@ -253,10 +253,8 @@ class RobotShape:
         across *= tendon.radius if radius is None else radius
         for body, wall in enumerate(walls(tendon.direction_deg)[: last + 1]):
             if body and tendon.path == "wall-arc":  # the fibre that meets the body here
-                flexure = self.flexures[body - 1]
-                place = (
-                    self.on_body(body, [*across, 0.0]) - flexure.position[-1]
-                ) @ flexure.rotation[-1]
+                flexure, point = self.flexures[body - 1], self.on_body(body, [*across, 0.0])
+                place = (point - flexure.position[-1]) @ flexure.rotation[-1]
                 yield flexure.fibre(*place[:2]), False
             if wall is not None:
                 yield self.on_body(body, [[*across, end] for end in sorted(wall)]), True

@@ -293,9 +293,12 @@ class Stepper(Displayed):
             drives: Tension (N) or stroke (mm) of every tendon.
         """
         before, towards = self._checked(state, drives)
-        options: Any = {"settings": self.settings, "refinement": self.refinement}
         return simulate(
-            self.robot, self._load(towards), from_state=self.unpacked(before), **options
+            self.robot,
+            self._load(towards),
+            from_state=self.unpacked(before),
+            settings=self.settings,
+            refinement=self.refinement,
         )
 
     def unpacked(self, state: Float[np.ndarray, " state"]) -> State:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
@@ -77,13 +77,11 @@ class Recorded:
     def rows(self, some: slice) -> Recorded:
         """Return some of the loads."""
         start = np.arange(len(self.converged))[some][0]
-        first = dict(self.first)
+        first = self.first
         if start:
             recorded = {**self.reported, MATERIAL: self.solved.memory.material}
             first = {name: np.asarray(recorded[name])[start - 1] for name in first}
-        cut = {
-            field.name: getattr(self, field.name) for field in fields(self) if field.name != "first"
-        }
+        cut = {name: values for name, values in vars(self).items() if name != "first"}
         return Recorded(first=first, **jax.tree.map(lambda values: np.asarray(values)[some], cut))
 
     def before(self, name: str) -> np.ndarray:
