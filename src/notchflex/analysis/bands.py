@@ -444,7 +444,7 @@ def band_document(bands: Bands) -> dict[str, Any]:
                 "converged": converged,
                 **{
                     quantity.key: {
-                        end: np.asarray(getattr(bands[quantity.name], end)[step]) * quantity.scale
+                        end: getattr(bands[quantity.name], end)[step] * quantity.scale
                         for end in ENDS
                     }
                     for quantity in quantities

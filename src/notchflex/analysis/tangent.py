@@ -314,8 +314,8 @@ def kinks(path: EquilibriumPath, within: float = 1e-6) -> list[Kink]:
         return []
     solved, before = path.run.solved, path.prepared.state.unpack(path.run.between)
     switches = [*_contacts(path.chain, solved, before, within), *_notches(path, within)]
-    converged = np.asarray(path.converged)
-    return sorted((kink for kink in switches if converged[kink.step]), key=lambda kink: kink.step)
+    known = (kink for kink in switches if path.converged[kink.step])
+    return sorted(known, key=lambda kink: kink.step)
 
 
 def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: float) -> list[Kink]:

@@ -149,7 +149,7 @@ def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
     return all(
         isinstance(written, dict)
         and step == {**written, "reason": step["reason"], "reason_code": step["reason_code"]}
-        for step, written, tried in zip(expected, steps, np.asarray(path.run.tried), strict=True)
+        for step, written, tried in zip(expected, steps, path.run.tried, strict=True)
         if tried
     )
 

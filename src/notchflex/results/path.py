@@ -145,7 +145,7 @@ def _strains(path: EquilibriumPath) -> Iterator[str]:
         if limit is None:
             continue
         values = getattr(path, strain.replace(" ", "_"))
-        size = np.where(np.asarray(path.converged)[:, None], np.abs(values), -np.inf)
+        size = np.where(path.converged[:, None], np.abs(values), -np.inf)
         beyond = size > limit
         if not beyond.any():
             continue
@@ -159,7 +159,7 @@ def _strains(path: EquilibriumPath) -> Iterator[str]:
 
 
 def _unstable(path: EquilibriumPath) -> Iterator[str]:
-    unstable = np.flatnonzero(np.asarray(path.converged) & ~np.asarray(path.stable))
+    unstable = np.flatnonzero(path.converged & ~path.stable)
     determined = path.determinant_sign[unstable] != 0.0 if len(unstable) else np.zeros(0, bool)
     indeterminate = Failure.INDETERMINATE_TENSIONS
     for steps, verdict, reason in (
@@ -173,7 +173,7 @@ def _unstable(path: EquilibriumPath) -> Iterator[str]:
 
 
 def _coarse(path: EquilibriumPath) -> Iterator[str]:
-    error = np.where(np.asarray(path.converged), path.moment_error, -np.inf)
+    error = np.where(path.converged, path.moment_error, -np.inf)
     if not (error > MOMENT_ERROR).any():
         return
     step = int(np.argmax(error))

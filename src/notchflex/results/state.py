@@ -436,7 +436,7 @@ _HINT = "[step] is one state; also .plot(), .to_dataframe(), .to_xarray()"
 
 def path_summary(path: EquilibriumPath) -> Summary:
     """Summarise a path: how load, angle and tip change along it, and whether it converged."""
-    converged = np.asarray(path.converged)
+    converged = path.converged
     rows = list(external_rows(path.load))
     for name, unit, values in (
         ("tension", "N", path.tension),
@@ -459,11 +459,12 @@ def path_summary(path: EquilibriumPath) -> Summary:
 
 
 def _converged(path: EquilibriumPath) -> str:
-    converged = np.asarray(path.converged)
-    if converged.all():
+    if path.converged.all():
         return "all steps"
-    first = int(np.argmin(converged))
-    return f"{int(converged.sum())} of {len(path)} steps; step {first + 1}: {path.reason[first]}"
+    first = int(np.argmin(path.converged))
+    return (
+        f"{int(path.converged.sum())} of {len(path)} steps; step {first + 1}: {path.reason[first]}"
+    )
 
 
 def _few(values: np.ndarray, digits: int | None = None) -> str:
