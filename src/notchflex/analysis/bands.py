@@ -444,8 +444,8 @@ def band_document(bands: Bands) -> dict[str, Any]:
                 "converged": converged,
                 **{
                     quantity.key: {
-                        end: getattr(bands[quantity.name], end)[step] * quantity.scale
-                        for end in ENDS
+                        end: values[step] * quantity.scale
+                        for end, values in vars(bands[quantity.name]).items()
                     }
                     for quantity in quantities
                     if quantity.key

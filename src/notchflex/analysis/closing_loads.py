@@ -229,8 +229,7 @@ class Closing(Displayed):
         """
         closes = np.flatnonzero(np.isfinite(self.tension))
         rows = np.arange(len(closes))
-        unit = np.zeros((len(closes), self.robot.number_of_tendons))
-        unit[rows, self.tendon[closes] - 1] = 1.0
+        unit = np.eye(self.robot.number_of_tendons)[self.tendon[closes] - 1]
         load = LoadPath((1.0 - _BELOW) * self.tension[closes, None] * unit)
         path = ForwardModel(self.robot, load, from_rest=True).solve(self.robot, load)
         along = [*directions(path), Change(load_change(path, LoadPath(load.tension + unit)), None)]

@@ -77,7 +77,7 @@ def _width(value: float, order: int) -> float:
 def _stencil(order: int, side: int) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
     """Return points, in widths, and weights of the slope at 0 of their interpolant."""
     half = order // 2
-    central = np.concatenate([np.arange(-half, 0.0), np.arange(1.0, half + 1.0)])
+    central = np.setdiff1d(np.arange(-half, half + 1.0), [0.0])
     points = side * np.arange(order + 1.0) if side else central
     powers = np.vander(points, increasing=True).T
     return points, np.linalg.solve(powers, np.eye(len(points))[1])
