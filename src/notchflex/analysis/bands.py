@@ -30,9 +30,6 @@ from notchflex.solver.newton import Settings
 
 LEVELS = (0.05, 0.50, 0.95)
 """Quantiles of the draws at the low end, the middle and the high end of a band."""
-_FEWEST = 20
-"""Draws of which 5 % is one at each end."""
-
 DRAWS = 256
 
 USUAL = ("total_angle", "tip_position", "notch_angle", "peak_strain", "tension", "stroke")
@@ -113,26 +110,27 @@ class Bands(Displayed, Mapping[str, Band]):
             "interactions"; none where too few draws converged.
         """
         values = self.samples[name][:, step]
-        known = np.isfinite(values)
-        values = values[known]
+        finite = np.isfinite(values)
+        values = values[finite]
         if not len(values) or not np.ptp(values):
             return {}
         levels: dict[str, np.ndarray] = {}
-        for one, numbers in self.drawn.items():
-            if np.ptp(numbers[known]) > 0.0:
-                level = (numbers[known] - numbers[known].mean()) / numbers[known].std()
+        for parameter, draws in self.drawn.items():
+            numbers = draws[finite]
+            if np.ptp(numbers) > 0.0:
+                level = (numbers - numbers.mean()) / numbers.std()
                 # Notches that deviate together are one number.
                 if not any(np.allclose(level, other) for other in levels.values()):
-                    levels[one] = level
+                    levels[parameter] = level
         if len(values) < 4 * len(levels):
             return {}
         table = np.stack(list(levels.values()), axis=1)
         slopes = np.linalg.lstsq(table, values - values.mean(), rcond=None)[0]
         shares = dict.fromkeys(("material", "friction", "cuts", "law", "other"), 0.0)
-        for one, slope in zip(levels, slopes.tolist(), strict=True):
-            section = one.partition(".")[0].partition("[")[0]
+        for parameter, slope in zip(levels, slopes.tolist(), strict=True):
+            section = parameter.partition(".")[0].partition("[")[0]
             group = {"notch": "cuts"}.get(section, section)
-            if one.endswith(".stiffness_factor"):
+            if parameter.endswith(".stiffness_factor"):
                 group = "law"
             shares[group if group in shares else "other"] += slope**2 / values.var()
         total = sum(shares.values())
@@ -166,10 +164,11 @@ class Bands(Displayed, Mapping[str, Band]):
                 f"{self.redrawn} of {self.draws} draws made no valid robot and were drawn again: "
                 "the tolerances reach beyond what the tube allows."
             )
-        if self.draws < _FEWEST:
+        fewest = round(1.0 / LEVELS[0])  # one of them lies at each end
+        if self.draws < fewest:
             sentences.append(
                 f"{self.draws} draws have no 5 in a hundred at an end: the bands are narrower than "
-                f"5 to 95 %; give {_FEWEST} draws or more."
+                f"5 to 95 %; give {fewest} draws or more."
             )
         return sentences
 
@@ -178,8 +177,8 @@ class Bands(Displayed, Mapping[str, Band]):
         for name in ("total_angle", "notch_angle", "tension"):
             quantity = QUANTITIES[name]
             if name in self and self.samples[name].ndim == 2:
-                one = self[name]
-                low, high = (course(end * quantity.scale) for end in (one.low, one.high))
+                ends = self[name].low, self[name].high
+                low, high = (course(end * quantity.scale) for end in ends)
                 rows.append((quantity.title, f"{low} {quantity.unit}; {high} {quantity.unit}"))
         rows.append(("bands of", ", ".join(self)))
         rows.append(("assumed", ", ".join(self.assumed) or "nothing"))
@@ -205,7 +204,7 @@ def band(samples: Float[np.ndarray, "draws ..."]) -> Band:
     with np.errstate(invalid="ignore"):
         empty = np.isnan(samples).all(axis=0)
         low, median, high = np.nanquantile(np.where(empty, 0.0, samples), LEVELS, axis=0)
-    return Band(*(np.where(empty, np.nan, one) for one in (low, median, high)))
+    return Band(*(np.where(empty, np.nan, percentile) for percentile in (low, median, high)))
 
 
 def uncertain(
@@ -262,12 +261,12 @@ def uncertain(
     else:
         chosen, assumed = robot.replace(tolerance=tolerances).tolerance, ()
     path = simulate(robot, loads, settings=settings, refinement=refinement)
-    asked = check_outputs(USUAL if outputs is None else outputs)
-    names = [name for name in asked if _has_band(name) and holds(path, QUANTITIES[name])]
-    drawn = draw_robots(robot, chosen, draws, check_integer(seed, "seed"))
+    names = check_outputs(USUAL if outputs is None else outputs)
+    names = [name for name in names if _has_band(name) and holds(path, QUANTITIES[name])]
+    sample = draw_robots(robot, chosen, draws, check_integer(seed, "seed"))
     results = batch(
-        drawn.robot if drawn.values else [drawn.robot] * draws,
-        drawn.values,
+        sample.robot if sample.values else [sample.robot] * draws,
+        sample.values,
         path.load,
         outputs=names,
         settings=settings,
@@ -278,7 +277,7 @@ def uncertain(
     converged = results["converged"]
     samples = {name: results[name] for name in names}
     return Bands(
-        path, chosen, assumed, samples, drawn.values, converged.sum(axis=0), drawn.redrawn, seed
+        path, chosen, assumed, samples, sample.values, converged.sum(axis=0), sample.redrawn, seed
     )
 
 
@@ -299,77 +298,55 @@ DEPTH = 0.010
 """The change of depth whose effect is reported, mm."""
 
 _DRAWS, _STEPS, _BEYOND = 128, 32, 1.6
-_NEVER = 1e12
 
 
 class ClosingBands(NamedTuple):
-    """Results of `notchflex show` on tolerances.
-
-    Attributes:
-        bands: The bands that the others were taken from.
-        notches: Numbers of the notches, from 1, that the tendon closes that closes one first.
-        tension: Tension that closes each of them, N, (n,); infinite beyond 1.6 times the tension
-            that closes all of the robot of the drawing.
-        angle: Angle at which it closes, rad, (n,).
-        load: Half the tension that closes the first notch, N.
-        tendon: That tendon, from 1.
-        total_angle: Total angle at that load, rad.
-        by_depth: Change of the total angle at that load if all notches are cut 10 µm deeper, rad;
-            NaN for notches without a depth.
-        shares: Parts of the variance of that angle, by `Bands.variance_shares`.
-    """
+    """Results of `notchflex show` on tolerances, n notches."""
 
     bands: Bands
-    notches: Int[np.ndarray, " n"]
-    tension: Band
-    angle: Band
-    load: float
-    tendon: int
-    total_angle: Band
-    by_depth: float
-    shares: dict[str, float]
+    notches: Int[np.ndarray, " n"]  # from 1: those that `tendon` closes
+    tension: Band  # N; infinite beyond 1.6 times what closes all notches of the drawing
+    angle: Band  # at which they close, rad
+    load: float  # half the tension that closes the first notch, N
+    tendon: int  # from 1: the one that closes a notch first
+    total_angle: Band  # at that load, rad
+    by_depth: float  # its change if all notches are cut 10 µm deeper, rad; NaN without a depth
+    shares: dict[str, float]  # of its variance; see `Bands.variance_shares`
 
 
 def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
-    """Propagate the tolerances of a robot to the closing of its notches.
-
-    Args:
-        robot: The robot, n notches.
-        table: Result of `closing` for it.
-
-    Returns:
-        The bands; None where no notch closes.
-    """
+    """Propagate the tolerances of a robot to the closing of its notches; None if none closes."""
     if not np.isfinite(table.tension).any():
         return None
     first = int(np.nanargmin(table.tension))
     tendon = int(table.tendon[first])
-    own = np.flatnonzero(np.isfinite(table.tension) & (table.tendon == tendon))
+    notches = np.flatnonzero(np.isfinite(table.tension) & (table.tendon == tendon))
     load = 0.5 * float(table.tension[first])
-    loads = np.linspace(0.0, _BEYOND * table.tension[own].max(), _STEPS)
+    loads = np.linspace(0.0, _BEYOND * table.tension[notches].max(), _STEPS)
     loads = np.sort(np.append(loads, load))
     names = ("total_angle", "notch_angle", "gap", "contact_force")
     bands = uncertain(robot, _pull(robot, tendon, loads), outputs=names, draws=_DRAWS)
-    gaps, forces = (bands.samples[name][:, :, own] for name in ("gap", "contact_force"))
-    stiffness = np.asarray(bands.path.chain.contact_stiffness)[own]
-    angles = bands.samples["notch_angle"][:, :, own]
+    gaps, forces = (bands.samples[name][:, :, notches] for name in ("gap", "contact_force"))
+    stiffness = np.asarray(bands.path.chain.contact_stiffness)[notches]
+    angles = bands.samples["notch_angle"][:, :, notches]
     tension, angle = _closing(loads, gaps, forces > gaps * stiffness, angles)
     step = int(np.searchsorted(loads, load))
     total = band(bands.samples["total_angle"][:, step])
     shares = bands.variance_shares("total_angle", step)
     by_depth = _by_depth(robot, _pull(robot, tendon, np.array([load])))
-    # Of tensions of which some are infinite.
-    finite = band(np.minimum(tension, _NEVER))
-    ends = (finite.low, finite.median, finite.high)
-    closing = Band(*(np.where(end < _NEVER, end, np.inf) for end in ends)), band(angle)
-    return ClosingBands(bands, own + 1, *closing, load, tendon, total, by_depth, shares)
+    # Of tensions of which some are infinite: huge numbers in their place have quantiles.
+    ends = vars(band(np.nan_to_num(tension, nan=np.nan))).values()
+    closing = Band(*(np.where(end <= loads[-1], end, np.inf) for end in ends)), band(angle)
+    return ClosingBands(bands, notches + 1, *closing, load, tendon, total, by_depth, shares)
 
 
 def closing_document(closing_bands: ClosingBands) -> dict[str, Any]:
     """Return the document of `notchflex show --json` on tolerances, in output units."""
     return {
         "draws": closing_bands.bands.draws,
-        "tolerances": {one.value: one.written for one in closing_bands.bands.tolerances},
+        "tolerances": {
+            tolerance.value: tolerance.written for tolerance in closing_bands.bands.tolerances
+        },
         "assumed": list(closing_bands.bands.assumed),
         "tendon": closing_bands.tendon,
         "notches": closing_bands.notches,
@@ -382,9 +359,9 @@ def closing_document(closing_bands: ClosingBands) -> dict[str, Any]:
     }
 
 
-def _ends(one: Band, scale: float = 1.0) -> dict[str, Any]:
-    ends = {"low": one.low, "median": one.median, "high": one.high}
-    return {name: np.where(np.isfinite(end), end * scale, np.nan) for name, end in ends.items()}
+def _ends(percentiles: Band, scale: float = 1.0) -> dict[str, Any]:
+    ends = vars(percentiles).items()
+    return {name: np.where(np.isfinite(end), end * scale, np.nan) for name, end in ends}
 
 
 def _pull(robot: Robot, tendon: int, loads: Float[np.ndarray, " s"]) -> LoadPath:
@@ -400,22 +377,19 @@ def _closing(
     closed: Bool[np.ndarray, "d s n"],
     angles: Float[np.ndarray, "d s n"],
 ) -> tuple[Float[np.ndarray, "d n"], Float[np.ndarray, "d n"]]:
-    """Compute tension and angle at which each notch of each draw closes.
-
-    The gap falls almost evenly until it is closed and stands still then, so the last two open
-    steps are continued.
-    """
-    step = np.argmax(closed, axis=1)[:, None]
-    near, far = (
-        np.take_along_axis(gaps, np.maximum(step - back, 0), axis=1)[:, 0] for back in (1, 2)
+    """Compute tension and angle at which each notch of each draw closes."""
+    # The gap falls almost evenly until it is closed and stands still then, so the last two open
+    # steps are continued.
+    first = np.argmax(closed, axis=1)
+    steps = [np.maximum(first - back, 0) for back in range(3)]
+    after, before, earlier = (loads[step] for step in steps)
+    angle, near, far = (
+        np.take_along_axis(values, step[:, None], axis=1)[:, 0]
+        for values, step in zip((angles, gaps, gaps), steps, strict=True)
     )
-    step = step[:, 0]
-    before, after = loads[np.maximum(step - 1, 0)], loads[step]
-    earlier = loads[np.maximum(step - 2, 0)]
     with np.errstate(divide="ignore", invalid="ignore"):
         extrapolated = before + near * (before - earlier) / (far - near)
-    tension = np.where(step > 1, np.clip(extrapolated, before, after), 0.5 * (before + after))
-    angle = np.take_along_axis(angles, step[:, None], axis=1)[:, 0]
+    tension = np.where(first > 1, np.clip(extrapolated, before, after), 0.5 * (before + after))
     closes = closed.any(axis=1)
     failed = np.isnan(gaps).any(axis=1)
     never = np.where(failed, np.nan, np.inf)
@@ -429,8 +403,8 @@ def _by_depth(robot: Robot, load: LoadPath) -> float:
     except InputError:  # no depth
         return float("nan")
     values = {name: depth + DEPTH * np.array([1.0, -1.0]) for name, depth in depths.items()}
-    found = batch(robot.replace(tolerance=None), values, load, outputs=("total_angle",))
-    deeper, shallower = found["total_angle"][:, 0]  # NaN where the spine is thinner than that
+    states = batch(robot.replace(tolerance=None), values, load, outputs=("total_angle",))
+    deeper, shallower = states["total_angle"][:, 0]  # NaN where the spine is thinner than that
     return 0.5 * float(deeper - shallower)
 
 
@@ -448,8 +422,8 @@ def band_columns(bands: Bands) -> dict[str, Sequence[Any]]:
             ends = [list(entries_of(bands.end(end), quantity)) for end in ENDS]
             for entries in zip(*ends, strict=True):
                 columns |= {
-                    f"{one.header}_{end}": one.values
-                    for one, end in zip(entries, ENDS, strict=True)
+                    f"{entry.header}_{end}": entry.values
+                    for entry, end in zip(entries, ENDS, strict=True)
                 }
     return columns
 
@@ -461,7 +435,7 @@ def band_document(bands: Bands) -> dict[str, Any]:
         "draws": bands.draws,
         "seed": bands.seed,
         "percentiles": [100.0 * level for level in LEVELS],
-        "tolerances": {one.value: one.written for one in bands.tolerances},
+        "tolerances": {tolerance.value: tolerance.written for tolerance in bands.tolerances},
         "assumed": list(bands.assumed),
         "redrawn": bands.redrawn,
         "steps": [
@@ -469,12 +443,12 @@ def band_document(bands: Bands) -> dict[str, Any]:
                 "step": step + 1,
                 "converged": converged,
                 **{
-                    one.key: {
-                        end: np.asarray(getattr(bands[one.name], end)[step]) * one.scale
-                        for end in ENDS
+                    quantity.key: {
+                        end: values[step] * quantity.scale
+                        for end, values in vars(bands[quantity.name]).items()
                     }
-                    for one in quantities
-                    if one.key
+                    for quantity in quantities
+                    if quantity.key
                 },
             }
             for step, converged in enumerate(bands.converged)

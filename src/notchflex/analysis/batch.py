@@ -26,6 +26,7 @@ from notchflex._summary import Displayed, Summary, short
 from notchflex._values import ByValue, frozen
 from notchflex.analysis.outputs import (
     DEFAULT_OUTPUTS,
+    LOADS,
     OUTPUTS,
     WORKS,
     UnknownOutputError,
@@ -108,7 +109,7 @@ class Batch(ByValue, Displayed, Mapping[str, np.ndarray]):
         """Why a row or step did not converge, in the shape of `converged`; empty where it did."""
         converged = self["converged"]
         reasons = np.full(converged.shape, "", object)
-        table, states = (one.reshape(len(converged), -1) for one in (reasons, converged))
+        table, states = (array.reshape(len(converged), -1) for array in (reasons, converged))
         for row in np.flatnonzero(~states.all(axis=1)).tolist():
             texts = [text for _, text in self._failures(row)]
             table[row] = np.where(states[row], "", texts)
@@ -220,15 +221,15 @@ def batch(
         >>> np.degrees(found["total_angle"].reshape(2, 3)).round(1).tolist()
         [[25.5, 49.8, 106.5], [26.4, 51.5, 111.6]]
     """
-    several = _robots(robots)
+    checked = _checked_robots(robots)
     message = "a batch needs a notchflex.Load or LoadPath, or some in order"
     listed = [loads] if isinstance(loads, Load) else one_or_several(loads, LoadPath, message)
-    paths = [load_path(one, _tendons(several)) for one in listed]
+    paths = [load_path(load, _tendons(checked)) for load in listed]
     if not paths or len({len(path) for path in paths}) > 1:
         raise InputError.WRONG_SHAPE("a batch needs one path or more, all of equally many steps")
     joined = LoadRows(paths[0] if len(paths) == 1 else join_paths(paths), len(paths[0]))
-    single = all(isinstance(one, Load) for one in listed)
-    return _solved(_rows(several, values, joined, product, options), options, single)
+    single = all(isinstance(load, Load) for load in listed)
+    return _solved(_rows(checked, values, joined, product, options), options, single)
 
 
 def solve_batch(
@@ -255,9 +256,9 @@ def solve_batch(
         >>> found["total_angle"].shape
         (100,)
     """
-    several = _robots(robots)
-    each = LoadRows(load_path(loads, _tendons(several)), 1)
-    return _solved(_rows(several, {}, each, False, options), options, True)
+    checked = _checked_robots(robots)
+    single_loads = LoadRows(load_path(loads, _tendons(checked)), 1)
+    return _solved(_rows(checked, {}, single_loads, False, options), options, True)
 
 
 def simulate_batch(
@@ -288,13 +289,13 @@ def simulate_batch(
     return batch(robots, {}, loads, **options)
 
 
-def _robots(robots: Any) -> list[Robot]:
+def _checked_robots(robots: Any) -> list[Robot]:
     """Return the robots that a caller gives, checked."""
     message = "a batch needs a notchflex.Robot, or some of them"
-    several = one_or_several(robots, Robot, message)
-    if not several or not all(isinstance(robot, Robot) for robot in several):
+    listed = one_or_several(robots, Robot, message)
+    if not listed or not all(isinstance(robot, Robot) for robot in listed):
         raise InputError.WRONG_TYPE(f"{message}; got {short_repr(robots)}")
-    return several
+    return listed
 
 
 def _tendons(robots: Sequence[Robot]) -> int:
@@ -309,27 +310,27 @@ def _rows(
     options: BatchOptions,
 ) -> BatchRows:
     """Return the rows of a batch."""
-    numbers = {name: _numbers(name, each) for name, each in values.items()}
-    sizes = {"robots": len(robots)} | {name: len(each) for name, each in numbers.items()}
-    sizes["loads"] = len(loads)
+    columns = {"robots": np.arange(len(robots))}
+    columns |= {name: _numbers(name, array) for name, array in values.items()}
+    columns["loads"] = np.arange(len(loads))
+    sizes = {name: len(column) for name, column in columns.items()}
     count, places = _places(sizes, product)
 
     def distinct(names: list[str]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """Return which combination of some names each row has, and the places of each."""
-        own = {name: sizes[name] for name in names}
-        number, own_places = _places(own, product)
+        """Return which combination of some names each row has, and the numbers of each."""
+        axes = {name: sizes[name] for name in names}
+        number, combinations = _places(axes, product)
+        numbers = {name: columns[name][index] for name, index in combinations.items()}
         if not product:
-            return np.arange(count) % number, own_places
+            return np.arange(count) % number, numbers
         index = [places[name] for name in names]
-        return np.ravel_multi_index(index, tuple(own.values())), own_places
+        return np.ravel_multi_index(index, tuple(axes.values())), numbers
 
-    of_loads = [name for name in numbers if name in (*TENDONS, *TIP)]
-    robot_of, of_robot = distinct(["robots", *(name for name in numbers if name not in of_loads)])
+    of_loads = [name for name in values if name in LOADS]
+    robot_of, of_robot = distinct(["robots", *(name for name in values if name not in LOADS)])
     path_of, of_path = distinct([*of_loads, "loads"])
-    which = of_robot.pop("robots")
-    varied = VariedRobots(robots, which, {name: numbers[name][at] for name, at in of_robot.items()})
-    which = of_path.pop("loads")
-    paths = loads.varied(which, {name: numbers[name][at] for name, at in of_path.items()})
+    varied = VariedRobots(robots, of_robot.pop("robots"), of_robot)
+    paths = loads.varied(of_path.pop("loads"), of_path)
     names = check_outputs(options.get("outputs", DEFAULT_OUTPUTS), (*OUTPUTS, *WORKS))
     outputs = tuple(dict.fromkeys([*names, "converged"]))
     check_refinement(refinement := options.get("refinement", 0))
@@ -343,11 +344,11 @@ def _numbers(name: str, values: ArrayLike) -> np.ndarray:
         numbers = np.asarray(values, float)
     except (TypeError, ValueError):
         numbers = np.zeros(())
-    if numbers.ndim == 0 or (numbers.ndim > 1 and name not in (*TENDONS, *TIP)):
+    if numbers.ndim == 0 or (numbers.ndim > 1 and name not in LOADS):
         raise InputError.WRONG_SHAPE(
             f"`{name}` needs numbers, one for each row; got {short_repr(values)}"
         )
-    if not np.isfinite(numbers).all() and name in (*TENDONS, *TIP):
+    if not np.isfinite(numbers).all() and name in LOADS:
         raise InputError.NOT_FINITE(f"`{name}` needs finite numbers; got {short_repr(values)}")
     return numbers
 
@@ -384,7 +385,7 @@ def _solved(rows: BatchRows, options: BatchOptions, single: bool) -> Batch:
         raise InputError.NO_DATA("a batch needs one row or more")
     if not rows.valid.any():
         raise next(iter(rows.robots.errors.values()))
-    arrays = rows.solved(threads, rows.tables(compiled=True), options.get("progress"))
+    arrays = rows.solved(threads, rows.tables(), options.get("progress"))
     if single:
         arrays = {name: array[:, 0] for name, array in arrays.items()}
     return Batch(arrays, rows)
@@ -392,17 +393,11 @@ def _solved(rows: BatchRows, options: BatchOptions, single: bool) -> Batch:
 
 @dataclass(frozen=True, eq=False)
 class LoadRows:
-    """Paths of loads of equally many steps.
+    """Paths of loads of equally many steps."""
 
-    Attributes:
-        load: All steps of all paths.
-        steps: Number of steps of a path.
-        tip: Force and moment at the tip in every step, where they are not those of `load`.
-    """
-
-    load: LoadPath
-    steps: int
-    tip: Float[np.ndarray, "s 6"] | None = None
+    load: LoadPath  # all steps of all paths
+    steps: int  # of each path
+    tip: Float[np.ndarray, "s 6"] | None = None  # force and moment, if not those of `load`
 
     def __len__(self) -> int:
         """Return the number of paths."""
@@ -421,25 +416,17 @@ class LoadRows:
         return load.commanding(dict(zip(TIP, np.split(self.tip[steps], 2, axis=1), strict=True)))
 
     def varied(self, which: Int[np.ndarray, " n"], values: Mapping[str, np.ndarray]) -> LoadRows:
-        """Return paths made of some of these and of numbers of their own.
-
-        Args:
-            which: Which of these each is made of.
-            values: Numbers of each by name.
-
-        Raises:
-            InputError: Numbers of another shape, that are not finite, or that no load can have.
-        """
+        """Return paths made of some of these and of numbers of their own by name."""
         if not values and np.array_equal(which, np.arange(len(self))):
             return self
         load = self.load[self.steps_of(which).ravel()]
         tables = {
-            name: self._table(name, each, load.numbers(name)) for name, each in values.items()
+            name: self._table(name, numbers, load.numbers(name)) for name, numbers in values.items()
         }
-        load = load.commanding({one: tables[one] for one in TENDONS if one in tables})
+        load = load.commanding({name: tables[name] for name in TENDONS if name in tables})
         if not any(name in TIP for name in tables):
             return replace(self, load=load)
-        tip = np.hstack([tables[one] if one in tables else load.numbers(one) for one in TIP])
+        tip = np.hstack([tables[name] if name in tables else load.numbers(name) for name in TIP])
         load = load.loaded(tip_force=NO_VECTOR, tip_moment=NO_VECTOR)
         return replace(self, load=load, tip=tip)
 
@@ -460,30 +447,15 @@ class LoadRows:
                 f"got numbers of shape {values.shape}"
             ) from None
 
-    def kinds(self, robot: Robot, paths: Int[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
-        """Return what acts on a robot along some paths, as bits; see `acting`."""
-        kinds = acting(self.load, robot, self.steps_of(paths), self.tip)
-        return np.bitwise_or.reduce(kinds, axis=1)
-
 
 @dataclass(frozen=True, eq=False)
 class BatchRows:
-    """Rows of a batch: robots and paths of loads.
-
-    Attributes:
-        robots: All robots.
-        loads: All paths.
-        robot_of: Number of the robot of each row.
-        path_of: Number of the path of each row.
-        outputs: Names of what is returned.
-        settings: Tolerance and limits of the solver.
-        refinement: More strain modes, as for `simulate`.
-    """
+    """Rows of a batch: robots and paths of loads."""
 
     robots: VariedRobots
     loads: LoadRows
-    robot_of: Int[np.ndarray, " rows"]
-    path_of: Int[np.ndarray, " rows"]
+    robot_of: Int[np.ndarray, " rows"]  # number of the robot of each row
+    path_of: Int[np.ndarray, " rows"]  # number of its path
     outputs: tuple[str, ...]
     settings: Settings
     refinement: int
@@ -500,43 +472,40 @@ class BatchRows:
         load = replace(load, tension=load.tension[:, tendons], stroke=load.stroke[:, tendons])
         return follow_path(robot, load, None, self.settings, self.refinement)
 
-    def tables(self, compiled: bool) -> Iterator[BatchTable]:
-        """Yield the valid rows by the programs that they run through.
-
-        Args:
-            compiled: Whether programs may make the chains of many robots.
-        """
+    def tables(self) -> Iterator[BatchTable]:
+        """Yield the valid rows by their programs, which make the chains of many robots."""
         rows = np.flatnonzero(self.valid)
-        if compiled and len(self.robots) > FEW:
-            few = [rows[:0]]
+        if len(self.robots) > FEW:
+            singly = [rows[:0]]
             for form in self.robots.forms(np.unique(self.robot_of[rows])):
-                own = rows[np.isin(self.robot_of[rows], form.members)]
-                for kind, part in self._by_kind(form.example, own):
-                    several = len(np.unique(self.robot_of[part])) > FEW
-                    chains = form.chains(kind, self.refinement) if several else None
+                of_form = rows[np.isin(self.robot_of[rows], form.members)]
+                for kind, part in self._by_kind(form.example, of_form):
+                    many = len(np.unique(self.robot_of[part])) > FEW
+                    chains = form.chains(kind, self.refinement) if many else None
                     if chains is None:
-                        few.append(part)
+                        singly.append(part)
                     else:
                         yield BatchTable(self, part, chains, kind)
-            rows = np.concatenate(few)
-        yield from self._one_by_one(rows)
+            rows = np.concatenate(singly)
+        yield from self.one_by_one(rows)
 
     def _by_kind(
         self, robot: Robot, rows: Int[np.ndarray, " k"]
     ) -> Iterator[tuple[int, Int[np.ndarray, " m"]]]:
         """Yield what acts, and rows where it does: no row changes the modes of another."""
-        kinds = self.loads.kinds(robot, self.path_of[rows])
+        loads, steps = self.loads, self.loads.steps_of(self.path_of[rows])
+        kinds = np.bitwise_or.reduce(acting(loads.load, robot, steps, loads.tip), axis=1)
         for kind in np.unique(kinds).tolist():
             yield kind, rows[kinds == kind]
 
-    def _one_by_one(self, rows: Int[np.ndarray, " k"]) -> Iterator[BatchTable]:
+    def one_by_one(self, rows: Int[np.ndarray, " k"]) -> Iterator[BatchTable]:
         """Yield rows whose robots are assembled in Python, by the structures of their chains."""
         groups: dict[Any, tuple[list[np.ndarray], dict[int, PreparedChain]]] = {}
         rows = rows[np.argsort(self.robot_of[rows], kind="stable")]
         numbers, first = np.unique(self.robot_of[rows], return_index=True)
-        for number, own in zip(numbers.tolist(), np.split(rows, first)[1:], strict=True):
+        for number, of_robot in zip(numbers.tolist(), np.split(rows, first)[1:], strict=True):
             robot = self.robots[number]
-            for kind, part in self._by_kind(robot, own):
+            for kind, part in self._by_kind(robot, of_robot):
                 ready = prepare_kind(robot, kind, self.refinement)
                 parts, chains = groups.setdefault((ready.static_structure, kind), ([], {}))
                 parts.append(part)
@@ -553,11 +522,10 @@ class BatchRows:
         """Solve the rows of tables, on several cores."""
         arrays: dict[str, np.ndarray] = {}
         count, done = len(self.robot_of), int((~self.valid).sum())
-        work = [(table, index) for table in tables for index in table.pieces(threads)]
-        solving = on_cores(lambda one: one[0].run(one[1]), work, threads)
+        work = [(table, rows) for table in tables for rows in table.pieces(threads)]
+        solving = on_cores(lambda task: task[0].run(task[1]), work, threads)
         with closing(solving) as pieces:
-            for (table, index), piece in zip(work, pieces, strict=True):
-                rows = table.rows[index]
+            for (_, rows), piece in zip(work, pieces, strict=True):
                 for name, values in piece.items():
                     _store(arrays, name, rows, values, count)
                 done += len(rows)
@@ -568,36 +536,29 @@ class BatchRows:
 
 @dataclass(frozen=True, eq=False)
 class BatchTable:
-    """Rows of a batch that run through one program.
-
-    Attributes:
-        batch: The batch.
-        rows: Numbers of these rows, ascending.
-        chains: Chains of their robots.
-        kind: What acts, as bits; see `acting`.
-    """
+    """Rows of a batch that run through one program."""
 
     batch: BatchRows
-    rows: Int[np.ndarray, " k"]
+    rows: Int[np.ndarray, " k"]  # their numbers, ascending
     chains: Chains
-    kind: int
+    kind: int  # what acts, as bits; see `acting`
 
-    def pieces(self, cores: int) -> Iterator[slice]:
-        """Return the rows of each call of the program: equal pieces, balanced over the cores."""
-        rows = len(self.rows)
-        max_size = max(size for limit, size in _PIECE_SIZES.items() if rows >= limit)
-        each = -(-rows // (max_size * cores))
-        size = -(-rows // (each * cores * WIDTH)) * WIDTH
-        return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
+    def pieces(self, cores: int) -> Iterator[Int[np.ndarray, " m"]]:
+        """Yield the rows of each call of the program: equal pieces, balanced over the cores."""
+        count = len(self.rows)
+        max_size = max(size for limit, size in _PIECE_SIZES.items() if count >= limit)
+        rounds = -(-count // (max_size * cores))
+        size = -(-count // (rounds * cores * WIDTH)) * WIDTH
+        return (self.rows[start : start + size] for start in range(0, count, size))
 
-    def run(self, index: slice) -> dict[str, np.ndarray]:
+    def run(self, rows: Int[np.ndarray, " m"]) -> dict[str, np.ndarray]:
         """Solve a piece of the rows: quantities in the world, NaN where they are not known."""
-        batch, rows = self.batch, self.rows[index]
+        batch = self.batch
         outputs, alike = self.solved(rows)
         if not alike.all():
             wrong = rows[~alike]
             alone = replace(batch, robot_of=batch.robot_of[wrong], path_of=batch.path_of[wrong])
-            for name, values in alone.solved(1, alone.tables(compiled=False)).items():
+            for name, values in alone.solved(1, alone.one_by_one(np.arange(len(wrong)))).items():
                 outputs[name][~alike] = values
         return outputs
 
@@ -606,11 +567,13 @@ class BatchTable:
     ) -> tuple[dict[str, np.ndarray], Bool[np.ndarray, " k"]]:
         """Solve some rows: quantities as `run` returns them, and which rows are right."""
         names, turn = self.batch.outputs, self.batch.loads.load.base_to_world
-        every = (one for name in names for one in WORKS.get(name, (name,)))
-        followed = self.followed(rows, (*dict.fromkeys(every),))
-        found = followed.outputs
-        outputs = found | {name: _work(found, name) for name in names if name in WORKS}
-        outputs = {name: outputs[name] for name in sorted(names)}
+        needed = (source for name in names for source in WORKS.get(name, (name,)))
+        followed = self.followed(rows, (*dict.fromkeys(needed),))
+        quantities = followed.outputs
+        outputs = {
+            name: _work(quantities, name) if name in WORKS else quantities[name]
+            for name in sorted(names)
+        }
         failed = ~outputs["converged"]
         for name, values in outputs.items():
             if name in REGISTERED and values.dtype.kind == "f":
@@ -624,39 +587,34 @@ class BatchTable:
         batch = self.batch
         chains, alike = self.chains.packed(batch.robot_of[rows])
         steps, bodies = batch.loads.steps_of(batch.path_of[rows]), self.chains.bodies(chains)
-        drawn = bool(self.kind & DRAWN)
-        acting = row_commands(batch.loads.load, steps, bodies, batch.loads.tip, drawn=drawn)
-        layout = self.chains.ready.command_layout(acting)
-        commands = np.asarray(layout.pack(acting, leading=2))
-        packed = Packed(chains, self.chains.structure, chains.ndim == 2)
-        numbers = np.array(batch.settings.numbers)
-        found = follow_row.rows(packed, Packed(commands, layout, True), numbers, names)
-        return FollowedRows(chains, alike, commands, layout, found)
+        load, tip = batch.loads.load, batch.loads.tip
+        commands = row_commands(load, steps, bodies, tip, drawn=bool(self.kind & DRAWN))
+        layout = self.chains.ready.command_layout(commands)
+        packed_commands = np.asarray(layout.pack(commands, leading=2))
+        outputs = follow_row.rows(
+            Packed(chains, self.chains.structure, chains.ndim == 2),
+            Packed(packed_commands, layout, True),
+            np.array(batch.settings.numbers),
+            names,
+        )
+        return FollowedRows(chains, alike, packed_commands, layout, outputs)
 
 
 class FollowedRows(NamedTuple):
-    """Rows of a batch that were followed along their paths.
+    """Rows of a batch that were followed along their paths."""
 
-    Attributes:
-        chains: Their chains, packed; one where all have the same.
-        alike: Which of the chains are right.
-        commands: Their loads, packed, rows and steps as leading axes.
-        layout: Layout of one load.
-        outputs: What was asked for, by name.
-    """
-
-    chains: np.ndarray
-    alike: Bool[np.ndarray, " k"]
-    commands: Float[np.ndarray, "k s command"]
-    layout: PytreeLayout
+    chains: np.ndarray  # packed; one where all have the same
+    alike: Bool[np.ndarray, " k"]  # which of the chains are right
+    commands: Float[np.ndarray, "k s command"]  # packed loads
+    layout: PytreeLayout  # of one load
     outputs: dict[str, np.ndarray]
 
 
-def _work(found: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+def _work(outputs: Mapping[str, np.ndarray], name: str) -> np.ndarray:
     """Return the work since rest, where force and length are 0, rows and steps as leading axes."""
     force, length = (
         (np.concatenate([np.zeros_like(after[:, :1]), after[:, :-1]], axis=1), after)
-        for after in (found[one] for one in WORKS[name])
+        for after in (outputs[quantity] for quantity in WORKS[name])
     )
     return np.cumsum(work_of_steps(force, length), axis=1)
 

@@ -61,7 +61,7 @@ class ClosingStatus(StrEnum):
     NOT_FOUND = "not found"
 
 
-# A tension of this many times the first guess that leaves a notch open is taken as "never".
+# A notch that stays open after the first guess was doubled so often never closes.
 _DOUBLINGS = 6
 # Trials between a tension that leaves a notch open and one where the solver fails.
 _TRIALS = 12
@@ -77,16 +77,7 @@ _ROUNDS = 200
 def closing_tensions(
     overlap: Overlap, guess: Float[np.ndarray, " m"], precision: float = PRECISION
 ) -> tuple[Float[np.ndarray, " m"], np.ndarray]:
-    """Find the tension that closes each notch, and a status for each.
-
-    Args:
-        overlap: The overlap of all notches, each at its own tension.
-        guess: Tensions to begin from, N; 2 ** 6 times that is the largest one tried.
-        precision: Relative precision of a tension.
-
-    Returns:
-        Tensions (N), NaN where none was found, and statuses (`ClosingStatus`).
-    """
+    """Find the tension that closes each notch, N, NaN where none was found; and its status."""
     low, high, failed = _bracket(overlap, guess)
     bracketed = np.isfinite(high)
     tension, precise = find_roots(overlap, low, np.where(bracketed, high, low), precision)
@@ -129,20 +120,9 @@ def find_roots(
     high: Float[np.ndarray, " m"],
     precision: float = PRECISION,
 ) -> tuple[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
-    """Find roots by false position, bisecting where that stalls.
-
-    After a failed solve the next trials are elsewhere in the bracket, ever closer to its lower end.
-
-    Args:
-        overlap: The overlap of all notches, each at its own tension.
-        low: Tensions (N) that leave the notches open; of one that is not searched, `high`.
-        high: Tensions (N) that close them.
-        precision: Relative precision of a root.
-
-    Returns:
-        The roots, and whether each is known: to that precision, or to 1e-3 where the solver
-        fails nearby.
-    """
+    """Find roots by false position, bisecting where that stalls, and whether each is precise."""
+    # `low` leaves a notch open, `high` closes it; both are the same for one that is not searched.
+    # After a failed solve the next trials are elsewhere in the bracket, ever closer to its low end.
     # `scipy.optimize.elementwise.find_root` gives a notch up at its first NaN. Of 9 ready robots it
     # solves 2221 states for the same roots, this one 1274 (wrist A: 281 and 67; York: 242 and 433).
     searched = low < high
@@ -156,7 +136,7 @@ def find_roots(
         with np.errstate(divide="ignore", invalid="ignore"):
             part = at_low / (at_low - at_high)
         part = np.where((slow > 3) | ~((part > 0.0) & (part < 1.0)), 0.5, part)
-        part = np.where(misses > 0, 0.6 ** np.maximum(misses, 1), part)
+        part = np.where(misses > 0, 0.6**misses, part)
         trial = low + part * (high - low)
         value = np.where(open_still, overlap(trial, open_still), np.nan)
         up, down = value > 0.0, value <= 0.0
@@ -249,8 +229,7 @@ class Closing(Displayed):
         """
         closes = np.flatnonzero(np.isfinite(self.tension))
         rows = np.arange(len(closes))
-        unit = np.zeros((len(closes), self.robot.number_of_tendons))
-        unit[rows, self.tendon[closes] - 1] = 1.0
+        unit = np.eye(self.robot.number_of_tendons)[self.tendon[closes] - 1]
         load = LoadPath((1.0 - _BELOW) * self.tension[closes, None] * unit)
         path = ForwardModel(self.robot, load, from_rest=True).solve(self.robot, load)
         along = [*directions(path), Change(load_change(path, LoadPath(load.tension + unit)), None)]
@@ -299,14 +278,13 @@ def closing(robot: Robot) -> Closing:
     height = np.asarray(rods.length.sum(-1))
     section = rods.section
     arm = moment_arms(chain)
-    tendon = np.argmax(arm, axis=1)
-    longest = arm[np.arange(len(arm)), tendon]
-    if np.isfinite(closing_angle).all():
+    tendon, longest = arm.argmax(axis=1), arm.max(axis=1)
+    has_spine = np.isfinite(closing_angle)
+    if has_spine.all():
         tension, status = _tensions(prepare(robot), tendon, longest, closing_angle)
         contact_angle = closing_angle
     else:
         tension, contact_angle, status = _edge_closing(prepare(robot), tendon, longest)
-    has_spine = np.isfinite(closing_angle)
     elastic = np.where(has_spine, closing_angle / height, np.nan)
     first = jax.tree.map(lambda leaf: leaf[:, 0], section)
     outer, peak = _strains(chain.law, first, elastic, chain.law.rest(first))
@@ -331,11 +309,8 @@ def _strains(law: SectionLaw, sections: FibreSection, curvature: Any, memory: An
 
 
 def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
-    """Compute the moment arm of every tendon about the neutral axis of every notch at rest, mm.
-
-    Positive where it bends the notch toward its direction; 0 where it does not run. The chain must
-    be assembled with `flat=False`.
-    """
+    """Return the arm of every tendon about each neutral axis at rest, mm; 0 where none runs."""
+    # Positive where the tendon bends the notch toward its direction; needs a chain of `flat=False`.
     entry_x = np.einsum("nba,tb->nta", chain.notch_frame, chain.tendon_entry)[..., 0]
     spine = np.where(np.asarray(chain.rods.has_closure) > 0.0, chain.rods.end_offset[:, 0], 0.0)
     arm = np.zeros((chain.flexures, chain.tendons))
@@ -360,15 +335,15 @@ def _tensions(
         return tension, status
     stiffness = np.asarray(chain.contact_stiffness)
     # As many rows as notches, whichever are searched: one compiled program.
-    which, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
+    searched, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
 
     def overlap(tension: Float[np.ndarray, " m"], _: Bool[np.ndarray, " m"]) -> np.ndarray:
         value = np.zeros((chain.flexures, chain.tendons))
-        value[rows, tendon[which]] = np.resize(tension, chain.flexures)
+        value[rows, tendon[searched]] = np.resize(tension, chain.flexures)
         force, gap, converged = solve_contacts(
             ready, tension_commands(value), ready.rest, Settings()
         )
-        overlap = force[rows, which] / stiffness[which] - gap[rows, which]
+        overlap = force[rows, searched] / stiffness[searched] - gap[rows, searched]
         return np.where(converged, overlap, np.nan)[: len(notches)]
 
     linear = np.asarray(chain.stiffness)[notches, 0] * closing_angle[notches] / arm[notches]
@@ -379,10 +354,8 @@ def _tensions(
 def _edge_closing(
     ready: PreparedChain, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], np.ndarray]:
-    """Find tension, angle and status of closing for notches with edges on rigid pieces.
-
-    The tendon is pulled in steps from rest, which brackets the tension where an edge touches.
-    """
+    """Find tension, angle and status of closing for notches with edges on rigid pieces."""
+    # The tendon is pulled in steps from rest, which brackets the tension where an edge touches.
     tension, angle = (np.full(ready.chain.flexures, np.nan) for _ in range(2))
     status = np.full(ready.chain.flexures, ClosingStatus.NEVER, dtype=object)
     for number in np.unique(tendon):
@@ -408,7 +381,7 @@ def _by_one_tendon(
     closes = touching.any(axis=0)
     after = np.maximum(touching.argmax(axis=0), 1)
 
-    def at(tension: Float[np.ndarray, " m"]) -> tuple[np.ndarray, np.ndarray]:
+    def evaluate(tension: Float[np.ndarray, " m"]) -> tuple[np.ndarray, np.ndarray]:
         """Compute overlap and angle of every notch, each at its own tension, on one path."""
         order = np.argsort(tension)
         back = np.argsort(order)
@@ -416,8 +389,8 @@ def _by_one_tendon(
         return overlap[back, notches], angle[back, notches]
 
     low, high = (np.where(closes, steps[step], steps[-1]) for step in (after - 1, after))
-    tension, precise = find_roots(lambda tension, _: at(tension)[0], low, high)
-    _, angle = at(tension)
+    tension, precise = find_roots(lambda tension, _: evaluate(tension)[0], low, high)
+    _, angle = evaluate(tension)
     closed = closes & precise & np.isfinite(angle)
     failed = ~np.isfinite(overlap[:, notches]).all(axis=0)
     status = statuses(closed, np.asarray(~closes & ~failed))
@@ -448,19 +421,11 @@ _OUTPUTS = ("contact_force", "gap", "converged")
 def closing_tensions_of(
     robot: Robot, values: Mapping[str, Float[np.ndarray, " robots"]]
 ) -> Float[np.ndarray, "robots n"]:
-    """Find the tension that closes every notch of many robots, as `closing` does for one.
-
-    Args:
-        robot: The robot that is varied.
-        values: Numbers of the robots by name.
-
-    Returns:
-        Base tensions, N; NaN where none was found, or where the numbers make no valid robot.
-    """
-    own = closing(robot)
+    """Find the tensions (N) that close the notches of many robots, as `closing` does for one."""
+    nominal = closing(robot)
     chain = assemble(robot, flat=False)
-    closing_angle, arm = closing_angles(chain.rods), moment_arms(chain)
-    unit = np.eye(chain.tendons)[own.tendon - 1]
+    closing_angle = np.asarray(closing_angles(chain.rods))
+    unit = np.eye(chain.tendons)[nominal.tendon - 1]
     robots = VariedRobots.of(robot, values)
     tension = np.full((len(robots), chain.flexures), np.nan)
     valid = np.setdiff1d(np.arange(len(robots)), [*robots.errors])
@@ -471,16 +436,18 @@ def closing_tensions_of(
         for number in valid.tolist():
             tension[number] = closing(robots[number]).tension
         return tension
-    longest = arm[np.arange(len(arm)), own.tendon - 1]
-    notches = np.flatnonzero((longest > 0.0) & (np.asarray(closing_angle) > 0.0))
+    longest = moment_arms(chain).max(axis=1)
+    notches = np.flatnonzero((longest > 0.0) & (closing_angle > 0.0))
     with np.errstate(divide="ignore"):
-        linear = np.asarray(chain.stiffness)[:, 0] * np.asarray(closing_angle) / longest
-    guess = np.where(np.isfinite(own.tension), _FIRST * own.tension, linear)[notches]
+        linear = np.asarray(chain.stiffness)[:, 0] * closing_angle / longest
+    guess = np.where(np.isfinite(nominal.tension), _FIRST * nominal.tension, linear)[notches]
     # The root does not depend on the stiffness: that of one robot serves for all.
     stiffness = np.asarray(chain.contact_stiffness)[notches]
     table, alike = chains.packed(valid)
-    known = replace(chains, packed=lambda numbers: (table[numbers], alike[numbers]))
-    some = VariedRobots.of(robot, {name: each[valid] for name, each in values.items()})
+    packed_chains = replace(chains, packed=lambda numbers: (table[numbers], alike[numbers]))
+    valid_robots = VariedRobots.of(
+        robot, {name: numbers[valid] for name, numbers in values.items()}
+    )
 
     def overlap(
         tension: Float[np.ndarray, " rows"], mask: Bool[np.ndarray, " rows"]
@@ -488,10 +455,10 @@ def closing_tensions_of(
         """Compute contact force / stiffness - gap of the masked rows: robots by notches."""
         places = np.flatnonzero(mask)
         numbers, notch = np.divmod(places, len(notches))
-        load, each = LoadPath(tension[places, None] * unit[notch]), np.arange(len(places))
-        rows = BatchRows(some, LoadRows(load, 1), numbers, each, _OUTPUTS, DEFAULT, 0)
-        solved = rows.solved(number_of_cores(), [BatchTable(rows, each, known, 0)])
-        force, gap = (solved[name][each, 0, notches[notch]] for name in ("contact_force", "gap"))
+        load, trials = LoadPath(tension[places, None] * unit[notch]), np.arange(len(places))
+        rows = BatchRows(valid_robots, LoadRows(load, 1), numbers, trials, _OUTPUTS, DEFAULT, 0)
+        solved = rows.solved(number_of_cores(), [BatchTable(rows, trials, packed_chains, 0)])
+        force, gap = (solved[name][trials, 0, notches[notch]] for name in ("contact_force", "gap"))
         overlaps = np.full(len(tension), np.nan)
         overlaps[places] = force / stiffness[notch] - gap
         return overlaps
@@ -506,59 +473,34 @@ def closing_tensions_of(
 
 
 def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict[str, Any]]:
-    """Return geometry, section and closing of every notch, base to tip.
-
-    Args:
-        robot: The robot, n notches, t tendons.
-        closing_table: What `closing` returned of it; found anew where not given.
-
-    Returns:
-        n rows with the values of the robot file, their units in their names, and
-
-        * `area_mm2` and `second_moment_mm4` of the section that the cut leaves, where it is
-          weakest; `centroid_mm` (from the tube axis toward the spine) where there is a spine,
-        * `moment_arm_mm`, t numbers: how far each tendon runs from the neutral axis, positive
-          where it bends the notch toward its direction, 0 where it does not go,
-        * `closing_angle_deg`, `closing_tendon` (from 1: the one with the longest arm),
-          `closing_tension_N` (of that tendon, pulled from rest; NaN if none was found),
-          `closing_status` ("closes", "never", or "not found" where the solver failed),
-          `closing_outer_strain` (Pacheco 2021, eq. 16) and `closing_peak_strain` (farthest fibre),
-          both NaN without a spine.
-
-    Example:
-        >>> from notchflex import load_robot
-        >>> row = notch_table(load_robot("pacheco2021-a"))[0]
-        >>> round(row["closing_angle_deg"], 2), round(row["moment_arm_mm"][0], 3)
-        (30.63, 1.387)
-    """
+    """Return geometry, section and closing of every notch as a row, units in the names."""
     table = closing(robot) if closing_table is None else closing_table
     arms = moment_arms(assemble(robot, flat=False))
     placed = list(zip(robot.notches, sites_of(robot), strict=True))
-    described = {each: _description(*each, robot.tube) for each in dict.fromkeys(placed)}
+    described = {
+        placed_notch: _description(*placed_notch, robot.tube)
+        for placed_notch in dict.fromkeys(placed)
+    }
     return [
         {
             "notch": index + 1,
-            **described[each],
+            **described[placed_notch],
+            # Of every tendon, positive where it bends the notch toward itself, 0 where none runs.
             "moment_arm_mm": arms[index].tolist(),
             "closing_angle_deg": float(table.angle[index]) * DEGREES,
+            # The tendon with the longest arm, from 1; its tension, pulled from rest.
             "closing_tendon": int(table.tendon[index]),
             "closing_tension_N": float(table.tension[index]),
             "closing_status": str(table.status[index]),
             "closing_outer_strain": float(table.outer_strain[index]),
             "closing_peak_strain": float(table.peak_strain[index]),
         }
-        for index, each in enumerate(placed)
+        for index, placed_notch in enumerate(placed)
     ]
 
 
 def named_values(notch: Notch) -> dict[str, Any]:
-    """Return the values of a notch as in a robot file, their units in their names.
-
-    Example:
-        >>> from notchflex import load_robot
-        >>> list(named_values(load_robot("pacheco2021-a").notches[0]))[:3]
-        ['kind', 'cut', 'depth_mm']
-    """
+    """Return the values of a notch as in a robot file, their units in their names."""
     values: dict[str, Any] = {}
     for name, field in fields_of(type(notch)).items():
         unit = unit_of(field)
@@ -569,13 +511,13 @@ def named_values(notch: Notch) -> dict[str, Any]:
 
 
 def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
-    one = rod_at(site, notch, tube)
-    section = one.section
+    rod = rod_at(site, notch, tube)
+    section = rod.section
     weakest = int(np.argmin(section.second_moment_weak))
-    values: dict[str, Any] = {
+    values: dict[str, Any] = {  # of the weakest section
         "area_mm2": float(section.area[weakest]),
         "second_moment_mm4": float(section.second_moment_weak[weakest]),
     }
-    if float(one.has_closure) > 0.0:  # opposite a spine
+    if float(rod.has_closure) > 0.0:  # opposite a spine; from the tube axis toward it
         values["centroid_mm"] = tube.outer_radius - float(section.edge_spine[weakest])
     return named_values(notch) | values

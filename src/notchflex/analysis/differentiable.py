@@ -20,9 +20,8 @@ from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.batch import BatchRows, BatchTable, FollowedRows, LoadRows
 from notchflex.analysis.forward_model import ForwardModel
-from notchflex.analysis.outputs import STEPS, OutputTable, check_outputs
+from notchflex.analysis.outputs import LOADS, STEPS, OutputTable, check_outputs, slices_of
 from notchflex.analysis.slopes import (
-    LOADS,
     SLOPING,
     changes,
     derivatives,
@@ -106,7 +105,7 @@ def differentiable(
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     if not names or len(set(names)) < len(names):
         raise InputError.NO_DATA("parameters must name at least one number, and none of them twice")
-    start = {name: jnp.asarray(at) for name, at in start_of(robot, path, names).items()}
+    start = {name: jnp.asarray(value) for name, value in start_of(robot, path, names).items()}
     return Differentiable(
         robot, path, start, check_outputs(outputs), settings or DEFAULT, refinement
     )
@@ -151,7 +150,8 @@ class Differentiable(Displayed):
 
     def _summary(self) -> Summary:
         shapes = {
-            name: "×".join(map(str, at.shape)) or "a number" for name, at in self.start.items()
+            name: "×".join(map(str, value.shape)) or "a number"
+            for name, value in self.start.items()
         }
         rows = [*shapes.items(), ("outputs", ", ".join(self.outputs))]
         title = f"Function of {self.robot.name} under {len(self.load)} loads"
@@ -190,7 +190,7 @@ class Differentiable(Displayed):
             InputError: Values of another name or shape, a robot that cannot exist, or a load that
                 does not converge.
         """
-        at, along = self._complete(values), self._complete(direction)
+        point, along = self._complete(values), self._complete(direction)
         along = {name: along[name] if name in direction else 0.0 * along[name] for name in along}
         size = max(float(jnp.max(jnp.abs(step))) for step in along.values())
         if size == 0.0:
@@ -199,10 +199,10 @@ class Differentiable(Displayed):
             )
 
         def outputs(part: float) -> dict[str, np.ndarray]:
-            moved = {name: at[name] + part * along[name] for name in at}
+            moved = {name: point[name] + part * along[name] for name in point}
             path = self._path(moved).raise_if_failed()
-            every = {name: np.asarray(getattr(path, name)) for name in self.outputs}
-            return {name: one for name, one in every.items() if one.dtype != bool}
+            arrays = {name: np.asarray(getattr(path, name)) for name in self.outputs}
+            return {name: array for name, array in arrays.items() if array.dtype != bool}
 
         middle = outputs(0.0)
 
@@ -217,7 +217,7 @@ class Differentiable(Displayed):
 
     def _path(self, values: Mapping[str, Any]) -> EquilibriumPath:
         """Solve the path at some values."""
-        numbers = tuple((name, float(at)) for name, at in values.items() if name not in LOADS)
+        numbers = tuple((name, float(value)) for name, value in values.items() if name not in LOADS)
         return self.model.solve(_varied(self.robot, numbers), self.load.commanding(values))
 
     def _complete(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
@@ -232,15 +232,18 @@ class Differentiable(Displayed):
             raise InputError.UNKNOWN_NAME(
                 f"`{unknown[0]}` is not one of the parameters {', '.join(self.start)}"
             )
-        return {name: self._value(name, values.get(name, at)) for name, at in self.start.items()}
+        return {
+            name: self._value(name, values.get(name, present))
+            for name, present in self.start.items()
+        }
 
     def _value(self, name: str, value: Any) -> Array:
         shape = self.start[name].shape
         if isinstance(value, Tracer) and (value.shape, value.dtype) == (shape, float):
             return value  # JAX would compile even a conversion that changes nothing
         try:
-            plain = [one for one in jax.tree.leaves(value) if not isinstance(one, Tracer)]
-            if any(np.asarray(one).dtype.kind in "USO" for one in plain):
+            plain = [leaf for leaf in jax.tree.leaves(value) if not isinstance(leaf, Tracer)]
+            if any(np.asarray(leaf).dtype.kind in "USO" for leaf in plain):
                 raise TypeError("text")
             return jnp.broadcast_to(jnp.asarray(value, float), shape)
         except (TypeError, ValueError):
@@ -256,16 +259,25 @@ class Differentiable(Displayed):
 
     @cached_property
     def _solver(self) -> VectorSolver:
-        start = {name: np.asarray(at) for name, at in self.start.items()}
+        start = {name: np.asarray(value) for name, value in self.start.items()}
         return VectorSolver(start, self.outputs, self._path, self.refinement)
 
     @cached_property
     def _traced(self) -> Callable[[dict[str, Array]], OutputTable]:
         """The function of named values for JAX, as one program: JAX compiles each step else."""
-        function = outputs_function(self._solver)
-        return jax.jit(
-            lambda values: function(jnp.concatenate([values[name].ravel() for name in self.start]))
-        )
+        # Invalid values give NaN for numbers and false for flags, as a program cannot raise.
+        solver = self._solver
+
+        def function(named: dict[str, Array]) -> OutputTable:
+            point = jnp.concatenate([named[name].ravel() for name in self.start])
+            flat = _VALUES.bind(point, solver=solver)
+            table = OutputTable()
+            for name, (part, shape, kind) in solver.forms.items():
+                values = flat[part].reshape(shape)
+                table[name] = values if kind == "f" else as_kind(jnp.nan_to_num(values), kind)
+            return table
+
+        return jax.jit(function)
 
 
 @lru_cache(maxsize=16)
@@ -282,24 +294,17 @@ def _varied(robot: Robot, values: tuple[tuple[str, float], ...]) -> Robot:
 
 @dataclass(frozen=True, eq=False)
 class VectorSolver:
-    """Outputs and their derivatives by compiled programs, for rows of plain values.
+    """Outputs and their derivatives by compiled programs, for rows of plain values."""
 
-    Attributes:
-        start: Present values of the parameters, by name.
-        outputs: Names of the outputs.
-        solve: Solves the path at named values; raises `InputError` for invalid values.
-        refinement: More strain modes.
-    """
-
-    start: Mapping[str, np.ndarray]
+    start: Mapping[str, np.ndarray]  # present values of the parameters
     outputs: tuple[str, ...]
-    solve: Callable[[Mapping[str, Any]], EquilibriumPath]
+    solve: Callable[[Mapping[str, Any]], EquilibriumPath]  # raises `InputError` for invalid values
     refinement: int
 
     @cached_property
     def first(self) -> Float[np.ndarray, " n"]:
         """The present values as a row."""
-        return np.concatenate([at.ravel() for at in self.start.values()])
+        return np.concatenate([value.ravel() for value in self.start.values()])
 
     @cached_property
     def _path(self) -> EquilibriumPath:
@@ -310,8 +315,10 @@ class VectorSolver:
     def forms(self) -> dict[str, tuple[slice, tuple[int, ...], str]]:
         """Where every output is in a row of them, its shape, and its kind of numbers."""
         values = self.table(self.first)
-        parts = _slices(values)
-        return {name: (parts[name], one.shape, one.dtype.kind) for name, one in values.items()}
+        parts = slices_of(values)
+        return {
+            name: (parts[name], array.shape, array.dtype.kind) for name, array in values.items()
+        }
 
     @cached_property
     def size(self) -> int:
@@ -322,46 +329,46 @@ class VectorSolver:
     def _sloping(self) -> tuple[str, ...]:
         return tuple(name for name in self.outputs if name in SLOPING)
 
-    def table(self, at: Float[np.ndarray, " n"]) -> dict[str, np.ndarray]:
+    def table(self, point: Float[np.ndarray, " n"]) -> dict[str, np.ndarray]:
         """Return the outputs; raise `InputError` for values that no robot or load can have."""
-        path = self._path_at(at)
+        path = self._path_at(point)
         values = {name: np.asarray(getattr(path, name)) for name in self.outputs}
         for name in self._sloping if not path.converged.all() else ():
             values[name] = values[name].copy()
             values[name][~path.converged] = np.nan
         return values
 
-    def values(self, at: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k m"]:
+    def values(self, points: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k m"]:
         """Return the outputs of rows of values, as rows; NaN where values are refused."""
 
-        def single(at: np.ndarray) -> np.ndarray:
-            return self._packed({name: one[None] for name, one in self.table(at).items()})
+        def single(point: np.ndarray) -> np.ndarray:
+            return self._packed({name: array[None] for name, array in self.table(point).items()})
 
-        def several(table: BatchTable, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def batched(table: BatchTable, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             outputs, alike = table.solved(rows)
             return self._packed(outputs), alike
 
-        return self._each(single, several, self.size, at)
+        return self._each(single, batched, self.size, points)
 
     def along(
-        self, at: Float[np.ndarray, "k n"], change: Float[np.ndarray, "j n"]
+        self, points: Float[np.ndarray, "k n"], change: Float[np.ndarray, "j n"]
     ) -> Float[np.ndarray, "j m"]:
         """Return the changes of the outputs along changes of the values."""
 
-        def single(at: np.ndarray, change: np.ndarray) -> np.ndarray:
-            path = self._path_at(at)
+        def single(point: np.ndarray, change: np.ndarray) -> np.ndarray:
+            path = self._path_at(point)
             directions = changes(path, (*self.start,), change)
             return self._packed(derivatives(path, directions, self._sloping))
 
-        return self._each(single, self._along, self.size, at, change)
+        return self._each(single, self._along, self.size, points, change)
 
     def back(
-        self, at: Float[np.ndarray, "k n"], weights: Float[np.ndarray, "j m"]
+        self, points: Float[np.ndarray, "k n"], weights: Float[np.ndarray, "j m"]
     ) -> Float[np.ndarray, "j n"]:
         """Return the derivatives of weighted sums of the outputs by the values."""
 
-        def single(at: np.ndarray, weights: np.ndarray) -> np.ndarray:
-            path = self._path_at(at)
+        def single(point: np.ndarray, weights: np.ndarray) -> np.ndarray:
+            path = self._path_at(point)
             parts = {name: self.forms[name] for name in self._sloping}
             gradients = [
                 path_gradient(
@@ -370,9 +377,9 @@ class VectorSolver:
                 )
                 for row in weights
             ]
-            return np.stack([gradient_by(path, one, (*self.start,)) for one in gradients])
+            return np.stack([gradient_by(path, gradient, (*self.start,)) for gradient in gradients])
 
-        return self._each(single, self._back, len(self.first), at, weights)
+        return self._each(single, self._back, len(self.first), points, weights)
 
     def _packed(self, by_name: Mapping[str, np.ndarray]) -> Float[np.ndarray, "k m"]:
         """Return outputs or their changes side by side; 0 for what has no change."""
@@ -384,44 +391,45 @@ class VectorSolver:
     def _each(
         self,
         single: Callable[..., np.ndarray],
-        several: Callable[..., tuple[np.ndarray, Bool[np.ndarray, " k"]]],
+        batched: Callable[..., tuple[np.ndarray, Bool[np.ndarray, " k"]]],
         size: int,
-        at: np.ndarray,
+        points: np.ndarray,
         *others: np.ndarray,
     ) -> np.ndarray:
         """Evaluate one row, with some directions, or rows, which are solved at once if possible."""
-        if len(at) == 1:
-            return self._safe(single, size, at[0], *others)
-        results, solved = np.empty((len(at), size)), np.zeros(len(at), bool)
-        places = np.flatnonzero((np.isfinite(at) & (at >= self._least)).all(axis=1))
-        table = self._rows(at[places]) if len(places) else None
+        if len(points) == 1:
+            return self._safe(single, size, points[0], *others)
+        results, solved = np.empty((len(points), size)), np.zeros(len(points), bool)
+        places = np.flatnonzero((np.isfinite(points) & (points >= self._least)).all(axis=1))
+        table = self._rows(points[places]) if len(places) else None
         # Loads on what weighs something depend on the numbers of the robot.
         weighs = bool(self._numbers) and self._path.chain.loaded and bool(others)
         if table is not None and not weighs:
-            pieces = [table.rows[index] for index in table.pieces(number_of_cores())]
+            pieces = list(table.pieces(number_of_cores()))
             solving = on_cores(
-                lambda rows: several(table, rows, *(one[places[rows]] for one in others)), pieces
+                lambda rows: batched(table, rows, *(vectors[places[rows]] for vectors in others)),
+                pieces,
             )
             for rows, (values, alike) in zip(pieces, solving, strict=True):
                 results[places[rows]], solved[places[rows]] = values, alike
         for row in np.flatnonzero(~solved):
-            own = (one[row : row + 1] for one in others)
-            results[row] = self._safe(single, size, at[row], *own)
+            directions = (vectors[row : row + 1] for vectors in others)
+            results[row] = self._safe(single, size, points[row], *directions)
         return results
 
     def _safe(
-        self, single: Callable[..., np.ndarray], size: int, at: np.ndarray, *others: np.ndarray
+        self, single: Callable[..., np.ndarray], size: int, point: np.ndarray, *others: np.ndarray
     ) -> np.ndarray:
         """Evaluate one row; NaN where its values are refused."""
         try:
-            return single(at, *others)
+            return single(point, *others)
         except InputError:
             return np.full((max(map(len, others), default=1), size), np.nan)
 
     @cached_property
     def _columns(self) -> dict[str, slice]:
         """Where the numbers of each name are in a row of values."""
-        return _slices(self.start)
+        return slices_of(self.start)
 
     @cached_property
     def _numbers(self) -> list[int]:
@@ -441,24 +449,24 @@ class VectorSolver:
     def _units(self) -> Float[np.ndarray, "n s command"]:
         """The change of the packed loads per unit of each value."""
         still = np.zeros((1, *self._path.commands.packed().shape))
-        units = [load_units(self._path, one) if one in LOADS else still for one in self.start]
+        units = [load_units(self._path, name) if name in LOADS else still for name in self.start]
         return np.concatenate(units)
 
-    def _rows(self, at: Float[np.ndarray, "k n"]) -> BatchTable | None:
+    def _rows(self, points: Float[np.ndarray, "k n"]) -> BatchTable | None:
         """Return values as rows of a batch, those that make robots; None if they need Python."""
-        path, every = self._path, np.arange(len(at))
-        distinct, robot_of = np.unique(at[:, self._numbers], axis=0, return_inverse=True)
+        path, row_numbers = self._path, np.arange(len(points))
+        distinct, robot_of = np.unique(points[:, self._numbers], axis=0, return_inverse=True)
         of_robots, of_loads = dict[str, np.ndarray](), dict[str, np.ndarray]()
         for name, start in self.start.items():
             if name in LOADS:
-                of_loads[name] = at[:, self._columns[name]].reshape(-1, *start.shape)
+                of_loads[name] = points[:, self._columns[name]].reshape(-1, *start.shape)
             else:
                 of_robots[name] = distinct[:, len(of_robots)]
         robots = VariedRobots([path.robot], np.zeros(len(distinct), int), of_robots)
-        loads = LoadRows(path.load, len(path)).varied(0 * every, of_loads)
+        loads = LoadRows(path.load, len(path)).varied(0 * row_numbers, of_loads)
         outputs = tuple(dict.fromkeys((*self.outputs, "converged")))
         settings = outputs, path.settings, self.refinement
-        rows = BatchRows(robots, loads, robot_of.reshape(-1), every, *settings)
+        rows = BatchRows(robots, loads, robot_of.reshape(-1), row_numbers, *settings)
         chain = path.chain
         kind = (
             LOADED * chain.loaded
@@ -474,12 +482,12 @@ class VectorSolver:
     def _steps(self, table: BatchTable, rows: np.ndarray) -> tuple[FollowedRows, StepLayouts, Any]:
         """Follow rows; return also what programs take of every step, rows and steps as axes."""
         followed, ready = table.followed(rows, STEPS), table.chains.ready
-        found = followed.outputs
-        rest = np.broadcast_to(ready.rest_vector, found["states"][:, :1].shape)
-        before = np.concatenate([rest, found["states"][:, :-1]], axis=1)
+        outputs = followed.outputs
+        rest = np.broadcast_to(ready.rest_vector, outputs["states"][:, :1].shape)
+        before = np.concatenate([rest, outputs["states"][:, :-1]], axis=1)
         structure, varies = table.chains.structure, bool(self._numbers)
         layouts = StepLayouts(structure, followed.layout, ready.state, self._sloping, varies)
-        return followed, layouts, (before, *(found[one] for one in STEPS), followed.commands)
+        return followed, layouts, (before, *(outputs[name] for name in STEPS), followed.commands)
 
     def _along(
         self, table: BatchTable, rows: np.ndarray, change: np.ndarray
@@ -490,11 +498,11 @@ class VectorSolver:
         by_robot, alike = table.chains.along(robots, change[:, self._numbers])
         tables = (*tables, np.einsum("kn,nsc->ksc", change, self._units))
         carried, by_row = np.zeros_like(tables[0][:, 0]), followed.chains.ndim == 2
-        which = (True, by_row, by_row, *(True,) * len(tables))
+        have_rows = (True, by_row, by_row, *(True,) * len(tables))
         parts: list[dict[str, np.ndarray]] = []
         for step in range(len(self._path)):
-            vectors = (carried, followed.chains, by_robot, *(one[:, step] for one in tables))
-            carried, by = tangent_step.rows(*map(Packed, vectors, repeat(None), which), layouts)
+            vectors = (carried, followed.chains, by_robot, *(array[:, step] for array in tables))
+            carried, by = tangent_step.rows(*map(Packed, vectors, repeat(None), have_rows), layouts)
             parts.append(by)
         turn = self._path.load.base_to_world
         slopes = {
@@ -512,16 +520,16 @@ class VectorSolver:
         turn, seeds = self._path.load.base_to_world, list[np.ndarray]()
         for name in self._sloping:
             part, shape, _ = self.forms[name]
-            own = weights[:, part].reshape(-1, *shape)
-            own = REGISTERED[name].turned(own, None if turn is None else turn.T)
-            seeds.append(own.reshape(*own.shape[:2], -1))
+            seed = weights[:, part].reshape(-1, *shape)
+            seed = REGISTERED[name].turned(seed, None if turn is None else turn.T)
+            seeds.append(seed.reshape(*seed.shape[:2], -1))
         tables = (*tables, np.concatenate(seeds, axis=2))
         carried, by_load = np.zeros_like(tables[0][:, 0]), np.zeros_like(followed.commands)
         by_chain = np.zeros((len(rows), layouts.chain.size))
         by_row = (True, followed.chains.ndim == 2, *(True,) * len(tables))
         counts = np.zeros((len(rows), 1), bool)
         for step in reversed(range(len(self._path))):
-            vectors = carried, followed.chains, *(one[:, step] for one in tables)
+            vectors = carried, followed.chains, *(array[:, step] for array in tables)
             before, by = adjoint_step.rows(*map(Packed, vectors, repeat(None), by_row), layouts)
             # No step beyond the last that counts: one that failed there must not matter.
             counts |= tables[-1][:, step].any(axis=1, keepdims=True)
@@ -533,14 +541,14 @@ class VectorSolver:
         gradient[:, self._numbers] += by_number
         return gradient, alike & followed.alike
 
-    def _path_at(self, at: Float[np.ndarray, " n"]) -> EquilibriumPath:
+    def _path_at(self, point: Float[np.ndarray, " n"]) -> EquilibriumPath:
         """Solve the path at some values; the last one is cached for its derivatives."""
-        if not np.isfinite(at).all():  # a tension that is not a number would mean a slack tendon
+        if not np.isfinite(point).all():  # a tension that is not a number would mean a slack tendon
             raise InputError.NOT_FINITE("values must be finite numbers")
-        key = at.tobytes()
+        key = point.tobytes()
         if key not in self._last:
-            parts = {name: at[part] for name, part in self._columns.items()}
-            shaped = {name: parts[name].reshape(one.shape) for name, one in self.start.items()}
+            parts = {name: point[part] for name, part in self._columns.items()}
+            shaped = {name: parts[name].reshape(start.shape) for name, start in self.start.items()}
             path = self.solve(shaped)
             self._last.clear()
             self._last[key] = path
@@ -551,66 +559,39 @@ class VectorSolver:
         return {}
 
 
-def _slices(arrays: Mapping[str, np.ndarray]) -> dict[str, slice]:
-    """Return where arrays are in a row of all their numbers."""
-    ends = np.cumsum([0, *(one.size for one in arrays.values())]).tolist()
-    return dict(zip(arrays, map(slice, ends, ends[1:]), strict=True))
-
-
-def outputs_function(solver: VectorSolver) -> Callable[[Array], OutputTable]:
-    """Wrap a solver as a function of JAX.
-
-    Invalid values give NaN for numbers and false for flags, as a program of JAX cannot raise.
-
-    Args:
-        solver: Gives outputs and derivatives.
-
-    Returns:
-        A function of a vector of values that JAX traces, differentiable once, forward and reverse.
-    """
-
-    def function(at: Array) -> OutputTable:
-        flat = _VALUES.bind(at, solver=solver)
-        table = OutputTable()
-        for name, (part, shape, kind) in solver.forms.items():
-            values = flat[part].reshape(shape)
-            table[name] = values if kind == "f" else as_kind(jnp.nan_to_num(values), kind)
-        return table
-
-    return function
-
-
 def _primitive(name: str, method: Callable[..., np.ndarray], size: Callable[..., int]) -> Primitive:
     """Make a primitive of rows of values and, for each, of a vector; see `VectorSolver`."""
     primitive = Primitive(f"notchflex_{name}")
 
     def evaluate(solver: VectorSolver, *arrays: Any) -> np.ndarray:
-        plain = [np.asarray(one) for one in arrays]
-        shape = np.broadcast_shapes(*(one.shape[:-1] for one in plain))
+        plain = [np.asarray(array) for array in arrays]
+        shape = np.broadcast_shapes(*(array.shape[:-1] for array in plain))
         if plain[0].size > plain[0].shape[-1]:
             plain[0] = np.broadcast_to(plain[0], (*shape, plain[0].shape[-1]))
-        rows = [one.reshape(-1, one.shape[-1]) for one in plain]
+        rows = [array.reshape(-1, array.shape[-1]) for array in plain]
         return method(solver, *rows).reshape(*shape, size(solver))
 
     def form(*arrays: Any, solver: VectorSolver) -> Any:
-        shape = np.broadcast_shapes(*(one.shape[:-1] for one in arrays))
+        shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
         return ShapedArray((*shape, size(solver)), np.dtype(float))
 
     def lowered(*arrays: Array, solver: VectorSolver) -> Array:
         # Compiled now: within a program of JAX nothing may be traced.
         rows = np.tile(solver.first, (min(prod(arrays[0].shape[:-1]), 2), 1))
-        evaluate(solver, rows, *(np.ones((len(rows), one.shape[-1])) for one in arrays[1:]))
+        evaluate(solver, rows, *(np.ones((len(rows), array.shape[-1])) for array in arrays[1:]))
         shape = jax.ShapeDtypeStruct(form(*arrays, solver=solver).shape, float)
         return jax.pure_callback(partial(evaluate, solver), shape, *arrays)
 
     def mapped(arrays: Any, axes: Any, *, solver: VectorSolver) -> tuple[Array, int]:
         moved = [
-            jnp.expand_dims(one, 0) if axis is batching.not_mapped else jnp.moveaxis(one, axis, 0)
-            for one, axis in zip(arrays, axes, strict=True)
+            jnp.expand_dims(array, 0)
+            if axis is batching.not_mapped
+            else jnp.moveaxis(array, axis, 0)
+            for array, axis in zip(arrays, axes, strict=True)
         ]
-        count = max(len(one) for one in moved)
+        count = max(len(array) for array in moved)
         # Vectors have all leading axes, so that the transpose has the same.
-        vectors = [jnp.broadcast_to(one, (count, *one.shape[1:])) for one in moved[1:]]
+        vectors = [jnp.broadcast_to(array, (count, *array.shape[1:])) for array in moved[1:]]
         return primitive.bind(moved[0], *vectors, solver=solver), 0
 
     primitive.def_impl(lambda *arrays, solver: jnp.asarray(evaluate(solver, *arrays)))
@@ -626,30 +607,30 @@ _BACK = _primitive("back", VectorSolver.back, lambda solver: len(solver.first))
 
 
 def _values_along(primals: Any, tangents: Any, *, solver: VectorSolver) -> tuple[Array, Any]:
-    (at,), (change,) = primals, tangents
-    values = _VALUES.bind(at, solver=solver)
+    (point,), (change,) = primals, tangents
+    values = _VALUES.bind(point, solver=solver)
     if type(change) is ad.Zero:
         return values, jnp.zeros_like(values)
-    return values, _ALONG.bind(at, change, solver=solver)
+    return values, _ALONG.bind(point, change, solver=solver)
 
 
 def _linear(primitive: Primitive, transpose: Primitive) -> None:
     """Tell JAX that a primitive is linear in its vector, and what its transpose is."""
 
     def moved(primals: Any, tangents: Any, *, solver: VectorSolver) -> tuple[Array, Array]:
-        (at, vector), (change, by_vector) = primals, tangents
+        (point, vector), (change, by_vector) = primals, tangents
         if type(change) is not ad.Zero:
             raise InputError.UNSUPPORTED(
                 "a robot under loads can be differentiated once, not twice: take differences of "
                 "its gradients, or minimise by a method that needs first derivatives only"
             )
-        values = primitive.bind(at, vector, solver=solver)
-        return values, primitive.bind(at, by_vector, solver=solver)
+        values = primitive.bind(point, vector, solver=solver)
+        return values, primitive.bind(point, by_vector, solver=solver)
 
-    def back(cotangent: Any, at: Array, vector: Any, *, solver: VectorSolver) -> tuple[Any, Any]:
+    def back(cotangent: Any, point: Array, vector: Any, *, solver: VectorSolver) -> tuple[Any, Any]:
         if type(cotangent) is ad.Zero:
             return None, ad.Zero(vector.aval)
-        return None, transpose.bind(at, cotangent, solver=solver)
+        return None, transpose.bind(point, cotangent, solver=solver)
 
     ad.primitive_jvps[primitive] = moved
     ad.primitive_transposes[primitive] = back

@@ -21,29 +21,18 @@ _TRIES = 100
 
 
 class Draws(NamedTuple):
-    """Robots within tolerances.
+    """Robots within tolerances."""
 
-    Attributes:
-        robot: The robot of the drawing, without tolerances.
-        values: The numbers that were drawn, by name, one per robot.
-        redrawn: How many draws made no valid robot and were drawn again.
-    """
-
-    robot: Robot
+    robot: Robot  # of the drawing, without tolerances
     values: Mapping[str, Float[np.ndarray, " draws"]]
-    redrawn: int
+    redrawn: int  # draws that made no valid robot at first
 
 
 class ToleranceSource(NamedTuple):
-    """One number drawn, and the values that follow it.
-
-    Attributes:
-        tolerance: How it deviates.
-        nominal: The values of the drawing by name.
-    """
+    """One number drawn, and the values that follow it."""
 
     tolerance: Tolerance
-    nominal: dict[str, float]
+    nominal: dict[str, float]  # values of the drawing by name
 
     @property
     def name(self) -> str:
@@ -53,22 +42,13 @@ class ToleranceSource(NamedTuple):
     def values(self, level: Any) -> dict[str, Any]:
         """Return the values at levels of the distribution, each between 0 and 1."""
         return {
-            name: one + deviation(self.tolerance, one, level) for name, one in self.nominal.items()
+            name: value + deviation(self.tolerance, value, level)
+            for name, value in self.nominal.items()
         }
 
 
 def deviation(tolerance: Tolerance, value: float, level: Any) -> Any:
-    """Return the deviation from a value that a part `level` of all deviations stays below.
-
-    Args:
-        tolerance: How the value deviates.
-        value: The value of the drawing.
-        level: Between 0 and 1; an array gives an array.
-
-    Example:
-        >>> deviation(Tolerance("material.elastic_modulus", plus="20 %", minus="10 %"), 4e4, 0.5)
-        2000.0
-    """
+    """Return the deviation from a value that a part `level` (0 to 1) of all stays below."""
     sd = amount(tolerance.sd, value)
     plus, minus = amount(tolerance.plus, value), amount(tolerance.minus, value)
     if tolerance.sd is None:
@@ -82,12 +62,7 @@ def deviation(tolerance: Tolerance, value: float, level: Any) -> Any:
 
 
 def moments(tolerance: Tolerance, value: float) -> tuple[float, float]:
-    """Return mean and standard deviation of the deviation from a value.
-
-    Example:
-        >>> moments(Tolerance("notch.depth", plus=0.03, minus=0.03), 1.4)
-        (0.0, 0.017320508075688773)
-    """
+    """Return mean and standard deviation of the deviation from a value."""
     sd = amount(tolerance.sd, value)
     plus, minus = amount(tolerance.plus, value), amount(tolerance.minus, value)
     if tolerance.sd is None:
@@ -101,22 +76,12 @@ def moments(tolerance: Tolerance, value: float) -> tuple[float, float]:
     part = ndtr(b) - ndtr(a)
     low, high = (math.exp(-0.5 * end**2) / math.sqrt(2.0 * math.pi) for end in (a, b))
     mean = (low - high) / part
-    ends = sum(end * one for end, one in ((a, low), (-b, high)) if one)
+    ends = sum(end * density for end, density in ((a, low), (-b, high)) if density)
     return float(sd * mean), float(sd * math.sqrt(1.0 + ends / part - mean**2))
 
 
 def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed: int) -> Draws:
-    """Draw robots within tolerances, as a Latin hypercube.
-
-    Args:
-        robot: The robot with the values of the drawing.
-        tolerances: What deviates; one of a single notch replaces that of all notches there.
-        draws: How many robots.
-        seed: The same seed makes the same robots.
-
-    Raises:
-        InputError: Hardly any draw makes a valid robot.
-    """
+    """Draw robots within tolerances, as a Latin hypercube."""
     exact = robot.replace(tolerance=None)
     sources = sources_of(exact, tolerances)
     random = np.random.default_rng(seed)
@@ -140,11 +105,9 @@ def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed:
 def _levels(
     draws: int, count: int, random: np.random.Generator
 ) -> Float[np.ndarray, "draws count"]:
-    """Draw a Latin hypercube whose columns do not correlate (Iman and Conover 1982).
-
-    In every column one draw lies in each of as many equal parts. Their random pairing alone would
-    make spreads wrong by 4 % at 256 draws; without its correlations it is 0.5 %.
-    """
+    """Draw a Latin hypercube whose columns do not correlate (Iman and Conover 1982)."""
+    # In every column one draw lies in each of as many equal parts. Their random pairing alone would
+    # make spreads wrong by 4 % at 256 draws; without its correlations it is 0.5 %.
     part = random.permuted(np.tile(np.arange(draws), (count, 1)), axis=1).T
     if draws > count + 1 > 2:
         from scipy.special import ndtri
@@ -159,37 +122,29 @@ def values_at(
     sources: Sequence[ToleranceSource], levels: Float[np.ndarray, "... d"]
 ) -> dict[str, Any]:
     """Return the values of robots by name, at levels of the sources between 0 and 1."""
-    drawn: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for source, level in zip(sources, np.moveaxis(levels, -1, 0), strict=True):
-        drawn |= source.values(level)
-    return drawn
+        values |= source.values(level)
+    return values
 
 
 def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[ToleranceSource]:
-    """Return what is drawn; the tolerance of a single notch replaces that of all notches there.
-
-    Args:
-        robot: The robot with the values of the drawing.
-        tolerances: What deviates.
-    """
+    """Return what is drawn; the tolerance of a single notch replaces that of all notches there."""
     sources: list[ToleranceSource] = []
-    alone = {one.value for one in tolerances if "[" in one.value}
-    for one in tolerances:
-        numbers = numbers_at(robot, one.value)
+    alone = {tolerance.value for tolerance in tolerances if "[" in tolerance.value}
+    for tolerance in tolerances:
+        numbers = numbers_at(robot, tolerance.value)
         others = {name: value for name, value in numbers.items() if name not in alone}
-        if one.value not in alone and len(others) < len(numbers):
-            names = [[name] for name in others] if one.per_notch else [list(others)]
+        nominal = numbers if tolerance.value in alone else others
+        if tolerance.per_notch:
             sources += [
-                ToleranceSource(one, {name: others[name] for name in each})
-                for each in names
-                if each
+                ToleranceSource(tolerance, {name: value}) for name, value in nominal.items()
             ]
-        elif one.per_notch:
-            sources += [ToleranceSource(one, {name: value}) for name, value in numbers.items()]
-        elif len(set(numbers.values())) == 1:  # by one name: equal notches stay a group
-            sources.append(ToleranceSource(one, {one.value: number_at(robot, one.value)}))
-        else:
-            sources.append(ToleranceSource(one, numbers))
+        elif nominal == numbers and len(set(numbers.values())) == 1:  # equal notches stay a group
+            value = number_at(robot, tolerance.value)
+            sources.append(ToleranceSource(tolerance, {tolerance.value: value}))
+        elif nominal:
+            sources.append(ToleranceSource(tolerance, nominal))
     return sources
 
 
@@ -224,20 +179,10 @@ _LEFT_OUT = ("plastic_modulus",)
 
 
 def tolerances_of(robot: Robot) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]:
-    """Return the tolerances of a robot, those that its file lacks assumed.
-
-    Returns:
-        The tolerances, and the names of the values whose tolerance is assumed.
-
-    Example:
-        >>> from notchflex import load_robot
-        >>> wrist = load_robot("pacheco2021-a").replace(tolerance={"notch.depth": 0.005})
-        >>> tolerances_of(wrist)[1][0]
-        'notch.height'
-    """
-    given = {one.value: one for one in robot.tolerance}
-    assumed = {one.value: one for one in _assumed(robot) if one.value not in given}
-    return (*given.values(), *assumed.values()), tuple(assumed)
+    """Return the tolerances of a robot, and the names of those that its file lacks: assumed."""
+    specified = {tolerance.value for tolerance in robot.tolerance}
+    assumed = [tolerance for tolerance in _assumed(robot) if tolerance.value not in specified]
+    return (*robot.tolerance, *assumed), tuple(tolerance.value for tolerance in assumed)
 
 
 def _assumed(robot: Robot) -> Iterator[Tolerance]:
@@ -278,18 +223,16 @@ def _tendon_radius(robot: Robot) -> Iterator[Tolerance]:
 
 
 def _law(robot: Robot) -> Iterator[Tolerance]:
-    """Yield the error of the law of notches with elastic ends, larger for the last notch.
-
-    Papers' laws of rigid ends come with constants that were fitted by them, error included.
-    """
+    """Yield the error of the law of notches with elastic ends, larger for the last notch."""
+    # Papers' laws of rigid ends come with constants that were fitted by them, error included.
     notches = robot.notches
     all_of_them = max(notch.law_errors[0] for notch in notches)
     last = notches[-1].law_errors[1]
     names = ("notch", all_of_them), (f"notch[{len(notches)}]", last)
     for name, error in names if all_of_them != last else names[:1]:
         if error:
-            both = math.hypot(error, _LAW_OF_FIBRES * robot.material.by_fibres)
-            yield Tolerance(f"{name}.stiffness_factor", sd=f"{100 * both:.2g} %")
+            total = math.hypot(error, _LAW_OF_FIBRES * robot.material.by_fibres)
+            yield Tolerance(f"{name}.stiffness_factor", sd=f"{100 * total:.2g} %")
 
 
 def _rounded(size: float) -> float:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from notchflex._jax import constant
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.solve import check_refinement, prepare_for
 from notchflex.analysis.tangent import Change, Kink, PathTangents, kinks
 from notchflex.errors import InputError
 from notchflex.loads import Load
-from notchflex.loads.command import BodyLoads, Command, make_commands
+from notchflex.loads.command import make_commands
 from notchflex.loads.load import check_is_robot
 from notchflex.loads.load_path import LoadPath, load_path
 from notchflex.results.path import EquilibriumPath
@@ -41,19 +40,9 @@ _WIDTHS = {2: 5e-6, 6: 1.3e-3}
 def slope(
     vector_of: Callable[[float], Float[np.ndarray, "*m"]], value: float, *, order: int = 6
 ) -> Float[np.ndarray, "*m"]:
-    """Differentiate by a number.
-
-    Args:
-        vector_of: The arrays of a value; entries may be infinite, and count as constant.
-        value: Where. At the end of its range, such as a friction of 0, the derivative is inward.
-        order: Order of accuracy: 6, or 2 with a third of the evaluations, for plain formulas.
-
-    Returns:
-        The derivative, accurate to about 1e-10.
-
-    Raises:
-        InputError: The number cannot be varied.
-    """
+    """Differentiate arrays by a number to about 1e-10; at an end of its range, inward."""
+    # Infinite entries count as constant. Order 2, for plain formulas, takes a third of the
+    # evaluations of order 6.
     width, reason = _width(value, order), ""
     for side in (0, 1, -1):
         points, weights = _stencil(order, side)
@@ -69,11 +58,7 @@ def slope(
 
 
 def nearby(robot_at: Callable[[float], T], value: float, order: int = 6) -> T:
-    """Return what a function gives beside a number, to the side where it gives something.
-
-    Raises:
-        InputError: The number cannot be varied.
-    """
+    """Return what a function gives next to a number, on the side where it gives something."""
     width, reason = _width(value, order), ""
     for moved in (value + width, value - width):
         try:
@@ -92,7 +77,7 @@ def _width(value: float, order: int) -> float:
 def _stencil(order: int, side: int) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
     """Return points, in widths, and weights of the slope at 0 of their interpolant."""
     half = order // 2
-    central = np.concatenate([np.arange(-half, 0.0), np.arange(1.0, half + 1.0)])
+    central = np.setdiff1d(np.arange(-half, half + 1.0), [0.0])
     points = side * np.arange(order + 1.0) if side else central
     powers = np.vander(points, increasing=True).T
     return points, np.linalg.solve(powers, np.eye(len(points))[1])
@@ -100,23 +85,14 @@ def _stencil(order: int, side: int) -> tuple[Float[np.ndarray, " p"], Float[np.n
 
 @dataclass(frozen=True, eq=False)
 class ForwardModel:
-    """A robot under loads as a function of its numbers and of the loads.
+    """A robot under loads as a function of its numbers and of the loads."""
 
-    Attributes:
-        robot: The nominal robot.
-        load: The nominal loads.
-        settings: Tolerance and limits of the solver.
-        refinement: More strain modes, as for `simulate`.
-        from_rest: Which steps start from rest, (s,); the others from the step before.
-        any_load: Whether loads on the bodies may vary, and so may point anywhere.
-    """
-
-    robot: Robot
-    load: LoadPath
+    robot: Robot  # the nominal one
+    load: LoadPath  # the nominal loads
     settings: Settings = DEFAULT
     refinement: int = 0
-    from_rest: bool | Bool[np.ndarray, " s"] = False
-    any_load: bool = False
+    from_rest: bool | Bool[np.ndarray, " s"] = False  # which steps start from rest
+    any_load: bool = False  # whether loads on the bodies vary, and may point anywhere
 
     @cached_property
     def ready(self) -> PreparedChain:
@@ -128,20 +104,11 @@ class ForwardModel:
     def solve(
         self, robot: Robot, load: LoadPath, start: SolverState | None = None
     ) -> EquilibriumPath:
-        """Solve loads with a robot that has other numbers.
-
-        Args:
-            robot: The robot.
-            load: Loads of the same kind as those of the model.
-            start: The state to start from; rest where not given.
-
-        Raises:
-            InputError: The arrays of the robot have another form than those of the model's.
-        """
+        """Solve loads of the model's kind with a robot of its form, from `start` or from rest."""
         ready = self._prepared(robot)
         commands = make_commands(load, robot, ready.chain)
-        came = run(ready, commands, start, self.settings, each_from_start=self.from_rest)
-        return EquilibriumPath(robot, load, ready, came, settings=self.settings)
+        states = run(ready, commands, start, self.settings, each_from_start=self.from_rest)
+        return EquilibriumPath(robot, load, ready, states, settings=self.settings)
 
     @cached_property
     def _prepared(self) -> Callable[[Robot], PreparedChain]:
@@ -157,11 +124,7 @@ class ForwardModel:
 
 
 def prepared_like(robot: Robot, like: PreparedChain) -> PreparedChain:
-    """Prepare a robot for the same loads as another one.
-
-    Raises:
-        InputError: Its arrays have another form.
-    """
+    """Prepare a robot for the same loads as another one; raise where its form differs."""
     chain = like.chain
     options = chain.level, chain.loaded, chain.follows, chain.refinement, chain.frame is not None
     ready = prepare(robot, *options)
@@ -253,10 +216,10 @@ def tip_response(
         robot, load, settings or DEFAULT, refinement, from_rest=each_from_rest, any_load=True
     )
     path = model.solve(robot, load)
-    changes = [Change(loads, None) for loads in _unit_loads(path)]
+    changes = [Change(np.tile(unit, (len(path), 1)), None) for unit in _unit_loads(path)]
     # Each state is varied alone: what the contacts remember of the state before stays.
     columns = PathTangents(path, _POSE, remembers=False).along(changes)
-    by_loads = {name: np.stack([one[name] for one in columns]) for name in _POSE}
+    by_loads = {name: np.stack([column[name] for column in columns]) for name in _POSE}
     # Rotation vectors and displacements of the tip, in the world.
     spin = by_loads["tip_rotation"] @ np.swapaxes(path.tip_rotation, -1, -2)
     turned = [0.5 * (spin[..., b, a] - spin[..., a, b]) for a, b in ((1, 2), (2, 0), (0, 1))]
@@ -268,28 +231,15 @@ def tip_response(
     return TipResponse(path, by_drive, in_world.reshape(by_wrench.shape))
 
 
-def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"]]:
+def _unit_loads(path: EquilibriumPath) -> Float[np.ndarray, "k command"]:
     """Pack unit changes of the loads: of every drive, then of tip moment and force."""
-    form = path.prepared.command_layout(path.commands)
-    none: Command = form.unpack(np.zeros(form.size))
-    assert none.applied is not None  # the chain is assembled for loads
-    units = [none._replace(target=constant(row)) for row in np.eye(path.chain.tendons)]
-    for row in np.eye(6):
-        applied = _with_tip(none.applied, row, np.asarray(path.chain.body_length)[-1])
-        units.append(none._replace(applied=applied))
-    for unit in units:
-        yield np.broadcast_to(np.asarray(form.pack(unit)), (len(path), form.size))
-
-
-def _with_tip(applied: BodyLoads, wrench: Float[np.ndarray, " 6"], length: float) -> BodyLoads:
-    """Add a moment and a force at the tip to loads, dead in the base frame."""
-    moment, force = wrench[:3], wrench[3:]
-    last = np.zeros(len(applied.dead_force))
-    last[-1] = 1.0
-    arm = np.zeros((3, 3))
-    arm[2] = length * force
-    return applied._replace(
-        dead_force=constant(applied.dead_force + np.multiply.outer(last, force)),
-        dead_moment=constant(applied.dead_moment + np.multiply.outer(last, moment)),
-        dead_arm=constant(applied.dead_arm + np.multiply.outer(last, arm)),
-    )
+    layout, tendons = path.prepared.command_layout(path.commands), path.chain.tendons
+    indices: Any = layout.unpack_indices()
+    units = np.zeros((tendons + 6, layout.size))
+    drives, moments, forces = np.split(np.arange(len(units)), [tendons, tendons + 3])
+    units[drives, indices.target] = 1.0
+    units[moments, indices.applied.dead_moment[-1]] = 1.0
+    units[forces, indices.applied.dead_force[-1]] = 1.0
+    # The tip lies on the axis of the last body, at its end.
+    units[forces, indices.applied.dead_arm[-1, 2]] = np.asarray(path.chain.body_length)[-1]
+    return units

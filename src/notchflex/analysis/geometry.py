@@ -25,8 +25,6 @@ from notchflex.robot.cuts import CutLayout
 Array = NDArray[np.float64]
 Wall = tuple[float, float] | None
 
-_UP = np.array([0.0, 0.0, 1.0])
-
 
 @dataclass(frozen=True)
 class Geometry:
@@ -105,7 +103,7 @@ class Geometry:
         Raises:
             InputError: A kind of notch does not know its cuts.
         """
-        tube, at = self.robot.tube, self.robot.tube.base_length
+        tube, start = self.robot.tube, self.robot.tube.base_length
         neighbours, layouts = (None, *self.robot.notches, None), list[CutLayout]()
         for number, notch in enumerate(self.robot.notches):
             layout = notch.cut_layout(tube, neighbours[number], neighbours[number + 2])
@@ -114,8 +112,8 @@ class Geometry:
                     f'a notch of kind = "{notch.kind}" has no definition of its cuts, so there is '
                     "no drawing, pattern or solid of it; give its class a method `cut_layout`."
                 )
-            layouts.append(layout._replace(cuts=tuple(cut.moved(at) for cut in layout.cuts)))
-            at += layout.length
+            layouts.append(layout._replace(cuts=tuple(cut.moved(start) for cut in layout.cuts)))
+            start += layout.length
         return tuple(layouts)
 
     @lru_cache(maxsize=256)  # noqa: B019
@@ -133,10 +131,11 @@ class Geometry:
         robot, lengths = self.robot, constant(self.body_length)
         line = passage(robot.notches, lengths, side_deg, robot.tube.outer_radius, radius)
         ends = np.stack([line.enters, line.leaves], axis=1).tolist()
-        there = (
-            tuple(both) if visits else None for visits, both in zip(line.visits, ends, strict=True)
+        body_walls = (
+            tuple(interval) if visits else None
+            for visits, interval in zip(line.visits, ends, strict=True)
         )
-        return ((0.0, float(line.base_leaves)), *there)
+        return ((0.0, float(line.base_leaves)), *body_walls)
 
     def shape(self, notch_angle: ArrayLike, level: str = "tendons") -> RobotShape:
         """Return the shape that notch angles give, in the frame of the base.
@@ -212,7 +211,7 @@ class RobotShape:
     @property
     def tip(self) -> Array:
         """The tip, on the tube axis."""
-        return self.on_body(-1, self.robot.geometry.body_length[-1] * _UP)
+        return self.on_body(-1, [0.0, 0.0, self.robot.geometry.body_length[-1]])
 
     def on_body(self, body: int, points: ArrayLike) -> Array:
         """Return points that are given in the frame of a body, (..., 3)."""
@@ -250,15 +249,15 @@ class RobotShape:
         """Yield the pieces of a tendon, and whether each lies on a body or crosses a notch."""
         tendon, walls = self.robot.tendon[number], self.robot.geometry.walls
         angle, last = np.radians(tendon.direction_deg), tendon.end_body or len(self.flexures)
-        across = np.array([np.cos(angle), np.sin(angle), 0.0])
+        across = np.array([np.cos(angle), np.sin(angle)])
         across *= tendon.radius if radius is None else radius
         for body, wall in enumerate(walls(tendon.direction_deg)[: last + 1]):
             if body and tendon.path == "wall-arc":  # the fibre that meets the body here
-                flexure = self.flexures[body - 1]
-                place = (self.on_body(body, across) - flexure.position[-1]) @ flexure.rotation[-1]
+                flexure, point = self.flexures[body - 1], self.on_body(body, [*across, 0.0])
+                place = (point - flexure.position[-1]) @ flexure.rotation[-1]
                 yield flexure.fibre(*place[:2]), False
             if wall is not None:
-                yield self.on_body(body, [across + end * _UP for end in sorted(wall)]), True
+                yield self.on_body(body, [[*across, end] for end in sorted(wall)]), True
 
     def from_base(self) -> RobotShape:
         """Return the same shape in the frame of its base."""
@@ -302,8 +301,8 @@ def _shape(robot: Robot, chain: Chain, modes: Any, position: Array, rotation: Ar
     line = np.concatenate([along, end[:, None]], axis=1)
     flexures: list[FlexureShape] = []
     for notch, length in enumerate(rods.length):
-        used = np.flatnonzero(length)  # others fill up the arrays
-        shown, ends = np.pad(used + 1, 1, constant_values=(0, -1)), np.pad(used, 1, "edge")
+        segments = np.flatnonzero(length)  # others fill up the arrays
+        shown, ends = np.pad(segments + 1, 1, constant_values=(0, -1)), np.pad(segments, 1, "edge")
         edges = rods.section.edge_spine, rods.section.edge_near, rods.section.area
         values = (edge[notch, ends] for edge in edges)
         flexures.append(FlexureShape(axes[notch, shown], line[notch, shown], *values))

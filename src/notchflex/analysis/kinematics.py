@@ -134,8 +134,8 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
         >>> print(f"{np.degrees(shared.notch_angle[0, 0]):.8f} deg, {shared.stroke_lost[1]:.3f} mm")
         2.06615233 deg, 0.294 mm
     """
-    drawn = np.atleast_1d(np.asarray(stroke, float))
-    if not np.isfinite(drawn).all():
+    strokes = np.atleast_1d(np.asarray(stroke, float))
+    if not np.isfinite(strokes).all():
         raise InputError.NOT_FINITE("a stroke is not finite; give strokes in mm")
     chain = assemble(robot, flat=False)
     first = next(group for group in chain.groups if 0 in group.numbers)
@@ -151,7 +151,7 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
             "the kinematic model needs a first tendon that crosses every notch on the side to "
             f"which it bends; that of {robot.name} does not"
         )
-    share = drawn[:, None] / chain.flexures
+    share = strokes[:, None] / chain.flexures
     free, closing = robot.geometry.free_angle, robot.geometry.closing_angle
     angle = np.clip(free + share / arm, free, closing)
     lost = np.maximum(share - arm * (angle - free), 0.0)
@@ -173,54 +173,30 @@ _COMPLEX_STEP = 1e-30
 
 
 class AxisPlaces(NamedTuple):
-    """Positions of m points on a straight robot of n notches.
+    """Positions of m points on a straight robot."""
 
-    Attributes:
-        body: The body that each point is on, or the one before its notch, (m,).
-        along: Its distance from that body's proximal face along the axis, mm, (m,).
-        after: The body beyond its notch, or any other where it is on a body, (m,).
-        length: Length of the body before, mm, (m,).
-        fraction: Position across its notch, 0 to 1; -1 where it is on a body, (m,).
-    """
-
-    body: Int[np.ndarray, " m"]
-    along: Float[np.ndarray, " m"]
-    after: Int[np.ndarray, " m"]
-    length: Float[np.ndarray, " m"]
-    fraction: Float[np.ndarray, " m"]
+    body: Int[np.ndarray, " m"]  # that each is on, or the one before its notch
+    along: Float[np.ndarray, " m"]  # distance from that body's proximal face, mm
+    after: Int[np.ndarray, " m"]  # the body beyond its notch
+    length: Float[np.ndarray, " m"]  # of the body before, mm
+    fraction: Float[np.ndarray, " m"]  # across the notch, 0 to 1; -1 on a body
 
 
 def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
-    """Locate points on the axis of the straight robot.
-
-    Args:
-        robot: The robot.
-        axis_at: Distances from the base when the robot is straight, mm, (m,).
-
-    Returns:
-        The positions, for `points_on_axis`.
-
-    Raises:
-        InputError: A distance is not finite, negative or beyond the tip.
-
-    Example:
-        >>> from notchflex import load_robot
-        >>> axis_places(load_robot("pacheco2021-a"), [0.4, 1.3]).fraction.round(9).tolist()
-        [0.5, -1.0]
-    """
-    at = np.atleast_1d(np.asarray(axis_at, float))
+    """Locate points on the axis of the straight robot by their distances from the base, mm."""
+    distance = np.atleast_1d(np.asarray(axis_at, float))
     start, length = robot.geometry.body_start, robot.geometry.body_length
-    tip = float(start[-1] + length[-1])
-    wrong = at[~((at >= -_BEYOND * tip) & (at <= (1.0 + _BEYOND) * tip))]
+    tip = robot.geometry.length
+    wrong = distance[~((distance >= -_BEYOND * tip) & (distance <= (1.0 + _BEYOND) * tip))]
     if len(wrong):
         raise InputError.OUT_OF_RANGE(
             f"there is no point on the axis {wrong[0]:g} mm from the base: {robot.name} is "
             f"{tip:.6g} mm long; give 0 to {tip:.6g} mm"
         )
     # A point on a face belongs to the body, in spite of rounding.
-    body = np.searchsorted(start - _BEYOND * tip, at, side="right") - 1
+    body = np.searchsorted(start - _BEYOND * tip, distance, side="right") - 1
     body = np.maximum(body, 0)
-    along = at - start[body]
+    along = distance - start[body]
     after = np.minimum(body + 1, len(start) - 1)
     gap = start[after] - start[body] - length[body]
     across = along - length[body]
@@ -234,23 +210,7 @@ def points_on_axis(
     body_position: Float[Array, "*s bodies 3"],
     body_rotation: Float[Array, "*s bodies 3 3"],
 ) -> Float[Array, "*s m 3"]:
-    """Return points on the axis of a bent robot.
-
-    Args:
-        positions: Their positions on the straight robot.
-        body_position: Origins of the bodies, base first, mm; plain or traced numbers.
-        body_rotation: Their rotations.
-
-    Returns:
-        The points, mm, in the frame in which the bodies are given.
-
-    Example:
-        >>> from notchflex import bodies_from_angles, load_robot
-        >>> robot = load_robot("pacheco2021-a")
-        >>> bodies = bodies_from_angles(robot, np.zeros((1, 5)))
-        >>> points_on_axis(axis_places(robot, [0.4, 9.0]), *bodies)[0, :, 2].round(9).tolist()
-        [0.4, 9.0]
-    """
+    """Return points on the axis of a bent robot, mm, in the frame of its bodies."""
     axis = body_rotation[..., :, 2]
     first, last = axis[..., positions.body, :], axis[..., positions.after, :]
     origin = body_position[..., positions.body, :]
@@ -279,28 +239,9 @@ def axis_point_changes(
     changes: Sequence[Float[np.ndarray, ...]],
     lengths: Float[np.ndarray, "k bodies"] | float = 0.0,
 ) -> Float[np.ndarray, "k *s m 3"]:
-    """Differentiate the points on the axis along k changes of the bodies.
-
-    By a complex step: `points_on_axis` is analytic, so the derivative is exact to rounding. It
-    takes one evaluation; `jax.jvp` takes a compilation for every shape.
-
-    Args:
-        places: Where the points lie on the straight robot.
-        bodies: Origins of the bodies, mm, (*s, bodies, 3), and their rotations, (*s, bodies, 3, 3).
-        changes: Changes of both, with k in front.
-        lengths: Changes of the lengths of the bodies; the last point, the tip, moves with its end.
-
-    Returns:
-        The changes of the points.
-
-    Example:
-        >>> from notchflex import bodies_from_angles, load_robot
-        >>> robot = load_robot("pacheco2021-a")
-        >>> bodies = [pose[0] for pose in bodies_from_angles(robot, np.zeros((1, 5)))]
-        >>> along_z = np.tile([0.0, 0.0, 1.0], (1, 6, 1)), np.zeros((1, 6, 3, 3))
-        >>> print(axis_point_changes(axis_places(robot, [0.4]), bodies, along_z)[0, 0].round(9))
-        [0. 0. 1.]
-    """
+    """Differentiate the points on the axis along k changes of the bodies and of their lengths."""
+    # By a complex step: `points_on_axis` is analytic, so the derivative is exact to rounding. It
+    # takes one evaluation; `jax.jvp` takes a compilation for every shape.
     step = _COMPLEX_STEP * 1j
     grown = step * np.broadcast_to(lengths, changes[0].shape[:-1])[..., places.body]
     at_tip = np.arange(len(places.body)) == len(places.body) - 1
@@ -311,24 +252,7 @@ def axis_point_changes(
 
 
 def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> NDArray[np.float64]:
-    """Return points on the tube axis of every state of a path, in the world.
-
-    Args:
-        path: The states, s steps.
-        axis_at: Distances of the points from the base when the robot is straight, mm, (m,).
-
-    Returns:
-        The points, mm, (s, m, 3).
-
-    Raises:
-        InputError: A distance is beyond the tip.
-
-    Example:
-        >>> from notchflex import load_robot, pull, simulate
-        >>> path = simulate(load_robot("pacheco2021-a"), pull(1.0, 1.0, steps=1))
-        >>> bool(np.allclose(axis_points(path, [10.0])[0, 0], path.tip_position[0]))
-        True
-    """
+    """Return points on the tube axis by their distances, mm, in every state, in the world."""
     positions = axis_places(path.robot, axis_at)
     return np.asarray(
         points_on_axis(positions, constant(path.body_position), constant(path.body_rotation))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NoReturn
 
@@ -14,6 +14,7 @@ from notchflex._quantity import REGISTERED
 from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.command import Command
 from notchflex.loads.load import short_repr
+from notchflex.loads.load_path import TENDONS, TIP
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import solve_load_step
 from notchflex.solver.newton import Settings
@@ -24,12 +25,16 @@ from notchflex.solver.quantities import believable, unpad_quantity
 from notchflex.solver.residual import SolverState, at_rest
 from notchflex.solver.solved_state import SolvedState
 
-OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]
+OF_STATE = [
+    name for name, quantity in REGISTERED.items() if quantity.title and quantity.source != "path"
+]
 """What is reported of a state alone, without its path."""
 DEFAULT_OUTPUTS = ("total_angle", "notch_angle", "tip_position", "tip_rotation", "converged")
 OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *OF_STATE]),)
 """What can be asked of a batch or of a function that can be differentiated."""
-WORKS = {name: one.work_of for name, one in REGISTERED.items() if one.work_of}
+LOADS = (*TENDONS, *TIP)
+"""Names of the loads that batches vary and that slopes are taken by."""
+WORKS = {name: quantity.work_of for name, quantity in REGISTERED.items() if quantity.work_of}
 """What can be asked of a batch besides: works, with what they are integrated of."""
 
 
@@ -61,7 +66,7 @@ class OutputTable(dict[str, Array]):
 
     def tree_flatten_with_keys(self) -> tuple[list[Any], tuple[str, ...]]:
         """Return keys and values, and the names, for JAX."""
-        return [(jax.tree_util.DictKey(name), one) for name, one in self.items()], tuple(self)
+        return [(jax.tree_util.DictKey(name), value) for name, value in self.items()], tuple(self)
 
     @classmethod
     def tree_unflatten(cls, names: tuple[str, ...], values: Iterable[Any]) -> OutputTable:
@@ -70,11 +75,7 @@ class OutputTable(dict[str, Array]):
 
 
 def check_outputs(outputs: Sequence[str], allowed: Sequence[str] = OUTPUTS) -> tuple[str, ...]:
-    """Return the names of outputs, checked.
-
-    Raises:
-        InputError: There is no such output, or none is asked.
-    """
+    """Return the names of outputs, at least one, all of them allowed."""
     names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     wrong = [name for name in names if name not in allowed]
     if wrong or not names:
@@ -100,16 +101,22 @@ def reported_shapes(
     def report(numbers: Array, packed: Array) -> dict[str, Array]:
         return report_quantities(chain.unpack(numbers), state.unpack(packed), outputs)
 
-    vectors = (jax.ShapeDtypeStruct((one.size,), float) for one in (chain, state))
+    vectors = (jax.ShapeDtypeStruct((layout.size,), float) for layout in (chain, state))
     reported = jax.eval_shape(report, *vectors)
     return {name: reported[name].shape for name in outputs}
 
 
-def own_entries(ready: PreparedChain, outputs: Sequence[str]) -> dict[str, Int[np.ndarray, ...]]:
-    """Return where programs of the padded chain report the numbers of a robot's own quantities.
+def slices_of(arrays: Mapping[str, np.ndarray]) -> dict[str, slice]:
+    """Return where arrays are in a row of all their numbers."""
+    ends = np.cumsum([0, *(array.size for array in arrays.values())]).tolist()
+    return dict(zip(arrays, map(slice, ends, ends[1:]), strict=True))
 
-    The index is -1 for numbers beyond the end of a tendon.
-    """
+
+def unpadded_entries(
+    ready: PreparedChain, outputs: Sequence[str]
+) -> dict[str, Int[np.ndarray, ...]]:
+    """Return where programs of the padded chain report the numbers of a robot's own quantities."""
+    # -1 stands for numbers beyond the end of a tendon.
     long, begin, indices = ready.long, 1, {}
     shapes = reported_shapes(long.static_structure, long.state, tuple(outputs))
     for name, shape in shapes.items():
@@ -123,21 +130,10 @@ def own_entries(ready: PreparedChain, outputs: Sequence[str]) -> dict[str, Int[n
 def follow_row(
     robot: Chain, loads: Command, numbers: Float[Array, " settings"], outputs: tuple[str, ...]
 ) -> dict[str, Array]:
-    """Follow the path of one row of a batch from rest.
-
-    Beside `run` this is a second loop over a path, and stays one: `run` continues or starts anew,
-    skips what comes after a failure (a branch that rows side by side would both take), and packs
-    all that a path may be asked for later; here only what is asked for is kept.
-
-    Args:
-        robot: The robot.
-        loads: Its loads, step by step.
-        numbers: Tolerance and limits of the solver.
-        outputs: Names of the outputs.
-
-    Returns:
-        By name, steps as leading axis; after a load that failed the last good state.
-    """
+    """Follow the path of a batch row from rest; the last good state stays after a failure."""
+    # Beside `run` this is a second loop over a path, and stays one: `run` continues or starts
+    # anew, skips what comes after a failure (a branch that rows side by side would both take),
+    # and packs all that a path may be asked for later; here only what is asked for is kept.
     settings = Settings.of(numbers)
 
     def step(state: tuple[SolverState, Array], command: Any) -> tuple[Any, dict[str, Array]]:
@@ -146,15 +142,15 @@ def follow_row(
         solved = choose(alive, result.solved, last)
         reached = alive & result.converged
         quantity = SolvedState(robot, solved).quantity
+        converged = reached & believable(quantity)
         values = {name: quantity(name) for name in outputs if name in OF_STATE} | {
             "residual": result.residual,
             "iterations": result.iterations,
-            "converged": reached & believable(quantity),
+            "converged": converged,
         }
         if STEPS[0] in outputs:
-            known = reached & believable(quantity)
-            how = [result.fraction_before, result.substeps, known, True]
-            packed = [PytreeLayout.of(one).pack(one) for one in (solved, result.between)]
+            how = [result.fraction_before, result.substeps, converged, True]
+            packed = [PytreeLayout.of(pytree).pack(pytree) for pytree in (solved, result.between)]
             values |= dict(zip(STEPS, [*packed, jnp.array(how, float)], strict=True))
         return (solved, reached), {name: values[name] for name in outputs}
 

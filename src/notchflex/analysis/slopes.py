@@ -18,11 +18,11 @@ from jaxtyping import Float
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.forward_model import nearby, prepared_like, slope
-from notchflex.analysis.outputs import OUTPUTS, check_outputs
+from notchflex.analysis.outputs import LOADS, OUTPUTS, check_outputs
 from notchflex.analysis.tangent import Change, Gradient, PathTangents, path_gradient
 from notchflex.errors import InputError
 from notchflex.loads.command import BodyLoads, Command, load_slopes, make_commands
-from notchflex.loads.load_path import TENDONS, TIP, LoadPath
+from notchflex.loads.load_path import LoadPath
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.numbers import PartsForm, Place, differing, parts_of, places_by_name
@@ -30,8 +30,6 @@ from notchflex.robot.value_names import number_at, parse_path
 from notchflex.solver.programs.assembled import chain_gradient, chain_slopes
 from notchflex.solver.programs.run import SolverRun
 
-LOADS = (*TENDONS, *TIP)
-"""Names of the loads that slopes are taken by."""
 SLOPING = tuple(name for name in OUTPUTS if name in REGISTERED and REGISTERED[name].kind is float)
 """Quantities that have slopes."""
 
@@ -119,11 +117,7 @@ def _checked(path: EquilibriumPath, names: str | Sequence[str]) -> tuple[str, ..
 
 
 def start_of(robot: Robot, load: LoadPath, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Return the present values of numbers and loads by name.
-
-    Raises:
-        InputError: There is no such number, or it cannot be varied.
-    """
+    """Return the present values of numbers and loads by name; raise for one that cannot vary."""
     numbers = tuple(name for name in names if name not in LOADS)
     values = dict(zip(numbers, _variable(robot, numbers), strict=True))
     return {name: load.numbers(name) if name in LOADS else np.array(values[name]) for name in names}
@@ -136,11 +130,6 @@ def _variable(robot: Robot, names: tuple[str, ...]) -> list[float]:
     for name, value in zip(names, values, strict=True):
         nearby(_moved(robot, name, names), value, 2)
     return values
-
-
-def _sizes(load: LoadPath, names: Sequence[str]) -> list[int]:
-    """Return how many numbers every name stands for."""
-    return [load.numbers(name).size if name in LOADS else 1 for name in names]
 
 
 def load_units(path: EquilibriumPath, name: str) -> Float[np.ndarray, "n s command"]:
@@ -177,19 +166,22 @@ def changes(
     Raises:
         InputError: A number cannot be varied.
     """
-    sizes = _sizes(path.load, names)
+    sizes = [path.load.numbers(name).size if name in LOADS else 1 for name in names]
     along = np.eye(sum(sizes)) if along is None else along
     first = np.cumsum([0, *sizes])[:-1].tolist()
-    columns = [at for at, name in zip(first, names, strict=True) if name not in LOADS]
-    made = [Change(None, None)] * len(along)
+    columns = [column for column, name in zip(first, names, strict=True) if name not in LOADS]
+    by_direction = [Change(None, None)] * len(along)
     if along[:, columns].any():
         numbers = [name for name in names if name not in LOADS]
-        made = _by_numbers(path, numbers, along[:, columns])
-    for at, size, name in zip(first, sizes, names, strict=True):
+        by_direction = _by_numbers(path, numbers, along[:, columns])
+    for column, size, name in zip(first, sizes, names, strict=True):
         if name in LOADS:
-            loads = np.tensordot(along[:, at : at + size], load_units(path, name), 1)
-            made = [one.plus(Change(load, None)) for one, load in zip(made, loads, strict=True)]
-    return made
+            loads = np.tensordot(along[:, column : column + size], load_units(path, name), 1)
+            by_direction = [
+                change.plus(Change(load, None))
+                for change, load in zip(by_direction, loads, strict=True)
+            ]
+    return by_direction
 
 
 def _by_numbers(
@@ -198,54 +190,47 @@ def _by_numbers(
     """Differentiate arrays and loads of a path along changes of numbers of its robot."""
     robot, places = places_by_name(path.robot, names)
     traced, varied = _traced(robot, places)
-    own = [places[number] for number in traced]
-    made = _along(path, robot, varied, lambda form: along[:, traced] @ _units(own, form))
-    others = set(range(len(names))).difference([] if made is None else traced)
-    made = made or [Change(None, None)] * len(along)
-    for number in sorted(others):
+    traced_places = [places[number] for number in traced]
+    by_direction = _along(
+        path, robot, varied, lambda form: along[:, traced] @ _units(traced_places, form)
+    )
+    untraced = set(range(len(names))).difference([] if by_direction is None else traced)
+    by_direction = by_direction or [Change(None, None)] * len(along)
+    for number in sorted(untraced):
         name = names[number]
         by = differences(path, _moved(path.robot, name, names), number_at(path.robot, name))
-        made = [
-            one.plus(by, size) if size else one
-            for one, size in zip(made, along[:, number].tolist(), strict=True)
+        by_direction = [
+            change.plus(by, size) if size else change
+            for change, size in zip(by_direction, along[:, number].tolist(), strict=True)
         ]
-    return made
+    return by_direction
 
 
 def _traced(robot: Robot, places: Sequence[list[Place]]) -> tuple[list[int], list[Place]]:
     """Return which of some numbers programs differentiate by, and the places of these."""
     numbers = set(PartsForm.of(parts_of(robot), list(chain(*places))).places)
-    traced = [number for number, own in enumerate(places) if numbers.issuperset(own)]
+    traced = [number for number, named in enumerate(places) if numbers.issuperset(named)]
     return traced, [place for number in traced for place in places[number]]
 
 
 def _units(places: Sequence[list[Place]], form: PartsForm) -> Float[np.ndarray, "k numbers"]:
     """Return which of the numbers of a form stand at some places."""
-    return np.array([[place in own for place in form.places] for own in places], float)
+    return np.array([[place in named for place in form.places] for named in places], float)
 
 
 def change_along(
-    path: EquilibriumPath, robot_at: Callable[[float], Robot], at: float, *, order: int = 6
+    path: EquilibriumPath, robot_at: Callable[[float], Robot], value: float, *, order: int = 6
 ) -> Change:
-    """Differentiate arrays and loads of a path along a family of robots.
-
-    Args:
-        path: The path, of the robot at the number.
-        robot_at: The robot of a number; only its geometry and loads on its mass may vary.
-        at: The number at which to differentiate.
-        order: Order of accuracy of the slopes of the robot's numbers, as for `slope`.
-
-    Raises:
-        InputError: The number cannot be varied.
-    """
-    robot = robot_at(at)
+    """Differentiate arrays and loads of a path along a family of robots, at a number."""
+    # Only the geometry and the loads on the mass may vary; `order` is that of `slope`.
+    robot = robot_at(value)
 
     def difference(form: PartsForm) -> Float[np.ndarray, "1 numbers"]:
-        return slope(lambda v: form.numbers_of(parts_of(robot_at(v))), at, order=order)[None]
+        return slope(lambda v: form.numbers_of(parts_of(robot_at(v))), value, order=order)[None]
 
-    varied = differing(parts_of(robot), parts_of(nearby(robot_at, at, order)))
+    varied = differing(parts_of(robot), parts_of(nearby(robot_at, value, order)))
     by_programs = _along(path, robot, varied or (), difference)
-    return by_programs[0] if by_programs else differences(path, robot_at, at, order)
+    return by_programs[0] if by_programs else differences(path, robot_at, value, order)
 
 
 def _along(
@@ -274,7 +259,7 @@ def _packed(path: EquilibriumPath, by: BodyLoads) -> Float[np.ndarray, "k s comm
 
 
 def differences(
-    path: EquilibriumPath, robot_at: Callable[[float], Robot], at: float, order: int = 6
+    path: EquilibriumPath, robot_at: Callable[[float], Robot], value: float, order: int = 6
 ) -> Change:
     """Differentiate by what decides the form, such as a direction, by differences."""
 
@@ -285,15 +270,17 @@ def differences(
         return np.concatenate([ready.vector, loads.ravel()])
 
     size = path.prepared.chain_layout.size
-    by_number = slope(packed, at, order=order)
+    by_number = slope(packed, value, order=order)
     return Change(by_number[size:].reshape(len(path), -1), by_number[:size])
 
 
 def _moved(robot: Robot, name: str, names: Iterable[str]) -> Callable[[float], Robot]:
     """Return the robot as a function of a number; what has a name of its own stays."""
-    alone = {one for one in names if parse_path(one).number is not None} - {name}
-    kept = {} if parse_path(name).number else {one: number_at(robot, one) for one in alone}
-    return lambda value: robot.with_values({name: value, **kept})
+    alone = {other for other in names if parse_path(other).number is not None} - {name}
+    unchanged = (
+        {} if parse_path(name).number else {other: number_at(robot, other) for other in alone}
+    )
+    return lambda value: robot.with_values({name: value, **unchanged})
 
 
 def derivatives(
@@ -313,14 +300,14 @@ def derivatives(
     shapes = {name: np.shape(path.quantity(name)) for name in outputs}
     if _ADJOINT * sum(map(math.prod, shapes.values())) > len(along):
         columns = PathTangents(path, outputs).along(along)
-        return {name: np.stack([one[name] for one in columns]) for name in outputs}
+        return {name: np.stack([column[name] for column in columns]) for name in outputs}
     slopes = {name: np.empty((len(along), *shape)) for name, shape in shapes.items()}
     for name, shape in shapes.items():
         for index in np.ndindex(shape):
             weight = np.zeros(shape)
             weight[index] = 1.0
             by = path_gradient(path, {name: weight})
-            slopes[name][:, *index] = [by.along(one) for one in along]
+            slopes[name][:, *index] = [by.along(change) for change in along]
     return slopes
 
 
@@ -337,8 +324,8 @@ def gradient_by(
         units = partial(_units, places)
         by_number = chain_gradient(robot, path.chain, varied, by.chain, units)
     if by_number is None:
-        every = _by_numbers(path, numbers, np.eye(len(numbers)))
-        by_number = np.array([by.along(one) for one in every])
+        directions = _by_numbers(path, numbers, np.eye(len(numbers)))
+        by_number = np.array([by.along(change) for change in directions])
     rest = iter(by_number)
     columns = [
         np.tensordot(load_units(path, name), by.loads, 2) if name in LOADS else next(rest)

@@ -182,13 +182,7 @@ def prepare_for(
 
 
 def level_of(robot: Robot, loaded: bool, sideways: bool) -> str:
-    """Return the level of the strain modes that loads need.
-
-    Args:
-        robot: The robot.
-        loaded: Whether external loads act.
-        sideways: Whether these leave the robot's plane of bending.
-    """
+    """Return the level of strain modes for loads, some of them `sideways` out of the plane."""
     if sideways or not tendons_in_plane(robot):
         return "space"
     return "plane" if loaded else "tendons"

@@ -21,7 +21,13 @@ from notchflex._jax import choose, jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.batch import number_of_threads, range_of
-from notchflex.analysis.outputs import OF_STATE, check_outputs, own_entries, report_quantities
+from notchflex.analysis.outputs import (
+    OF_STATE,
+    check_outputs,
+    report_quantities,
+    slices_of,
+    unpadded_entries,
+)
 from notchflex.analysis.solve import prepare_for, simulate
 from notchflex.errors import Failure, InputError
 from notchflex.loads import Load, LoadPath
@@ -184,10 +190,8 @@ class Stepper(Displayed):
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        count, form = (
-            check_is_robot(self.robot).number_of_tendons,
-            'drives are "tension" or "stroke"',
-        )
+        count = check_is_robot(self.robot).number_of_tendons
+        form = 'drives are "tension" or "stroke"'
         words = one_or_several(self.drives, str, form)
         words = tuple(count * words if len(words) == 1 else words)
         if len(words) != count or not set(words) <= set(get_args(Drive)):
@@ -289,9 +293,12 @@ class Stepper(Displayed):
             drives: Tension (N) or stroke (mm) of every tendon.
         """
         before, towards = self._checked(state, drives)
-        options: Any = {"settings": self.settings, "refinement": self.refinement}
         return simulate(
-            self.robot, self._load(towards), from_state=self.unpacked(before), **options
+            self.robot,
+            self._load(towards),
+            from_state=self.unpacked(before),
+            settings=self.settings,
+            refinement=self.refinement,
         )
 
     def unpacked(self, state: Float[np.ndarray, " state"]) -> State:
@@ -301,10 +308,8 @@ class Stepper(Displayed):
     @cached_property
     def places(self) -> dict[str, tuple[slice, tuple[int, ...]]]:
         """Where in `Step.flat_values` the numbers of each output are, and their shape."""
-        ends = np.cumsum([0, *(index.size for index in self._indices.values())]).tolist()
-        parts = map(slice, ends[:-1], ends[1:])
-        shaped = zip(parts, self._indices.items(), strict=True)
-        return {name: (part, index.shape) for part, (name, index) in shaped}
+        parts = slices_of(self._indices)
+        return {name: (parts[name], index.shape) for name, index in self._indices.items()}
 
     def _summary(self) -> Summary:
         rows = [("outputs", ", ".join(self.outputs)), ("drives", ", ".join(self.drives))]
@@ -380,8 +385,8 @@ class Stepper(Displayed):
         """Return one load, with its commands."""
         commanded = {
             word: [
-                float(one) if own == word else None
-                for own, one in zip(self.drives, drives, strict=True)
+                float(value) if drive == word else None
+                for drive, value in zip(self.drives, drives, strict=True)
             ]
             for word in get_args(Drive)
         }
@@ -393,9 +398,8 @@ class Stepper(Displayed):
 
     @cached_property
     def _drive_places(self) -> Int[np.ndarray, " t"]:
-        layout = self.prepared.state
-        at: Any = jax.tree.unflatten(layout.structure, layout.indices)
-        return np.where(self._by_stroke, at.stroke, at.point.base_tension)
+        indices: Any = self.prepared.state.unpack_indices()
+        return np.where(self._by_stroke, indices.stroke, indices.point.base_tension)
 
     @cached_property
     def _one_load(self) -> LoadPath:
@@ -413,37 +417,30 @@ class Stepper(Displayed):
 
     @cached_property
     def _indices(self) -> dict[str, Int[np.ndarray, ...]]:
-        return own_entries(self.prepared, self.outputs)
+        return unpadded_entries(self.prepared, self.outputs)
 
     @cached_property
     def entries(self) -> Int[np.ndarray, " m"]:
         """Where a program of the padded chain reports the values."""
-        return np.concatenate([one.ravel() for one in self._indices.values()])
+        return np.concatenate([index.ravel() for index in self._indices.values()])
 
     @cached_property
     def contact_places(self) -> Int[np.ndarray, "3 t contacts"]:
         """Where a state has log ratio, bound and slid length of all contacts; -1 beyond the end."""
-        layout, edges = self.prepared.state, np.asarray(self.prepared.chain.contacts)
-        memory: Any = jax.tree.unflatten(layout.structure, layout.indices).memory
+        edges = np.asarray(self.prepared.chain.contacts)
+        memory: Any = self.prepared.state.unpack_indices().memory
         places = np.full((3, *edges.shape), -1)
         fields = memory.log_ratio, memory.bound, memory.slid
         for group, *numbers in zip(self.prepared.chain.groups, *fields, strict=True):
             for column, tendon in enumerate(group.numbers):
                 met = edges[tendon] >= 0
                 flexure, edge = np.divmod(edges[tendon, met], 2)
-                places[:, tendon, met] = [one[flexure, column, edge] for one in numbers]
+                places[:, tendon, met] = [indices[flexure, column, edge] for indices in numbers]
         return places
 
 
 def dead_band(drive: Any, ratio: Any, bound: Any, by_stroke: Any) -> tuple[Any, Any]:
-    """Return between which drives nothing moves, as the first contact of a tendon sticks.
-
-    Args:
-        drive: The drives, N or mm, (t,), of NumPy or JAX.
-        ratio: Log ratios of the first contacts, (t,).
-        bound: Their largest, (t,).
-        by_stroke: Which drives are strokes, (t,).
-    """
+    """Return the drives (N or mm) between which the first contact of each tendon sticks."""
     # The ratio of a contact that slides misses its bound by rounding, to either side.
     still = by_stroke | (xp.abs(ratio) > (1.0 + _ROUNDING) * bound)
     low, high = (drive * xp.exp(-ratio + side * bound) for side in (-1.0, 1.0))
@@ -472,12 +469,9 @@ def _step(
     outputs: tuple[str, ...],
     jacobian: bool,
 ) -> tuple[Array, Array, Array]:
-    """Solve one load from a state.
-
-    Returns:
-        The state, that before after a failure; the outputs and, as further rows, their change by
-        every drive, and in a last column NaN; and whether it converged.
-    """
+    """Solve one load from a state; return state, table of outputs, and whether it converged."""
+    # After a failure the state is that before. Further rows of the table are changes of the outputs
+    # by every drive; its last column is NaN.
     command = command._replace(target=drives)
     result = solve_load_step(robot, command, last, Settings.of(numbers))
     converged = result.converged & believable(SolvedState(robot, result.solved).quantity)

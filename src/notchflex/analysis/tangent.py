@@ -26,7 +26,7 @@ from jaxtyping import Array, Float, Int
 
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
-from notchflex.analysis.outputs import own_entries, report_quantities, reported_shapes
+from notchflex.analysis.outputs import report_quantities, reported_shapes, unpadded_entries
 from notchflex.mechanics.chain import Chain
 from notchflex.results.path import EquilibriumPath
 from notchflex.solver.programs.compiled import Native, Packed
@@ -43,21 +43,13 @@ from notchflex.solver.sensitivity import attach_derivatives
 
 
 class StepLayouts(NamedTuple):
-    """How a program takes chain, load and state as vectors, and what it reports.
-
-    Attributes:
-        chain: Structure and layout of the chain.
-        command: Layout of one load.
-        state: Layout of a state.
-        outputs: Names of the quantities.
-        chain_varies: Whether a change of the chain is followed.
-    """
+    """How a program takes chain, load and state as vectors, and what it reports."""
 
     chain: StaticStructure
-    command: PytreeLayout
+    command: PytreeLayout  # of one load
     state: PytreeLayout
     outputs: tuple[str, ...]
-    chain_varies: bool = False
+    chain_varies: bool = False  # whether its change is followed
 
     @property
     def lanes(self) -> tuple[int, int]:
@@ -82,63 +74,53 @@ class Change:
         pairs = (self.loads, other.loads), (self.chain, other.chain)
         return Change(
             *(
-                own if more is None else size * more + (0.0 if own is None else own)
-                for own, more in pairs
+                present if more is None else size * more + (0.0 if present is None else present)
+                for present, more in pairs
             )
         )
 
 
 @dataclass(frozen=True, eq=False)
 class PathTangents:
-    """Directional derivatives of a solved path.
-
-    Attributes:
-        path: The path, as solved.
-        outputs: Names of what is differentiated: quantities of `EquilibriumPath` that the solver
-            reports as floats.
-        remembers: Whether changes pass from state to state through the memory of the contacts.
-    """
+    """Directional derivatives of a solved path."""
 
     path: EquilibriumPath
-    outputs: tuple[str, ...]
-    remembers: bool = True
+    outputs: tuple[str, ...]  # quantities that the solver reports as floats
+    remembers: bool = True  # whether changes pass on through the memory of contacts
 
     def along(self, directions: Sequence[Change]) -> list[dict[str, np.ndarray]]:
-        """Differentiate along some directions, by one program.
-
-        Returns:
-            For each the change of every output by name, in the world, steps as leading axis. NaN
-            from a step on that did not converge, or was so hard that its derivatives are not known.
-        """
+        """Differentiate the outputs, in the world, along each of some directions."""
+        # NaN from a step on that did not converge, or was so hard that its derivatives are not
+        # known.
         ready = self.path.prepared
-        varies = any(one.chain is not None for one in directions)
+        varies = any(direction.chain is not None for direction in directions)
         layouts = self.layouts._replace(chain_varies=varies)
         start = np.zeros(ready.long.state.size)
         by_row = (*(False,) * 3, *(True,) * (len(self.steps) + 2))
         turn = self.path.load.base_to_world
-        every: list[dict[str, np.ndarray]] = []
-        for one in directions:
+        by_direction: list[dict[str, np.ndarray]] = []
+        for direction in directions:
             change = np.zeros(layouts.chain.size if varies else 1)
-            if one.chain is not None:
-                change = np.append(0.0, one.chain)[ready.own_numbers]
+            if direction.chain is not None:
+                change = np.append(0.0, direction.chain)[ready.own_numbers]
             load_change = np.zeros_like(self.loads)
-            if one.loads is not None:
-                load_change[:, self.own_loads] = one.loads
+            if direction.loads is not None:
+                load_change[:, self.unpadded_loads] = direction.loads
             vectors = (start, ready.long.dynamic_vector, change, *self.steps, self.loads)
             packed = map(Packed, (*vectors, load_change), repeat(None), by_row)
             by_name = tangent_step.scan(*packed, layouts)
             for name, values in by_name.items():
-                own = unpad_quantity(self.path.chain, name, values)
-                by_name[name] = REGISTERED[name].turned(own, turn)
-            every.append(by_name)
-        return every
+                unpadded = unpad_quantity(self.path.chain, name, values)
+                by_name[name] = REGISTERED[name].turned(unpadded, turn)
+            by_direction.append(by_name)
+        return by_direction
 
     @property
-    def own_loads(self) -> Int[np.ndarray, " command"]:
+    def unpadded_loads(self) -> Int[np.ndarray, " command"]:
         """Where the numbers of a load are among those of a load for the long chain."""
         ready, commands = self.path.prepared, self.path.commands
-        own, long = ready.command_layout(commands), ready.long.command_layout(commands)
-        return padded_indices(own, long)
+        short, long = ready.command_layout(commands), ready.long.command_layout(commands)
+        return padded_indices(short, long)
 
     @cached_property
     def layouts(self) -> StepLayouts:
@@ -157,16 +139,14 @@ class PathTangents:
 
     @cached_property
     def steps(self) -> tuple[np.ndarray, ...]:
-        """What programs take of every step beside its load, for the long chain.
-
-        The states before and at the load and between, and how it was found: parts of the substeps,
-        whether it converged, and whether a change of the state before passes on.
-        """
+        """What programs take of every step but its load, for the long chain."""
+        # The states before and at the load and between, and how it was found: parts of the
+        # substeps, whether it converged, and whether a change of the state before passes on.
         ready, run = self.path.prepared, self.path.run
         assert isinstance(run, SolverRun)
         states = (
-            pad_rows(one, ready.state, ready.long.state)
-            for one in (run.states_before, run.states, run.between)
+            pad_rows(state, ready.state, ready.long.state)
+            for state in (run.states_before, run.states, run.between)
         )
         remembers = self.remembers & (run.from_start[:, 0] == 0.0)
         how = np.stack([run.fraction_before, run.substeps, self.path.converged, remembers], axis=1)
@@ -179,18 +159,8 @@ def step_function(
     how: Float[Array, " 4"],
     layouts: StepLayouts,
 ) -> Callable[[Chain, Array, Array], tuple[Array, dict[str, Array]]]:
-    """Return a solved step as a function that can be differentiated.
-
-    Args:
-        state: The solved state, packed.
-        between: The state before its last part, packed.
-        how: How it was found, as `PathTangents.steps` has it.
-        layouts: How things are packed, and what is reported.
-
-    Returns:
-        A function of a chain, a packed load and the packed state before; it returns the packed
-        state and the outputs.
-    """
+    """Return a solved step as a function of chain, load and state before, for derivatives."""
+    # `between` is the state before its last part, `how` that of `PathTangents.steps`.
     solved, halfway = layouts.state.unpack(state), layouts.state.unpack(between)
     history = halfway, how[0], how[1].astype(int), how[2] > 0.0
 
@@ -215,33 +185,26 @@ def tangent_step(
     load_change: Float[Array, " command"],
     layouts: StepLayouts,
 ) -> tuple[Float[Array, " state"], dict[str, Array]]:
-    """Compute the change of a solved state, carried to the next, and of its reported quantities.
-
-    The program for loads alone, where the chain does not vary, is a fifth shorter.
-    """
+    """Compute the change of a solved state, carried to the next, and of its reported quantities."""
+    # The program for loads alone, where the chain does not vary, is a fifth shorter.
     step = step_function(state, between, how, layouts)
 
     def packed(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
         return step(layouts.chain.unpack(varied), load, before)
 
-    at = (load, before)
+    point = (load, before)
     changes = (load_change, jnp.where(how[3] > 0.0, last_change, 0.0))
     if layouts.chain_varies:
-        at, changes = (*at, chain), (*changes, chain_change)
-    return jax.jvp(packed, at, changes)[1]
+        point, changes = (*point, chain), (*changes, chain_change)
+    return jax.jvp(packed, point, changes)[1]
 
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """Derivatives of a number by all that a path is computed from.
-
-    Attributes:
-        loads: By the loads, packed, steps as leading axis.
-        chain: By the chain, packed whole.
-    """
+    """Derivatives of a number by all that a path is computed from."""
 
     loads: Float[np.ndarray, "s command"]
-    chain: Float[np.ndarray, " chain"]
+    chain: Float[np.ndarray, " chain"]  # packed, all of it
 
     def along(self, change: Change) -> float:
         """Return the derivative of the number along a change."""
@@ -252,34 +215,26 @@ class Gradient:
 
 
 def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradient:
-    """Differentiate a weighted sum of quantities by all loads and by all numbers of the chain.
-
-    Args:
-        path: The path, as solved.
-        weights: By name of quantities that the solver reports as floats, in the world, the weight
-            of each number of a quantity, steps as leading axis.
-
-    Returns:
-        Its derivatives. NaN if a step of any weight, or one before it, did not converge, or was so
-        hard that its derivatives are not known.
-    """
+    """Differentiate a weighted sum of quantities in the world by all loads and by the chain."""
+    # NaN if a step of any weight, or one before it, did not converge, or was so hard that its
+    # derivatives are not known.
     long = path.prepared.long
     tangents = PathTangents(path, tuple(weights))
     layouts = tangents.layouts
     seeds = _packed(path, weights)
     # No step beyond the last that counts: one that failed there must not matter.
     backwards = slice(int(np.flatnonzero(seeds.any(axis=1)).max(initial=0)), None, -1)
-    steps = [one[backwards] for one in (*tangents.steps, tangents.loads, seeds)]
+    steps = [array[backwards] for array in (*tangents.steps, tangents.loads, seeds)]
     by_row = (False, False, *(True,) * len(steps))
     start = (np.zeros(long.state.size), long.dynamic_vector)
     packed = map(Packed, (*start, *steps), repeat(None), by_row)
     result = adjoint_step.scan(*packed, layouts)
     loads = np.zeros_like(tangents.loads)
     loads[backwards] = result["load"]
-    loads = loads[:, tangents.own_loads]
-    by_chain, own = result["chain"].sum(axis=0), path.prepared.own_numbers
+    loads = loads[:, tangents.unpadded_loads]
+    by_chain, numbers = result["chain"].sum(axis=0), path.prepared.own_numbers
     size = path.prepared.chain_layout.size + 1
-    return Gradient(loads, np.bincount(own, by_chain, size)[1:])
+    return Gradient(loads, np.bincount(numbers, by_chain, size)[1:])
 
 
 def _packed(
@@ -290,7 +245,7 @@ def _packed(
     back = None if turn is None else turn.T
     shapes = reported_shapes(long.static_structure, long.state, tuple(weights))
     seeds = np.zeros((len(path), sum(int(np.prod(shape)) for shape in shapes.values()) + 1))
-    for name, index in own_entries(path.prepared, [*weights]).items():
+    for name, index in unpadded_entries(path.prepared, [*weights]).items():
         seeds[:, index] = REGISTERED[name].turned(weights[name], back)
     return seeds[:, :-1]  # the last column takes what is beyond the end of a tendon
 
@@ -314,19 +269,21 @@ def adjoint_step(
 
     def packed(load: Array, before: Array, numbers: list[Array]) -> tuple[Array, Array]:
         rest = iter(numbers)
-        every = [next(rest) if one else leaf for one, leaf in zip(varies, leaves, strict=True)]
-        solved, values = step(jax.tree.unflatten(structure, every), load, before)
-        return solved, jnp.concatenate([values[one].ravel() for one in layouts.outputs])
+        varied = [
+            next(rest) if varying else leaf for varying, leaf in zip(varies, leaves, strict=True)
+        ]
+        solved, values = step(jax.tree.unflatten(structure, varied), load, before)
+        return solved, jnp.concatenate([values[name].ravel() for name in layouts.outputs])
 
-    numbers = [jnp.asarray(leaf) for one, leaf in zip(varies, leaves, strict=True) if one]
+    numbers = [jnp.asarray(leaf) for varying, leaf in zip(varies, leaves, strict=True) if varying]
     pull_back = jax.vjp(packed, load, before, numbers)[1]
     by_load, by_before, by_numbers = pull_back((seed, weights))
     rest = iter(by_numbers)
-    every = [
-        next(rest).ravel() if one else jnp.zeros(leaf.size)
-        for one, leaf in zip(varies, leaves, strict=True)
+    by_leaves = [
+        next(rest).ravel() if varying else jnp.zeros(leaf.size)
+        for varying, leaf in zip(varies, leaves, strict=True)
     ]
-    by_chain = layouts.chain.pack(jnp.concatenate(every))
+    by_chain = layouts.chain.pack(jnp.concatenate(by_leaves))
     return jnp.where(how[3] > 0.0, by_before, 0.0), {"load": by_load, "chain": by_chain}
 
 
@@ -352,21 +309,13 @@ class Kink:
 
 
 def kinks(path: EquilibriumPath, within: float = 1e-6) -> list[Kink]:
-    """List the contacts and notches of a path that lie at a switch, or nearly so.
-
-    Args:
-        path: The path, as solved (not as read from a file).
-        within: Distance from the switch up to which they count.
-
-    Returns:
-        One record each, by step; none where a step did not converge.
-    """
+    """List the contacts and notches of a solved path within a distance of a switch, by step."""
     if not isinstance(path.run, SolverRun):
         return []
     solved, before = path.run.solved, path.prepared.state.unpack(path.run.between)
-    every = [*_contacts(path.chain, solved, before, within), *_notches(path, within)]
-    converged = np.asarray(path.converged)
-    return sorted((one for one in every if converged[one.step]), key=lambda one: one.step)
+    switches = [*_contacts(path.chain, solved, before, within), *_notches(path, within)]
+    known = (kink for kink in switches if path.converged[kink.step])
+    return sorted(known, key=lambda kink: kink.step)
 
 
 def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: float) -> list[Kink]:
@@ -375,7 +324,7 @@ def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: fl
     contacts: list[Kink] = []
     for k, group in enumerate(chain.groups):
         ratio, bound = (
-            np.asarray(one[k]) for one in (solved.memory.log_ratio, solved.memory.bound)
+            np.asarray(field[k]) for field in (solved.memory.log_ratio, solved.memory.bound)
         )
         slip = np.abs(np.asarray(solved.memory.slid[k]) - np.asarray(before.memory.slid[k]))
         left = np.maximum(bound - np.abs(ratio), 0.0)

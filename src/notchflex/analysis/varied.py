@@ -32,17 +32,11 @@ _WIDER = 0.25
 
 @dataclass(frozen=True, eq=False)
 class VariedRobots:
-    """Robots made of some robots and numbers of their own; each is made when asked for.
+    """Robots made of some robots and numbers of their own; each is made when asked for."""
 
-    Attributes:
-        robots: What they are made of.
-        which: Which of these each is made of.
-        values: Numbers of each by name, as for `Robot.with_value`.
-    """
-
-    robots: Sequence[Robot]
-    which: Int[np.ndarray, " n"]
-    values: Mapping[str, Float[np.ndarray, " n"]]
+    robots: Sequence[Robot]  # what they are made of
+    which: Int[np.ndarray, " n"]  # of these each is made of
+    values: Mapping[str, Float[np.ndarray, " n"]]  # numbers of each by name
 
     @classmethod
     def of(cls, robot: Robot, values: Mapping[str, Float[np.ndarray, " n"]]) -> VariedRobots:
@@ -54,13 +48,9 @@ class VariedRobots:
         return len(self.which)
 
     def __getitem__(self, number: int) -> Robot:
-        """Make one of the robots.
-
-        Raises:
-            InputError: The numbers make no valid robot.
-        """
+        """Make one of the robots; raise where the numbers make none."""
         robot = self.robots[self.which[number]]
-        values = {name: float(each[number]) for name, each in self.values.items()}
+        values = {name: float(column[number]) for name, column in self.values.items()}
         return robot.with_values(values) if values else robot
 
     @cached_property
@@ -69,7 +59,7 @@ class VariedRobots:
         errors = dict[int, InputError]()
         for number, robot in enumerate(self.robots if self.values else ()):
             members = np.flatnonzero(self.which == number)
-            table = np.stack([each[members] for each in self.values.values()], axis=1)
+            table = np.stack([column[members] for column in self.values.values()], axis=1)
             names = tuple(self.values)
             with np.errstate(invalid="ignore"):  # numbers may be infinite, or none
                 for row, error in _errors(robot, names, table, np.arange(len(members))):
@@ -82,7 +72,7 @@ class VariedRobots:
         for number in np.unique(self.which[numbers]).tolist():
             robot, places = places_by_name(self.robots[number], [*self.values])
             pairs = zip(self.values, places, strict=True)
-            columns = {place: name for name, own in pairs for place in own}
+            columns = {place: name for name, named in pairs for place in named}
             form = PartsForm.of(parts_of(robot), columns)
             of_form = forms.setdefault(form, RobotForm(self, numbers, form, {}, columns))
             of_form.bases[number] = robot
@@ -97,26 +87,24 @@ def _errors(
     table: Float[np.ndarray, "n d"],
     rows: Int[np.ndarray, " k"],
 ) -> Iterator[tuple[int, InputError]]:
-    """Yield rows of a table whose numbers make no valid robot, with the reason.
-
-    Rules tie a number to its limits, to the tube, a tendon or another number of the same notch,
-    each of them monotonic: if all corners of a box are valid, so is all inside. Other boxes are
-    halved.
-    """
+    """Yield rows of a table whose numbers make no valid robot, with the reason."""
+    # Rules tie a number to its limits, to the tube, a tendon or another number of the same notch,
+    # each of them monotonic: if all corners of a box are valid, so is all inside. Other boxes are
+    # halved.
     notches = [parse_path(name).number if "notch" in name else None for name in names]
     cliques = tuple(
-        tuple(place for place, notch in enumerate(notches) if notch in (None, own))
-        for own in dict.fromkeys(one for one in notches if one is not None) or [None]
+        tuple(place for place, notch in enumerate(notches) if notch in (None, single))
+        for single in dict.fromkeys(notch for notch in notches if notch is not None) or [None]
     )
     numbers = table[rows]
-    if sum(2 ** len(one) for one in cliques) <= len(rows):
+    if sum(2 ** len(clique) for clique in cliques) <= len(rows):
         low, high = numbers.min(axis=0), numbers.max(axis=0)
-        known, wider = _known_box(robot, names), _WIDER * (high - low)
-        if known and (known[0] <= low).all() and (high <= known[1]).all():
+        known_box, wider = _known_box(robot, names), _WIDER * (high - low)
+        if known_box and (known_box[0] <= low).all() and (high <= known_box[1]).all():
             return
         for box in ((low - wider, high + wider), (low, high)):
             if _corners_are_valid(robot, names, cliques, np.array(box)):
-                known[:] = box
+                known_box[:] = box
                 return
         spread = np.nan_to_num((high - low) / np.ptp(table, axis=0))
         order = np.argsort(numbers[:, np.argmax(spread)], kind="stable")
@@ -166,21 +154,12 @@ def _error(
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Chains of robots, packed for programs.
+    """Chains of robots, packed for programs."""
 
-    Attributes:
-        ready: One of the chains.
-        structure: Layout of all.
-        packed: Returns the chains of some robots by their numbers (one where all have the same),
-            and which are right.
-        programs: What makes the chains from numbers of the robots; None where nothing does.
-        form: The form of those robots.
-    """
-
-    ready: PreparedChain
-    structure: StaticStructure
+    ready: PreparedChain  # one of the chains
+    structure: StaticStructure  # layout of all
     packed: Callable[[Int[np.ndarray, " k"]], tuple[np.ndarray, Bool[np.ndarray, " k"]]]
-    programs: AssembledRobots | None = None
+    programs: AssembledRobots | None = None  # what makes chains from numbers of the form
     form: RobotForm | None = None
 
     def along(
@@ -214,7 +193,7 @@ class Chains:
 def single_chains(prepared: Mapping[int, PreparedChain]) -> Chains:
     """Return chains of one structure that were assembled one by one, by the robots' numbers."""
     ready = next(iter(prepared.values()))
-    table = np.stack([one.dynamic_vector for one in prepared.values()])
+    table = np.stack([chain.dynamic_vector for chain in prepared.values()])
     rows = np.zeros(max(prepared) + 1, int)
     rows[list(prepared)] = np.arange(len(prepared))
 
@@ -226,21 +205,13 @@ def single_chains(prepared: Mapping[int, PreparedChain]) -> Chains:
 
 
 class RobotForm(NamedTuple):
-    """Robots whose parts have one form.
+    """Robots whose parts have one form."""
 
-    Attributes:
-        robots: All robots of the batch.
-        members: Numbers of those of this form.
-        form: The form.
-        bases: What they are made of, by numbers; notches that have a name stand alone.
-        columns: Names of the numbers that vary, by their places.
-    """
-
-    robots: VariedRobots
-    members: Int[np.ndarray, " k"]
+    robots: VariedRobots  # all of the batch
+    members: Int[np.ndarray, " k"]  # numbers of those of this form
     form: PartsForm
-    bases: dict[int, Robot]
-    columns: dict[Place, str]
+    bases: dict[int, Robot]  # robots by number; notches that have a name stand alone
+    columns: dict[Place, str]  # names of the numbers that vary, by place
 
     @property
     def example(self) -> Robot:
@@ -256,20 +227,16 @@ class RobotForm(NamedTuple):
     def table(self, numbers: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k numbers"]:
         """Return the numbers of some robots, as `PartsForm.numbers_of` does."""
         bases = np.zeros((len(self.robots.robots), len(self.form.places)))
-        own = [self.form.numbers_of(parts_of(one)) for one in self.bases.values()]
-        bases[list(self.bases)] = own
+        bases[list(self.bases)] = [
+            self.form.numbers_of(parts_of(robot)) for robot in self.bases.values()
+        ]
         rows = bases[self.robots.which[numbers]]
         for place, name in self.columns.items():
             rows[:, self.form.places.index(place)] = self.robots.values[name][numbers]
         return rows
 
     def chains(self, kind: int, refinement: int) -> Chains | None:
-        """Return the chains for a kind of loads; None where no program makes them.
-
-        Args:
-            kind: Bits of `loads.command.acting`.
-            refinement: More strain modes.
-        """
+        """Return the chains for a kind of loads (`acting`); None where no program makes them."""
         # A direction, or no finite number, is no number of a form.
         if not set(self.columns) <= set(self.form.places):
             return None

@@ -141,17 +141,15 @@ def _read_json(file: str | FilePath) -> EquilibriumPath:
 
 
 def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
-    """Whether the steps of a document are those of a path, but for steps that were not tried.
-
-    Version 0.1.0 wrote zeros for the shape of those. Reasons are worded anew.
-    """
+    """Return whether the steps of a document are those of a path, but for those not tried."""
+    # Version 0.1.0 wrote zeros for the shape of those. Reasons are worded anew.
     expected = plain(path_document(path))["steps"]
     if not isinstance(steps, list) or len(steps) != len(expected):
         return False
     return all(
-        isinstance(step, dict)
-        and wanted == {**step, "reason": wanted["reason"], "reason_code": wanted["reason_code"]}
-        for wanted, step, tried in zip(expected, steps, np.asarray(path.run.tried), strict=True)
+        isinstance(written, dict)
+        and step == {**written, "reason": step["reason"], "reason_code": step["reason_code"]}
+        for step, written, tried in zip(expected, steps, path.run.tried, strict=True)
         if tried
     )
 
@@ -177,8 +175,10 @@ _HELD = ("smallest_eigenvalue", "determinant_sign")
 _RUN = {
     # A path counts more as not converged than the solver does.
     "solver_converged": "converged",
-    **{name: name for name in ("residual", "iterations", "tried", "reached")},
-    **{name: name for name in ("snapped", "overdrawn")},
+    **{
+        name: name
+        for name in ("residual", "iterations", "tried", "reached", "snapped", "overdrawn")
+    },
 }
 """Names of arrays in files to the attributes of a run."""
 
@@ -387,11 +387,7 @@ def write_parquet(target: str | FilePath, path: EquilibriumPath) -> None:
 
 
 def read_columns(file: str | FilePath) -> Mapping[str, Sequence[Any]]:
-    """Return the columns of a Parquet table.
-
-    Raises:
-        InputError: polars is not installed, or the file is not a Parquet table.
-    """
+    """Return the columns of a Parquet table."""
     with _reading(file) as polars:
         return polars.read_parquet(FilePath(file)).to_dict(as_series=False)
 
@@ -439,11 +435,7 @@ _FACTS = "facts"
 
 
 def dataset_of(path: EquilibriumPath) -> Dataset:
-    """Return a path as a data set; for what it holds see `EquilibriumPath.to_xarray`.
-
-    Raises:
-        InputError: xarray is not installed.
-    """
+    """Return a path as a data set; for what it holds see `EquilibriumPath.to_xarray`."""
     need("xarray", "data", "to_xarray")
     import xarray
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
@@ -20,9 +20,10 @@ from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import LoadPath
 from notchflex.loads.command import Command, make_commands
 from notchflex.mechanics.chain import Chain, unchecked_dimensions
+from notchflex.mechanics.flexure import MAX_REFINEMENT
 from notchflex.mechanics.tendon import Straight
 from notchflex.results.quantities import QUANTITIES, PathQuantities, friction_front
-from notchflex.results.state import Equilibrium, State, state_of
+from notchflex.results.state import Equilibrium, State, path_summary, state_of
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain
@@ -55,34 +56,19 @@ MATERIAL = "material"
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """States of many loads, loads as leading axis, as `SolverRun` has them.
+    """States of many loads, loads as leading axis, as `SolverRun` has them."""
 
-    Attributes:
-        solved: The last solved state at each load.
-        reported: What is reported of each state, by the names of `REPORTED`.
-        first: What is reported of the state before the first load, by the names of `BEFORE`;
-            the memory of the material, as `MATERIAL`, and `FLATTENING`.
-        held: Smallest eigenvalue of every stiffness, and the sign of its determinant.
-        residual: Largest scaled imbalance of the last attempt.
-        iterations: Newton iterations.
-        converged: Whether the load was reached.
-        tried: Whether it was tried at all.
-        reached: Part of the way from the load before that was reached.
-        overdrawn: Sum of 2**k over the tendons k, from 0, whose strokes no shape allows.
-        snapped: Notches that snapped shut (1) or open (-1).
-    """
-
-    solved: SolverState
-    reported: Mapping[str, np.ndarray]
-    first: Mapping[str, np.ndarray]
-    held: tuple[np.ndarray, np.ndarray]
+    solved: SolverState  # the last solved states
+    reported: Mapping[str, np.ndarray]  # by the names of `REPORTED`
+    first: Mapping[str, np.ndarray]  # state before the first load: `BEFORE` and others
+    held: tuple[np.ndarray, np.ndarray]  # smallest eigenvalue, sign of determinant
     residual: Float[np.ndarray, " s"]
     iterations: Int[np.ndarray, " s"]
     converged: Bool[np.ndarray, " s"]
     tried: Bool[np.ndarray, " s"]
-    reached: Float[np.ndarray, " s"]
-    overdrawn: Int[np.ndarray, " s"]
-    snapped: Float[np.ndarray, "s n"]
+    reached: Float[np.ndarray, " s"]  # part of the way from the load before
+    overdrawn: Int[np.ndarray, " s"]  # bit k: no shape allows the stroke of tendon k
+    snapped: Float[np.ndarray, "s n"]  # notches that snapped shut (1) or open (-1)
 
     def quantity(self, name: str) -> np.ndarray:
         """Return a quantity of each state by its name in the registry."""
@@ -91,11 +77,11 @@ class Recorded:
     def rows(self, some: slice) -> Recorded:
         """Return some of the loads."""
         start = np.arange(len(self.converged))[some][0]
-        first = dict(self.first)
+        first = self.first
         if start:
-            every = {**self.reported, MATERIAL: self.solved.memory.material}
-            first = {name: np.asarray(every[name])[start - 1] for name in first}
-        cut = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "first"}
+            recorded = {**self.reported, MATERIAL: self.solved.memory.material}
+            first = {name: np.asarray(recorded[name])[start - 1] for name in first}
+        cut = {name: values for name, values in vars(self).items() if name != "first"}
         return Recorded(first=first, **jax.tree.map(lambda values: np.asarray(values)[some], cut))
 
     def before(self, name: str) -> np.ndarray:
@@ -120,28 +106,19 @@ MOMENT_ERROR = 0.01
 
 
 def path_warnings(path: EquilibriumPath) -> list[str]:
-    """Return one sentence for each reason to doubt a path.
-
-    Args:
-        path: Solved path.
-
-    Returns:
-        Sentences on dimensions outside the range that was checked, on strains beyond what the
-        material is allowed or its law is known for, on unstable equilibria, and on too few strain
-        modes; none if there is nothing to warn of.
-    """
+    """Return one sentence for each reason to doubt a path."""
     outside = unchecked_dimensions(path.robot)
     return [*outside, *_snaps(path), *_strains(path), *_unstable(path), *_coarse(path)]
 
 
 def _snaps(path: EquilibriumPath) -> Iterator[str]:
     """Warn of notches that pass a limit point under tension."""
-    for what, side in (("snaps shut", 1), ("snaps open", -1)):
+    for event, side in (("snaps shut", 1), ("snaps open", -1)):
         steps, notches = np.nonzero(path.snap == side)
         if len(steps):
             names = ", ".join(str(notch + 1) for notch in dict.fromkeys(notches.tolist()))
             yield (
-                f"notch {names} {what}, first at step {steps[0] + 1} "
+                f"notch {names} {event}, first at step {steps[0] + 1} "
                 f"({_load(path, int(steps[0]))}): it passes a limit point, where it softens as it "
                 "closes, so that no shape between is in equilibrium under this tension; prescribe "
                 "the stroke to pass through the shapes between."
@@ -151,7 +128,7 @@ def _snaps(path: EquilibriumPath) -> Iterator[str]:
 def _strains(path: EquilibriumPath) -> Iterator[str]:
     material = path.robot.material
     # The law is fitted in the outer strain of eq. 16, which therefore selects its branch.
-    for strain, limit, what, so in (
+    for strain, limit, description, consequence in (
         (
             "peak strain",
             material.allowed_strain,
@@ -168,41 +145,38 @@ def _strains(path: EquilibriumPath) -> Iterator[str]:
         if limit is None:
             continue
         values = getattr(path, strain.replace(" ", "_"))
-        size = np.where(np.asarray(path.converged)[:, None], np.abs(values), -np.inf)
+        size = np.where(path.converged[:, None], np.abs(values), -np.inf)
         beyond = size > limit
         if not beyond.any():
             continue
         notches = [str(notch + 1) for notch in np.flatnonzero(beyond.any(axis=0))]
         step = int(np.flatnonzero(beyond.any(axis=1))[0])
         yield (
-            f"the {strain} passes {what.format(100 * limit)} in notch"
+            f"the {strain} passes {description.format(100 * limit)} in notch"
             f"{'es' if len(notches) > 1 else ''} {', '.join(notches)}, first at step {step + 1} "
-            f"({_load(path, step)}), at most {100 * size.max():.3g} %: {so}."
+            f"({_load(path, step)}), at most {100 * size.max():.3g} %: {consequence}."
         )
 
 
 def _unstable(path: EquilibriumPath) -> Iterator[str]:
-    bad = np.flatnonzero(np.asarray(path.converged) & ~np.asarray(path.stable))
-    fixed = path.determinant_sign[bad] != 0.0 if len(bad) else np.zeros(0, bool)
-    snaps, many = "a real robot would snap to another shape", Failure.INDETERMINATE_TENSIONS
-    for steps, what, why in (
-        (bad[fixed], "unstable", snaps),
-        (bad[~fixed], "not determined", f"{many.text}; {many.remedy}"),
+    unstable = np.flatnonzero(path.converged & ~path.stable)
+    determined = path.determinant_sign[unstable] != 0.0 if len(unstable) else np.zeros(0, bool)
+    indeterminate = Failure.INDETERMINATE_TENSIONS
+    for steps, verdict, reason in (
+        (unstable[determined], "unstable", "a real robot would snap to another shape"),
+        (unstable[~determined], "not determined", f"{indeterminate.text}; {indeterminate.remedy}"),
     ):
         if len(steps):
             plural = "s are" if len(steps) > 1 else " is"
             first = f"first step {steps[0] + 1} ({_load(path, steps[0])})"
-            yield f"{len(steps)} step{plural} {what}, {first}: {why}."
+            yield f"{len(steps)} step{plural} {verdict}, {first}: {reason}."
 
 
 def _coarse(path: EquilibriumPath) -> Iterator[str]:
-    error = np.where(np.asarray(path.converged), path.moment_error, -np.inf)
+    error = np.where(path.converged, path.moment_error, -np.inf)
     if not (error > MOMENT_ERROR).any():
         return
     step = int(np.argmax(error))
-    # Not at the head of the file: what only reads this table needs no solver.
-    from notchflex.mechanics.flexure import MAX_REFINEMENT
-
     refinement = path.chain.refinement
     remedy = (
         f"simulate with --refinement {refinement + 1} (in Python refinement={refinement + 1}) "
@@ -244,9 +218,8 @@ def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
         if path.run.quantity("friction_holds")[step]:
             return _said(Failure.TOO_FEW_MODES, percent=100 * path.moment_error[step])
         return _said(Failure.FRICTION_LOCKS)
-    tension = ", ".join(f"{value:.4g}" for value in path.tension[step])
-    drawn = ", ".join(f"{value:.4g}" for value in path.stroke[step])
-    last = f"; the last good state has tension {tension} N and stroke {drawn} mm"
+    stroke = ", ".join(f"{value:.4g}" for value in path.stroke[step])
+    last = f"; the last good state has tension {_load(path, step)} and stroke {stroke} mm"
     opening = np.asarray(path.chain.rods.length).sum(axis=-1)
     all_closed = (path.gap[step] < _CLOSED_TOLERANCE * opening).all()
     if (all_closed or _past_closing(path, step)) and not np.isnan(path.load.stroke[step]).all():
@@ -277,32 +250,28 @@ def _past_closing(path: EquilibriumPath, step: int) -> bool:
 
 
 def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None:
-    """Return a straight tendon and a notch, from 0, where its free span vanishes.
-
-    Where the edges of its channel meet before those of the notch, the span between them has no
-    direction. A compliant contact lets a closed notch reach that state.
-    """
+    """Return a straight tendon and a notch, from 0, where its free span vanishes."""
+    # Where the edges of its channel meet before those of the notch, the span between them has no
+    # direction. A compliant contact lets a closed notch reach that state.
     chain = path.chain
     position, rotation = path.body_position[step], path.body_rotation[step]
     for group in chain.groups:
         if not isinstance(group, Straight):
             continue
-        leaves, enters = (_in_space(chain, one) for one in (group.leaves, group.enters))
+        leaves, enters = (_in_space(chain, points) for points in (group.leaves, group.enters))
         runs, natural = np.asarray(group.runs), np.asarray(group.natural_gap)
-        for (notch, one), before in np.ndenumerate(np.asarray(group.back)):
-            at, anchor = notch + 1, notch + 1 - int(before)
-            entered = position[at] + rotation[at] @ enters[notch, one]
-            left = position[anchor] + rotation[anchor] @ leaves[notch, one]
-            if runs[notch, one] and norm(entered - left) < _EDGES_MEET * natural[notch, one]:
-                return group.numbers[one], notch
+        for (notch, column), before in np.ndenumerate(np.asarray(group.back)):
+            body, anchor = notch + 1, notch + 1 - int(before)
+            entered = position[body] + rotation[body] @ enters[notch, column]
+            left = position[anchor] + rotation[anchor] @ leaves[notch, column]
+            if runs[notch, column] and norm(entered - left) < _EDGES_MEET * natural[notch, column]:
+                return group.numbers[column], notch
     return None
 
 
 def _slack_by_loss(path: EquilibriumPath, step: int) -> tuple[int, float] | None:
-    """Return a tendon driven by stroke, from 0, that its constant losses leave slack; their sum, N.
-
-    While the slack passes from a closed notch to the next, the tension rises at the same stroke.
-    """
+    """Return a tendon driven by stroke, from 0, that constant losses leave slack; their sum, N."""
+    # While the slack passes from a closed notch to the next, the tension rises at the same stroke.
     for tendon in np.flatnonzero(np.isfinite(path.load.stroke[step])):
         turning = path.contact_turning[step, tendon]
         losses = path.chain.friction.constant_loss(turning)
@@ -373,9 +342,9 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
         Args:
             name: Name of a property, such as "notch_angle".
         """
-        kept = vars(self).setdefault("_kept", {})
-        if name in kept:
-            return kept[name]
+        cache = vars(self).setdefault("_cache", {})
+        if name in cache:
+            return cache[name]
         if name not in QUANTITIES:
             names = ", ".join(QUANTITIES)
             raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {names}")
@@ -384,8 +353,8 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
             values = quantity.formula(self)
         else:  # vectors and rotations of the solver are in the frame of the base
             values = quantity.turned(self.solver_quantity(name), self.load.base_to_world)
-        kept[name] = frozen(values)
-        return kept[name]
+        cache[name] = frozen(values)
+        return cache[name]
 
     def _value(self) -> Any:
         solved = tuple(self.solver_quantity(name) for name in Shape._fields)
@@ -398,8 +367,6 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
         Steps that were not tried repeat the last one that was: their rows are empty.
         """
         values = self.run.quantity(name)
-        if len(values) == 1:  # always tried
-            return values
         tried = self.run.tried
         if tried.all():
             return values
@@ -576,8 +543,6 @@ class EquilibriumPath(ByValue, PathQuantities, Displayed):
         return plot(self, x, y, ax=ax)
 
     def _summary(self) -> Summary:
-        from notchflex.results.state import path_summary
-
         return path_summary(self)
 
     def raise_if_failed(self) -> EquilibriumPath:

@@ -176,10 +176,8 @@ def _accumulated(path: EquilibriumPath, force: str, length: str) -> np.ndarray:
 def work_of_steps(
     force: tuple[np.ndarray, np.ndarray], length: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
-    """Return the work of a force, before and after every step, by the trapezoid rule.
-
-    A contact between two spans takes the drop of the tension from one to the other.
-    """
+    """Return the work of a force, before and after every step, by the trapezoid rule."""
+    # A contact between two spans takes the drop of the tension from one to the other.
     mean, change = 0.5 * (force[0] + force[1]), length[1] - length[0]
     if mean.shape[-1] > change.shape[-1]:
         mean = mean[..., :-1] - mean[..., 1:]
@@ -199,15 +197,7 @@ def _before_and_after(
 def friction_front(
     ratio: Float[np.ndarray, "s t contacts"], bound: Float[np.ndarray, "s t contacts"]
 ) -> tuple[Int[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
-    """Return the contact that turns, and its friction over the largest (Gao 2017, eq. 26).
-
-    Args:
-        ratio: Log ratio of the tension at every contact, base to tip; NaN where there is none.
-        bound: Its largest magnitude.
-
-    Returns:
-        m and eta of every tendon; see `EquilibriumPath.front`.
-    """
+    """Return the contact that turns, and its friction over the largest (Gao 2017, eq. 26)."""
     exists = ~np.isnan(ratio)
     rubs = exists & (bound > 0.0)
     # A contact without friction (a law may lay it all on one edge of a gap) is passed over, and
@@ -217,8 +207,8 @@ def friction_front(
     let_go = np.nansum(ratio, axis=-1, keepdims=True) < 0.0
     nothing = ~counts.any(axis=-1, keepdims=True)
     waits = np.where(nothing, rubs & ~let_go, counts & ~turned)
-    every = np.where(rubs.any(axis=-1), exists.sum(axis=-1), 0)
-    count = np.where(waits.any(axis=-1), waits.argmax(axis=-1), every)
+    all_turned = np.where(rubs.any(axis=-1), exists.sum(axis=-1), 0)
+    count = np.where(waits.any(axis=-1), waits.argmax(axis=-1), all_turned)
     at_front = np.minimum(count, ratio.shape[-1] - 1)[..., None]
     at_contact, largest = (
         np.take_along_axis(value, at_front, axis=-1)[..., 0] for value in (ratio, bound)
@@ -233,33 +223,30 @@ def friction_front(
 #
 # Their documentation and their values come from the registry (`notchflex._quantity`).
 
-QUANTITIES = {name: one for name, one in REGISTERED.items() if one.title}
+QUANTITIES = {name: quantity for name, quantity in REGISTERED.items() if quantity.title}
 """Every quantity of a solved state, by the attribute that holds it."""
 
-_Many = TypeVar("_Many")
-_One = TypeVar("_One")
+_OfPath = TypeVar("_OfPath")
+_OfState = TypeVar("_OfState")
 
 
-class _Property(property, Generic[_Many, _One]):
-    """A quantity as property: values of every step of a path, or the value of one equilibrium.
-
-    A property of Python, so that help on `path.tension` tells what it is, not what an array is.
-    """
+class _Property(property, Generic[_OfPath, _OfState]):
+    """A quantity as property: values of every step of a path, or the value of one equilibrium."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         quantity = QUANTITIES[name]
         self._name, self.__doc__ = name, f"{quantity.summary}\n\n{quantity.text}"
 
     @overload
-    def __get__(self, thing: None, owner: type) -> Self: ...
+    def __get__(self, instance: None, owner: type) -> Self: ...
     @overload
-    def __get__(self, thing: PathQuantities, owner: type) -> _Many: ...
+    def __get__(self, instance: PathQuantities, owner: type) -> _OfPath: ...
     @overload
-    def __get__(self, thing: EquilibriumQuantities, owner: type) -> _One: ...
+    def __get__(self, instance: EquilibriumQuantities, owner: type) -> _OfState: ...
     def __get__(  # pyright: ignore[reportIncompatibleMethodOverride]
-        self, thing: _Quantities | None, owner: type
+        self, instance: _Quantities | None, owner: type
     ) -> Any:
-        return self if thing is None else thing.quantity(self._name)
+        return self if instance is None else instance.quantity(self._name)
 
 
 class Number(_Property[np.ndarray, float]):
@@ -395,15 +382,7 @@ CONTACT_STATES = {0: "stick", 1: "slip toward base", -1: "slip toward tip"}
 
 
 def span_names(count: int) -> list[str]:
-    """Return the names of the spans of a tendon, base to tip.
-
-    Args:
-        count: Number of spans, 2 m for a tendon that runs through m bodies to its end.
-
-    Example:
-        >>> span_names(4)
-        ['proximal', 'gap_1', 'body_1', 'gap_2']
-    """
+    """Return the names of the spans of a tendon, base to tip: proximal, gap_1, body_1, gap_2."""
     names = ["proximal"]
     for index in range(1, count):
         names.append(f"gap_{(index + 1) // 2}" if index % 2 else f"body_{index // 2}")

@@ -15,7 +15,6 @@ import re
 from collections.abc import Callable, Container, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from pathlib import Path
-from pathlib import Path as FilePath
 from typing import Any, TypeVar
 
 import numpy as np
@@ -98,20 +97,19 @@ class Table:
 
     def _number(self, text: str, column: str, line: int, hint: str) -> float:
         column = self.written.get(column, column)
-        at = f"{self.name}, line {line}: {column} is {text}"
+        place = f"{self.name}, line {line}: {column} is"
         try:
             value = float(text.replace(self.decimal, ".", 1))
         except ValueError:
             got = repr(text) if text else "nothing"
-            at = f"{self.name}, line {line}: {column} is {got}"
-            raise InputError.NOT_A_NUMBER(f"{at}; give a number{hint}.") from None
+            raise InputError.NOT_A_NUMBER(f"{place} {got}; give a number{hint}.") from None
         if not math.isfinite(value):
-            raise InputError.NOT_FINITE(f"{at}; give a finite number{hint}.")
+            raise InputError.NOT_FINITE(f"{place} {text}; give a finite number{hint}.")
         if abs(value) > LARGEST:
-            raise InputError.OUT_OF_RANGE(f"{at}; give at most {LARGEST:g}.")
+            raise InputError.OUT_OF_RANGE(f"{place} {text}; give at most {LARGEST:g}.")
         return value
 
-    def at(self, row: int) -> str:
+    def place_of(self, row: int) -> str:
         """Return where a row (from 0) stands, as messages begin: file and line."""
         return f"{self.name}, line {self.lines[row]}"
 
@@ -136,18 +134,7 @@ class Table:
 
 
 def csv_table(source: str | os.PathLike[str]) -> Table:
-    """Read a table.
-
-    Args:
-        source: Path of the file.
-
-    Returns:
-        Its header and rows, at least one.
-
-    Raises:
-        InputError: No such file, not a CSV, empty, two columns of one name, or a row that has
-            more or fewer entries than the header.
-    """
+    """Read a table of at least one row, as it stands in a file."""
     path, text = Path(source), read_text(source, "CSV file")
     separator = _separator(text)
     reader = csv.reader(text.splitlines(), strict=True, delimiter=separator)
@@ -198,11 +185,8 @@ def _separator(text: str) -> str:
 
 
 def _decimal(path: Path, lines: Sequence[int], rows: Sequence[Sequence[str]]) -> str:
-    """Return the decimal separator of a table with semicolons, whose numbers may have either.
-
-    Raises:
-        InputError: Some numbers have a comma and others a point: one of them separates thousands.
-    """
+    """Return the decimal separator of a table with semicolons, whose numbers may have either."""
+    # A table with commas and points has separators of thousands: it is refused.
     first: dict[str, tuple[int, str]] = {}
     for line, row in zip(lines, rows, strict=True):
         for entry in row:
@@ -238,10 +222,10 @@ def tendon_columns(header: Sequence[str], quantity: str, tendons: int) -> dict[i
 def no_tendon_column(table: Table, tendons: int) -> InputError:
     """Return what is raised where a table has no column for any tendon."""
     label = "" if tendons == 1 else 1
-    wanted = [QUANTITIES[q].header(tendon=label) for q in ("tension", "stroke")]
+    columns = [QUANTITIES[q].header(tendon=label) for q in ("tension", "stroke")]
     more = "" if tendons == 1 else f" (and so on to tendon {tendons})"
     return InputError.TABLE_COLUMNS(
-        f"{table.name}: there is no column {wanted[0]} or {wanted[1]}{more}; {table.columns}. "
+        f"{table.name}: there is no column {columns[0]} or {columns[1]}{more}; {table.columns}. "
         f'Say which it is: --column tension="{_likely(table)}".'
     )
 
@@ -300,7 +284,7 @@ def read_data_table(
         named[header] = name
     entries: dict[str, tuple[str, ...]] = {}
     written: dict[str, str] = {}
-    told: set[str] = set()
+    named_columns: set[str] = set()
     for header, texts in table.entries.items():
         column, factor = _understood(header, named.get(header, ""))
         if column != header and (column in table.entries or column in entries):
@@ -311,17 +295,14 @@ def read_data_table(
             column, factor = header, 1.0
         entries[column] = tuple(_converted(text, factor, table.decimal) for text in texts)
         written |= {column: header} if column != header else {}
-        told |= {column} if header in named else set()
-    return dataclasses.replace(table, entries=entries, written=written, named=frozenset(told))
+        named_columns |= {column} if header in named else set()
+    return dataclasses.replace(
+        table, entries=entries, written=written, named=frozenset(named_columns)
+    )
 
 
 def _understood(header: str, name: str) -> tuple[str, float]:
-    """Return the usual name of a column, and what its numbers are multiplied by.
-
-    Args:
-        header: As it stands in the file.
-        name: What the reader says it is; "" for what its own words say.
-    """
+    """Return the usual name of a column, and the factor of its numbers; `name` may say it."""
     if _PLAIN.fullmatch(name):
         return name, 1.0
     words, unit = _name_and_unit(header)
@@ -334,9 +315,9 @@ def _understood(header: str, name: str) -> tuple[str, float]:
     numbers = re.findall(r"\d+", words)
     key = " ".join(re.findall(r"[^\W\d_]+", words.lower()))
     if key in _WORDS:
-        column, wanted = _WORDS[key]
-        if base in ("", wanted) and len(numbers) <= 1:
-            return f"{column.format(n=''.join(f'_{n}' for n in numbers))}_{wanted}", factor
+        column, usual_unit = _WORDS[key]
+        if base in ("", usual_unit) and len(numbers) <= 1:
+            return f"{column.format(n=''.join(f'_{n}' for n in numbers))}_{usual_unit}", factor
     if name and (key in _WORDS or not base):
         raise InputError.UNKNOWN_NAME(
             f"--column {name}={header}: {TOLD_COLUMNS}, for a column in its unit."
@@ -420,7 +401,7 @@ _PATTERNS = {
 }
 
 
-def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
+def read_table(file: str | Path) -> dict[str, NDArray[Any]]:
     """Read a table that was written of a path, as its quantities in mm, N and rad.
 
     A table holds every step as it was printed, so angles come back to the last digit or two. What
@@ -448,7 +429,7 @@ def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
         ((3, 5), False)
     """
     entries: dict[str, dict[tuple[int, ...], NDArray[Any]]] = {}
-    is_parquet = FilePath(file).suffix.lower() == ".parquet"
+    is_parquet = Path(file).suffix.lower() == ".parquet"
     columns = read_columns(file) if is_parquet else csv_table(file).entries
     for header, values in columns.items():
         place = _place(header)
@@ -505,7 +486,7 @@ def _joined(quantity: Quantity, parts: Mapping[tuple[int, ...], NDArray[Any]]) -
     first = next(iter(parts.values()))
     shape = np.max(list(parts), axis=0) + 1
     empty = np.nan if first.dtype.kind == "f" else 0
-    whole = np.full((len(first), *shape), empty, first.dtype)
+    array = np.full((len(first), *shape), empty, first.dtype)
     for index, values in parts.items():
-        whole[(slice(None), *index)] = values
-    return whole
+        array[(slice(None), *index)] = values
+    return array

@@ -44,33 +44,18 @@ _MAX_NAMED = 3
 
 
 def differences(robot: Robot, other: Robot) -> list[str]:
-    """List the values in which two robots differ, by their names in a robot file.
-
-    Args:
-        robot: The robot whose values are given first.
-        other: The robot that it is compared with.
-
-    Returns:
-        One text for each value, such as `notch.depth = 1.38 instead of 1.4`; a value that differs
-        in all notches in the same way is listed once.
-
-    Example:
-        >>> from notchflex.robot import load_robot
-        >>> wrist = load_robot("pacheco2021-a")
-        >>> differences(wrist.with_value("notch.depth", 1.38), wrist)
-        ['notch.depth = 1.38 instead of 1.4']
-    """
+    """List the values in which two robots differ, by their names in a robot file."""
     first, second = _values(robot), _values(other)
     changes: dict[tuple[str, Any, Any], list[str]] = {}
     for name in dict.fromkeys([*first, *second]):
-        mine, its = first.get(name), second.get(name)
-        if mine != its:
-            changes.setdefault((_general(name), mine, its), []).append(name)
+        value, compared = first.get(name), second.get(name)
+        if value != compared:
+            changes.setdefault((_general(name), value, compared), []).append(name)
     changed: list[str] = []
-    for (general, mine, its), names in changes.items():
+    for (general, value, compared), names in changes.items():
         everywhere = len(names) == sum(_general(name) == general for name in first)
         shown = [general] if everywhere else names
-        changed += [f"{name} = {_text(mine)} instead of {_text(its)}" for name in shown]
+        changed += [f"{name} = {_text(value)} instead of {_text(compared)}" for name in shown]
     return changed
 
 
@@ -251,10 +236,8 @@ class State(ByValue, Displayed):
 
 
 def leaves_of(solved: SolverState) -> dict[str, np.ndarray]:
-    """Return the arrays of a solved state by the names that they have in files.
-
-    Files keep the names of their first version, whatever the fields of the solver are called.
-    """
+    """Return the arrays of a solved state by the names that they have in files."""
+    # Files keep the names of their first version, whatever the fields of the solver are called.
     leaves, _ = tree_util.tree_flatten_with_path(solved)
     return {
         tree_util.keystr(key).replace("contact_force", "lip_force"): np.asarray(leaf)
@@ -287,12 +270,7 @@ def _damaged(source: str | FilePath, what: str) -> InputError:
 
 
 def check_robot(state: object, robot: Robot) -> None:
-    """Check that a state belongs to a robot.
-
-    Raises:
-        InputError: It belongs to another one, and the message names the values that differ; or it
-            is not a state.
-    """
+    """Raise if a state belongs to another robot; the message names the values that differ."""
     if not isinstance(state, State):
         raise InputError.WRONG_TYPE(
             "from_state must be a notchflex.State: the `state` of a result, or State.load(file); "
@@ -458,7 +436,7 @@ _HINT = "[step] is one state; also .plot(), .to_dataframe(), .to_xarray()"
 
 def path_summary(path: EquilibriumPath) -> Summary:
     """Summarise a path: how load, angle and tip change along it, and whether it converged."""
-    converged = np.asarray(path.converged)
+    converged = path.converged
     rows = list(external_rows(path.load))
     for name, unit, values in (
         ("tension", "N", path.tension),
@@ -481,11 +459,12 @@ def path_summary(path: EquilibriumPath) -> Summary:
 
 
 def _converged(path: EquilibriumPath) -> str:
-    converged = np.asarray(path.converged)
-    if converged.all():
+    if path.converged.all():
         return "all steps"
-    first = int(np.argmin(converged))
-    return f"{int(converged.sum())} of {len(path)} steps; step {first + 1}: {path.reason[first]}"
+    first = int(np.argmin(path.converged))
+    return (
+        f"{int(path.converged.sum())} of {len(path)} steps; step {first + 1}: {path.reason[first]}"
+    )
 
 
 def _few(values: np.ndarray, digits: int | None = None) -> str:

@@ -28,6 +28,7 @@ from notchflex.results.quantities import (
     spans_of,
     units,
 )
+from notchflex.results.writing import write_text
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from pathlib import Path as FilePath
 
     from notchflex.results.path import EquilibriumPath
-from notchflex.results.writing import write_text
 
 
 def path_columns(path: EquilibriumPath) -> dict[str, Sequence[Any]]:
@@ -43,7 +43,7 @@ def path_columns(path: EquilibriumPath) -> dict[str, Sequence[Any]]:
     columns: dict[str, Sequence[Any]] = {"step": range(1, len(path) + 1)}
     for quantity in QUANTITIES.values():
         if quantity.column and holds(path, quantity):
-            columns.update({one.header: one.values for one in entries_of(path, quantity)})
+            columns.update({entry.header: entry.values for entry in entries_of(path, quantity)})
     return columns
 
 
@@ -102,16 +102,10 @@ def csv_text(header: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
 
 @dataclass(frozen=True)
 class CsvEntry:
-    """One entry of a quantity along a path, such as the angle of one notch.
+    """One entry of a quantity along a path, such as the angle of one notch."""
 
-    Attributes:
-        header: The CSV column; "" where the quantity has none.
-        name: Which entry it is, such as "notch 3"; "" for a quantity with one number.
-        values: A value per step, at the edge units.
-    """
-
-    header: str
-    name: str
+    header: str  # the CSV column; "" where there is none
+    name: str  # such as "notch 3"; "" for one number
     values: Any
 
 
@@ -172,19 +166,9 @@ LOAD_UNITS = {f"load.{key}": unit for key, unit in _LOAD_KEYS.values()}
 
 
 def path_document(path: EquilibriumPath) -> dict[str, Any]:
-    """Return a path as a document of plain lists, numbers, strings and None.
-
-    Args:
-        path: Solved path, S steps.
-
-    Returns:
-        `name`, `version`, `robot` (its whole description), `units` (JSON key to unit),
-        `converged`, `reason`, `reason_code` (name of a `Failure`) and `steps`, a list of S
-        objects. None stands where there is no number. Angles in deg, lengths in mm, forces in N.
-        Where external loads act in any step, `load` holds those of every step.
-    """
+    """Return a path as a JSON document of plain values, angles in deg, None for no number."""
     external = _external(path)
-    failed = next((step for step, good in enumerate(path.converged) if not good), None)
+    failed = next((step for step, converged in enumerate(path.converged) if not converged), None)
     steps = [_step(path, index, external) for index in range(len(path))]
     return {
         **document_head(path.robot),
@@ -212,18 +196,7 @@ def document_head(robot: Robot) -> dict[str, Any]:
 
 
 def json_text(document: Any) -> str:
-    r"""Return a document as JSON text that ends with a newline.
-
-    Args:
-        document: Nested dicts and lists; numpy arrays and numbers are allowed.
-
-    Returns:
-        Strict JSON: NaN becomes null.
-
-    Example:
-        >>> json_text({"angle_deg": [1.5, float("nan")]})
-        '{"angle_deg": [1.5, null]}\n'
-    """
+    """Return a document as strict JSON text that ends with a newline; NaN becomes null."""
     return json.dumps(plain(document), ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -243,9 +216,9 @@ def plain(value: Any) -> Any:
     back as a number by the robot models.
     """
     if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
+        return [plain(entry) for entry in value]
     if isinstance(value, (np.ndarray, np.generic)):
         return plain(value.tolist())
     if isinstance(value, float):
@@ -273,9 +246,9 @@ def _step(path: EquilibriumPath, index: int, external: list[dict[str, Any]]) -> 
 
 def _external(path: EquilibriumPath) -> list[dict[str, Any]]:
     """External loads of every step; nothing at all where no step has any."""
-    if all(one.is_nothing for one in path.load.external):
+    if all(load.is_nothing for load in path.load.external):
         return []
-    return [_with_units(asdict(one)) for one in path.load.external]
+    return [_with_units(asdict(load)) for load in path.load.external]
 
 
 def _with_units(values: dict[str, Any]) -> dict[str, Any]:

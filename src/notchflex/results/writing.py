@@ -139,8 +139,8 @@ def check_folder(
                 f"{option} {folder}: a file cannot be called {name!r}."
             )
         files.append(Path(folder) / name)
-    there, sources = "\0" not in folder and os.path.exists(folder), list(inputs)
-    for target in files if there else [folder]:
+    exists, sources = "\0" not in folder and os.path.exists(folder), list(inputs)
+    for target in files if exists else [folder]:
         check_output(str(target), option, inputs=sources)
     return tuple(files)
 
@@ -170,9 +170,9 @@ def check_picture(
         )
     suffix = Path(target).suffix.lower()
     if suffix not in kinds:
-        known = f"{', '.join(kinds[:-1])} or {kinds[-1]}"
+        listed = f"{', '.join(kinds[:-1])} or {kinds[-1]}"
         raise InputError.FILE_FORMAT(
-            f"{option} {target}: got {suffix_of(target)}; a picture is written as {known}."
+            f"{option} {target}: got {suffix_of(target)}; a picture is written as {listed}."
         )
     check_output(target, option, inputs=inputs)
     for module in _DRAWN_BY.get(suffix, ("matplotlib",)):
@@ -227,10 +227,8 @@ def write_text(target: str | Path, text: str) -> None:
 
 
 def _folder_takes_files(folder: Path) -> bool:
-    """Say whether a file can be made in `folder`, by making one without a name and dropping it.
-
-    Asking for permissions is not enough: a read-only file system or a full quota grants them.
-    """
+    """Say whether a file can be made in a folder, by making one without a name and dropping it."""
+    # Asking for permissions is not enough: a read-only file system or a full quota grants them.
     try:
         with tempfile.TemporaryFile(dir=folder):
             return True

@@ -73,7 +73,7 @@ class MeasurementReader:
         for row, text in enumerate(texts):
             if text.lower() not in _YES_OR_NO:
                 raise InputError.NOT_A_NUMBER(
-                    f"{self.table.at(row)}: {name} is {text or 'nothing'!r}; give 0 or 1."
+                    f"{self.table.place_of(row)}: {name} is {text or 'nothing'!r}; give 0 or 1."
                 )
         return [_YES_OR_NO[text.lower()] for text in texts]
 
@@ -84,8 +84,8 @@ class MeasurementReader:
         for row, text in enumerate(texts):
             if text.lower() not in words:
                 raise InputError.TABLE_COLUMNS(
-                    f"{self.table.at(row)}: {columns.DIRECTION} is {text or 'nothing'!r}; give "
-                    "loading or unloading."
+                    f"{self.table.place_of(row)}: {columns.DIRECTION} is {text or 'nothing'!r}; "
+                    "give loading or unloading."
                 )
         return [words[text.lower()] for text in texts]
 
@@ -115,8 +115,8 @@ class MeasurementReader:
         if len(set(flags)) > 1:
             row = flags.index(not flags[0])
             raise InputError.UNSUPPORTED(
-                f"{self.table.at(row)}: {columns.FROM_REST} differs from the rows before; it is "
-                "the same for all."
+                f"{self.table.place_of(row)}: {columns.FROM_REST} differs from the rows before; it "
+                "is the same for all."
             )
         return flags[0]
 
@@ -126,7 +126,7 @@ class MeasurementReader:
         differs = np.flatnonzero((turned != turned[0]).any(axis=1))
         if len(differs):
             raise InputError.UNSUPPORTED(
-                f"{self.table.at(differs[0])}: the base rotation differs from the row before "
+                f"{self.table.place_of(differs[0])}: the base rotation differs from the row before "
                 "it; write a file for each way that it is turned."
             )
         return np.radians(turned[0])
@@ -153,7 +153,7 @@ class MeasurementReader:
             missing = np.flatnonzero(np.isnan(tension[:, tendon]) & np.isnan(stroke[:, tendon]))
             if len(missing):
                 raise InputError.MISSING_VALUE(
-                    f"{table.at(missing[0])}: {' and '.join(names)} "
+                    f"{table.place_of(missing[0])}: {' and '.join(names)} "
                     f"{'are' if len(names) > 1 else 'is'} nothing; say what was done to the "
                     "tendon, 0 N where it was slack."
                 )
@@ -177,12 +177,12 @@ class MeasurementReader:
             try:
                 loads.append(ExternalLoad(**load))
             except InputError as problem:
-                raise InputError(f"{self.table.at(row)}: {problem}.", problem.code) from None
+                raise InputError(f"{self.table.place_of(row)}: {problem}.", problem.code) from None
             has_mass = self.robot.material.density is not None or load.get("tip_mass")
             if any(load.get("gravity", ())) and not has_mass:
                 raise InputError.UNSUPPORTED(
-                    f"{self.table.at(row)}: gravity has nothing to act on, because the density of "
-                    f"{self.robot.name} is not known; give material.density, or a "
+                    f"{self.table.place_of(row)}: gravity has nothing to act on, because the "
+                    f"density of {self.robot.name} is not known; give material.density, or a "
                     f"{columns.TIP_MASS}."
                 )
         return tuple(loads)
@@ -299,9 +299,9 @@ def _order(
         return order
     row, name, top, bottom = order.unclear
     raise InputError.UNSUPPORTED(
-        f"{table.at(row)}: the {name} falls from {top:g} to {bottom:g} neither step by step nor "
-        "to where the pull began, so the order of the rows does not show how the robot was loaded. "
-        "Say so: --from-rest (a column from_rest "
+        f"{table.place_of(row)}: the {name} falls from {top:g} to {bottom:g} neither step by step "
+        "nor to where the pull began, so the order of the rows does not show how the robot was "
+        "loaded. Say so: --from-rest (a column from_rest "
         "of 1) if every row was loaded from rest, --path (0) if the rows of each pull are one "
         "loading path; a column trial separates pulls."
     )
@@ -388,8 +388,8 @@ def check_deviation(table: Table, column: str, values: Numbers) -> None:
     if (values <= 0.0).any():
         row = int(np.argmax(values <= 0.0))
         raise InputError.OUT_OF_RANGE(
-            f"{table.at(row)}: {column} is {values[row]:g}; a standard deviation is above 0, or "
-            "empty where it is not known."
+            f"{table.place_of(row)}: {column} is {values[row]:g}; a standard deviation is above 0, "
+            "or empty where it is not known."
         )
 
 
