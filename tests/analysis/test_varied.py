@@ -355,6 +355,7 @@ def test_few_numbers_that_make_no_robot_need_few_robots(monkeypatch):
     ("values", "code", "said"),
     [
         ({"notch.dept": [1.0]}, "UNKNOWN_NAME", "depth"),
+        ({"robots": [1.0, 2.0]}, "UNKNOWN_NAME", "`robots` is no number"),
         ({"notch.depth": [1.4, 1.39], "notch.height": [0.8] * 3}, "WRONG_SHAPE", "2 notch.depth"),
         ({"notch.depth": []}, "WRONG_SHAPE", "0 notch.depth"),
         ({"notch.depth": 1.4}, "WRONG_SHAPE", "one for each row"),

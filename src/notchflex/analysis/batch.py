@@ -340,6 +340,8 @@ def _rows(
 
 def _numbers(name: str, values: ArrayLike) -> np.ndarray:
     """Return the numbers of a name as an array."""
+    if name in ("robots", "loads"):
+        raise InputError.UNKNOWN_NAME(f"`{name}` is no number of a robot or of a load")
     try:
         numbers = np.asarray(values, float)
     except (TypeError, ValueError):
