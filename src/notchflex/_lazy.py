@@ -5,12 +5,7 @@ from collections.abc import Callable, Mapping
 
 
 def loader(module: str, homes: Mapping[str, str]) -> Callable[[str], object]:
-    """Return a `__getattr__` that imports a name from its home and keeps it.
-
-    Args:
-        module: The module that lacks the names.
-        homes: The module that has each.
-    """
+    """Return a `__getattr__` that imports a name from its home and keeps it."""
 
     def load(name: str) -> object:
         from importlib import import_module

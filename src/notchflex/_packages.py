@@ -17,14 +17,7 @@ def import_all(package: str, path: Iterable[str]) -> None:
 
 
 def unregistered(wanted: str, part: object, folder: str, function: str) -> TypeError:
-    """Make the error of a kind that a function was not told of.
-
-    Args:
-        wanted: What was asked for, such as "rod".
-        part: A description.
-        folder: The folder in `mechanics` where kinds register themselves.
-        function: The function that they register for.
-    """
+    """Make the error of a kind that a function was not told of."""
     return TypeError(
         f"no {wanted} is registered for a description of type {type(part).__name__}; "
         f"add one to notchflex/mechanics/{folder} with @{function}.register"

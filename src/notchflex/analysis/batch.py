@@ -624,8 +624,8 @@ class BatchTable:
         batch = self.batch
         chains, alike = self.chains.packed(batch.robot_of[rows])
         steps, bodies = batch.loads.steps_of(batch.path_of[rows]), self.chains.bodies(chains)
-        drawn = bool(self.kind & DRAWN)
-        acting = row_commands(batch.loads.load, steps, bodies, batch.loads.tip, drawn=drawn)
+        draws = bool(self.kind & DRAWN)
+        acting = row_commands(batch.loads.load, steps, bodies, batch.loads.tip, draws=draws)
         layout = self.chains.ready.command_layout(acting)
         commands = np.asarray(layout.pack(acting, leading=2))
         packed = Packed(chains, self.chains.structure, chains.ndim == 2)

@@ -35,28 +35,16 @@ def linear_step(
     command: Command,
     point: Iterate,
     memory: Memory,
-    at: Evaluation,
+    evaluation: Evaluation,
 ) -> Iterate:
-    """Solve the linearised balance for the step to equilibrium.
-
-    Derivatives of the step are those of the residual, not those of the linear system: a step
-    from a solved state then changes as the solution does (implicit function theorem).
-
-    Args:
-        chain: The chain.
-        command: Tensions and strokes commanded, external loads.
-        point: The point to step from.
-        memory: History of the contacts.
-        at: Evaluation there.
-
-    Returns:
-        The step.
-    """
+    """Solve the linearised balance at a point for the step to equilibrium."""
+    # Derivatives of the step are those of the residual, not those of the linear system: a step from
+    # a solved state then changes as the solution does (implicit function theorem).
     unit = unit_rows(chain, by_stroke=command.by_stroke is not None)
     unknowns = point.unknowns
-    state = (chain, unknowns, memory, command.applied, at)
+    state = (chain, unknowns, memory, command.applied, evaluation)
     rows = linearise(*jax.tree.map(jax.lax.stop_gradient, state), unit=unit)
-    residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.residual)
+    residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(evaluation.residual)
     size = unit.unknowns
     # Own unknowns as functions of 1, carried and beyond: du = response @ (1, c, b).
     right = jnp.concatenate([residual[..., None], rows.residual[..., size:]], axis=-1)
@@ -72,7 +60,7 @@ def linear_step(
     condensed, back = _condense(insert(rows.to_next), insert(rows.to_previous), unit)
     tension_step = command.target - point.base_tension
     if command.by_stroke is not None:
-        slopes, count = command_slopes(chain, command, at.base), len(order)
+        slopes, count = command_slopes(chain, command, evaluation.base), len(order)
         by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ at_base], axis=1)
         lengths = by_tension[len(back) - 2 * count :].reshape(2, count, -1)
         # Rows in the order of the robot's tendons.
@@ -82,14 +70,14 @@ def linear_step(
         # Where every contact sticks, the stroke does not depend on the tension; a small pivot keeps
         # the step finite.
         undetermined = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _ZERO_SLOPE)
-        missing = command_residual(chain, command, at.base) + by_base[:, 0]
+        missing = command_residual(chain, command, evaluation.base) + by_base[:, 0]
         pivots = _PIVOT_SHIFT * jnp.diag(undetermined.astype(float))
         tension_step = -gauss_jordan(matrix + pivots, missing[:, None])[:, 0]
 
     def follow(carried: Array, blocks: tuple[Array, Array]) -> tuple[Array, Array]:
         to_next, returned = blocks
-        own = jnp.concatenate([jnp.ones(1), carried])
-        return to_next @ own, jnp.concatenate([own, returned @ own])
+        homogeneous = jnp.concatenate([jnp.ones(1), carried])
+        return to_next @ homogeneous, jnp.concatenate([homogeneous, returned @ homogeneous])
 
     # (1, carried, from beyond) of every element, from the base to the tip.
     surroundings = jax.lax.scan(follow, jnp.asarray(at_base) @ tension_step, condensed)[1]
@@ -101,19 +89,17 @@ def linear_step(
 def _condense(
     to_next: Float[Array, "n c z"], to_previous: Float[Array, "n b z"], unit: UnitRows
 ) -> tuple[tuple[Float[Array, "n c 1+c"], Float[Array, "n b 1+c"]], Float[Array, "b 1+c"]]:
-    """Eliminate the couplings between neighbours, from the tip.
-
-    Both arguments are rows over (1, carried, from beyond). Returns rows over (1, carried) of what
-    every element carries to the next and receives from it, and of what the first hands to the base.
-    """
+    """Eliminate the couplings of neighbours from the tip: rows over (1, carried, from beyond)."""
+    # Returns rows over (1, carried) of what every element carries to the next and receives from it,
+    # and of what the first hands to the base.
     size = 1 + unit.carried
-    one = constant(np.eye(unit.carried))
+    identity = constant(np.eye(unit.carried))
 
     def join(back: Array, item: tuple[Array, Array]) -> tuple[Array, tuple[Array, Array]]:
         to_next, to_previous = item
         by_back = to_next[:, size:]
         right = _add_constant(to_next[:, :size], by_back @ back[:, 0])
-        carried_on = gauss_jordan(one - by_back @ back[:, 1:], right)
+        carried_on = gauss_jordan(identity - by_back @ back[:, 1:], right)
         returned = _add_constant(back[:, 1:] @ carried_on, back[:, 0])
         return to_previous[:, :size] + to_previous[:, size:] @ returned, (carried_on, returned)
 
@@ -130,12 +116,10 @@ def _add_constant(rows: Float[Array, "k z"], by: Float[Array, " k"]) -> Float[Ar
 def gauss_jordan(
     matrix: Float[Array, "*n u u"], right: Float[Array, "*n u r"]
 ) -> Float[Array, "*n u r"]:
-    """Solve small systems by Gauss-Jordan elimination without pivoting.
-
-    Modes come first: their stiffness makes their pivots safe. A step drops the column that it has
-    cleared. The barrier keeps the compiler from recomputing earlier steps for every later one; a
-    loop takes twice as long, and many small factorisations by LAPACK two to seven times.
-    """
+    """Solve small systems by Gauss-Jordan elimination without pivoting."""
+    # Modes come first: their stiffness makes their pivots safe. A step drops the column that it has
+    # cleared. The barrier keeps the compiler from recomputing earlier steps for every later one; a
+    # loop takes twice as long, and many small factorisations by LAPACK two to seven times.
     size = matrix.shape[-1]
     table = jnp.concatenate([matrix, right], axis=-1)
     for number in range(size):

@@ -37,11 +37,10 @@ from notchflex.solver.residual import (
 
 
 class UnitRows(NamedTuple):
-    """Unit rows of all columns: own unknowns, then carried from the base, then from the tip.
+    """Unit rows of all columns: unknowns of a flexure, carried from the base, from the tip."""
 
-    Motions of bodies depend on few columns: their rows are short, over the modes and the motions of
-    earlier bodies only, until `spread` inserts the others.
-    """
+    # Motions of bodies depend on few columns: their rows are short, over the modes and the motions
+    # of earlier bodies only, until `spread` inserts the others.
 
     modes: Any
     contact_pairs: Any
@@ -98,13 +97,11 @@ def _pad(rows: Array, columns: int) -> Array:
 
 
 def unit_rows(chain: Chain, *, by_stroke: bool) -> UnitRows:
-    """Return the unit rows of a chain whose tendons are given by tension alone, or some by stroke.
-
-    A tendon passes its released length and its tension times length from the tip. Slip over a
-    contact depends only on a sum of the two, which suffices where no stroke is commanded.
-    Dead forces change with the rotation of the body in whose frame they are given; only their
-    moment comes from the tip.
-    """
+    """Return the unit rows of a chain whose tendons have tensions alone, or some strokes."""
+    # A tendon passes its released length and its tension times length from the tip. Slip over a
+    # contact depends only on a sum of the two, which suffices where no stroke is commanded. Dead
+    # forces change with the rotation of the body in whose frame they are given; only their moment
+    # comes from the tip.
     wrench = chain.rods.basis.shape[-2] if chain.forces_on_bodies else 0
     older = (wrench,) * (chain.window - 1 if wrench else 0)
     turn = (3 if wrench == 6 else 1) if chain.loaded else 0
@@ -162,13 +159,13 @@ class StateJacobians:
     unknowns: Unknowns
     memory: Memory
     applied: BodyLoads | None
-    at: Any
+    evaluation: Any
     unit: UnitRows
 
     @cached_property
     def relative(self) -> list[Float[Array, "n w short"]]:
         """Motion of the distal body relative to each of those before, in its own frame; short."""
-        pose, twist = self.at.flexure.pose, self.at.flexure.twist
+        pose, twist = self.evaluation.flexure.pose, self.evaluation.flexure.twist
         if pose is None or twist is None:
             return []
         modes = self.unit.of_modes(twist)
@@ -180,7 +177,9 @@ class StateJacobians:
         """Turn of the distal body against the base, where there are external loads."""
         before = jax.vmap(lambda rotation: turned(rotation.T, self.unit.turn))
         axes = len(self.unit.turn)
-        return self.unit.spread(self.relative[0][:, :axes]) + before(self.at.flexure.pose.rotation)
+        return self.unit.spread(self.relative[0][:, :axes]) + before(
+            self.evaluation.flexure.pose.rotation
+        )
 
     @cached_property
     def tendons(self) -> list[TendonJacobian]:
@@ -191,10 +190,7 @@ class StateJacobians:
     def contacts(
         self,
     ) -> list[tuple[Float[Array, "n l short"], Float[Array, "n l w short"] | None]]:
-        """Short rows of gap and of wrench per force of every kind of contacts.
-
-        The wrench is that on the distal body; None where it does not act on bodies.
-        """
+        """Short rows of gap, and of wrench per force on the distal body, of every kind."""
         return [self._contact(k) for k in range(len(self.chain.contact_pairs))]
 
     def _by_relative_motion(
@@ -203,7 +199,7 @@ class StateJacobians:
         """Differentiate a crossing or contact by the motion relative to the anchor (last axis)."""
         chain = self.chain
         size = chain.rods.basis.shape[-2]
-        anchors = select_anchors(self.at.anchors, group.back)
+        anchors = select_anchors(self.evaluation.anchors, group.back)
 
         def slopes(part: Any, rod: Rod, flexure: Any, anchor: Any) -> Any:
             def moved(twist: Array) -> Any:
@@ -213,11 +209,11 @@ class StateJacobians:
 
             return jax.jacfwd(moved)(jnp.zeros(size))
 
-        return jax.vmap(slopes)(group, chain.rods, self.at.flexure, anchors)
+        return jax.vmap(slopes)(group, chain.rods, self.evaluation.flexure, anchors)
 
     def _by_modes(self, group: TendonGroup) -> Any:
         """Differentiate a crossing by the modes of the flexure, anchor fixed (last axis)."""
-        chain, anchors = self.chain, self.at.anchors
+        chain, anchors = self.chain, self.evaluation.anchors
         with_pose = anchors is not None and group.acts_on_bodies
         anchors = select_anchors(anchors, group.back) if with_pose else None
 
@@ -228,12 +224,12 @@ class StateJacobians:
 
             return jax.jacfwd(moved)(modes)
 
-        memory = self.at.flexure.memory
+        memory = self.evaluation.flexure.memory
         return jax.vmap(slopes)(group, chain.rods, memory, anchors, self.unknowns.modes)
 
     def _tendon(self, k: int) -> TendonJacobian:
         """Linearise the k-th group of tendons."""
-        chain, unit, span = self.chain, self.unit, self.at.spans[k]
+        chain, unit, span = self.chain, self.unit, self.evaluation.spans[k]
         group, tension = chain.groups[k], unit.tension[k][None]
         length, turning, wrench = self._crossing(k)
         log_ratio = unit.log_ratio[k].reshape(-1, 2, unit.modes.shape[-1])
@@ -271,7 +267,7 @@ class StateJacobians:
 
     def _crossing(self, k: int) -> tuple[Any, Any, Array | None]:
         """Compute short rows of span length, turning angles and wrench of the k-th group."""
-        group, crossing = self.chain.groups[k], self.at.spans[k].crossing
+        group, crossing = self.chain.groups[k], self.evaluation.spans[k].crossing
         length, turning, wrench = [], [], None
         if group.acts_on_bodies:
             slopes = self._by_relative_motion(group, type(group).cross)
@@ -288,7 +284,7 @@ class StateJacobians:
 
     def _contact(self, k: int) -> tuple[Array, Array | None]:
         """Linearise the k-th kind of contacts."""
-        group, response = self.chain.contact_pairs[k], self.at.contacts[k]
+        group, response = self.chain.contact_pairs[k], self.evaluation.contacts[k]
         if response.slope is not None:
             return self.unit.of_modes(response.slope), None
         slopes = self._by_relative_motion(group, type(group).cross)
@@ -300,7 +296,7 @@ class StateJacobians:
 
     def wrenches(self) -> tuple[Float[Array, "n w z"], list[Array]]:
         """Compute the rows of the resultant on the distal body and beyond, and of its reactions."""
-        chain, unit, wrenches = self.chain, self.unit, self.at.wrenches
+        chain, unit, wrenches = self.chain, self.unit, self.evaluation.wrenches
         terminating = self._terminating()
         resultant = terminating[:, 0]
         if unit.transmitted:
@@ -321,9 +317,9 @@ class StateJacobians:
 
     def _terminating(self) -> Float[Array, "n window w z"]:
         """Compute the rows of wrenches of spans and contacts that end at the distal body."""
-        chain, at, unit = self.chain, self.at, self.unit
-        terminating = jnp.zeros((*at.wrenches.terminating.shape, unit.modes.shape[-1]))
-        for group, span, tendon in zip(chain.groups, at.spans, self.tendons, strict=True):
+        chain, evaluation, unit = self.chain, self.evaluation, self.unit
+        terminating = jnp.zeros((*evaluation.wrenches.terminating.shape, unit.modes.shape[-1]))
+        for group, span, tendon in zip(chain.groups, evaluation.spans, self.tendons, strict=True):
             if tendon.wrench is not None:
                 along = tendon.gap_tension[:, :, None] * span.crossing.wrench[..., None]
                 pull = along + unit.spread(span.gap_tension[..., None, None] * tendon.wrench)
@@ -331,7 +327,7 @@ class StateJacobians:
                 terminating = terminating - jnp.einsum("ntwz,ntk->nkwz", pull, reach)
         for group, response, force, unit_force, (_, wrench) in zip(
             chain.contact_pairs,
-            at.contacts,
+            evaluation.contacts,
             self.unknowns.contact_force,
             unit.contact_pairs,
             self.contacts,
@@ -351,11 +347,13 @@ class StateJacobians:
         """Transform rows of a wrench that moves with the distal body to the previous frame."""
         turning = jax.vmap(wrench_turn)(wrench)
         turned = jnp.einsum("nvw,nwz->nvz", turning, self.relative[0])
-        return jax.vmap(Motion.wrench)(self.at.flexure.pose, rows + self.unit.spread(turned))
+        return jax.vmap(Motion.wrench)(
+            self.evaluation.flexure.pose, rows + self.unit.spread(turned)
+        )
 
     def _external(self) -> Float[Array, "n w z"]:
         """Compute the rows of the external loads on the distal body and beyond."""
-        at, unit, turn = self.at, self.unit, self.turn
+        evaluation, unit, turn = self.evaluation, self.unit, self.turn
         axes = len(unit.turn)
 
         def slopes(rotation: Array, load: BodyLoads) -> Float[Array, "w a"]:
@@ -368,12 +366,12 @@ class StateJacobians:
 
         on_bodies = jax.tree.map(lambda leaf: leaf[1:], self.applied)
         on_body = jnp.einsum(
-            "nwa,naz->nwz", jax.vmap(slopes)(at.wrenches.rotation, on_bodies), turn
+            "nwa,naz->nwz", jax.vmap(slopes)(evaluation.wrenches.rotation, on_bodies), turn
         )
         if self.chain.follows:
             return unit.external[None] + on_body
         # Dead forces keep their direction: they rotate relative to the body.
-        against = -jax.vmap(wrench_turn)(at.wrenches.external)[:, axes:, :axes]
+        against = -jax.vmap(wrench_turn)(evaluation.wrenches.external)[:, axes:, :axes]
         forces = jnp.einsum("nwa,naz->nwz", against, turn)
         return jnp.concatenate([unit.external[None] + on_body[:, :axes], forces], axis=1)
 
@@ -418,23 +416,11 @@ def linearise(
     unknowns: Unknowns,
     memory: Memory,
     applied: BodyLoads | None,
-    at: Evaluation,
+    evaluation: Evaluation,
     unit: UnitRows,
 ) -> LinearisedRows:
-    """Linearise the residual of all flexures.
-
-    Args:
-        chain: The chain.
-        unknowns: Its unknowns.
-        memory: History of its contacts.
-        applied: External loads on the bodies.
-        at: Evaluation there.
-        unit: Unit rows of all columns.
-
-    Returns:
-        The rows.
-    """
-    jacobians = StateJacobians(chain, unknowns, memory, applied, at, unit)
+    """Linearise the residual of all flexures."""
+    jacobians = StateJacobians(chain, unknowns, memory, applied, evaluation, unit)
     tendons = jacobians.tendons
     balance, to_previous = _balance_rows(jacobians)
     residual = [balance / chain.stiffness[..., None], *_contact_rows(jacobians)]
@@ -453,10 +439,12 @@ def linearise(
 
 def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], list[Array]]:
     """Compute the rows of equilibrium of the modes, and of the wrenches to the previous body."""
-    chain, at, unit = jacobians.chain, jacobians.at, jacobians.unit
+    chain, evaluation, unit = jacobians.chain, jacobians.evaluation, jacobians.unit
     elastic = chain.elastic
     if elastic is None:
-        elastic = jax.vmap(material_tangent, (0, None, 0))(chain.rods, chain.law, at.flexure)
+        elastic = jax.vmap(material_tangent, (0, None, 0))(
+            chain.rods, chain.law, evaluation.flexure
+        )
         # Just beyond the strain where plastic hardening begins (exp(b / x) at x = 0) the law is
         # flat to the last digit. The modes are eliminated first, so their pivots must not vanish,
         # though friction makes the whole system regular. Without friction the step becomes long but
@@ -467,22 +455,25 @@ def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], lis
         if jacobians.memory.damping is not None:
             elastic = elastic + jacobians.memory.damping[0] * jax.vmap(jnp.diag)(chain.stiffness)
     to_previous: list[Array] = []
-    if at.wrenches is None:
+    if evaluation.wrenches is None:
         balance = unit.spread(unit.of_modes(elastic))
     else:
-        assert at.flexure.configuration is not None
+        assert evaluation.flexure.configuration is not None
         elastic = elastic - jax.vmap(geometric_stiffness)(
-            chain.rods, jacobians.unknowns.modes, at.flexure.configuration, at.wrenches.resultant
+            chain.rods,
+            jacobians.unknowns.modes,
+            evaluation.flexure.configuration,
+            evaluation.wrenches.resultant,
         )
         resultant, to_previous = jacobians.wrenches()
         balance = unit.spread(unit.of_modes(elastic)) - jnp.einsum(
-            "nwm,nwz->nmz", at.flexure.twist, resultant
+            "nwm,nwz->nmz", evaluation.flexure.twist, resultant
         )
-    for tendon, span in zip(jacobians.tendons, at.spans, strict=True):
+    for tendon, span in zip(jacobians.tendons, evaluation.spans, strict=True):
         if span.crossing.slope is not None:
             balance = balance + jnp.einsum("ntm,ntz->nmz", span.crossing.slope, tendon.gap_tension)
     for group, response, force in zip(
-        chain.contact_pairs, at.contacts, unit.contact_pairs, strict=True
+        chain.contact_pairs, evaluation.contacts, unit.contact_pairs, strict=True
     ):
         if response.slope is not None:
             closing = group.has_contact[..., None] * response.slope
@@ -497,7 +488,7 @@ def _contact_rows(jacobians: StateJacobians) -> list[Array]:
     stiffness = chain.contact_stiffness[:, None, None]
     for group, response, force, unit_force, (gap, _) in zip(
         chain.contact_pairs,
-        jacobians.at.contacts,
+        jacobians.evaluation.contacts,
         jacobians.unknowns.contact_force,
         jacobians.unit.contact_pairs,
         jacobians.contacts,
@@ -513,7 +504,7 @@ def _contact_rows(jacobians: StateJacobians) -> list[Array]:
 
 def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     """Compute the rows of the friction law at both edges, for the k-th group."""
-    chain, span, tendon = jacobians.chain, jacobians.at.spans[k], jacobians.tendons[k]
+    chain, span, tendon = jacobians.chain, jacobians.evaluation.spans[k], jacobians.tendons[k]
     log_ratio, group = jacobians.unknowns.log_ratio[k], jacobians.chain.groups[k]
     crossing, offset = span.crossing, chain.friction.offset()
     tension_before = (span.gap_tension + offset) / span.tension_ratio[..., 0] - offset
@@ -523,8 +514,8 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     def slope(turning_change: Array, tension_change: Array) -> Array:
         """Differentiate the limits by turning angles and tensions, where contacts can slide."""
         limits = partial(chain.friction.limits, log_ratio=log_ratio)
-        at, change = (crossing.turning, tension), (turning_change, tension_change)
-        return slip_mask(group) * jax.jvp(limits, at, change)[1]
+        primals, tangents = (crossing.turning, tension), (turning_change, tension_change)
+        return slip_mask(group) * jax.jvp(limits, primals, tangents)[1]
 
     # Edges, then the turning angles that they depend on.
     by_turning = jnp.stack([slope(still + unit[None, None], still) for unit in jnp.eye(2)], -1)

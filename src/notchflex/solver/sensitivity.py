@@ -32,25 +32,10 @@ def attach_derivatives(
     substeps: Int[Array, ""],
     reached: Bool[Array, ""],
 ) -> SolverState:
-    """Return a solved state with its derivatives by chain, command and the previous state.
-
-    Contacts and material have memory: where a load took two substeps, the derivatives go through
-    both. Of more substeps only the last states are stored; with memory the derivatives are then
-    NaN.
-
-    Args:
-        chain: The chain.
-        command: The load.
-        last: The previous state, with the memory of the contacts.
-        solved: The solution.
-        between: The state before the last substep.
-        fraction_before: Fraction of the load step at that state.
-        substeps: Number of substeps.
-        reached: Whether the load was reached.
-
-    Returns:
-        The same state.
-    """
+    """Return a solved state with its derivatives by chain, command and the previous state."""
+    # Contacts and material have memory: where a load took two substeps, the derivatives go through
+    # both. Of more substeps only the last states are stored; with memory the derivatives are then
+    # NaN.
     if not chain.remembers:
         return attach_to_part(chain, command, last, solved, reached)
     has_history = reached & (substeps <= _MAX_SUBSTEPS)

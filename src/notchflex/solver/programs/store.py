@@ -45,11 +45,9 @@ class Usage(NamedTuple):
 
 
 def chosen_folder() -> Path | None:
-    """Return the folder of the user's compiled code; None where it is not stored.
-
-    `JAX_COMPILATION_CACHE_DIR` chooses another folder than the user's cache folder. Its value may
-    be the address of a store that JAX can write to and this library cannot.
-    """
+    """Return the folder of the user's compiled code; None where it is not stored."""
+    # `JAX_COMPILATION_CACHE_DIR` chooses another folder than the user's cache folder. Its value may
+    # be the address of a store that JAX can write to and this library cannot.
     if VARIABLE in os.environ:
         chosen = os.environ[VARIABLE]
         return Path(chosen) if chosen and "://" not in chosen else None
@@ -93,8 +91,12 @@ def write(key: str, content: bytes) -> None:
         try:
             with os.fdopen(folder.open(temporary, _NEW_FILE), "wb") as file:
                 file.write(hashlib.sha256(content).digest() + content)
-            old, new, at = folder.path(temporary), folder.path(_name(key)), folder.descriptor
-            os.replace(old, new, src_dir_fd=at, dst_dir_fd=at)
+            old, new, descriptor = (
+                folder.path(temporary),
+                folder.path(_name(key)),
+                folder.descriptor,
+            )
+            os.replace(old, new, src_dir_fd=descriptor, dst_dir_fd=descriptor)
         finally:
             with suppress(OSError):
                 os.unlink(folder.path(temporary), dir_fd=folder.descriptor)
@@ -126,8 +128,8 @@ def code_digest() -> str:
     code = hashlib.sha256()
     for root in (os.fspath(PACKAGE), compiler.submodule_search_locations[0]):
         for folder, inner, files in os.walk(root):  # every process does this; pathlib takes longer
-            inner[:] = sorted(one for one in inner if folder != root or one not in _NOT_COMPILED)
-            for name in sorted(one for one in files if one.endswith(".py")):
+            inner[:] = sorted(name for name in inner if folder != root or name not in _NOT_COMPILED)
+            for name in sorted(name for name in files if name.endswith(".py")):
                 path = os.path.join(folder, name)
                 with open(path, "rb", buffering=0) as file:
                     code.update(os.path.relpath(path, root).encode() + b"\0" + file.read() + b"\0")
@@ -186,22 +188,22 @@ def _opened(folder: Path) -> Generator[_Opened]:
     if not _POSIX:
         yield _Opened(folder, None)
         return
-    at = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
-        if not _private(os.fstat(at), stat.S_ISDIR):
+        if not _private(os.fstat(descriptor), stat.S_ISDIR):
             raise PermissionError(
                 f"compiled programs are not kept in {folder}: it belongs to others or others can "
                 f"write to it; make it private (chmod go-w) or choose another with {VARIABLE}"
             )
-        yield _Opened(folder, at)
+        yield _Opened(folder, descriptor)
     finally:
-        os.close(at)
+        os.close(descriptor)
 
 
 def _private(status: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
     """Return whether a file or folder belongs to the user and nobody else can write to it."""
-    own = not _POSIX or (status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE)
-    return is_kind(status.st_mode) and own
+    is_owned = not _POSIX or (status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE)
+    return is_kind(status.st_mode) and is_owned
 
 
 def _files(folder: Path) -> list[tuple[float, int, str]]:
@@ -238,10 +240,8 @@ def _user_cache() -> Path:
 
 @cache
 def _machine() -> str:
-    """Return a short name of the kind of processor, its instruction sets included.
-
-    A home folder may be shared by machines of different kinds.
-    """
+    """Return a short name of the kind of processor, its instruction sets included."""
+    # A home folder may be shared by machines of different kinds.
     facts = [platform.machine(), platform.processor()]
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
