@@ -13,7 +13,7 @@ from notchflex._jax import Pytree, choose, jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.flexure import in_space
-from notchflex.solver.block_elimination import linear_step
+from notchflex.solver.linear_step import linear_step
 from notchflex.solver.residual import (
     Evaluation,
     Iterate,

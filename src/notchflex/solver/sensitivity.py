@@ -14,8 +14,8 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.block_elimination import linear_step
 from notchflex.solver.continuation import interpolate_command
+from notchflex.solver.linear_step import linear_step
 from notchflex.solver.residual import SolverState, evaluate, state_at
 
 # From rest, loads on the bodies come before the tendons; a load step that fails is halved.

@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 from jaxtyping import Array, Float, Int
 
 from notchflex._arrays import decide, xp
+from notchflex._imports import unregistered
 from notchflex._jax import Pytree, constant, jax, static
-from notchflex._packages import unregistered
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.material.law import FibreSection
 from notchflex.mechanics.motion import IN_PLANE, PLANE

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 from jaxtyping import Array, Bool, Float
 
+from notchflex._imports import unregistered
 from notchflex._jax import Pytree, jnp
-from notchflex._packages import unregistered
 from notchflex.robot import Frictionless
 
 AtEdges = Float[Array, "*t 2"]

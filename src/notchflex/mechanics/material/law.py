@@ -24,8 +24,8 @@ from typing import Any, ClassVar, NamedTuple
 from jaxtyping import Array, Float
 
 from notchflex._arrays import decide, xp
+from notchflex._imports import unregistered
 from notchflex._jax import Pytree, constant, jax, jnp
-from notchflex._packages import unregistered
 from notchflex.mechanics.section import gauss_on
 
 Scalar = Float[Array, ""]

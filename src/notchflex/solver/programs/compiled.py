@@ -21,7 +21,7 @@ import numpy as np
 from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code, target
 from notchflex._jax import jax, jit, jnp
 from notchflex.errors import InputError
-from notchflex.solver.programs import shipped, store
+from notchflex.solver.programs import store
 
 BACKEND = "NOTCHFLEX_BACKEND"
 """Environment variable: `native` (lanewise, the default) or `xla` compiles the programs."""
@@ -230,14 +230,14 @@ class Native:
         on_processor = f"{key} {target()}"
         content = store.read(on_processor)
         if content is None:
-            text = shipped.read(key) or self._trace(key, how, shapes, forms)
+            text = store.read_shipped(key) or self._trace(key, how, shapes, forms)
             if text is None:
                 return None
             Native.compiled += 1
             head, body = _parts(text)
             # A program that is recorded for a wheel runs once.
             long = how == "rows" and body.count(b"\n") > _OPTIMISED
-            level = 0 if long or shipped.recording() else 2
+            level = 0 if long or store.recording() else 2
             content = _content(head, machine_code(body.decode(), level))
             store.write(on_processor, content)
         return CompiledFunction(content)
@@ -265,7 +265,7 @@ class Native:
         content = _content(
             [program.sizes, program.memory, by_row, _structure(tree)], program.text.encode()
         )
-        shipped.record(key, content)
+        store.record(key, content)
         return content
 
     def _of_vectors(self, forms: tuple[Any, ...]) -> Callable[..., Any]:

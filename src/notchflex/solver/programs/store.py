@@ -1,12 +1,17 @@
-"""The folder of compiled programs: private to its user, verified, and bounded in size.
+"""Compiled programs on disk: those of a user as machine code, those of a wheel as LLVM text.
 
-Machine code is run only from a folder and files that belong to the user and that nobody else can
-write to; links are not followed.
+The folder of a user is private, verified, and bounded in size. Machine code is run only from a
+folder and files that belong to the user and that nobody else can write to; links are not followed.
+
+A wheel carries text, so that the first call need not trace a program. It serves every processor and
+every allowed LLVM; machine code is made when it is first needed. `packaging/hatch_build.py` records
+the programs of typical calls when a wheel is built.
 """
 
 from __future__ import annotations
 
 import hashlib
+import lzma
 import os
 import platform
 import stat
@@ -28,7 +33,10 @@ VARIABLE = "JAX_COMPILATION_CACHE_DIR"
 MAX_BYTES = 256 * 2**20
 """Size beyond which the least recently used programs are removed."""
 
-_DIGEST = 32  # bytes
+RECORD = "NOTCHFLEX_RECORD_PROGRAMS"
+"""Environment variable: the folder to which the text of every program is written."""
+
+SHIPPED = PACKAGE / "shipped_programs"
 _PREFIX = "program-"
 # Folders of notchflex that no program depends on. Programs depend on all of `lanewise`.
 _NOT_COMPILED = {"bench", "cli", "comparison", "fit", "plotting", "viewer"}
@@ -77,7 +85,8 @@ def read(key: str) -> bytes | None:
                 os.utime(file.fileno() if _POSIX else root / _name(key))
     except OSError:
         return None
-    digest, content = content[:_DIGEST], content[_DIGEST:]
+    size = hashlib.sha256().digest_size
+    digest, content = content[:size], content[size:]
     return content if hashlib.sha256(content).digest() == digest else None
 
 
@@ -117,6 +126,35 @@ def clear() -> Usage:
         with suppress(OSError):
             os.unlink(os.path.join(folder or "", name))
     return before
+
+
+def read_shipped(key: str) -> bytes | None:
+    """Return the text recorded under a key; None where it is missing or damaged."""
+    try:
+        return lzma.decompress((SHIPPED / _shipped_name(key)).read_bytes())
+    except (OSError, EOFError, lzma.LZMAError):
+        return None
+
+
+def recording() -> bool:
+    """Return whether a wheel is being built."""
+    return bool(os.environ.get(RECORD))
+
+
+def record(key: str, content: bytes) -> None:
+    """Record text under a key while a wheel is built."""
+    if recording():
+        path = Path(os.environ[RECORD]) / _shipped_name(key)
+        path.write_bytes(lzma.compress(content, preset=2))
+
+
+def count_shipped() -> int:
+    """Return the number of programs in the package."""
+    return sum(1 for _ in SHIPPED.glob("*.xz"))
+
+
+def _shipped_name(key: str) -> str:
+    return hashlib.sha256(f"{code_digest()} {key}".encode()).hexdigest()[:32] + ".xz"
 
 
 @cache
