@@ -8,6 +8,9 @@ from html import escape
 from itertools import pairwise
 from math import floor, log10
 
+MOST = 4
+"""Rows or values of one kind that are listed; of more, the first or their range."""
+
 _TURNS = 6
 """A series with more turning points than this is described by its range."""
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from enum import IntFlag
 from math import hypot, pi
 from typing import Any, NamedTuple, cast
 
@@ -189,7 +190,16 @@ def _cross(first: Sequence[Any], second: Sequence[Any]) -> list[Any]:
     return [b * z - c * y, c * x - a * z, a * y - b * x]
 
 
-LOADED, SIDEWAYS, FOLLOWING, DRAWN = 1, 2, 4, 8
+class LoadKind(IntFlag):
+    """What acts in a step of a path: external loads, some out of the plane or turning, strokes."""
+
+    LOADED = 1
+    SIDEWAYS = 2
+    FOLLOWING = 4
+    DRAWN = 8
+
+
+LOADED, SIDEWAYS, FOLLOWING, DRAWN = LoadKind
 
 
 def acting(
@@ -198,7 +208,7 @@ def acting(
     steps: Int[np.ndarray, "*k"],
     tip: Float[np.ndarray, "s 6"] | None = None,
 ) -> Int[np.ndarray, "*k"]:
-    """Return what acts in some steps of a path, as bits: `LOADED` and so on."""
+    """Return what acts in some steps of a path, as bits of `LoadKind`."""
     tendons = robot.number_of_tendons
     commands = load.tension, load.stroke
     if any(not np.isnan(table[steps, tendons:]).all() for table in commands):

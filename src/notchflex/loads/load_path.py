@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, TypeGuard, overload
+from typing import Any, TypeGuard, overload
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._load_words import MOST_STEPS
-from notchflex._summary import Displayed, Summary, course, short, vector
+from notchflex._summary import MOST, Displayed, Summary, course, short, vector
 from notchflex._values import ByValue, read_only
 from notchflex.errors import InputError
 from notchflex.loads.load import (
@@ -30,10 +30,6 @@ from notchflex.loads.load import (
     rotation_of,
     short_repr,
 )
-
-if TYPE_CHECKING:
-    from notchflex.loads.load import ExternalLoad, Load
-
 
 TENDONS, TIP = ("tension", "stroke"), ("tip_force", "tip_moment")
 """Names of the numbers of a load that may vary: one for each tendon, and vectors."""
@@ -382,9 +378,6 @@ _base_rotation = lru_cache(maxsize=64)(read_only)
 
 
 # Summaries of loads: what `repr` and a notebook show of them.
-
-MOST = 4
-"""Tendons, notches or outputs that have a line each; of more, the first."""
 
 
 def load_words(load: Load) -> str:

@@ -379,11 +379,13 @@ def assemble(
         >>> assemble(load_robot("pacheco2021-a")).flexures
         5
     """
-    template = chain_template(robot, level, refinement, flexures)
+    chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
+    sites, tendons = sites_of(robot), robot.tendon
+    shape = robot.tube, robot.notches, sites, tendons, level, refinement, chord, fibres
+    template = _template(*shape, flexures or flexure)
     rods, groups, body_length = template.rods, template.groups, template.body_length
     body_mass, body_centre = body_masses(robot, rods)
     section = rods.section.stiffened(template.stiffness_factor[:, None])
-    tendons = robot.tendon
     chain = Chain(
         rods=replace(rods, section=section),
         groups=groups,
@@ -456,16 +458,6 @@ class ChainTemplate(NamedTuple):
     contact_motion: Float[Array, "n modes"]
     # Factor on the stiffness of each notch, which the rods are without
     stiffness_factor: Float[Array, " n"]
-
-
-def chain_template(
-    robot: Robot, level: str, refinement: int, flexures: Callable[..., Any] | None = None
-) -> ChainTemplate:
-    """Build the template of a robot's chain; for the arguments see `assemble`."""
-    chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
-    sites = sites_of(robot)
-    shape = robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord, fibres
-    return _template(*shape, flexures or flexure)
 
 
 # Fits of material or friction constants assemble one shape hundreds of times.

@@ -21,7 +21,13 @@ from jaxtyping import Array, Bool, Float
 from notchflex._jax import jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.linear_step import LinearisedRows, UnitRows, linearise, unit_rows
+from notchflex.solver.linear_step import (
+    LinearisedRows,
+    StateJacobians,
+    UnitRows,
+    linearise,
+    unit_rows,
+)
 from notchflex.solver.programs.compiled import Native
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.residual import Memory, SolverState, bound_side, command_slopes, evaluate
@@ -93,8 +99,8 @@ def _rows(chain: Chain, command: Command, solved: SolverState) -> tuple[Array, .
     bound = tuple(span.bound for span in evaluation.spans)
     memory = Memory(unknowns.log_ratio, slid, bound, solved.memory.material)
     form = unit_rows(chain, by_stroke=command.by_stroke is not None)
-    rows = linearise(chain, unknowns, memory, solved.applied, evaluation, form)
-    return (*rows, jnp.stack(command_slopes(chain, command, evaluation.base)))
+    jacobians = StateJacobians(chain, unknowns, memory, solved.applied, evaluation, form)
+    return (*linearise(jacobians), jnp.stack(command_slopes(chain, command, evaluation.base)))
 
 
 def _assemble(

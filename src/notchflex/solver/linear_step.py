@@ -415,16 +415,9 @@ class LinearisedRows(NamedTuple):
     to_previous: Float[Array, "n b z"]
 
 
-def linearise(
-    chain: Chain,
-    unknowns: Unknowns,
-    memory: Memory,
-    applied: BodyLoads | None,
-    evaluation: Evaluation,
-    unit: UnitRows,
-) -> LinearisedRows:
+def linearise(jacobians: StateJacobians) -> LinearisedRows:
     """Linearise the residual of all flexures."""
-    jacobians = StateJacobians(chain, unknowns, memory, applied, evaluation, unit)
+    chain, unit = jacobians.chain, jacobians.unit
     tendons = jacobians.tendons
     balance, to_previous = _balance_rows(jacobians)
     residual = [balance / chain.stiffness[..., None], *_contact_rows(jacobians)]
@@ -571,7 +564,7 @@ def linear_step(
     unit = unit_rows(chain, by_stroke=command.by_stroke is not None)
     unknowns = point.unknowns
     state = (chain, unknowns, memory, command.applied, evaluation)
-    rows = linearise(*jax.tree.map(jax.lax.stop_gradient, state), unit=unit)
+    rows = linearise(StateJacobians(*jax.tree.map(jax.lax.stop_gradient, state), unit))
     residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(evaluation.residual)
     size = unit.unknowns
     # Own unknowns as functions of 1, carried and beyond: du = response @ (1, c, b).

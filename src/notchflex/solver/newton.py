@@ -84,7 +84,7 @@ class Settings(Pytree, eq=True):
     @property
     def numbers(self) -> tuple[float, ...]:
         """All settings, in the order of the fields."""
-        return tuple(getattr(self, field.name) for field in dataclasses.fields(self))
+        return dataclasses.astuple(self)
 
     @classmethod
     def of(cls, numbers: Float[Array, " settings"]) -> Settings:

@@ -198,7 +198,8 @@ def _pairs(
 rod_quadrature = cached(64)(RodQuadrature)
 """The same, kept: notches that only differ by site share it."""
 
-STRAIGHT = xp.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+_ABOUT_X, _ABOUT_Y, _ABOUT_Z, _ALONG_X, _ALONG_Y, _ALONG_Z = xp.eye(6)
+STRAIGHT = _ALONG_Z
 """Strains of a straight, unloaded rod: a stretch of 1 along z."""
 
 
@@ -272,15 +273,14 @@ def legendre_modes(
     """
     length = quadrature.ends[-1]
     polynomials = legendre(2.0 * quadrature.positions / length - 1.0, max(bending, sideways, twist))
-    about_x, about_y, about_z, along_x, along_y, _ = np.eye(6)
     # Of dM/ds = n x e_z: a force along x lowers the moment about y, along y it raises that about x.
-    sheared = {0: -shear[0] * along_x, 1: shear[1] * along_y}
+    sheared = {0: -shear[0] * _ALONG_X, 1: shear[1] * _ALONG_Y}
     # Twist about the shear centre shears the neutral axis, which lies off it, sideways.
-    turning = about_z + shear_centre * along_y
+    turning = _ABOUT_Z + shear_centre * _ALONG_Y
     strains = [
         polynomials[:, degree, None] * strain + (sheared.get(number, 0.0) if degree == 1 else 0.0)
         for number, (strain, count) in enumerate(
-            ((about_y, bending), (about_x, sideways), (turning, twist))
+            ((_ABOUT_Y, bending), (_ABOUT_X, sideways), (turning, twist))
         )
         for degree in range(count)
     ]
@@ -373,8 +373,6 @@ def build_rod(
 # for each component of m and n; only the change of the levers is missing, which is of second order.
 # The direction of n couples stretch and shear (Gao 2017, eq. 1-5): independent polynomials for them
 # are far less accurate.
-
-_ABOUT_X, _ABOUT_Y, _ABOUT_Z, _ALONG_X, _ALONG_Y, _ALONG_Z = xp.eye(6)
 
 
 def course_poses(

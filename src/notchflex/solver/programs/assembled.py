@@ -351,8 +351,9 @@ class AssembledRobots:
             joined = assemble(example, **loads, flexures=lambda *_: next(made_flexures))
         layouts = tuple(map(_sparse, trees.values()))
         prepared = PreparedChain(joined)
-        structure = prepared.static_structure
-        made_for = form, layouts, tuple(loads.items()), tuple(decisions.made), structure
+        made_for = _JoinedForm(
+            form, layouts, tuple(loads.items()), tuple(decisions.made), prepared.static_structure
+        )
         ends = np.cumsum([0, *(layout.size for layout in layouts)]).tolist()
         packed = dict(zip(first.values(), map(np.arange, ends, ends[1:]), strict=True))
         groups = dict[_NotchForm, list[Any]]()
@@ -371,7 +372,7 @@ class AssembledRobots:
             _Notches(sited, *map(np.array, zip(*entries, strict=True)))
             for sited, entries in groups.items()
         ]
-        return cls(form, tuple(notches), _JoinedForm(*made_for), prepared)
+        return cls(form, tuple(notches), made_for, prepared)
 
     def prepared(self, chain: Float[np.ndarray, " chain"]) -> PreparedChain:
         """Return a chain as `chains` makes it, prepared for repeated solves."""

@@ -41,7 +41,7 @@ def backend() -> str:
     return value
 
 
-def warn_of_xla(function: str, error: UnsupportedPrimitiveError, stacklevel: int = 2) -> None:
+def warn_of_xla(function: str, error: UnsupportedPrimitiveError) -> None:
     """Warn once for each unsupported primitive that XLA compiles a function."""
     reason = error.primitive or str(error)
     if reason in _warned:
@@ -51,7 +51,7 @@ def warn_of_xla(function: str, error: UnsupportedPrimitiveError, stacklevel: int
         f"XLA compiles {function}, which makes it some ten times slower: lanewise does not support "
         f"{error}",
         RuntimeWarning,
-        stacklevel=stacklevel + 1,
+        stacklevel=3,
     )
 
 

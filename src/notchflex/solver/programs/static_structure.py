@@ -93,10 +93,6 @@ def as_kind(values: Array, kind: str) -> Array:
     return values.astype(int) if kind in "iu" else values
 
 
-# Padding at the end of the vector, so that programs may read whole SIMD vectors up to its end.
-_PADDING = 8
-
-
 class StaticStructure:
     """Which numbers of a chain are constants, and the layout of the others in a vector.
 
@@ -129,7 +125,8 @@ class StaticStructure:
         self._taken: Int[np.ndarray, " dynamic"] = order[~constant[order]]
         self._index = np.zeros(form.size, int)
         self._index[self._taken] = np.arange(len(self._taken))
-        self.size = len(self._taken) + _PADDING
+        # Padded, so that programs may read whole SIMD vectors up to its end.
+        self.size = len(self._taken) + WIDTH
 
     def __repr__(self) -> str:
         """Return the full content: the key of stored programs."""
@@ -166,7 +163,7 @@ class StaticStructure:
 
     def pack(self, numbers: Any) -> Any:
         """Return the vectors of chains from their packed numbers (NumPy or JAX)."""
-        padding = np.zeros((*numbers.shape[:-1], _PADDING))
+        padding = np.zeros((*numbers.shape[:-1], WIDTH))
         return xp.concatenate([numbers[..., self._taken], padding], axis=-1)
 
     def expand(
