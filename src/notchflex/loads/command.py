@@ -59,7 +59,9 @@ def applied(
     # Masses, their moments and the distance of the tip (`body_numbers`) may have the rows of
     # `steps` as leading axis; the sums are linear in them. `tip` acts besides the loads of the
     # path. Of a flat chain they are the sums in the plane that x and z of its frame span.
-    axes, bodies = _axes_of(load, chain), bodies or body_numbers(chain)
+    along, about = (np.eye(3),) * 2 if chain.frame is None else _of_plane(chain.frame)
+    turn, bodies = load.base_to_world, bodies or body_numbers(chain)
+    axes = along, about, *((along, about) if turn is None else (turn @ along, turn @ about))
     by_row = bodies[2].ndim
     fields: list[np.ndarray] = []
     for external, places, at_tip in _each(load, steps, tip):
@@ -257,17 +259,6 @@ def row_commands(
     target: Any = load.target[commanded]
     loads = applied(load, chain, steps, tip=tip) if chain.loaded else None
     return Command(target, by_stroke, loads)
-
-
-def _axes_of(load: LoadPath, chain: Chain) -> _Axes:
-    """Return axes of bodies (three, or x and z of a plane): in their frame, then in the world."""
-    along, about = np.eye(3), np.eye(3)
-    if chain.frame is not None:
-        along, about = _of_plane(chain.frame)
-    turn = load.base_to_world
-    if turn is None:
-        return along, about, along, about
-    return along, about, turn @ along, turn @ about
 
 
 def _of_plane(frame: Float[Array, "3 3"]) -> tuple[np.ndarray, np.ndarray]:

@@ -37,7 +37,7 @@ from notchflex.mechanics.material import Fibres, SectionLaw, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
-from notchflex.mechanics.tendon import TendonGroup, route
+from notchflex.mechanics.tendon import TUBE_AXIS, TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
 from notchflex.robot.kinds import Friction, Material, Notch
 from notchflex.robot.part import unchecked
@@ -346,9 +346,6 @@ def flexure(
     return rod, relative_pose(rod, xp.zeros(rod.modes))
 
 
-_UP = xp.array([0.0, 0.0, 1.0])
-
-
 def assemble(
     robot: Robot,
     level: str = "tendons",
@@ -413,7 +410,7 @@ def assemble(
     normal = bending_normal(robot)
     if not flat or level == "space" or normal is None or not tendons_in_plane(robot):
         return chain
-    return _flat(chain, xp.stack([xp.cross(normal, _UP), normal, _UP], axis=1))
+    return _flat(chain, xp.stack([xp.cross(normal, TUBE_AXIS), normal, TUBE_AXIS], axis=1))
 
 
 def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
@@ -487,12 +484,12 @@ def _template(
     rod_index = xp.array([order[id(notch), id(site)] for notch, site in pairs])
     rods = jax.tree.map(lambda leaf: leaf[rod_index], distinct_rods)
     body_length = body_lengths(tube, notches)
-    lead = body_length[:-1, None] * _UP
+    lead = body_length[:-1, None] * TUBE_AXIS
     rods = replace(rods, start_offset=rods.start_offset + lead)
     free = jax.tree.map(lambda *leaves: xp.stack(leaves)[rod_index], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
     sides = dict.fromkeys(notch.direction_deg for notch in notches)
-    turns = {side: rotation_about(constant(_UP * xp.radians(side))) for side in sides}
+    turns = {side: rotation_about(constant(TUBE_AXIS * xp.radians(side))) for side in sides}
     return ChainTemplate(
         distinct_rods,
         rod_index,

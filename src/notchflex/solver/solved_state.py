@@ -156,14 +156,14 @@ class SolvedState:
         """Return the wrench that loads, tendons and contacts require at every node, in its axes."""
         chain, evaluation, unknowns = self.chain, self.evaluation, self.solved.point.unknowns
         acting = jnp.zeros((chain.flexures, chain.rods.basis.shape[-2]))
-        for group, span in zip(chain.groups, evaluation.spans, strict=True):
+        spans = zip(chain.groups, evaluation.spans, strict=True)
+        contacts = zip(chain.contact_pairs, unknowns.contact_force, strict=True)
+        lengthening = [(group, -span.gap_tension) for group, span in spans]
+        lengthening += [(pair, force * pair.has_contact) for pair, force in contacts]
+        for group, force in lengthening:
             if group.fibre is not None:
                 weights = of_rod(chain.rods, fibre_stretch(group.fibre))
-                acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
-        for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
-            if group.fibre is not None:
-                weights = of_rod(chain.rods, fibre_stretch(group.fibre))
-                acting = acting + jnp.einsum("nl,nlc->nc", force * group.has_contact, weights)
+                acting = acting + jnp.einsum("nt,ntc->nc", force, weights)
         required = jnp.broadcast_to(acting[:, None], evaluation.flexure.resultants.shape)
         if evaluation.wrenches is None:
             return required
