@@ -564,7 +564,7 @@ def linear_step(
     unit = unit_rows(chain, by_stroke=command.by_stroke is not None)
     unknowns = point.unknowns
     state = (chain, unknowns, memory, command.applied, evaluation)
-    rows = linearise(StateJacobians(*jax.tree.map(jax.lax.stop_gradient, state), unit))
+    rows = linearise(StateJacobians(*jax.tree.map(jax.lax.stop_gradient, state), unit=unit))
     residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(evaluation.residual)
     size = unit.unknowns
     # Own unknowns as functions of 1, carried and beyond: du = response @ (1, c, b).
