@@ -61,12 +61,13 @@ def applied(
     # path. Of a flat chain they are the sums in the plane that x and z of its frame span.
     along, about = (np.eye(3),) * 2 if chain.frame is None else _of_plane(chain.frame)
     turn, bodies = load.base_to_world, bodies or body_numbers(chain)
-    in_world = (along, about) if turn is None else (turn @ along, turn @ about)
+    world_along, world_about = (along, about) if turn is None else (turn @ along, turn @ about)
+    axes = along, about, world_along, world_about
     by_row = bodies[2].ndim
     fields: list[np.ndarray] = []
     for external, places, at_tip in _each(load, steps, tip):
         masses = [each[places // steps.shape[-1]] for each in bodies] if by_row else bodies
-        sums = _sums(external, (along, about, *in_world), *masses, at_tip=at_tip)
+        sums = _sums(external, axes, *masses, at_tip=at_tip)
         shapes = [values.shape[by_row if tip is None else 1 :] for values in sums]
         fields = fields or [np.empty((steps.size, *shape)) for shape in shapes]
         for field, values in zip(fields, sums, strict=True):
