@@ -253,7 +253,7 @@ def row_commands(
     *,
     draws: bool,
 ) -> Command:
-    """Return commands of k rows with s steps each, which are numbers of all steps."""
+    """Return the commands of k rows, each with s of the steps of all paths, by their numbers."""
     # Masses and lengths of the bodies of the chain may have the rows as leading axis.
     commanded = steps, slice(chain.tendons)
     by_stroke: Any = ~np.isnan(load.stroke[commanded]) if draws else None

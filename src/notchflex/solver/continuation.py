@@ -118,7 +118,7 @@ class _Attempt(NamedTuple):
         return _Attempt(2.0 * self.fraction, self.predicts)
 
     def _shorter(self, can_snap: bool) -> _Attempt:
-        """Return half of it; if it may snap with a viscosity, or the contacts otherwise."""
+        """Return half of it; a robot that can snap also tries a viscosity, or no prediction."""
         # A softening notch contradicts the predictor: the tension falls as the stroke rises
         # (`test_a_stroke_passes_the_limit_point`).
         fraction = 0.5 * self.fraction

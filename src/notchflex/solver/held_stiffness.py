@@ -58,7 +58,7 @@ def held_stiffness(
     states = prepared.packed_states(np.asarray(prepared.state.pack(solved, leading=1)))
     form = unit_rows(chain, by_stroke=commands.by_stroke is not None)
     modes = np.arange(chain.flexures)[:, None] * form.unknowns + np.arange(len(form.modes))
-    unpadded = modes[np.asarray(chain.rods.padding_mask) == 0.0]  # without padding
+    unpadded = modes[np.asarray(chain.rods.padding_mask) == 0.0]
     for start in range(0, len(loads.numbers), _BATCH):
         some = slice(start, start + _BATCH)
         tables = (table._replace(numbers=table.numbers[some]) for table in (loads, states))

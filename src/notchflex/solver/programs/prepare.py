@@ -69,7 +69,8 @@ class PreparedChain:
     @cached_property
     def own_numbers(self) -> Int[np.ndarray, " dynamic"]:
         """Which number of the chain each dynamic number of the long chain is, from 1; or 0."""
-        return _dynamic_numbers(self.chain_layout, self.long.static_structure)
+        numbers = _own_numbers(self.chain_layout, self.long.chain_layout)
+        return self.long.static_structure.pack(numbers).astype(int)
 
     def with_numbers(self, numbers: Float[np.ndarray, " chain"]) -> PreparedChain:
         """Return a chain of the same form, with the same constants."""
@@ -161,14 +162,15 @@ def _own_numbers(unpadded: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, 
     return which.astype(int)
 
 
-@lru_cache(maxsize=64)
-def _dynamic_numbers(unpadded: PytreeLayout, long: StaticStructure) -> Int[np.ndarray, " dynamic"]:
-    return long.pack(_own_numbers(unpadded, long.form)).astype(int)
-
-
 # Cached properties that chains of one form share.
 _OF_FORM = (
-    *("chain_layout", "static_structure", "rest", "rest_vector", "rest_carried", "state", "shape"),
+    "chain_layout",
+    "static_structure",
+    "rest",
+    "rest_vector",
+    "rest_carried",
+    "state",
+    "shape",
     "_command_layouts",
 )
 
