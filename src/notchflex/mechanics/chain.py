@@ -114,6 +114,17 @@ class Chain(Pytree):
         return self.loaded or any(part.acts_on_bodies for part in parts)
 
     @property
+    def options(self) -> dict[str, Any]:
+        """What it was assembled for, as `assemble` takes it."""
+        return {
+            "level": self.level,
+            "loaded": self.loaded,
+            "follows": self.follows,
+            "refinement": self.refinement,
+            "flat": self.frame is not None,
+        }
+
+    @property
     def memory_stiffness(self) -> Float[Array, " t"]:
         """Axial stiffness that the memory of the contacts uses, always finite, N."""
         # For wrist A 1e6 N. It distinguishes the slip over two sticking contacts of one rigid

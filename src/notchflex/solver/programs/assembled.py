@@ -234,8 +234,7 @@ def _first_alike(
     """Return what programs make of a robot: of those for its form the first that decide alike."""
     form = PartsForm.of(parts_of(robot), varied)
     numbers = form.numbers_of(form.parts)
-    loads = chain.level, chain.loaded, chain.follows, chain.refinement, chain.frame is None
-    known = _known(form, *loads)
+    known = _known(form, *chain.options.values())
     with tracing_told():
         for programs in known:
             if (result := work(programs, numbers)) is not None:
@@ -340,19 +339,16 @@ class AssembledRobots:
             alike = _NotchForm(parts, sited, options, decided, _sparse(trees[number]))
             made.setdefault((id(notch), alike), []).append(number)
         made_flexures = iter(trees.values())
-        loads: dict[str, Any] = {
-            "level": chain.level,
-            "loaded": chain.loaded,
-            "follows": chain.follows,
-            "refinement": chain.refinement,
-            "flat": chain.frame is not None,
-        }
         with Decisions().deciding() as decisions:
-            joined = assemble(example, **loads, flexures=lambda *_: next(made_flexures))
+            joined = assemble(example, **chain.options, flexures=lambda *_: next(made_flexures))
         layouts = tuple(map(_sparse, trees.values()))
         prepared = PreparedChain(joined)
         made_for = _JoinedForm(
-            form, layouts, tuple(loads.items()), tuple(decisions.made), prepared.static_structure
+            form,
+            layouts,
+            tuple(chain.options.items()),
+            tuple(decisions.made),
+            prepared.static_structure,
         )
         ends = np.cumsum([0, *(layout.size for layout in layouts)]).tolist()
         packed = dict(zip(first.values(), map(np.arange, ends, ends[1:]), strict=True))

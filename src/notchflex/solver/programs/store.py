@@ -114,17 +114,16 @@ def write(key: str, content: bytes) -> None:
 
 def usage() -> Usage:
     """Return number and size (bytes) of the stored programs for this processor."""
-    folder = program_folder()
-    files = [] if folder is None else _files(folder)
-    return Usage(len(files), sum(size for _, size, _ in files))
+    sizes = [size for _, size, _ in _files(program_folder())]
+    return Usage(len(sizes), sum(sizes))
 
 
 def clear() -> Usage:
     """Remove all stored programs of this processor; return their number and size."""
-    before, folder = usage(), program_folder()
-    for _, _, name in [] if folder is None else _files(folder):
+    before = usage()
+    for _, _, file in _files(program_folder()):
         with suppress(OSError):
-            os.unlink(os.path.join(folder or "", name))
+            os.unlink(file)
     return before
 
 
@@ -244,14 +243,16 @@ def _private(status: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
     return is_kind(status.st_mode) and is_owned
 
 
-def _files(folder: Path) -> list[tuple[float, int, str]]:
-    """Return time of the last use, size and name of every program."""
+def _files(folder: Path | None) -> list[tuple[float, int, str]]:
+    """Return time of the last use, size and path of every program; none without a folder."""
     files: list[tuple[float, int, str]] = []
+    if folder is None:
+        return files
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
             if entry.is_file(follow_symlinks=False):  # those of JAX too
                 about = entry.stat(follow_symlinks=False)
-                files.append((about.st_mtime, about.st_size, entry.name))
+                files.append((about.st_mtime, about.st_size, entry.path))
     return files
 
 
@@ -259,11 +260,11 @@ def _shrink(folder: Path) -> None:
     """Remove the least recently used programs until the rest is small enough."""
     files = sorted(_files(folder))
     left = sum(size for _, size, _ in files)
-    for _, size, name in files:
+    for _, size, file in files:
         if left <= MAX_BYTES:
             return
         with suppress(OSError):
-            (folder / name).unlink()
+            os.unlink(file)
             left -= size
 
 
