@@ -1,4 +1,4 @@
-"""Records the programs of typical calls when a wheel is built; see `solver/programs/shipped.py`."""
+"""Records the programs of typical calls when a wheel is built; see `solver/programs/store.py`."""
 
 import os
 import subprocess

@@ -48,7 +48,7 @@ MOST_FILES = 17
 
 SATELLITES = ORDER[ORDER.index("pieces") :]
 
-INNER_NAMES = 119
+INNER_NAMES = 118
 """Names of the core that satellites import from elsewhere than `notchflex` and
 `notchflex.support`: this number only ever falls."""
 

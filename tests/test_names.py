@@ -30,8 +30,8 @@ def test_few_files_of_the_solver_know_the_tension_at_the_base() -> None:
         if re.search(r"\b\w*base_tension\b", file.read_text("utf-8"))
     }
     assert named == {
-        "block_elimination.py",
         "continuation.py",
+        "linear_step.py",
         "newton.py",
         "quantities.py",
         "residual.py",

@@ -8,7 +8,7 @@ not import JAX.  It switches JAX to 64-bit floats, also for its other users in t
 import os as _os
 import sys as _sys
 
-from notchflex._lazy import loader as _loader
+from notchflex._imports import loader as _loader
 
 __version__ = "0.1.0"
 

@@ -75,21 +75,21 @@ def cached(maxsize: int) -> Callable[[Callable[..., Any]], Any]:
     """Make a function keep its last results; while decisions are taken, for the same objects."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        kept = lru_cache(maxsize)(function)
+        remembered = lru_cache(maxsize)(function)
 
         @wraps(function)
         def call(*arguments: Any) -> Any:
             decisions = _deciding.get()
             if decisions is not None:  # values may be traced, which are compared as objects
                 key = (function, *map(id, arguments))
-                if key not in decisions.kept:
-                    decisions.kept[key] = arguments, function(*arguments)
-                return decisions.kept[key][1]
+                if key not in decisions.results:
+                    decisions.results[key] = arguments, function(*arguments)
+                return decisions.results[key][1]
             try:
                 hash(arguments)
             except TypeError:
                 return function(*arguments)
-            return kept(*arguments)
+            return remembered(*arguments)
 
         return call
 
@@ -99,20 +99,20 @@ def cached(maxsize: int) -> Callable[[Callable[..., Any]], Any]:
 class Decisions:
     """What the values of a robot decide about the form of its arrays.
 
-    An example decides; a trace follows it, and says of its own values whether they decide alike.
-
     Attributes:
         made: The decisions of the example, in order.
         alike: Of the trace, whether every decision is the example's; traced.
         kept: Arguments and results of functions that are `cached`.
     """
 
+    # An example decides; a trace follows it, and says of its own values whether they decide alike.
+
     def __init__(self, made: tuple[bool, ...] | None = None) -> None:
         """Follow decisions, or note those of an example where none are given."""
         self.follows = made is not None
         self.made: list[bool] = list(made or ())
         self.alike: list[Any] = []
-        self.kept: dict[Any, tuple[Any, Any]] = {}
+        self.results: dict[Any, tuple[Any, Any]] = {}
 
     def take(self, value: Any) -> bool:
         """Take one decision."""

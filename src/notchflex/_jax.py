@@ -33,12 +33,7 @@ if jax.__version_info__ < (0, 11):
 
 
 def jit(function: Callable[..., Any], **options: Any) -> Any:
-    """Compile a function as `jax.jit` does, with the options of this package.
-
-    Args:
-        function: What to compile.
-        options: Others of `jax.jit`.
-    """
+    """Compile a function as `jax.jit` does, with the options of this package."""
     return jax.jit(function, compiler_options=_OPTIONS, **options)
 
 
@@ -48,13 +43,7 @@ def constant(value: ArrayLike) -> jax.Array:
 
 
 def scan(step: Callable[..., Any], state: Any, entries: tuple[Any, ...]) -> tuple[Any, Any]:
-    """Repeat a step along arrays as `jax.lax.scan` does; in Python where all is plain.
-
-    Args:
-        step: Returns the next state and a tuple of results, from a state and a tuple of entries.
-        state: The first state.
-        entries: Arrays with a row for every step.
-    """
+    """Repeat a step along arrays as `jax.lax.scan` does; in Python where all is plain."""
     if is_traced((state, entries)):
         return jax.lax.scan(step, state, entries)
     results: list[Any] = []
@@ -103,4 +92,6 @@ class Pytree:
 
 def choose(condition: Any, new: Tree, old: Tree) -> Tree:
     """Return the new tree of arrays where a condition holds, the old one where not."""
-    return jax.tree.map(lambda one, other: jnp.where(condition, one, other), new, old)
+    return jax.tree.map(
+        lambda new_leaf, old_leaf: jnp.where(condition, new_leaf, old_leaf), new, old
+    )

@@ -214,7 +214,7 @@ class BodyForceOption(NamedTuple):
 def read_body_force(text: str) -> BodyForceOption:
     """Read `BODY:X,Y,Z` or `BODY:X,Y,Z@X,Y,Z`."""
     body, colon, rest = text.partition(":")
-    force, at, point = rest.partition("@")
+    force, separator, point = rest.partition("@")
     if not colon or not body.strip().isdecimal() or len(body) > _DIGITS:
         raise InputError.BAD_SYNTAX(f"give {_BODY}.")
 
@@ -225,5 +225,5 @@ def read_body_force(text: str) -> BodyForceOption:
             message = f"{words!r} is not three finite {what}; give {_BODY}."
             raise InputError(message, problem.code) from None
 
-    where = read(point, "coordinates in mm") if at else None
+    where = read(point, "coordinates in mm") if separator else None
     return BodyForceOption(int(body), read(force, "forces in N"), where)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, overload
 
-from notchflex._extras import need
+from notchflex._imports import need
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,6 +8,9 @@ from html import escape
 from itertools import pairwise
 from math import floor, log10
 
+MOST = 4
+"""Rows or values of one kind that are listed; of more, the first or their range."""
+
 _TURNS = 6
 """A series with more turning points than this is described by its range."""
 
@@ -62,7 +65,9 @@ def round_number(most: float) -> float:
         (20.0, 0.2)
     """
     power = 10.0 ** floor(log10(most))
-    return max(one * power for one in (1.0, 2.0, 5.0) if one * power <= most * (1.0 + 1e-9))
+    return max(
+        factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= most * (1.0 + 1e-9)
+    )
 
 
 class Displayed:
@@ -105,11 +110,7 @@ def vector(values: Iterable[float], digits: int | None = None) -> str:
 
 
 def course(values: Iterable[float], digits: int | None = None) -> str:
-    """Return where a series starts, turns and ends; its range where it turns often.
-
-    Args:
-        values: The series; NaN are left out.
-        digits: Decimals; four significant digits if None.
+    """Return where a series starts, turns and ends; its range where it turns often; NaN left out.
 
     Example:
         >>> course([0.0, 1.0, 3.0, 1.5, 0.0])

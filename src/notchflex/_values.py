@@ -16,7 +16,7 @@ class ByValue:
 
     def _value(self) -> Any:
         """Return what is compared: the fields of a dataclass."""
-        return tuple(getattr(self, one.name) for one in fields(cast("Any", self)))
+        return tuple(getattr(self, field.name) for field in fields(cast("Any", self)))
 
     def __eq__(self, other: object) -> bool:
         """Compare by value with a record of the same type."""
@@ -47,13 +47,15 @@ def frozen(values: Any) -> Any:
     return view
 
 
-def same_values(one: Any, other: Any) -> bool:
+def same_values(first: Any, second: Any) -> bool:
     """Return whether two values are equal, arrays entry by entry; NaN equals NaN."""
-    if hasattr(one, "__array__") or hasattr(other, "__array__"):
-        exact = np.asarray(one).dtype.kind not in "fc"
-        return np.array_equal(one, other, equal_nan=not exact)
-    if isinstance(one, Mapping) and isinstance(other, Mapping):
-        return one.keys() == other.keys() and all(same_values(one[k], other[k]) for k in one)
-    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
-        return len(one) == len(other) and all(map(same_values, one, other))
-    return one is other or bool(one == other)
+    if hasattr(first, "__array__") or hasattr(second, "__array__"):
+        exact = np.asarray(first).dtype.kind not in "fc"
+        return np.array_equal(first, second, equal_nan=not exact)
+    if isinstance(first, Mapping) and isinstance(second, Mapping):
+        return first.keys() == second.keys() and all(
+            same_values(first[k], second[k]) for k in first
+        )
+    if isinstance(first, list | tuple) and isinstance(second, list | tuple):
+        return len(first) == len(second) and all(map(same_values, first, second))
+    return first is second or bool(first == second)

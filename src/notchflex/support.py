@@ -5,12 +5,12 @@ tables and the names of their values, the registry of quantities, slopes along a
 path is computed from.  Names are loaded when first used.
 """
 
-from notchflex._lazy import loader
+from notchflex._imports import loader
 
 _HOME = {
     name: home
     for home, names in {
-        "notchflex._extras": (
+        "notchflex._imports": (
             "install_command",
             "need",
         ),

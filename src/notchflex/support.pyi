@@ -1,5 +1,5 @@
-from notchflex._extras import install_command as install_command
-from notchflex._extras import need as need
+from notchflex._imports import install_command as install_command
+from notchflex._imports import need as need
 from notchflex._load_words import BodyForceOption as BodyForceOption
 from notchflex._load_words import TendonCommand as TendonCommand
 from notchflex._load_words import Vector as Vector

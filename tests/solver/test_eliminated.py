@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from notchflex._jax import jax
-from notchflex.solver.block_elimination import gauss_jordan
+from notchflex.solver.linear_step import gauss_jordan
 
 compiled = jax.jit(gauss_jordan)
 

@@ -11,7 +11,7 @@ from notchflex._jax import jax
 from notchflex.analysis.solve import prepare_for
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import load_path
-from notchflex.solver.block_elimination import linear_step
+from notchflex.solver.linear_step import linear_step
 from notchflex.solver.residual import Iterate, command_residual, evaluate
 
 TIP = {"tip_force": (0.02, 0.0, -0.01), "tip_moment": (0.0, 0.05, 0.0)}

@@ -590,7 +590,7 @@ class BatchTable:
         chains, alike = self.chains.packed(batch.robot_of[rows])
         steps, bodies = batch.loads.steps_of(batch.path_of[rows]), self.chains.bodies(chains)
         load, tip = batch.loads.load, batch.loads.tip
-        commands = row_commands(load, steps, bodies, tip, drawn=bool(self.kind & DRAWN))
+        commands = row_commands(load, steps, bodies, tip, draws=bool(self.kind & DRAWN))
         layout = self.chains.ready.command_layout(commands)
         packed_commands = np.asarray(layout.pack(commands, leading=2))
         outputs = follow_row.rows(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from enum import IntFlag
 from math import hypot, pi
 from typing import Any, NamedTuple, cast
 
@@ -54,21 +55,14 @@ def applied(
     bodies: tuple[np.ndarray, ...] | None = None,
     tip: Float[np.ndarray, "all 6"] | None = None,
 ) -> BodyLoads:
-    """Sum the external loads on each body, those on the base too.
-
-    Args:
-        load: The loads.
-        chain: The chain of their robot.
-        steps: Numbers of steps of the loads; its axes are the leading ones of the sums.
-        bodies: Mass (g) and moment of mass (g mm) of every body, and the distance from the last one
-            to the tip, mm, which may have the rows of `steps` as leading axis; those of the chain
-            where not given. The sums are linear in them.
-        tip: Force and moment at the tip in every step, besides those of the loads.
-
-    Returns:
-        The sums; of a flat chain those in the plane that x and z of its frame span.
-    """
-    axes, bodies = _axes_of(load, chain), bodies or body_numbers(chain)
+    """Sum the external loads on each body; the axes of `steps` are the leading ones of the sums."""
+    # Masses, their moments and the distance of the tip (`body_numbers`) may have the rows of
+    # `steps` as leading axis; the sums are linear in them. `tip` acts besides the loads of the
+    # path. Of a flat chain they are the sums in the plane that x and z of its frame span.
+    along, about = (np.eye(3),) * 2 if chain.frame is None else _of_plane(chain.frame)
+    turn, bodies = load.base_to_world, bodies or body_numbers(chain)
+    world_along, world_about = (along, about) if turn is None else (turn @ along, turn @ about)
+    axes = along, about, world_along, world_about
     by_row = bodies[2].ndim
     fields: list[np.ndarray] = []
     for external, places, at_tip in _each(load, steps, tip):
@@ -89,13 +83,7 @@ def body_numbers(chain: Chain) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def load_slopes(load: LoadPath, chain: Chain, change: Chain) -> BodyLoads:
-    """Differentiate the external loads along changes of masses and lengths of bodies.
-
-    Args:
-        load: The loads.
-        chain: The chain of their robot.
-        change: Changes of the chain, as leading axis of its masses, centres and lengths.
-    """
+    """Differentiate the external loads along changes of a chain, the leading axis of its bodies."""
     mass, centre = np.asarray(chain.body_mass), np.asarray(chain.body_centre)
     by_mass = np.asarray(change.body_mass)
     by_moment = by_mass[..., None] * centre + mass[:, None] * np.asarray(change.body_centre)
@@ -125,13 +113,6 @@ def in_space(loads: BodyLoads, frame: Float[Array, "3 3"], *, reduce: bool = Fal
 def body_wrench(rotation: Float[Array, "d d"], loads: BodyLoads) -> Float[Array, " w"]:
     """Return the wrench (moment, force) of the loads on one body, about its origin, in its frame.
 
-    Args:
-        rotation: Rotation of the body against the base.
-        loads: The sums for this body, without leading axes.
-
-    Returns:
-        The wrench, N mm and N; plain or traced numbers as given.
-
     Example:
         >>> at_side = BodyLoads(np.eye(3)[2], np.zeros(3), np.outer([2.0, 0, 0], [0, 0, 1.0]), 0.0)
         >>> body_wrench(np.eye(3), at_side).tolist()
@@ -153,12 +134,10 @@ def follows(load_path: LoadPath) -> bool:
 
 
 def is_planar(load_path: LoadPath, robot: Robot) -> bool:
-    """Return whether every external load stays in the robot's plane of bending, to rounding.
-
-    It does where each force lies in the plane and acts at a point of it, and each moment turns
-    about its normal. Own weight counts as acting on the tube axis. A robot whose notches bend in
-    several planes has no such plane.
-    """
+    """Return whether every external load stays in the robot's plane of bending, to rounding."""
+    # It does where each force lies in the plane and acts at a point of it, and each moment turns
+    # about its normal. A robot's weight counts as acting on the tube axis. A robot whose notches
+    # bend in several planes has no such plane.
     turn = load_path.base_to_world
     return not any(_sideways(external, robot, turn) for external in load_path.different)
 
@@ -192,10 +171,7 @@ def _sticks_out(
     normal: Sequence[float],
     normal_of_body: Sequence[float],
 ) -> Any:
-    """Return whether a force or its point leaves a plane, or a moment's axis is not its normal.
-
-    Components are numbers, or arrays of them.
-    """
+    """Return whether a force or its point leaves a plane, or a moment's axis is not its normal."""
     return (
         (abs(_dot(force, normal)) > _ROUNDING * _norm(force))
         | (_norm(_cross(moment, normal)) > _ROUNDING * _norm(moment))
@@ -217,7 +193,16 @@ def _cross(first: Sequence[Any], second: Sequence[Any]) -> list[Any]:
     return [b * z - c * y, c * x - a * z, a * y - b * x]
 
 
-LOADED, SIDEWAYS, FOLLOWING, DRAWN = 1, 2, 4, 8
+class LoadKind(IntFlag):
+    """What acts in a step of a path: external loads, some out of the plane or turning, strokes."""
+
+    LOADED = 1
+    SIDEWAYS = 2
+    FOLLOWING = 4
+    DRAWN = 8
+
+
+LOADED, SIDEWAYS, FOLLOWING, DRAWN = LoadKind
 
 
 def acting(
@@ -226,18 +211,7 @@ def acting(
     steps: Int[np.ndarray, "*k"],
     tip: Float[np.ndarray, "s 6"] | None = None,
 ) -> Int[np.ndarray, "*k"]:
-    """Return what acts in some steps of a path, as bits: `LOADED` and so on.
-
-    Args:
-        load: The path of s steps.
-        robot: The robot.
-        steps: Numbers of the steps.
-        tip: Force and moment at the tip in every step, where they are not those of the path.
-
-    Raises:
-        InputError: A tendon or a body that the robot does not have, or gravity where nothing has a
-            mass.
-    """
+    """Return what acts in some steps of a path, as bits of `LoadKind`."""
     tendons = robot.number_of_tendons
     commands = load.tension, load.stroke
     if any(not np.isnan(table[steps, tendons:]).all() for table in commands):
@@ -277,33 +251,15 @@ def row_commands(
     chain: Chain,
     tip: Float[np.ndarray, "all 6"] | None = None,
     *,
-    drawn: bool,
+    draws: bool,
 ) -> Command:
-    """Return the commands of rows of a batch, k rows and their s steps as leading axes.
-
-    Args:
-        load: All steps of all paths.
-        steps: Which of them those of each row are.
-        chain: The chain; masses and lengths of its bodies may have the rows as leading axis.
-        tip: As for `acting`.
-        drawn: Whether strokes are commanded.
-    """
+    """Return the commands of k rows, each with s of the steps of all paths, by their numbers."""
+    # Masses and lengths of the bodies of the chain may have the rows as leading axis.
     commanded = steps, slice(chain.tendons)
-    by_stroke: Any = ~np.isnan(load.stroke[commanded]) if drawn else None
+    by_stroke: Any = ~np.isnan(load.stroke[commanded]) if draws else None
     target: Any = load.target[commanded]
     loads = applied(load, chain, steps, tip=tip) if chain.loaded else None
     return Command(target, by_stroke, loads)
-
-
-def _axes_of(load: LoadPath, chain: Chain) -> _Axes:
-    """Return axes of bodies (three, or x and z of a plane): in their frame, then in the world."""
-    along, about = np.eye(3), np.eye(3)
-    if chain.frame is not None:
-        along, about = _of_plane(chain.frame)
-    turn = load.base_to_world
-    if turn is None:
-        return along, about, along, about
-    return along, about, turn @ along, turn @ about
 
 
 def _of_plane(frame: Float[Array, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
@@ -332,11 +288,9 @@ _Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool, boo
 
 
 def _forces(external: ExternalLoad, last: int, at_tip: Sequence[Any] = ()) -> Iterator[_Force]:
-    """List all loads but the robot's weight: body, force, moment, point, if it follows, if at tip.
-
-    Points at the tip are relative to it. Six more components of force and moment there may be
-    arrays, of many loads.
-    """
+    """List all loads but weight: body, force, moment, point, if it follows, if at the tip."""
+    # Points at the tip are relative to it. Six more components of force and moment there may be
+    # arrays, of many loads.
     for load in external.body_forces:
         yield load.body, load.force, load.moment, load.point, load.following, False
     point = external.tip_point

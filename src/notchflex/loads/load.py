@@ -56,11 +56,6 @@ def check_bool(value: Any, what: str) -> bool:
 def check_vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
     """Return three finite numbers.
 
-    Args:
-        value: What was given.
-        what: Its name, for the message.
-        form: Meaning and unit of the numbers, for the message.
-
     Example:
         >>> check_vector([0, 0, 1], "tip_force", "N")
         (0.0, 0.0, 1.0)
@@ -183,11 +178,11 @@ class BodyForce:
         body = check_integer(self.body, "the body of a BodyForce")
         if body < 0:
             raise InputError.OUT_OF_RANGE(f"bodies are counted from 0, the base; got {body}")
-        given = vars(self)
-        given["body"] = body
+        values = vars(self)
+        values["body"] = body
         for what, form in (("force", "N"), ("moment", "N mm"), ("point", "mm, from the body")):
-            given[what] = check_vector(given[what], f"the {what} of a BodyForce", form)
-        given["following"] = check_bool(self.following, "following of a BodyForce")
+            values[what] = check_vector(values[what], f"the {what} of a BodyForce", form)
+        values["following"] = check_bool(self.following, "following of a BodyForce")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,17 +216,17 @@ class ExternalLoad:
 
     def __post_init__(self) -> None:
         """Check the numbers and keep them as tuples, so that equal loads are found equal."""
-        given = vars(self)
+        values = vars(self)
         for name, default in _DEFAULTS:
-            value = given[name]
+            value = values[name]
             if value is not default:
-                given[name] = _CHECKS[name](value)
+                values[name] = _CHECKS[name](value)
 
     @property
     def external(self) -> ExternalLoad:
         """The external loads alone, without what else a load may command."""
-        given = vars(self)
-        numbers = {name: given[name] for name in EXTERNAL}
+        values = vars(self)
+        numbers = {name: values[name] for name in EXTERNAL}
         if numbers == vars(NOTHING):
             return NOTHING
         load = object.__new__(ExternalLoad)
@@ -247,13 +242,15 @@ class ExternalLoad:
     def is_nothing(self) -> bool:
         """Whether no load acts, whatever the robot weighs."""
         acting = any(self.tip_force) or any(self.tip_moment) or self.pulls_down
-        return not acting and not any(any(one.force) or any(one.moment) for one in self.body_forces)
+        return not acting and not any(
+            any(load.force) or any(load.moment) for load in self.body_forces
+        )
 
     @property
     def follows(self) -> bool:
         """Whether anything turns with a body."""
         tip = self.following and (any(self.tip_force) or any(self.tip_moment))
-        return tip or any(one.following for one in self.body_forces)
+        return tip or any(load.following for load in self.body_forces)
 
     def weight(self, mass: float) -> tuple[float, float, float]:
         """Weight of a mass (g) in the world, N."""
@@ -270,7 +267,7 @@ def _mass(value: Any) -> float:
 
 def _body_forces(value: Any) -> tuple[BodyForce, ...]:
     several = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-    if not several or not all(isinstance(one, BodyForce) for one in value):
+    if not several or not all(isinstance(entry, BodyForce) for entry in value):
         raise InputError.WRONG_TYPE(
             "body_forces must be a list of notchflex.BodyForce(body, force); "
             f"got {short_repr(value)}"
@@ -292,8 +289,8 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "body_forces": _body_forces,
     "tip_mass": _mass,
 }
-EXTERNAL = tuple(one.name for one in fields(ExternalLoad))
-_DEFAULTS = tuple((one.name, one.default) for one in fields(ExternalLoad))
+EXTERNAL = tuple(field.name for field in fields(ExternalLoad))
+_DEFAULTS = tuple((field.name, field.default) for field in fields(ExternalLoad))
 NOTHING = ExternalLoad()
 
 
@@ -305,23 +302,23 @@ def distinct_objects(values: Iterable[Any]) -> dict[int, Any]:
 def external_of_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     """Return the external loads of every step of a load path, checked."""
     try:
-        given: tuple[Any, ...] = tuple(external)
+        loads: tuple[Any, ...] = tuple(external)
     except TypeError:
-        given = (None,)
-    different = distinct_objects(given).values()
+        loads = (None,)
+    different = distinct_objects(loads).values()
     if not all(isinstance(load, ExternalLoad) for load in different):
         raise InputError.WRONG_TYPE(
             "external of a load path must hold one ExternalLoad per step; "
             f"got {short_repr(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
         )
-    if given and len(given) != steps:
+    if loads and len(loads) != steps:
         raise InputError.WRONG_SHAPE(
-            f"external of a load path has {len(given)} entries, but there are {steps} steps; "
+            f"external of a load path has {len(loads)} entries, but there are {steps} steps; "
             "give one per step"
         )
     if any(type(load) is not ExternalLoad for load in different):
-        given = tuple(load.external for load in given)
-    return given or (NOTHING,) * steps
+        loads = tuple(load.external for load in loads)
+    return loads or (NOTHING,) * steps
 
 
 _LARGEST_TURN = 1e6  # rad; of more, rounding leaves an angle worse than 1e-10 rad
@@ -366,20 +363,22 @@ class Load(ExternalLoad):
 
     def __repr__(self) -> str:
         """Show what is given; tendons first."""
-        ordered = sorted(fields(self), key=lambda one: bool(one.kw_only))
-        words = ((one.name, repr(getattr(self, one.name)), repr(one.default)) for one in ordered)
-        given = (f"{name}={value}" for name, value, default in words if value != default)
-        return f"Load({', '.join(given)})"
+        ordered = sorted(fields(self), key=lambda field: bool(field.kw_only))
+        words = (
+            (field.name, repr(getattr(self, field.name)), repr(field.default)) for field in ordered
+        )
+        arguments = (f"{name}={value}" for name, value, default in words if value != default)
+        return f"Load({', '.join(arguments)})"
 
     def __post_init__(self) -> None:
         """Check the numbers and keep them as tuples, which the caller cannot change."""
         super().__post_init__()
-        given = vars(self)
+        values = vars(self)
         for name in ("tension", "stroke"):
-            if given[name] is not None:
-                given[name] = _commanded(given[name], name)
+            if values[name] is not None:
+                values[name] = _commanded(values[name], name)
         if self.base_rotation is not NO_VECTOR:
-            given["base_rotation"] = check_turn(self.base_rotation)
+            values["base_rotation"] = check_turn(self.base_rotation)
 
     def per_tendon(self, what: str, tendons: int) -> tuple[float | None, ...]:
         """Return tension (N) or stroke (mm) of every tendon, None where not commanded.

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, TypeGuard, overload
+from typing import Any, TypeGuard, overload
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._load_words import MOST_STEPS
-from notchflex._summary import Displayed, Summary, course, short, vector
+from notchflex._summary import MOST, Displayed, Summary, course, short, vector
 from notchflex._values import ByValue, read_only
 from notchflex.errors import InputError
 from notchflex.loads.load import (
@@ -30,10 +30,6 @@ from notchflex.loads.load import (
     rotation_of,
     short_repr,
 )
-
-if TYPE_CHECKING:
-    from notchflex.loads.load import ExternalLoad, Load
-
 
 TENDONS, TIP = ("tension", "stroke"), ("tip_force", "tip_moment")
 """Names of the numbers of a load that may vary: one for each tendon, and vectors."""
@@ -74,15 +70,15 @@ class LoadPath(ByValue, Displayed):
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
-        given = {
+        tables = {
             name: np.atleast_2d(check_table(table, name))
             for name in TENDONS
             if (table := getattr(self, name)) is not None
         }
-        if not given:
+        if not tables:
             raise InputError.NO_DATA("a load path needs tensions (N) or strokes (mm); got neither")
-        nothing = np.full(next(iter(given.values())).shape, np.nan)
-        tension, stroke = (read_only(given.get(name, nothing)) for name in TENDONS)
+        nothing = np.full(next(iter(tables.values())).shape, np.nan)
+        tension, stroke = (read_only(tables.get(name, nothing)) for name in TENDONS)
         base_rotation = read_only(check_turn(self.base_rotation))
         if tension.shape != stroke.shape or tension.ndim != 2:
             raise InputError.WRONG_SHAPE(
@@ -203,7 +199,7 @@ class LoadPath(ByValue, Displayed):
             InputError: No tendon is commanded so.
         """
         if name in TIP:
-            return np.array([getattr(one, name) for one in self.external])
+            return np.array([getattr(load, name) for load in self.external])
         commanded = getattr(self, name)
         if np.isnan(commanded).all():
             raise InputError.NO_DATA(f"the loads give no {name} that could vary")
@@ -219,7 +215,9 @@ class LoadPath(ByValue, Displayed):
         Raises:
             InputError: A negative tension, or a number that is not finite.
         """
-        tables = {name: np.asarray(one) for name, one in values.items() if name in (*TENDONS, *TIP)}
+        tables = {
+            name: np.asarray(table) for name, table in values.items() if name in (*TENDONS, *TIP)
+        }
         changed: dict[str, Any] = {
             name: np.where(np.isnan(getattr(self, name)), np.nan, table)
             for name, table in tables.items()
@@ -227,8 +225,8 @@ class LoadPath(ByValue, Displayed):
         }
         if tip := {name: table.tolist() for name, table in tables.items() if name in TIP}:
             changed["external"] = tuple(
-                replace(one, **{name: tuple(each[step]) for name, each in tip.items()})
-                for step, one in enumerate(self.external)
+                replace(load, **{name: tuple(each[step]) for name, each in tip.items()})
+                for step, load in enumerate(self.external)
             )
         return replace(self, **changed) if changed else self
 
@@ -295,32 +293,28 @@ class LoadPath(ByValue, Displayed):
             >>> [one.tip_force for one in path.release().external]
             [(0.0, 0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0)]
         """
-        given = {n: v for n, v in locals().items() if n in EXTERNAL and v is not None}
+        changes = {n: v for n, v in locals().items() if n in EXTERNAL and v is not None}
         # Each distinct load is made and checked once.
-        changed = [replace(one, **given) for one in self.different]
+        changed = [replace(load, **changes) for load in self.different]
         return replace(self, external=tuple(changed[number] for number in self.which.tolist()))
 
     def for_tendons(self, count: int) -> LoadPath:
         """Return the path for a number of tendons; those added are slack."""
-        given = self.tension.shape[1]
-        if given == count:
+        commanded = self.tension.shape[1]
+        if commanded == count:
             return self
-        if given > count:
+        if commanded > count:
             raise InputError.WRONG_SHAPE(
-                f"the load commands {given} tendons, but the robot has {count}; "
+                f"the load commands {commanded} tendons, but the robot has {count}; "
                 f"give at most {count}"
             )
-        added = (0, 0), (0, count - given)
+        added = (0, 0), (0, count - commanded)
         tables = (np.pad(getattr(self, name), added, constant_values=np.nan) for name in TENDONS)
         return replace(self, **dict(zip(TENDONS, tables, strict=True)))
 
 
 def join_paths(paths: Sequence[LoadPath]) -> LoadPath:
-    """Join paths for equally many tendons to one.
-
-    Raises:
-        InputError: Their bases are turned differently.
-    """
+    """Join paths for equally many tendons to one."""
     if any((path.base_rotation != paths[0].base_rotation).any() for path in paths):
         raise InputError.CONFLICT(_TURNED)
     return LoadPath(
@@ -385,9 +379,6 @@ _base_rotation = lru_cache(maxsize=64)(read_only)
 
 # Summaries of loads: what `repr` and a notebook show of them.
 
-MOST = 4
-"""Tendons, notches or outputs that have a line each; of more, the first."""
-
 
 def load_words(load: Load) -> str:
     """Return a load in words: what is commanded of every tendon, and the external loads.
@@ -399,8 +390,8 @@ def load_words(load: Load) -> str:
     """
     words: list[str] = []
     for name, unit in (("tension", "N"), ("stroke", "mm")):
-        given = getattr(load, name)
-        several = given if isinstance(given, (list, tuple)) else [given]
+        commanded = getattr(load, name)
+        several = commanded if isinstance(commanded, (list, tuple)) else [commanded]
         for tendon, value in enumerate(several, start=1):
             if value is not None:
                 which = f"tendon {tendon} " if len(several) > 1 else ""
@@ -418,12 +409,12 @@ def external_words(load: ExternalLoad) -> list[str]:
         ['tip force (0, 0.1, 0) N following the tip', 'tip mass 20 g']
     """
     turning = " following the tip" if load.following else ""
-    at = f" at {vector(load.tip_point)} mm from the tip" if any(load.tip_point) else ""
-    at_of_mass = "" if any(load.tip_force) else at
+    where = f" at {vector(load.tip_point)} mm from the tip" if any(load.tip_point) else ""
+    where_of_mass = "" if any(load.tip_force) else where
     words = [
-        (any(load.tip_force), f"tip force {vector(load.tip_force)} N{at}{turning}"),
+        (any(load.tip_force), f"tip force {vector(load.tip_force)} N{where}{turning}"),
         (any(load.tip_moment), f"tip moment {vector(load.tip_moment)} N mm{turning}"),
-        (load.tip_mass, f"tip mass {short(load.tip_mass)} g{at_of_mass}"),
+        (load.tip_mass, f"tip mass {short(load.tip_mass)} g{where_of_mass}"),
         (any(load.gravity or ()), f"gravity {vector(load.gravity or ())} m/s²"),
     ]
     for force in load.body_forces:
@@ -439,7 +430,7 @@ def external_words(load: ExternalLoad) -> list[str]:
 
 def external_rows(load: LoadPath) -> Iterator[tuple[str, str]]:
     """Yield the row of the external loads of a path; none where there are none."""
-    different = [", ".join(external_words(one)) or "none" for one in load.different]
+    different = [", ".join(external_words(external)) or "none" for external in load.different]
     if different == ["none"]:
         return
     more = f"; {len(different) - 1} other" if len(different) > 1 else ""
@@ -532,8 +523,8 @@ def _ramp(what: str, start: Ends, stop: Ends, steps: int, tendon: int) -> LoadPa
     alone = [*[None] * (tendon - 1), 0.0]
     several = next((ends for ends in (start, stop) if _is_several(ends)), alone)
     first, last = (
-        one if _is_several(one) else [None if entry is None else one for entry in several]
-        for one in (start, stop)
+        end if _is_several(end) else [None if entry is None else end for entry in several]
+        for end in (start, stop)
     )
     if len(first) != len(last):
         raise InputError.WRONG_SHAPE(

@@ -37,7 +37,7 @@ from notchflex.mechanics.material import Fibres, SectionLaw, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
-from notchflex.mechanics.tendon import TendonGroup, route
+from notchflex.mechanics.tendon import TUBE_AXIS, TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
 from notchflex.robot.kinds import Friction, Material, Notch
 from notchflex.robot.part import unchecked
@@ -112,6 +112,17 @@ class Chain(Pytree):
         """Whether any force acts on a body, so that poses enter the balance."""
         parts = (*self.groups, *self.contact_pairs)
         return self.loaded or any(part.acts_on_bodies for part in parts)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What it was assembled for, as `assemble` takes it."""
+        return {
+            "level": self.level,
+            "loaded": self.loaded,
+            "follows": self.follows,
+            "refinement": self.refinement,
+            "flat": self.frame is not None,
+        }
 
     @property
     def memory_stiffness(self) -> Float[Array, " t"]:
@@ -346,9 +357,6 @@ def flexure(
     return rod, relative_pose(rod, xp.zeros(rod.modes))
 
 
-_UP = xp.array([0.0, 0.0, 1.0])
-
-
 def assemble(
     robot: Robot,
     level: str = "tendons",
@@ -379,11 +387,13 @@ def assemble(
         >>> assemble(load_robot("pacheco2021-a")).flexures
         5
     """
-    template = chain_template(robot, level, refinement, flexures)
+    chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
+    sites, tendons = sites_of(robot), robot.tendon
+    shape = robot.tube, robot.notches, sites, tendons, level, refinement, chord, fibres
+    template = _template(*shape, flexures or flexure)
     rods, groups, body_length = template.rods, template.groups, template.body_length
     body_mass, body_centre = body_masses(robot, rods)
     section = rods.section.stiffened(template.stiffness_factor[:, None])
-    tendons = robot.tendon
     chain = Chain(
         rods=replace(rods, section=section),
         groups=groups,
@@ -411,7 +421,7 @@ def assemble(
     normal = bending_normal(robot)
     if not flat or level == "space" or normal is None or not tendons_in_plane(robot):
         return chain
-    return _flat(chain, xp.stack([xp.cross(normal, _UP), normal, _UP], axis=1))
+    return _flat(chain, xp.stack([xp.cross(normal, TUBE_AXIS), normal, TUBE_AXIS], axis=1))
 
 
 def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
@@ -458,16 +468,6 @@ class ChainTemplate(NamedTuple):
     stiffness_factor: Float[Array, " n"]
 
 
-def chain_template(
-    robot: Robot, level: str, refinement: int, flexures: Callable[..., Any] | None = None
-) -> ChainTemplate:
-    """Build the template of a robot's chain; for the arguments see `assemble`."""
-    chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
-    sites = sites_of(robot)
-    shape = robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord, fibres
-    return _template(*shape, flexures or flexure)
-
-
 # Fits of material or friction constants assemble one shape hundreds of times.
 @cached(64)
 def _template(
@@ -495,12 +495,12 @@ def _template(
     rod_index = xp.array([order[id(notch), id(site)] for notch, site in pairs])
     rods = jax.tree.map(lambda leaf: leaf[rod_index], distinct_rods)
     body_length = body_lengths(tube, notches)
-    lead = body_length[:-1, None] * _UP
+    lead = body_length[:-1, None] * TUBE_AXIS
     rods = replace(rods, start_offset=rods.start_offset + lead)
     free = jax.tree.map(lambda *leaves: xp.stack(leaves)[rod_index], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
     sides = dict.fromkeys(notch.direction_deg for notch in notches)
-    turns = {side: rotation_about(constant(_UP * xp.radians(side))) for side in sides}
+    turns = {side: rotation_about(constant(TUBE_AXIS * xp.radians(side))) for side in sides}
     return ChainTemplate(
         distinct_rods,
         rod_index,

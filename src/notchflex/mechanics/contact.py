@@ -13,6 +13,7 @@ from notchflex._jax import jax
 from notchflex.mechanics.flexure import FlexureState, Rod, in_space
 from notchflex.mechanics.motion import Motion, wrench_at
 from notchflex.mechanics.tendon import (
+    TUBE_AXIS,
     AlongFibres,
     Crossing,
     CrossingGroup,
@@ -112,7 +113,6 @@ def build_contacts(
     if sides:
         line = passages(notches, body_length, sides)
         across = on_tube([tube.outer_radius] * len(sides), sides)
-        along = xp.array([0.0, 0.0, 1.0])
         # Keep as many contacts as close at one flexure, on any side.
         count = int(line.on_side.sum(axis=1).max(initial=1.0))
         chosen = xp.argsort(-line.on_side, axis=1, kind="stable")[:, :count]
@@ -126,9 +126,9 @@ def build_contacts(
             EdgeContact(
                 has_contact=has_contact,
                 back=xp.where(has_contact > 0.0, closing(line.back), 1),
-                leaves=closing(across + line.left[..., None] * along),
-                enters=closing(across + line.enters[..., None] * along),
-                normal=xp.broadcast_to(along, (*has_contact.shape, 3)),
+                leaves=closing(across + line.left[..., None] * TUBE_AXIS),
+                enters=closing(across + line.enters[..., None] * TUBE_AXIS),
+                normal=xp.broadcast_to(TUBE_AXIS, (*has_contact.shape, 3)),
             )
         )
     return tuple(groups)

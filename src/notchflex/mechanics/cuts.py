@@ -356,9 +356,9 @@ def annular_segment(outer_radius: ArrayLike, inner_radius: ArrayLike, depth: Arr
 
     # A bore that the plane does not reach lies this far above it.
     lift = xp.maximum(-(inner + plane), 0.0)
-    whole = segment_moments(outer, alpha, 0.0 * depth)
+    disc = segment_moments(outer, alpha, 0.0 * depth)
     bore = segment_moments(inner, beta, lift)
-    area, first, second, strong = (x - y for x, y in zip(whole, bore, strict=True))
+    area, first, second, strong = (x - y for x, y in zip(disc, bore, strict=True))
     from_plane = first / area
     weak = second - first * from_plane
 

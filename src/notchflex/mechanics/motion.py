@@ -223,17 +223,13 @@ def rotation_about(vector: Float[Array, "*n a"]) -> Matrix:
         sine, cosine = sine_cosine(vector[..., 0])
         return xp.stack([cosine, sine, -sine, cosine], -1).reshape(*vector.shape[:-1], 2, 2)
     first, second, _ = _coefficients(_squared(vector))
-    matrix = skew(vector)
-    unturned = xp.broadcast_to(xp.eye(3), matrix.shape)
-    return unturned + _each(first) * matrix + _each(second) * (matrix @ matrix)
+    return _quadratic(skew(vector), first, second)
 
 
 def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
     """Return the left Jacobian of SO(3): rotation in the outer frame per change of its vector."""
     _, second, third = _coefficients(_squared(vector))
-    matrix = skew(vector)
-    unturned = xp.broadcast_to(xp.eye(3), matrix.shape)
-    return unturned + _each(second) * matrix + _each(third) * (matrix @ matrix)
+    return _quadratic(skew(vector), second, third)
 
 
 def left_slope_change(
@@ -257,6 +253,9 @@ def _squared(vector: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
     return (vector * vector).sum(axis=-1)
 
 
-def _each(values: Float[Array, "*n"]) -> Float[Array, "*n 1 1"]:
-    """Shape numbers so that they multiply matrices."""
-    return values if xp.ndim(values) == 0 else values[..., None, None]
+def _quadratic(matrix: Matrix, linear: Float[Array, "*n"], square: Float[Array, "*n"]) -> Matrix:
+    """Return polynomials of matrices of 3 rows, 1 being their constant coefficient."""
+    linear, square = (
+        factor if xp.ndim(factor) == 0 else factor[..., None, None] for factor in (linear, square)
+    )
+    return xp.broadcast_to(xp.eye(3), matrix.shape) + linear * matrix + square * (matrix @ matrix)

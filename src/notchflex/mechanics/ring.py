@@ -66,7 +66,6 @@ HARMONICS = 41  # n = 0 ... 40
 _DEGREE = 18
 _EDGE = 4  # polynomials of each half that move an edge: along, around, outward and its slope
 _BAND = 7  # coefficients of a row, from the diagonal on
-_ROWS = 29  # polynomials of the larger half
 _GAUSS = np.polynomial.legendre.leggauss(_DEGREE + 1)  # exact for products of two polynomials
 
 
@@ -77,6 +76,9 @@ def _halves() -> list[list[tuple[int, int]]]:
         halves[0] += [(0, degree), (1, degree + 1), (2, degree + 3)]
         halves[1] += [(1, degree), (0, degree + 1), (2, degree + 2)]
     return [[term for term in half if term[1] <= _DEGREE] for half in halves]
+
+
+_ROWS = max(map(len, _halves()))
 
 
 def _polynomial(displacement: int, degree: int) -> np.ndarray:

@@ -118,23 +118,15 @@ def of_any_shape(properties: Formula) -> Formula:
 
 
 def two_walls(width: ArrayLike, thickness: ArrayLike, middle: ArrayLike) -> Section:
-    r"""Compute the section of two equal walls side by side.
-
-    Args:
-        width: Width b of each wall, across the strip, mm; any shape.
-        thickness: Thickness h, in the direction of bending, mm; broadcast with the others.
-        middle: Distance c of the middle of each wall from the plane of symmetry, mm.
-
-    Returns:
-        The section, every field of the common shape. Weak is the bending of the strip,
-        $2bh^3/12$, strong the bending sideways, $2(hb^3/12 + bhc^2)$; the torsion constant is
-        that of free warping.
+    r"""Compute the section of two equal walls (all in mm) of a strip side by side.
 
     Example:
         >>> strip = two_walls(2.0, 1.5, 4.0)
         >>> print(f"{strip.second_moment_weak:.4f} mm⁴, torsion {strip.torsion_constant:.4f} mm⁴")
         1.1250 mm⁴, torsion 2.4362 mm⁴
     """
+    # Weak is the bending of the strip, 2bh^3/12, strong the bending sideways, 2(hb^3/12 + bhc^2);
+    # the torsion constant is that of free warping.
     b, h, c = map(constant, xp.broadcast_arrays(width, thickness, middle))
     nought = xp.zeros_like(b)
     return Section(
@@ -233,8 +225,8 @@ def gauss_rule(points: Array, weights: Array, count: int) -> Points:
         before, polynomial = state
         diagonal = shares @ (points * polynomial**2)
         following = (points - diagonal) * polynomial - before
-        beside = xp.sqrt(shares @ following**2)
-        return (beside * polynomial, following / beside), (diagonal, beside)
+        off_diagonal = xp.sqrt(shares @ following**2)
+        return (off_diagonal * polynomial, following / off_diagonal), (diagonal, off_diagonal)
 
     start = xp.zeros_like(points), xp.ones_like(points)
     recurrence = scan(extend, start, (np.zeros(count),))[1]
@@ -266,8 +258,8 @@ def gauss_rule(points: Array, weights: Array, count: int) -> Points:
 
     order = np.arange(count, 0.0, -1.0)[:, None, None]
     # Compiled as a loop: soon, and small enough for the cache of code.
-    found = jax.lax.map(node, order) if is_traced(points) else node(order[..., 0].T)
-    nodes, areas = (values.ravel() for values in found)
+    rule = jax.lax.map(node, order) if is_traced(points) else node(order[..., 0].T)
+    nodes, areas = (values.ravel() for values in rule)
     return nodes, areas
 
 
@@ -276,10 +268,15 @@ def _polynomials(recurrence: Any, places: Any) -> Any:
 
     def step(state: Any, entry: Any) -> Any:
         before, polynomial, squares, changes = state
-        diagonal, beside = entry
+        diagonal, off_diagonal = entry
         following = (places - diagonal) * polynomial - before
         changes = changes + ((following < 0.0) != (polynomial < 0.0))
-        return (beside * polynomial, following / beside, squares + polynomial**2, changes), ()
+        return (
+            off_diagonal * polynomial,
+            following / off_diagonal,
+            squares + polynomial**2,
+            changes,
+        ), ()
 
     none = xp.zeros_like(places)
     return scan(step, (none, none + 1.0, none, xp.zeros_like(places, int)), recurrence)[0]

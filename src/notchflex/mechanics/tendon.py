@@ -141,6 +141,9 @@ def direction(vector: Vectors) -> Vectors:
     return vector / jnp.where(length == 0.0, 1.0, length)[..., None]
 
 
+# Direction of the tube, in the frames of its bodies.
+TUBE_AXIS = xp.array([0.0, 0.0, 1.0])
+
 # A tendon pulled straight from the edge of one body to the edge of the next it visits.
 #
 # It may skip bodies. The pull between two bodies is a force along the straight span on each of
@@ -382,11 +385,10 @@ def on_tube(radii: Any, directions_deg: Any) -> Float[Array, "t 3"]:
 def _straight(
     masks: dict[str, Any], place: Array, line: Passage, free: Motion, **options: Any
 ) -> Straight:
-    along = xp.array([0.0, 0.0, 1.0])
-    entry = place + line.enters[..., None] * along
-    leave = place + line.leaves[..., None] * along
+    entry = place + line.enters[..., None] * TUBE_AXIS
+    leave = place + line.leaves[..., None] * TUBE_AXIS
     # Every straight span in the free robot; 0 where a tendon passes by.
-    point, across = place + line.base_leaves[:, None] * along, list[Any]()
+    point, across = place + line.base_leaves[:, None] * TUBE_AXIS, list[Any]()
     for visits, enters, leaves, rotation, translation in zip(
         masks["visits"], entry, leave, *free, strict=True
     ):
@@ -397,7 +399,7 @@ def _straight(
         **masks,
         **options,
         natural_gap=masks["visits"] * xp.linalg.norm(xp.stack(across), axis=-1),
-        leaves=place + line.left[..., None] * along,
+        leaves=place + line.left[..., None] * TUBE_AXIS,
         enters=entry,
-        along=xp.broadcast_to(along, entry.shape),
+        along=xp.broadcast_to(TUBE_AXIS, entry.shape),
     )

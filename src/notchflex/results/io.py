@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex import __version__
-from notchflex._extras import need
+from notchflex._imports import need
 from notchflex._jax import jax
 from notchflex._quantity import REGISTERED, Quantity
 from notchflex._replacing import replacing

@@ -14,13 +14,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._replacing import replacing
-from notchflex._summary import Displayed, Summary, course, short, vector
+from notchflex._summary import MOST, Displayed, Summary, course, short, vector
 from notchflex._values import ByValue
 from notchflex.errors import ConvergenceError, InputError
 from notchflex.loads import Load
 from notchflex.loads.command import in_space
 from notchflex.loads.load import short_repr
-from notchflex.loads.load_path import MOST, external_rows, load_words, tendon_rows
+from notchflex.loads.load_path import external_rows, load_words, tendon_rows
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
 from notchflex.results.quantities import QUANTITIES, EquilibriumQuantities

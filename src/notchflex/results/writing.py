@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TextIO
 
-from notchflex._extras import need
+from notchflex._imports import need
 from notchflex._replacing import is_replaceable, replacing, unwritable
 from notchflex.errors import InputError
 

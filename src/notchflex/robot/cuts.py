@@ -75,9 +75,6 @@ def slot(
 class Opening(NamedTuple):
     """An opening of the wall through which a tendon enters the body beyond a notch.
 
-    A tendon may bypass a body: where its side of the wall is not cut, the wall there belongs to a
-    body nearer the base or nearer the tip.
-
     Attributes:
         side_deg: Side of the tube that is open [deg]; None is open all round.
         leaves: How far beyond its nominal distal face the last body that the tendon was in has its
@@ -92,6 +89,9 @@ class Opening(NamedTuple):
         >>> Opening(90.0, 0.0, 0.0).admits(60.0), Opening(90.0, 0.0, 0.0).admits(-60.0)
         (True, False)
     """
+
+    # A tendon may bypass a body: where its side of the wall is not cut, the wall there belongs to a
+    # body nearer the base or nearer the tip.
 
     side_deg: float | None
     leaves: float

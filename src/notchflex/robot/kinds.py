@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias, Union
 from pydantic import AfterValidator, BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
-from notchflex._packages import import_all
+from notchflex._imports import import_all
 from notchflex.robot.cuts import CutLayout, Opening
 from notchflex.robot.part import (
     MOST_STRAIN,

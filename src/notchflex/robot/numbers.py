@@ -86,17 +86,9 @@ def robot_of(parts: Sequence[Any]) -> Robot:
 
 
 def places_by_name(robot: Robot, names: Sequence[str]) -> tuple[Robot, list[list[Place]]]:
-    """Return where values stand among the parts of a robot, by their names.
-
-    Args:
-        robot: The robot.
-        names: Such as `notch[2].depth`; a number of one notch is not that of all.
-
-    Returns:
-        The robot, with notches of their own where a name is of one, and the places in it.
-    """
+    """Return where named values stand in a robot, with its notches apart where a name is of one."""
     targets = [parse_path(name) for name in names]
-    single = any(one.section == "notch" and one.number is not None for one in targets)
+    single = any(target.section == "notch" and target.number is not None for target in targets)
     if single and len(robot.notch) < robot.number_of_notches:
         robot = robot.replace(notch=robot.notches)
     parts = list(enumerate(_parts_of_arrays(robot)))
@@ -105,10 +97,10 @@ def places_by_name(robot: Robot, names: Sequence[str]) -> tuple[Robot, list[list
         for target in targets
     ]
     of_one = [target.number is not None for target in targets]
-    taken = {place for own in itertools.compress(places, of_one) for place in own}
+    taken = {place for of_target in itertools.compress(places, of_one) for place in of_target}
     return robot, [
-        [place for place in own if alone or place not in taken]
-        for own, alone in zip(places, of_one, strict=True)
+        [place for place in of_target if alone or place not in taken]
+        for of_target, alone in zip(places, of_one, strict=True)
     ]
 
 

@@ -95,13 +95,7 @@ _LONGEST = 80
 
 
 def sentences(error: ValidationError, cls: type, repeats: Sequence[int] = ()) -> list[str]:
-    """Say in a sentence each what pydantic refused in a part.
-
-    Args:
-        error: What pydantic refused.
-        cls: The part class that was validated.
-        repeats: `repeat` of every `[[notch]]` table, so that notches are counted as in the robot.
-    """
+    """Say in a sentence each what pydantic refused in a part."""
     records = cast("list[dict[str, Any]]", error.errors(include_url=False))
     places = [record["loc"] for record in records]
     said: dict[str, None] = {}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias, cast, o
 from pydantic import Field, TypeAdapter, ValidationError
 
 from notchflex import __version__
-from notchflex._summary import Summary, short
+from notchflex._summary import MOST, Summary, short
 from notchflex.errors import InputError, InputWarning
 from notchflex.robot.kinds import (
     PRINTABLE,
@@ -350,9 +350,6 @@ def _tidy(model: dict[str, Any]) -> None:
 
 
 # The summary of a robot: what `repr` and a notebook show of it.
-
-MOST = 4
-"""Different values of a key that are listed; of more, their range."""
 
 # A longer row goes on below.
 _WIDTH = 145

@@ -50,14 +50,13 @@ class LoadStepResult(NamedTuple):
 
 
 class _Mode(IntEnum):
-    """How a substep is tried: by the equations as they are, or along regularised ones to them.
+    """How a substep is tried: by the equations as they are, or along regularised ones to them."""
 
-    RELAXED: sticking contacts have a compliance. Many contacts on stiff tendons stick or slide in
-    combinations that are not found one contact at a time (benchmarks/hard_loads.py).
-    SNAPPING: the notches have a viscosity. A notch that softens as it closes has limit points,
-    where it snaps to another shape under constant tension; fibres on a flat plateau lose nearly all
-    stiffness (tests/solver/test_snapping.py).
-    """
+    # RELAXED: sticking contacts have a compliance. Many contacts on stiff tendons stick or slide in
+    # combinations that are not found one contact at a time (benchmarks/hard_loads.py). SNAPPING:
+    # the notches have a viscosity. A notch that softens as it closes has limit points, where it
+    # snaps to another shape under constant tension; fibres on a flat plateau lose nearly all
+    # stiffness (tests/solver/test_snapping.py).
 
     PLAIN = 0
     RELAXED = 1
@@ -88,11 +87,9 @@ class _Attempt(NamedTuple):
         return choose(converged, self._longer(), relaxed if can_relax else self._shorter(can_snap))
 
     def after_relaxed(self, converged: Array, can_snap: bool) -> _Attempt:
-        """Return what is tried after a relaxed shape, or after the equations from the last one.
-
-        A compliance that fails is approached by the root of the factor, for tendons that are all
-        but slack (tests/solver/test_slight_tensions.py).
-        """
+        """Return what is tried after a relaxed shape, or after the equations from the last one."""
+        # A compliance that fails is approached by the root of the factor, for tendons that are all
+        # but slack (tests/solver/test_slight_tensions.py).
         compliance, root = self.regularisation, jnp.sqrt(self.factor)
         factor = jnp.maximum(self.factor**2, _FACTOR)
         smaller = jnp.where(compliance < _MIN_COMPLIANCE, 0.0, factor * compliance)
@@ -106,11 +103,9 @@ class _Attempt(NamedTuple):
         )
 
     def after_snapping(self, converged: Array) -> _Attempt:
-        """Return what is tried after a viscous shape, or after the equations from the last one.
-
-        Under the same load the viscosity falls to zero while shapes are found, and rises when one
-        is not, up to the largest (tests/test_errors.py: the edges of a tendon's channel meet).
-        """
+        """Return what is tried after a viscous shape, or after the equations from the last one."""
+        # Under the same load the viscosity falls to zero while shapes are found, and rises when one
+        # is not, up to the largest (tests/test_errors.py: the edges of a tendon's channel meet).
         viscosity = self.regularisation
         smaller = jnp.where(viscosity < _MIN_VISCOSITY, 0.0, 0.4 * viscosity)
         larger = jnp.where(viscosity > 0.0, 3.0 * viscosity, _VISCOSITY)
@@ -123,11 +118,9 @@ class _Attempt(NamedTuple):
         return _Attempt(2.0 * self.fraction, self.predicts)
 
     def _shorter(self, can_snap: bool) -> _Attempt:
-        """Return half of it; of a robot that may snap with a viscosity, or the contacts otherwise.
-
-        A softening notch contradicts the predictor: the tension falls as the stroke rises
-        (`test_a_stroke_passes_the_limit_point`).
-        """
+        """Return half of it; a robot that can snap also tries a viscosity, or no prediction."""
+        # A softening notch contradicts the predictor: the tension falls as the stroke rises
+        # (`test_a_stroke_passes_the_limit_point`).
         fraction = 0.5 * self.fraction
         if not can_snap:
             return _Attempt(fraction, self.predicts)
@@ -175,25 +168,12 @@ _OVERDRAWN, _BALANCED = 1e3, 1e-5
 def solve_load_step(
     chain: Chain, command: Command, last: SolverState, settings: Settings
 ) -> LoadStepResult:
-    """Follow a load from a solved state.
-
-    The whole step is tried first. Where Newton's method fails, it is tried with regularised
-    contacts, whose compliance falls to zero; where that fails too, the step is halved until it
-    succeeds, and doubled afterwards. Only substeps that converged without regularisation enter the
-    friction history.
-
-    Where all tendons are slack before, external loads come first, then all tensions together: half
-    the load step each.
-
-    Args:
-        chain: The chain.
-        command: The load.
-        last: The solved state before.
-        settings: Tolerance and limits.
-
-    Returns:
-        The result.
-    """
+    """Follow a load from a solved state."""
+    # The whole step is tried first. Where Newton's method fails, it is tried with regularised
+    # contacts, whose compliance falls to zero; where that fails too, the step is halved until it
+    # succeeds, and doubled afterwards. Only substeps that converged without regularisation enter
+    # the friction history. Where all tendons are slack before, external loads come first, then all
+    # tensions together: half the load step each.
     section = chain.rods.section
     can_snap = section.ends is not None or section.fibres is not None
     # With a single tendon, contacts are never the reason for a failure.
@@ -228,8 +208,8 @@ def solve_load_step(
     zero, none = jnp.zeros(()), jnp.zeros((), int)
     no, infinite, slack = jnp.array(False), jnp.array(jnp.inf), jnp.zeros(chain.tendons, bool)
     begun = LoadStepResult(last, infinite, none, no, zero, none, last, zero, slack)
-    whole = _Attempt(jnp.ones(()), ~no, none, zero, zero)
-    return jax.lax.while_loop(goes_on, proceed, _Substeps(begun, none, whole, last.point)).result
+    first = _Attempt(jnp.ones(()), ~no, none, zero, zero)
+    return jax.lax.while_loop(goes_on, proceed, _Substeps(begun, none, first, last.point)).result
 
 
 def _result_after(
@@ -267,10 +247,8 @@ def _solve_substep(
     end: Float[Array, ""],
     can_snap: bool,
 ) -> NewtonResult:
-    """Solve for a command near the last solved state, from the predicted log ratios.
-
-    The history is that of the last solved state, not of regularised shapes.
-    """
+    """Solve for a command near the last solved state, from the predicted log ratios."""
+    # The history is that of the last solved state, not of regularised shapes.
     attempt, solved = state.attempt, state.result.solved
     memory, before = solved.memory, solved.point.base_tension
     base_tension = command.either(before, command.target)

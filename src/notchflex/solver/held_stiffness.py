@@ -21,7 +21,13 @@ from jaxtyping import Array, Bool, Float
 from notchflex._jax import jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.linear_step import LinearisedRows, UnitRows, linearise, unit_rows
+from notchflex.solver.linear_step import (
+    LinearisedRows,
+    StateJacobians,
+    UnitRows,
+    linearise,
+    unit_rows,
+)
 from notchflex.solver.programs.compiled import Native
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.residual import Memory, SolverState, bound_side, command_slopes, evaluate
@@ -43,40 +49,34 @@ _BATCH = 16
 def held_stiffness(
     prepared: PreparedChain, commands: Command, solved: SolverState
 ) -> Iterator[tuple[Float[np.ndarray, "s modes modes"], Float[np.ndarray, " s"]]]:
-    """Compute the stiffness of the whole robot in every state, in batches.
-
-    Args:
-        prepared: The robot.
-        commands: Commands of the states, as leading axis: a tendon driven by stroke is held, one
-            driven by tension moves.
-        solved: The equilibria.
-
-    Yields:
-        The stiffness of the next states against the modes, N mm per unit of mode squared (N mm/rad
-        for arc notches), and the sign of the determinant of the whole system, with all that is
-        eliminated; NaN where a state is not finite. The sign is 0 where the strokes of inextensible
-        tendons depend on each other, so that many tensions answer them.
-    """
+    """Yield the stiffness of the robot by its modes (N mm, NaN where not finite), and a sign."""
+    # The second is the sign of the determinant of the whole system, with all that is eliminated: 0
+    # where the strokes of inextensible tendons depend on each other, so that many tensions answer
+    # them. A tendon driven by stroke is held, one driven by tension moves.
     long, chain = prepared.long, prepared.chain
     loads = prepared.packed_commands(commands)
     states = prepared.packed_states(np.asarray(prepared.state.pack(solved, leading=1)))
     form = unit_rows(chain, by_stroke=commands.by_stroke is not None)
     modes = np.arange(chain.flexures)[:, None] * form.unknowns + np.arange(len(form.modes))
-    own = modes[np.asarray(chain.rods.padding_mask) == 0.0]  # without padding
+    unpadded = modes[np.asarray(chain.rods.padding_mask) == 0.0]
     for start in range(0, len(loads.numbers), _BATCH):
         some = slice(start, start + _BATCH)
         tables = (table._replace(numbers=table.numbers[some]) for table in (loads, states))
         *rows, slopes = _rows.map(long.packed, *tables)
-        rows = LinearisedRows(*(one[:, : chain.flexures] for one in rows))
+        rows = LinearisedRows(*(table[:, : chain.flexures] for table in rows))
         by_stroke = None if commands.by_stroke is None else np.asarray(commands.by_stroke)[some]
         matrix, strokes = _assemble(chain, form, rows, slopes, by_stroke)
         others = np.setdiff1d(np.arange(matrix.shape[-1]), modes)
         finite = np.isfinite(matrix).all(axis=(1, 2))
-        stiffness = np.full((len(matrix), len(own), len(own)), np.nan)
+        stiffness = np.full((len(matrix), len(unpadded), len(unpadded)), np.nan)
         sign = np.full(len(matrix), np.nan)
         good = matrix[finite]
-        response = np.linalg.solve(good[:, others[:, None], others], good[:, others[:, None], own])
-        stiffness[finite] = good[:, own[:, None], own] - good[:, own[:, None], others] @ response
+        response = np.linalg.solve(
+            good[:, others[:, None], others], good[:, others[:, None], unpadded]
+        )
+        stiffness[finite] = (
+            good[:, unpadded[:, None], unpadded] - good[:, unpadded[:, None], others] @ response
+        )
         sign[finite] = np.linalg.slogdet(good)[0]
         if by_stroke is not None:
             missing = np.asarray(solved.stroke)[some] - np.asarray(commands.target)[some]
@@ -91,16 +91,16 @@ def held_stiffness(
 def _rows(chain: Chain, command: Command, solved: SolverState) -> tuple[Array, ...]:
     """Compute the rows of all flexures of a state, and slopes of the command."""
     unknowns = solved.point.unknowns
-    at = evaluate(chain, solved.point, solved.memory, solved.applied)
+    evaluation = evaluate(chain, solved.point, solved.memory, solved.applied)
     slid = tuple(
         span.slid - _SLIP * bound_side(ratio, span.bound)
-        for span, ratio in zip(at.spans, unknowns.log_ratio, strict=True)
+        for span, ratio in zip(evaluation.spans, unknowns.log_ratio, strict=True)
     )
-    bound = tuple(span.bound for span in at.spans)
+    bound = tuple(span.bound for span in evaluation.spans)
     memory = Memory(unknowns.log_ratio, slid, bound, solved.memory.material)
     form = unit_rows(chain, by_stroke=command.by_stroke is not None)
-    rows = linearise(chain, unknowns, memory, solved.applied, at, form)
-    return (*rows, jnp.stack(command_slopes(chain, command, at.base)))
+    jacobians = StateJacobians(chain, unknowns, memory, solved.applied, evaluation, form)
+    return (*linearise(jacobians), jnp.stack(command_slopes(chain, command, evaluation.base)))
 
 
 def _assemble(
@@ -110,10 +110,7 @@ def _assemble(
     slopes: Float[np.ndarray, "s 3 t t"],
     by_stroke: np.ndarray | None,
 ) -> tuple[Float[np.ndarray, "s m m"], Float[np.ndarray, "s t modes"]]:
-    """Assemble the matrix over the unknowns of all flexures, base to tip, then base tensions.
-
-    And the derivatives of the strokes by the modes.
-    """
+    """Assemble the matrix over the unknowns, then base tensions, and the slopes of the strokes."""
     states, flexures, count = rows.residual.shape[:3]
     order = np.array([] if by_stroke is None else chain.tendon_order, int)
     tensions = flexures * count + np.arange(len(order))
@@ -122,14 +119,14 @@ def _assemble(
     # Rows of what is carried to each flexure, over all unknowns: only base tensions to the first.
     carried = [np.zeros((states, form.carried, size))]
     carried[0][:, form.carried - len(order) :] = unit[:, tensions[order]]
-    own = [slice(number * count, (number + 1) * count) for number in range(flexures)]
+    columns = [slice(number * count, (number + 1) * count) for number in range(flexures)]
     for number in range(flexures - 1):
-        operands = np.concatenate([unit[:, own[number]], carried[-1]], axis=1)
+        operands = np.concatenate([unit[:, columns[number]], carried[-1]], axis=1)
         carried.append(np.asarray(rows.to_next)[:, number, :, : operands.shape[1]] @ operands)
     matrix, back = np.zeros((states, size, size)), np.zeros((states, form.beyond, size))
     for number in reversed(range(flexures)):
-        operands = np.concatenate([unit[:, own[number]], carried[number], back], axis=1)
-        matrix[:, own[number]] = np.asarray(rows.residual)[:, number] @ operands
+        operands = np.concatenate([unit[:, columns[number]], carried[number], back], axis=1)
+        matrix[:, columns[number]] = np.asarray(rows.residual)[:, number] @ operands
         back = np.asarray(rows.to_previous)[:, number] @ operands
     first = np.arange(flexures)[:, None] * count
     modes = first + np.arange(len(form.modes))

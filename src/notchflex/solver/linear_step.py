@@ -8,10 +8,11 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jax, jnp
-from notchflex.loads.command import BodyLoads, body_wrench
+from notchflex.loads.command import BodyLoads, Command, body_wrench
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.contact import ContactGroup
 from notchflex.mechanics.flexure import flexure_state, geometric_stiffness, material_tangent
@@ -21,8 +22,11 @@ from notchflex.mechanics.tendon import TendonGroup
 from notchflex.solver.residual import (
     AUGMENTATION,
     Evaluation,
+    Iterate,
     Memory,
     Unknowns,
+    command_residual,
+    command_slopes,
     is_active,
     notch_heights,
     of_group,
@@ -37,11 +41,10 @@ from notchflex.solver.residual import (
 
 
 class UnitRows(NamedTuple):
-    """Unit rows of all columns: own unknowns, then carried from the base, then from the tip.
+    """Unit rows of all columns: unknowns of a flexure, carried from the base, from the tip."""
 
-    Motions of bodies depend on few columns: their rows are short, over the modes and the motions of
-    earlier bodies only, until `spread` inserts the others.
-    """
+    # Motions of bodies depend on few columns: their rows are short, over the modes and the motions
+    # of earlier bodies only, until `spread` inserts the others.
 
     modes: Any
     contact_pairs: Any
@@ -98,13 +101,11 @@ def _pad(rows: Array, columns: int) -> Array:
 
 
 def unit_rows(chain: Chain, *, by_stroke: bool) -> UnitRows:
-    """Return the unit rows of a chain whose tendons are given by tension alone, or some by stroke.
-
-    A tendon passes its released length and its tension times length from the tip. Slip over a
-    contact depends only on a sum of the two, which suffices where no stroke is commanded.
-    Dead forces change with the rotation of the body in whose frame they are given; only their
-    moment comes from the tip.
-    """
+    """Return the unit rows of a chain whose tendons have tensions alone, or some strokes."""
+    # A tendon passes its released length and its tension times length from the tip. Slip over a
+    # contact depends only on a sum of the two, which suffices where no stroke is commanded. Dead
+    # forces change with the rotation of the body in whose frame they are given; only their moment
+    # comes from the tip.
     wrench = chain.rods.basis.shape[-2] if chain.forces_on_bodies else 0
     older = (wrench,) * (chain.window - 1 if wrench else 0)
     turn = (3 if wrench == 6 else 1) if chain.loaded else 0
@@ -162,13 +163,13 @@ class StateJacobians:
     unknowns: Unknowns
     memory: Memory
     applied: BodyLoads | None
-    at: Any
+    evaluation: Any
     unit: UnitRows
 
     @cached_property
     def relative(self) -> list[Float[Array, "n w short"]]:
         """Motion of the distal body relative to each of those before, in its own frame; short."""
-        pose, twist = self.at.flexure.pose, self.at.flexure.twist
+        pose, twist = self.evaluation.flexure.pose, self.evaluation.flexure.twist
         if pose is None or twist is None:
             return []
         modes = self.unit.of_modes(twist)
@@ -180,7 +181,9 @@ class StateJacobians:
         """Turn of the distal body against the base, where there are external loads."""
         before = jax.vmap(lambda rotation: turned(rotation.T, self.unit.turn))
         axes = len(self.unit.turn)
-        return self.unit.spread(self.relative[0][:, :axes]) + before(self.at.flexure.pose.rotation)
+        return self.unit.spread(self.relative[0][:, :axes]) + before(
+            self.evaluation.flexure.pose.rotation
+        )
 
     @cached_property
     def tendons(self) -> list[TendonJacobian]:
@@ -191,10 +194,7 @@ class StateJacobians:
     def contacts(
         self,
     ) -> list[tuple[Float[Array, "n l short"], Float[Array, "n l w short"] | None]]:
-        """Short rows of gap and of wrench per force of every kind of contacts.
-
-        The wrench is that on the distal body; None where it does not act on bodies.
-        """
+        """Short rows of gap, and of wrench per force on the distal body, of every kind."""
         return [self._contact(k) for k in range(len(self.chain.contact_pairs))]
 
     def _by_relative_motion(
@@ -203,7 +203,7 @@ class StateJacobians:
         """Differentiate a crossing or contact by the motion relative to the anchor (last axis)."""
         chain = self.chain
         size = chain.rods.basis.shape[-2]
-        anchors = select_anchors(self.at.anchors, group.back)
+        anchors = select_anchors(self.evaluation.anchors, group.back)
 
         def slopes(part: Any, rod: Rod, flexure: Any, anchor: Any) -> Any:
             def moved(twist: Array) -> Any:
@@ -213,11 +213,11 @@ class StateJacobians:
 
             return jax.jacfwd(moved)(jnp.zeros(size))
 
-        return jax.vmap(slopes)(group, chain.rods, self.at.flexure, anchors)
+        return jax.vmap(slopes)(group, chain.rods, self.evaluation.flexure, anchors)
 
     def _by_modes(self, group: TendonGroup) -> Any:
         """Differentiate a crossing by the modes of the flexure, anchor fixed (last axis)."""
-        chain, anchors = self.chain, self.at.anchors
+        chain, anchors = self.chain, self.evaluation.anchors
         with_pose = anchors is not None and group.acts_on_bodies
         anchors = select_anchors(anchors, group.back) if with_pose else None
 
@@ -228,12 +228,12 @@ class StateJacobians:
 
             return jax.jacfwd(moved)(modes)
 
-        memory = self.at.flexure.memory
+        memory = self.evaluation.flexure.memory
         return jax.vmap(slopes)(group, chain.rods, memory, anchors, self.unknowns.modes)
 
     def _tendon(self, k: int) -> TendonJacobian:
         """Linearise the k-th group of tendons."""
-        chain, unit, span = self.chain, self.unit, self.at.spans[k]
+        chain, unit, span = self.chain, self.unit, self.evaluation.spans[k]
         group, tension = chain.groups[k], unit.tension[k][None]
         length, turning, wrench = self._crossing(k)
         log_ratio = unit.log_ratio[k].reshape(-1, 2, unit.modes.shape[-1])
@@ -271,7 +271,7 @@ class StateJacobians:
 
     def _crossing(self, k: int) -> tuple[Any, Any, Array | None]:
         """Compute short rows of span length, turning angles and wrench of the k-th group."""
-        group, crossing = self.chain.groups[k], self.at.spans[k].crossing
+        group, crossing = self.chain.groups[k], self.evaluation.spans[k].crossing
         length, turning, wrench = [], [], None
         if group.acts_on_bodies:
             slopes = self._by_relative_motion(group, type(group).cross)
@@ -288,7 +288,7 @@ class StateJacobians:
 
     def _contact(self, k: int) -> tuple[Array, Array | None]:
         """Linearise the k-th kind of contacts."""
-        group, response = self.chain.contact_pairs[k], self.at.contacts[k]
+        group, response = self.chain.contact_pairs[k], self.evaluation.contacts[k]
         if response.slope is not None:
             return self.unit.of_modes(response.slope), None
         slopes = self._by_relative_motion(group, type(group).cross)
@@ -300,7 +300,7 @@ class StateJacobians:
 
     def wrenches(self) -> tuple[Float[Array, "n w z"], list[Array]]:
         """Compute the rows of the resultant on the distal body and beyond, and of its reactions."""
-        chain, unit, wrenches = self.chain, self.unit, self.at.wrenches
+        chain, unit, wrenches = self.chain, self.unit, self.evaluation.wrenches
         terminating = self._terminating()
         resultant = terminating[:, 0]
         if unit.transmitted:
@@ -321,9 +321,9 @@ class StateJacobians:
 
     def _terminating(self) -> Float[Array, "n window w z"]:
         """Compute the rows of wrenches of spans and contacts that end at the distal body."""
-        chain, at, unit = self.chain, self.at, self.unit
-        terminating = jnp.zeros((*at.wrenches.terminating.shape, unit.modes.shape[-1]))
-        for group, span, tendon in zip(chain.groups, at.spans, self.tendons, strict=True):
+        chain, evaluation, unit = self.chain, self.evaluation, self.unit
+        terminating = jnp.zeros((*evaluation.wrenches.terminating.shape, unit.modes.shape[-1]))
+        for group, span, tendon in zip(chain.groups, evaluation.spans, self.tendons, strict=True):
             if tendon.wrench is not None:
                 along = tendon.gap_tension[:, :, None] * span.crossing.wrench[..., None]
                 pull = along + unit.spread(span.gap_tension[..., None, None] * tendon.wrench)
@@ -331,7 +331,7 @@ class StateJacobians:
                 terminating = terminating - jnp.einsum("ntwz,ntk->nkwz", pull, reach)
         for group, response, force, unit_force, (_, wrench) in zip(
             chain.contact_pairs,
-            at.contacts,
+            evaluation.contacts,
             self.unknowns.contact_force,
             unit.contact_pairs,
             self.contacts,
@@ -351,11 +351,13 @@ class StateJacobians:
         """Transform rows of a wrench that moves with the distal body to the previous frame."""
         turning = jax.vmap(wrench_turn)(wrench)
         turned = jnp.einsum("nvw,nwz->nvz", turning, self.relative[0])
-        return jax.vmap(Motion.wrench)(self.at.flexure.pose, rows + self.unit.spread(turned))
+        return jax.vmap(Motion.wrench)(
+            self.evaluation.flexure.pose, rows + self.unit.spread(turned)
+        )
 
     def _external(self) -> Float[Array, "n w z"]:
         """Compute the rows of the external loads on the distal body and beyond."""
-        at, unit, turn = self.at, self.unit, self.turn
+        evaluation, unit, turn = self.evaluation, self.unit, self.turn
         axes = len(unit.turn)
 
         def slopes(rotation: Array, load: BodyLoads) -> Float[Array, "w a"]:
@@ -368,12 +370,12 @@ class StateJacobians:
 
         on_bodies = jax.tree.map(lambda leaf: leaf[1:], self.applied)
         on_body = jnp.einsum(
-            "nwa,naz->nwz", jax.vmap(slopes)(at.wrenches.rotation, on_bodies), turn
+            "nwa,naz->nwz", jax.vmap(slopes)(evaluation.wrenches.rotation, on_bodies), turn
         )
         if self.chain.follows:
             return unit.external[None] + on_body
         # Dead forces keep their direction: they rotate relative to the body.
-        against = -jax.vmap(wrench_turn)(at.wrenches.external)[:, axes:, :axes]
+        against = -jax.vmap(wrench_turn)(evaluation.wrenches.external)[:, axes:, :axes]
         forces = jnp.einsum("nwa,naz->nwz", against, turn)
         return jnp.concatenate([unit.external[None] + on_body[:, :axes], forces], axis=1)
 
@@ -413,28 +415,9 @@ class LinearisedRows(NamedTuple):
     to_previous: Float[Array, "n b z"]
 
 
-def linearise(
-    chain: Chain,
-    unknowns: Unknowns,
-    memory: Memory,
-    applied: BodyLoads | None,
-    at: Evaluation,
-    unit: UnitRows,
-) -> LinearisedRows:
-    """Linearise the residual of all flexures.
-
-    Args:
-        chain: The chain.
-        unknowns: Its unknowns.
-        memory: History of its contacts.
-        applied: External loads on the bodies.
-        at: Evaluation there.
-        unit: Unit rows of all columns.
-
-    Returns:
-        The rows.
-    """
-    jacobians = StateJacobians(chain, unknowns, memory, applied, at, unit)
+def linearise(jacobians: StateJacobians) -> LinearisedRows:
+    """Linearise the residual of all flexures."""
+    chain, unit = jacobians.chain, jacobians.unit
     tendons = jacobians.tendons
     balance, to_previous = _balance_rows(jacobians)
     residual = [balance / chain.stiffness[..., None], *_contact_rows(jacobians)]
@@ -453,10 +436,12 @@ def linearise(
 
 def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], list[Array]]:
     """Compute the rows of equilibrium of the modes, and of the wrenches to the previous body."""
-    chain, at, unit = jacobians.chain, jacobians.at, jacobians.unit
+    chain, evaluation, unit = jacobians.chain, jacobians.evaluation, jacobians.unit
     elastic = chain.elastic
     if elastic is None:
-        elastic = jax.vmap(material_tangent, (0, None, 0))(chain.rods, chain.law, at.flexure)
+        elastic = jax.vmap(material_tangent, (0, None, 0))(
+            chain.rods, chain.law, evaluation.flexure
+        )
         # Just beyond the strain where plastic hardening begins (exp(b / x) at x = 0) the law is
         # flat to the last digit. The modes are eliminated first, so their pivots must not vanish,
         # though friction makes the whole system regular. Without friction the step becomes long but
@@ -467,22 +452,25 @@ def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], lis
         if jacobians.memory.damping is not None:
             elastic = elastic + jacobians.memory.damping[0] * jax.vmap(jnp.diag)(chain.stiffness)
     to_previous: list[Array] = []
-    if at.wrenches is None:
+    if evaluation.wrenches is None:
         balance = unit.spread(unit.of_modes(elastic))
     else:
-        assert at.flexure.configuration is not None
+        assert evaluation.flexure.configuration is not None
         elastic = elastic - jax.vmap(geometric_stiffness)(
-            chain.rods, jacobians.unknowns.modes, at.flexure.configuration, at.wrenches.resultant
+            chain.rods,
+            jacobians.unknowns.modes,
+            evaluation.flexure.configuration,
+            evaluation.wrenches.resultant,
         )
         resultant, to_previous = jacobians.wrenches()
         balance = unit.spread(unit.of_modes(elastic)) - jnp.einsum(
-            "nwm,nwz->nmz", at.flexure.twist, resultant
+            "nwm,nwz->nmz", evaluation.flexure.twist, resultant
         )
-    for tendon, span in zip(jacobians.tendons, at.spans, strict=True):
+    for tendon, span in zip(jacobians.tendons, evaluation.spans, strict=True):
         if span.crossing.slope is not None:
             balance = balance + jnp.einsum("ntm,ntz->nmz", span.crossing.slope, tendon.gap_tension)
     for group, response, force in zip(
-        chain.contact_pairs, at.contacts, unit.contact_pairs, strict=True
+        chain.contact_pairs, evaluation.contacts, unit.contact_pairs, strict=True
     ):
         if response.slope is not None:
             closing = group.has_contact[..., None] * response.slope
@@ -497,7 +485,7 @@ def _contact_rows(jacobians: StateJacobians) -> list[Array]:
     stiffness = chain.contact_stiffness[:, None, None]
     for group, response, force, unit_force, (gap, _) in zip(
         chain.contact_pairs,
-        jacobians.at.contacts,
+        jacobians.evaluation.contacts,
         jacobians.unknowns.contact_force,
         jacobians.unit.contact_pairs,
         jacobians.contacts,
@@ -513,7 +501,7 @@ def _contact_rows(jacobians: StateJacobians) -> list[Array]:
 
 def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     """Compute the rows of the friction law at both edges, for the k-th group."""
-    chain, span, tendon = jacobians.chain, jacobians.at.spans[k], jacobians.tendons[k]
+    chain, span, tendon = jacobians.chain, jacobians.evaluation.spans[k], jacobians.tendons[k]
     log_ratio, group = jacobians.unknowns.log_ratio[k], jacobians.chain.groups[k]
     crossing, offset = span.crossing, chain.friction.offset()
     tension_before = (span.gap_tension + offset) / span.tension_ratio[..., 0] - offset
@@ -523,8 +511,8 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     def slope(turning_change: Array, tension_change: Array) -> Array:
         """Differentiate the limits by turning angles and tensions, where contacts can slide."""
         limits = partial(chain.friction.limits, log_ratio=log_ratio)
-        at, change = (crossing.turning, tension), (turning_change, tension_change)
-        return slip_mask(group) * jax.jvp(limits, at, change)[1]
+        primals, tangents = (crossing.turning, tension), (turning_change, tension_change)
+        return slip_mask(group) * jax.jvp(limits, primals, tangents)[1]
 
     # Edges, then the turning angles that they depend on.
     by_turning = jnp.stack([slope(still + unit[None, None], still) for unit in jnp.eye(2)], -1)
@@ -542,3 +530,124 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     slides = tendon.log_ratio[None] - jnp.where(upper, limit, -limit)
     rows = jnp.where(upper | lower, slides, stuck)
     return rows.reshape(chain.flexures, -1, rows.shape[-1])
+
+
+# Elimination along the chain: O(n), never a dense matrix.
+#
+# Linearised, an element couples only to its neighbours:
+#
+#     residual + A du + B dcarried + C dbeyond = 0
+#     dnext = Yu du + Yc dcarried,   dprevious = Zu du + Zc dcarried + Zb dbeyond
+#
+# All elements eliminate their own unknowns at once, which leaves
+#
+#     dnext = y + Y1 dcarried + Y2 dbeyond,   dprevious = z + Z1 dcarried + Z2 dbeyond
+#
+# `_condense` eliminates dbeyond of one element after the other from the tip, until only the
+# tensions at the base are unknown; substitution then goes from the base to the tip. This is the
+# elimination of a block-tridiagonal matrix, in two loops: the program does not grow with the chain.
+
+# Slopes of a stroke below the second count as zero; the first is added to their pivots.
+_PIVOT_SHIFT, _ZERO_SLOPE = 1e-9, 1e-7
+
+
+def linear_step(
+    chain: Chain,
+    command: Command,
+    point: Iterate,
+    memory: Memory,
+    evaluation: Evaluation,
+) -> Iterate:
+    """Solve the linearised balance at a point for the step to equilibrium."""
+    # Derivatives of the step are those of the residual, not those of the linear system: a step from
+    # a solved state then changes as the solution does (implicit function theorem).
+    unit = unit_rows(chain, by_stroke=command.by_stroke is not None)
+    unknowns = point.unknowns
+    state = (chain, unknowns, memory, command.applied, evaluation)
+    rows = linearise(StateJacobians(*jax.tree.map(jax.lax.stop_gradient, state), unit=unit))
+    residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(evaluation.residual)
+    size = unit.unknowns
+    # Own unknowns as functions of 1, carried and beyond: du = response @ (1, c, b).
+    right = jnp.concatenate([residual[..., None], rows.residual[..., size:]], axis=-1)
+    response = -gauss_jordan(rows.residual[..., :size], right)
+
+    def insert(row: Array) -> Array:
+        rest = jnp.pad(row[..., size:], ((0, 0), (0, 0), (1, 0)))
+        return rest + row[..., :size] @ response
+
+    # What is carried to the first flexure per unit of base tension: the tension itself.
+    order, at_base = chain.tendon_order, np.zeros((unit.carried, chain.tendons))
+    at_base[unit.carried - len(order) + np.arange(len(order)), order] = 1.0
+    condensed, back = _condense(insert(rows.to_next), insert(rows.to_previous), unit)
+    tension_step = command.target - point.base_tension
+    if command.by_stroke is not None:
+        slopes, count = command_slopes(chain, command, evaluation.base), len(order)
+        by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ at_base], axis=1)
+        lengths = by_tension[len(back) - 2 * count :].reshape(2, count, -1)
+        # Rows in the order of the robot's tendons.
+        released, stretched = jnp.stack([lengths[:, row] for row in np.argsort(order)], axis=1)
+        by_base = slopes[1] @ released + slopes[2] @ stretched
+        matrix = slopes[0] + by_base[:, 1:]
+        # Where every contact sticks, the stroke does not depend on the tension; a small pivot keeps
+        # the step finite.
+        undetermined = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _ZERO_SLOPE)
+        missing = command_residual(chain, command, evaluation.base) + by_base[:, 0]
+        pivots = _PIVOT_SHIFT * jnp.diag(undetermined.astype(float))
+        tension_step = -gauss_jordan(matrix + pivots, missing[:, None])[:, 0]
+
+    def follow(carried: Array, blocks: tuple[Array, Array]) -> tuple[Array, Array]:
+        to_next, returned = blocks
+        homogeneous = jnp.concatenate([jnp.ones(1), carried])
+        return to_next @ homogeneous, jnp.concatenate([homogeneous, returned @ homogeneous])
+
+    # (1, carried, from beyond) of every element, from the base to the tip.
+    surroundings = jax.lax.scan(follow, jnp.asarray(at_base) @ tension_step, condensed)[1]
+    steps = jnp.einsum("nuz,nz->nu", response, surroundings)
+    _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
+    return Iterate(jax.vmap(unknowns_of)(steps), tension_step)
+
+
+def _condense(
+    to_next: Float[Array, "n c z"], to_previous: Float[Array, "n b z"], unit: UnitRows
+) -> tuple[tuple[Float[Array, "n c 1+c"], Float[Array, "n b 1+c"]], Float[Array, "b 1+c"]]:
+    """Eliminate the couplings of neighbours from the tip: rows over (1, carried, from beyond)."""
+    # Returns rows over (1, carried) of what every element carries to the next and receives from it,
+    # and of what the first hands to the base.
+    size = 1 + unit.carried
+    identity = constant(np.eye(unit.carried))
+
+    def join(back: Array, item: tuple[Array, Array]) -> tuple[Array, tuple[Array, Array]]:
+        to_next, to_previous = item
+        by_back = to_next[:, size:]
+        right = _add_constant(to_next[:, :size], by_back @ back[:, 0])
+        carried_on = gauss_jordan(identity - by_back @ back[:, 1:], right)
+        returned = _add_constant(back[:, 1:] @ carried_on, back[:, 0])
+        return to_previous[:, :size] + to_previous[:, size:] @ returned, (carried_on, returned)
+
+    at_tip = jnp.zeros((unit.beyond, size))
+    back, condensed = jax.lax.scan(join, at_tip, (to_next, to_previous), reverse=True)
+    return condensed, back
+
+
+def _add_constant(rows: Float[Array, "k z"], by: Float[Array, " k"]) -> Float[Array, "k z"]:
+    """Add constants to the first column of rows, that of 1."""
+    return jnp.concatenate([rows[:, :1] + by[:, None], rows[:, 1:]], axis=1)
+
+
+def gauss_jordan(
+    matrix: Float[Array, "*n u u"], right: Float[Array, "*n u r"]
+) -> Float[Array, "*n u r"]:
+    """Solve small systems by Gauss-Jordan elimination without pivoting."""
+    # Modes come first: their stiffness makes their pivots safe. A step drops the column that it has
+    # cleared. The barrier keeps the compiler from recomputing earlier steps for every later one; a
+    # loop takes twice as long, and many small factorisations by LAPACK two to seven times.
+    size = matrix.shape[-1]
+    table = jnp.concatenate([matrix, right], axis=-1)
+    for number in range(size):
+        is_pivot = (np.arange(size) == number)[:, None]
+        row = table[..., number : number + 1, :]
+        pivot = row[..., 1:] * (1.0 / row[..., :1])  # one division costs as much as ten products
+        # The pivot's row is inserted, since a difference would lose its digits.
+        table = jnp.where(is_pivot, pivot, table[..., 1:] - table[..., :1] * pivot)
+        table = jax.lax.optimization_barrier(table)
+    return table

@@ -13,7 +13,7 @@ from notchflex._jax import Pytree, choose, jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.flexure import in_space
-from notchflex.solver.block_elimination import linear_step
+from notchflex.solver.linear_step import linear_step
 from notchflex.solver.residual import (
     Evaluation,
     Iterate,
@@ -38,16 +38,18 @@ _OVERTRAVEL, _OVERLAP = 1e-6, 1e-12
 
 
 def limit_closing(
-    chain: Chain, unknowns: Unknowns, at: Evaluation, step: Iterate, fraction: Float[Array, ""]
+    chain: Chain,
+    unknowns: Unknowns,
+    evaluation: Evaluation,
+    step: Iterate,
+    fraction: Float[Array, ""],
 ) -> Iterate:
-    """Limit a step so that its fraction to be taken bends no notch beyond contact.
-
-    Beyond, the material law would be evaluated at an impossible strain, and the next step would
-    open the contact again.
-    """
+    """Limit a step so that its fraction to be taken bends no notch beyond contact."""
+    # Beyond, the material law would be evaluated at an impossible strain, and the next step would
+    # open the contact again.
     modes = step.unknowns.modes
     for group, response, force in zip(
-        chain.contact_pairs, at.contacts, unknowns.contact_force, strict=True
+        chain.contact_pairs, evaluation.contacts, unknowns.contact_force, strict=True
     ):
         if response.slope is None:
             continue  # several flexures bring these bodies together
@@ -82,7 +84,7 @@ class Settings(Pytree, eq=True):
     @property
     def numbers(self) -> tuple[float, ...]:
         """All settings, in the order of the fields."""
-        return tuple(getattr(self, one.name) for one in dataclasses.fields(self))
+        return dataclasses.astuple(self)
 
     @classmethod
     def of(cls, numbers: Float[Array, " settings"]) -> Settings:
@@ -175,20 +177,9 @@ _ROUNDING = 100.0
 def newton(
     problem: NewtonProblem, start: Iterate, settings: Settings, residual_target: Float[Array, ""]
 ) -> NewtonResult:
-    """Find the equilibrium under a command near a starting point.
-
-    Every pass of the loop evaluates one point: the start, a full Newton step, or half of the
-    fraction tried before if that did not reduce the residual.
-
-    Args:
-        problem: The chain, the command and the history.
-        start: Where to begin.
-        settings: Tolerance and limits.
-        residual_target: Residual at which to stop, where it is above the tolerance.
-
-    Returns:
-        The result; `converged` is false after a failure.
-    """
+    """Find the equilibrium near a point, to `residual_target` if above the tolerance."""
+    # Every pass of the loop evaluates one point: the start, a full Newton step, or half of the
+    # fraction tried before if that did not reduce the residual.
     chain, command, memory, *_ = problem
     tolerance = settings.tolerance * rounding_growth(chain, start)
     target = jnp.maximum(tolerance, residual_target)
@@ -361,17 +352,7 @@ _MIN_TENSION = 1e-100
 def predict_log_ratios(
     chain: Chain, before: Float[Array, " t"], base_tension: Float[Array, " t"], memory: Memory
 ) -> tuple[Float[Array, "n t 2"], ...]:
-    """Predict the log ratios of all contacts for new base tensions.
-
-    Args:
-        chain: The chain.
-        before: Base tensions of the last solved state, N.
-        base_tension: The new ones, N.
-        memory: History of the contacts, as of that state.
-
-    Returns:
-        Log ratios in the form of the unknowns.
-    """
+    """Predict the log ratios of all contacts from base tensions before and now, N."""
     predicted = []
     for group, old_ratio, bound in zip(chain.groups, memory.log_ratio, memory.bound, strict=True):
         old, new = (
@@ -404,11 +385,9 @@ def _cumulate(values: Float[Array, "n t 2"]) -> Float[Array, "n t 2"]:
 
 
 def limit_slack(chain: Chain, point: Iterate, step: Iterate) -> Iterate:
-    """Limit the log-ratio step of slack and nearly slack tendons.
-
-    Without tension their log ratios have no effect, and a sticking contact would change them at
-    random: only the direction of sliding matters. They must not shorten the rest of the step.
-    """
+    """Limit the log-ratio step of slack and nearly slack tendons."""
+    # Without tension their log ratios have no effect, and a sticking contact would change them at
+    # random: only the direction of sliding matters. They must not shorten the rest of the step.
     # With a constant loss a slack tendon may be tight beyond its first contact.
     tension = jnp.maximum(jnp.abs(point.base_tension), jnp.abs(step.base_tension))
     tension = tension + chain.friction.offset()
@@ -433,13 +412,10 @@ def predict_contacts(
     linear_fraction: Float[Array, ""],
     fraction: Float[Array, ""],
 ) -> Iterate:
-    """Replace the log ratios of a step by those of the friction predictor.
-
-    For tendons driven by stroke, whose tensions are unknown. Sticking contacts make a tendon very
-    stiff, so the change of its tension is limited. `fraction` of the returned step is to be taken;
-    of the linear step it would be `linear_fraction`. `last` is the last
-    solved point.
-    """
+    """Replace the log ratios of a step by those of the friction predictor."""
+    # For tendons driven by stroke, whose tensions are unknown. Sticking contacts make a tendon very
+    # stiff, so the change of its tension is limited. `fraction` of the returned step is to be
+    # taken; of the linear step it would be `linear_fraction`.
     assert command.by_stroke is not None
     tension = point.base_tension + linear_fraction * step.base_tension
     moderate = jnp.clip(
@@ -466,10 +442,8 @@ def _predict_sequentially(
     limits: Float[Array, "n t 2"],
     loss: Float[Array, "n t 2"],
 ) -> Float[Array, "n t 2"]:
-    """Predict log ratios contact by contact, for laws with a constant loss.
-
-    Bounds then depend on the tension, so cumulative sums over contacts do not apply.
-    """
+    """Predict log ratios contact by contact, for laws with a constant loss."""
+    # Bounds then depend on the tension, so cumulative sums over contacts do not apply.
 
     def step(tensions: tuple[Array, Array], contact: tuple[Array, ...]) -> Any:
         old, new = tensions

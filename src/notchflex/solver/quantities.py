@@ -70,7 +70,7 @@ def edge_angle(state: SolvedState) -> Array:
     With elastic ends it is less than the notch angle, which moves the tip: part of the elastic
     angle lies in the rings beyond the faces.
     """
-    chain, flexure, ends = state.chain, state.at.flexure, state.chain.rods.section.ends
+    chain, flexure, ends = state.chain, state.evaluation.flexure, state.chain.rods.section.ends
     angles = state.quantity("notch_angle")
     if ends is None:
         return angles
@@ -86,7 +86,7 @@ def chord_angle(state: SolvedState) -> Array:
 
     It is the bending angle of Liu 2022, about two thirds of the notch angle.
     """
-    chord, angle = state.chain.rods.chord, state.at.flexure.chord_angle
+    chord, angle = state.chain.rods.chord, state.evaluation.flexure.chord_angle
     if angle is None or chord is None:
         return jnp.full(state.chain.flexures, jnp.nan)
     return jnp.where(chord > 0.0, angle, jnp.nan)
@@ -173,7 +173,7 @@ def span_tension(state: SolvedState) -> Array:
           column="notch_{notch}_moment_Nmm", per=("notch",))  # fmt: skip
 def notch_moment(state: SolvedState) -> Array:
     """Bending moment carried by what the cut of a notch leaves, the largest along it."""
-    moment = in_space(state.at.flexure.resultants)[..., 1]
+    moment = in_space(state.evaluation.flexure.resultants)[..., 1]
     where = jnp.argmax(jnp.abs(moment), axis=-1)
     return jnp.take_along_axis(moment, where[:, None], axis=-1)[:, 0]
 
@@ -228,7 +228,7 @@ def contact_log_ratio(state: SolvedState) -> Array:
 @Quantity("state", "slid length", "s_i", "mm", key="contacts.slid_mm", per=("tendon", "contact"))
 def contact_slid(state: SolvedState) -> Array:
     """Tendon length that has slid over a friction contact toward the base."""
-    spans = state.at.spans
+    spans = state.evaluation.spans
     released = state.at_edges(jnp.stack([s.released_length, s.released_beyond], -1) for s in spans)
     lengths = (jnp.stack([s.tension_length, s.tension_length_beyond], -1) for s in spans)
     in_body = state.tensions[..., 1] * state.by_tendon("body_length")
@@ -259,7 +259,7 @@ def contact_state(state: SolvedState) -> Array:
 @Quantity("state", "largest tension ratio over a contact", "b_i", per=("tendon", "contact"))
 def contact_bound(state: SolvedState) -> Array:
     """Largest magnitude that the friction law allows the tension ratio over a contact."""
-    return state.along_contacts(span.bound for span in state.at.spans)
+    return state.along_contacts(span.bound for span in state.evaluation.spans)
 
 
 @Quantity("state", "base force", "F", "N", key="base_force_N", column="base_force_{axis}_N",
@@ -291,7 +291,7 @@ def moment_error(state: SolvedState) -> Array:
     real = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
     has_length = (real[:, None] & (chain.rods.length > 0.0))[..., None]
     carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
-    missing = state.at.flexure.resultants[..., bending] - required
+    missing = state.evaluation.flexure.resultants[..., bending] - required
     error = jnp.max(jnp.abs(missing) * has_length * carried)
     largest = jnp.max(jnp.abs(required) * has_length)
     # Smaller moments are rounding errors.
@@ -307,11 +307,11 @@ def bend_possible(state: SolvedState) -> Array:
     that the order of its turns is not known well.
     """
     chain, modes = state.chain, state.solved.point.unknowns.modes
-    below_half_turn = jnp.sum(state.at.flexure.bend**2, axis=-1) < np.pi**2
+    below_half_turn = jnp.sum(state.evaluation.flexure.bend**2, axis=-1) < np.pi**2
     accurate = jax.vmap(rotation_error_estimate)(chain.rods, modes) < _MAX_ROTATION_ERROR
     section = chain.rods.section
     farthest = jnp.maximum(section.edge_spine, section.edge_near)
-    bending = jnp.abs(in_space(state.at.flexure.strain)[..., 1]) * farthest
+    bending = jnp.abs(in_space(state.evaluation.flexure.strain)[..., 1]) * farthest
     return jnp.all(below_half_turn & accurate) & jnp.all(bending < 1.0)
 
 
@@ -326,7 +326,9 @@ def stored_energy(state: SolvedState) -> Array:
     in_tendons = in_tendons + in_body**2 * state.by_tendon("body_length")
     in_contacts = jnp.zeros(())
     if chain.contact_flexibility is not None:
-        squares = [jnp.sum(one**2, axis=-1) for one in state.solved.point.unknowns.contact_force]
+        squares = [
+            jnp.sum(force**2, axis=-1) for force in state.solved.point.unknowns.contact_force
+        ]
         in_contacts = 0.5 * jnp.sum(chain.contact_flexibility[None] * jnp.stack(squares))
     return (
         in_contacts
@@ -346,13 +348,15 @@ def flattening(state: SolvedState) -> Array:
     length = chain.rods.length
     if isinstance(memory, tuple) or chain.rods.section.ends is None:
         return jnp.zeros((len(length), 3, 1))
-    _, at = state.stored_energy_density
-    return jnp.stack([at.path, length * at.transformed, length * at.by_transformation], axis=1)
+    _, at_nodes = state.stored_energy_density
+    return jnp.stack(
+        [at_nodes.path, length * at_nodes.transformed, length * at_nodes.by_transformation], axis=1
+    )
 
 
 def reported(source: str) -> tuple[str, ...]:
     """Return the names of the quantities that a program computes: "solve", or "state" after it."""
-    return tuple(name for name, one in REGISTERED.items() if one.source == source)
+    return tuple(name for name, quantity in REGISTERED.items() if quantity.source == source)
 
 
 class Shape(namedtuple("Shape", reported("solve"))):  # pyright: ignore[reportUntypedNamedTuple]
@@ -364,9 +368,9 @@ class Shape(namedtuple("Shape", reported("solve"))):  # pyright: ignore[reportUn
     def form(flexures: int, tendons: int) -> PytreeLayout:
         """Return its layout for a number of flexures and tendons."""
         sizes = axis_sizes(flexures, tendons)
-        own = (REGISTERED[name] for name in Shape._fields)
+        registered = (REGISTERED[name] for name in Shape._fields)
         return PytreeLayout.of(
-            Shape(*(np.zeros([sizes[axis] for axis in q.per], q.kind) for q in own))
+            Shape(*(np.zeros([sizes[axis] for axis in q.per], q.kind) for q in registered))
         )
 
 
@@ -383,11 +387,7 @@ def quantities(chain: Chain, solved: SolverState) -> dict[str, Array]:
 
 
 def believable(value: Callable[[str], Any]) -> Any:
-    """Return whether states lie within the range of friction law, modes and geometry.
-
-    Args:
-        value: Gives the values of a quantity by its name.
-    """
+    """Return whether states lie within the range of friction law, modes and geometry."""
     return (
         value("friction_holds")
         & (value("moment_error") < MAX_MOMENT_ERROR)
@@ -396,17 +396,11 @@ def believable(value: Callable[[str], Any]) -> Any:
 
 
 def unpad_quantity(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
-    """Select the values of a chain from those of its padded chain with contacts at all edges.
-
-    Args:
-        chain: The chain.
-        name: Name of the quantity.
-        values: Values of the padded chain, with any leading axes.
-    """
+    """Select the values of a chain from those of its padded chain with contacts at all edges."""
     per = REGISTERED[name].per
     if per[:1] in (("notch",), ("body",)):
-        own = slice(chain.flexures + (per[0] == "body"))
-        return values[(..., own, *(slice(None),) * (len(per) - 1))]
+        unpadded = slice(chain.flexures + (per[0] == "body"))
+        return values[(..., unpadded, *(slice(None),) * (len(per) - 1))]
     if per[1:] not in (("span",), ("contact",)):
         return values
     contacts = np.asarray(chain.contacts)
@@ -430,21 +424,11 @@ _SHAPES_BETWEEN, _MIN_FALL = 33, 1e-6
 
 
 def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Float[Array, " n"]:
-    """Find the notches that have passed a limit point from one state to the next.
-
-    Every notch moves from its first shape to its last, under a constant tension. Its resistance
-    over the drive of tendons and loads is its holding tension, relative to that tension, as long as
-    its edges do not touch. The friction of its own edge grows with its angle; that of the notches
-    before it is that of the second state.
-
-    Args:
-        chain: The chain.
-        before: A solved state.
-        after: The next, under other tensions.
-
-    Returns:
-        1 for every notch that snapped shut, -1 for one that snapped open, 0 for the others.
-    """
+    """Return 1 for notches that snapped shut past a limit point, -1 for open, 0 else."""
+    # Every notch moves from its first shape to its last, under a constant tension. Its resistance
+    # over the drive of tendons and loads is its holding tension, relative to that tension, as long
+    # as its edges do not touch. The friction of its edge grows with its angle; that of the notches
+    # before it is that of the second state.
     first, last = before.point.unknowns.modes, after.point.unknowns.modes
     change = last - first
     tension = jnp.maximum(before.point.base_tension, after.point.base_tension)
@@ -457,14 +441,14 @@ def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Fl
     def balance_at(part: Array) -> tuple[Array, Array, Array]:
         """Compute resistance, drive and 1 where the edges are apart, at a fraction of the way."""
         point = Iterate(unknowns._replace(modes=first + part * change), tension)
-        at = evaluate(chain, point, before.memory, after.applied)
-        resistance = jnp.sum(at.flexure.internal * change, axis=-1)
-        missing = jnp.sum(at.residual.modes * chain.stiffness * change, axis=-1)
+        evaluation = evaluate(chain, point, before.memory, after.applied)
+        resistance = jnp.sum(evaluation.flexure.internal * change, axis=-1)
+        missing = jnp.sum(evaluation.residual.modes * chain.stiffness * change, axis=-1)
         # With the friction of a notch's own edge, relative to the end: a contact slides all the way
         # in the direction of its total slip, so its log ratio is its bound. Several tendons are
         # weighted with their tensions.
         left, all_tension = jnp.zeros(()), jnp.zeros(())
-        for span, last, slip in zip(at.spans, unknowns.log_ratio, slid, strict=True):
+        for span, last, slip in zip(evaluation.spans, unknowns.log_ratio, slid, strict=True):
             log_ratio = jnp.sign(slip[..., 0]) * span.bound[..., 0]
             raised = (span.gap_tension + offset) * jnp.exp(last[..., 0] - log_ratio)
             left = left + jnp.sum(jnp.where(span.gap_tension > 0.0, raised - offset, 0.0), axis=-1)
@@ -473,7 +457,7 @@ def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Fl
         own_edge = jnp.where(tight, left / jnp.where(tight, all_tension, 1.0), 1.0)
         drive = own_edge * (resistance - missing)
         apart = jnp.ones(chain.flexures)
-        for group, response in zip(chain.contact_pairs, at.contacts, strict=True):
+        for group, response in zip(chain.contact_pairs, evaluation.contacts, strict=True):
             touches = (response.gap <= 0.0) & (group.has_contact > 0.0)
             apart = jnp.where(jnp.any(touches, axis=-1), 0.0, apart)
         return resistance, drive, apart

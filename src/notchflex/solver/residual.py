@@ -25,10 +25,8 @@ from notchflex.mechanics.tendon import Crossing, TendonGroup, fibre_lengths
 
 
 def body_poses(relative: Motion) -> Motion:
-    """Return the poses of bodies 0 to n in the frame of the base, from those between neighbours.
-
-    A prefix product: first over pairs, then over fours, until all start at the base.
-    """
+    """Return the poses of bodies 0 to n in the frame of the base, from those between neighbours."""
+    # A prefix product: first over pairs, then over fours, until all start at the base.
     dimensions = relative.translation.shape[-1]
     poses = jax.tree.map(
         lambda first, rest: jnp.concatenate([first[None], rest]), identity(dimensions), relative
@@ -361,20 +359,9 @@ def evaluate(
     memory: Memory,
     applied: BodyLoads | None,
 ) -> Evaluation:
-    """Evaluate the residual of the chain, with its terms.
-
-    Equilibrium is stated as virtual work with the true work of the tendon, -T times the change of
-    its span lengths: normal and friction forces need not be summed.
-
-    Args:
-        chain: The chain.
-        point: Its unknowns, flexures as leading axis, and base tensions.
-        memory: History of its contacts and its material.
-        applied: External loads on the bodies; None for a chain assembled for tendons alone.
-
-    Returns:
-        The evaluation.
-    """
+    """Evaluate the residual of the chain, with its terms."""
+    # Equilibrium is stated as virtual work with the true work of the tendon, -T times the change of
+    # its span lengths: normal and friction forces need not be summed.
     unknowns = point.unknowns
     on_bodies = chain.forces_on_bodies
     flexure = flexure_states(chain, unknowns.modes, memory.material, with_pose=on_bodies)
@@ -554,11 +541,9 @@ def stroke(chain: Chain, base: BaseReaction) -> Float[Array, " t"]:
 
 
 def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
-    """Compute the stroke at which every notch is closed (mm); infinite where no formula exists.
-
-    Where every notch closes against its spine, a tendon on the wall shortens by the closing angle
-    times its lever arm. A tendon that lengthens as a notch closes has no such limit.
-    """
+    """Compute the stroke at which every notch is closed (mm); infinite where no formula exists."""
+    # Where every notch closes against its spine, a tendon on the wall shortens by the closing angle
+    # times its lever arm. A tendon that lengthens as a notch closes has no such limit.
     closing = np.full(chain.tendons, np.inf)
     rods = jax.tree.map(np.asarray, chain.rods)
     travel = closing_angles(rods)
@@ -575,11 +560,9 @@ def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
 
 
 def command_residual(chain: Chain, command: Command, base: BaseReaction) -> Float[Array, " t"]:
-    """Compute the deviation of the tendons from their command, scaled like angles.
-
-    A tendon driven by stroke is slack where the robot has released more than is drawn:
-    tension >= 0, stroke released >= stroke commanded, product 0.
-    """
+    """Compute the deviation of the tendons from their command, scaled like angles."""
+    # A tendon driven by stroke is slack where the robot has released more than is drawn: tension >=
+    # 0, stroke released >= stroke commanded, product 0.
     scale, base_tension = chain.stroke_stiffness, base.base_tension
     missing = stroke(chain, base) - command.target
     # Switching keeps the digits that a difference with a large tension would lose.
@@ -607,8 +590,8 @@ def command_slopes(
     def residual(tension: Array, released: Array, tension_length: Array) -> Array:
         return command_residual(chain, command, BaseReaction(tension, released, tension_length))
 
-    at = (base.base_tension, base.released_length, base.tension_length)
-    return jax.jacfwd(residual, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, at))
+    arguments = (base.base_tension, base.released_length, base.tension_length)
+    return jax.jacfwd(residual, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, arguments))
 
 
 # Largest tension of an inextensible tendon driven by stroke, in closing forces of a notch.
@@ -616,11 +599,9 @@ _MAX_CLOSING_FORCES = 1e5
 
 
 def tension_is_bounded(chain: Chain, command: Command, point: Iterate) -> Bool[Array, ""] | bool:
-    """Return whether the tensions of tendons driven by stroke are bounded.
-
-    Once the shape is rigid, an inextensible tendon cannot be drawn further; rounding would then
-    determine its tension. An extensible tendon bounds its tension itself.
-    """
+    """Return whether the tensions of tendons driven by stroke are bounded."""
+    # Once the shape is rigid, an inextensible tendon cannot be drawn further; rounding would then
+    # determine its tension. An extensible tendon bounds its tension itself.
     if command.by_stroke is None:
         return True
     limit = _MAX_CLOSING_FORCES * chain.closing_force

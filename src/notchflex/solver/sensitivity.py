@@ -14,12 +14,9 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.block_elimination import linear_step
 from notchflex.solver.continuation import interpolate_command
+from notchflex.solver.linear_step import linear_step
 from notchflex.solver.residual import SolverState, evaluate, state_at
-
-# From rest, loads on the bodies come before the tendons; a load step that fails is halved.
-_MAX_SUBSTEPS = 2
 
 
 def attach_derivatives(
@@ -32,33 +29,19 @@ def attach_derivatives(
     substeps: Int[Array, ""],
     reached: Bool[Array, ""],
 ) -> SolverState:
-    """Return a solved state with its derivatives by chain, command and the previous state.
-
-    Contacts and material have memory: where a load took two substeps, the derivatives go through
-    both. Of more substeps only the last states are stored; with memory the derivatives are then
-    NaN.
-
-    Args:
-        chain: The chain.
-        command: The load.
-        last: The previous state, with the memory of the contacts.
-        solved: The solution.
-        between: The state before the last substep.
-        fraction_before: Fraction of the load step at that state.
-        substeps: Number of substeps.
-        reached: Whether the load was reached.
-
-    Returns:
-        The same state.
-    """
+    """Return a solved state with its derivatives by chain, command and the previous state."""
+    # From rest, loads on the bodies come before the tendons, and a load step that fails is halved.
+    # Contacts and material have memory: where a load took two substeps, the derivatives go through
+    # both. Of more substeps only the last states are stored; with memory the derivatives are then
+    # NaN.
     if not chain.remembers:
         return attach_to_part(chain, command, last, solved, reached)
-    has_history = reached & (substeps <= _MAX_SUBSTEPS)
     first_command = interpolate_command(chain, command, last, _stop_gradient(fraction_before))
     items = (
         (first_command, between, substeps > 1),
         (command, solved, jnp.array(True)),
     )
+    has_history = reached & (substeps <= len(items))
 
     def follow(
         before: SolverState, item: tuple[Command, SolverState, Array]

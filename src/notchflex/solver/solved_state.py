@@ -38,25 +38,24 @@ from notchflex.solver.residual import (
 
 
 class SolvedState:
-    """A solved state in the frame of the base, with results that several formulas share.
+    """A solved state in the frame of the base, with results that several formulas share."""
 
-    Slid lengths, stroke and energy use the robot file's axial stiffness of the tendon; the finite
-    stiffness of the memory only decides which contacts stick.
-    """
+    # Slid lengths, stroke and energy use the robot file's axial stiffness of the tendon; the finite
+    # stiffness of the memory only decides which contacts stick.
 
     def __init__(self, chain: Chain, solved: SolverState) -> None:
         """Take a state of a chain."""
         self.chain, self.solved = chain, solved
-        self._found: dict[str, Array] = {}
+        self._evaluated: dict[str, Array] = {}
 
     def quantity(self, name: str) -> Array:
         """Evaluate the formula of a quantity, once."""
-        if name not in self._found:
-            self._found[name] = REGISTERED[name].formula(self)
-        return self._found[name]
+        if name not in self._evaluated:
+            self._evaluated[name] = REGISTERED[name].formula(self)
+        return self._evaluated[name]
 
     @cached_property
-    def at(self) -> Evaluation:
+    def evaluation(self) -> Evaluation:
         """The balance of the state."""
         solved = self.solved
         return evaluate(self.chain, solved.point, solved.memory, solved.applied)
@@ -64,7 +63,7 @@ class SolvedState:
     @cached_property
     def relative(self) -> Motion:
         """Pose of every body against the one before."""
-        pose = self.at.flexure.pose  # None where the balance did not ask for it
+        pose = self.evaluation.flexure.pose  # None where the balance did not ask for it
         modes = self.solved.point.unknowns.modes
         return jax.vmap(relative_pose)(self.chain.rods, modes) if pose is None else pose
 
@@ -81,14 +80,14 @@ class SolvedState:
     @cached_property
     def section_strain(self) -> SectionStrain:
         """Strains of the section at every node of every notch."""
-        strain, memory = in_space(self.at.flexure.strain), self.solved.memory.material
+        strain, memory = in_space(self.evaluation.flexure.strain), self.solved.memory.material
         of_section = partial(section_strain, self.chain.law)
         return jax.vmap(jax.vmap(of_section))(strain, self.chain.rods.section, memory)
 
     @cached_property
     def stored_energy_density(self) -> tuple[Float[Array, "n nodes"], Flattening]:
         """Energy stored per length, and flattening, at every node of every notch."""
-        strain, memory = in_space(self.at.flexure.strain), self.solved.memory.material
+        strain, memory = in_space(self.evaluation.flexure.strain), self.solved.memory.material
         return jax.vmap(jax.vmap(self.chain.law.stored_energy_density))(
             strain, self.chain.rods.section, memory
         )
@@ -96,27 +95,24 @@ class SolvedState:
     @cached_property
     def turning(self) -> Float[Array, "n t 2"]:
         """Turning angles at both edges of all gaps; 0 where a tendon has no contact."""
-        angles = self.at_edges(span.crossing.turning for span in self.at.spans)
+        angles = self.at_edges(span.crossing.turning for span in self.evaluation.spans)
         return jnp.where(self.by_tendon("visits")[..., None] > 0.0, angles, 0.0)
 
     @cached_property
     def tensions(self) -> Float[Array, "n t 2"]:
         """Tensions in the gaps and beside the bodies beyond them."""
-        spans = self.at.spans
+        spans = self.evaluation.spans
         return self.at_edges(jnp.stack([s.gap_tension, s.body_tension], -1) for s in spans)
 
     @cached_property
     def contact_pairs(self) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
         """Contact force and gap of every notch."""
-        return notch_contact(self.chain, self.solved.point.unknowns, self.at)
+        return notch_contact(self.chain, self.solved.point.unknowns, self.evaluation)
 
     @cached_property
     def base(self) -> Float[Array, " 6"]:
-        """Moment and force of the holder on the base, about its origin.
-
-        They balance the loads, and the tendon tensions where the tendons enter the base.
-        """
-        chain, wrenches, acting = self.chain, self.at.wrenches, jnp.zeros(6)
+        """Moment and force of the holder on the base, about its origin."""
+        chain, wrenches, acting = self.chain, self.evaluation.wrenches, jnp.zeros(6)
         if wrenches is not None and wrenches.on_base is not None:
             on_base = jax.tree.map(lambda leaf: leaf[0], self.solved.applied)
             acting = in_space(
@@ -124,7 +120,7 @@ class SolvedState:
             )
             if chain.frame is not None:
                 acting = (chain.frame @ acting.reshape(2, 3, 1)).reshape(6)
-        tendon_force = self.at.base.base_tension[:, None] * jnp.array([[0.0, 0.0, -1.0]])
+        tendon_force = self.evaluation.base.base_tension[:, None] * jnp.array([[0.0, 0.0, -1.0]])
         return -acting - jnp.sum(jax.vmap(wrench_at)(chain.tendon_entry, tendon_force), axis=0)
 
     @cached_property
@@ -144,10 +140,8 @@ class SolvedState:
         return in_tendon_order(self.chain, swapped).swapaxes(1, 2)
 
     def along_edges(self, values: Float[Array, "n t 2"]) -> Float[Array, "t edges"]:
-        """Return the values at the edges that each tendon meets, base to tip; NaN beyond its end.
-
-        The last edge, where the tendon enters its end body, is not a contact: it is fixed there.
-        """
+        """Return values at the edges that each tendon meets, base to tip; NaN beyond its end."""
+        # The last edge, where the tendon enters its end body, is not a contact: it is fixed there.
         contacts = self.chain.contacts
         flat = values.swapaxes(0, 1).reshape(values.shape[1], -1)
         met = jnp.take_along_axis(flat, jnp.maximum(contacts, 0), axis=1)
@@ -160,36 +154,36 @@ class SolvedState:
 
     def required(self) -> Float[Array, "n nodes w"]:
         """Return the wrench that loads, tendons and contacts require at every node, in its axes."""
-        chain, at, unknowns = self.chain, self.at, self.solved.point.unknowns
+        chain, evaluation, unknowns = self.chain, self.evaluation, self.solved.point.unknowns
         acting = jnp.zeros((chain.flexures, chain.rods.basis.shape[-2]))
-        for group, span in zip(chain.groups, at.spans, strict=True):
+        spans = zip(chain.groups, evaluation.spans, strict=True)
+        contacts = zip(chain.contact_pairs, unknowns.contact_force, strict=True)
+        lengthening = [(group, -span.gap_tension) for group, span in spans]
+        lengthening += [(pair, force * pair.has_contact) for pair, force in contacts]
+        for group, force in lengthening:
             if group.fibre is not None:
                 weights = of_rod(chain.rods, fibre_stretch(group.fibre))
-                acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
-        for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
-            if group.fibre is not None:
-                weights = of_rod(chain.rods, fibre_stretch(group.fibre))
-                acting = acting + jnp.einsum("nl,nlc->nc", force * group.has_contact, weights)
-        required = jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)
-        if at.wrenches is None:
+                acting = acting + jnp.einsum("nt,ntc->nc", force, weights)
+        required = jnp.broadcast_to(acting[:, None], evaluation.flexure.resultants.shape)
+        if evaluation.wrenches is None:
             return required
         return required + jax.vmap(_by_wrench)(
-            chain.rods, unknowns.modes, at.flexure, at.wrenches.resultant
+            chain.rods, unknowns.modes, evaluation.flexure, evaluation.wrenches.resultant
         )
 
 
 def notch_contact(
-    chain: Chain, unknowns: Unknowns, at: Evaluation
+    chain: Chain, unknowns: Unknowns, evaluation: Evaluation
 ) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
     """Compute contact force (N) and smallest gap (mm) of every notch."""
     force = jnp.zeros(chain.flexures)
     gap = jnp.full(chain.flexures, jnp.inf)
-    for group, own, contact in zip(
-        chain.contact_pairs, unknowns.contact_force, at.contacts, strict=True
+    for group, forces, contact in zip(
+        chain.contact_pairs, unknowns.contact_force, evaluation.contacts, strict=True
     ):
-        force = force + jnp.sum(own, axis=-1)
+        force = force + jnp.sum(forces, axis=-1)
         # Gaps of contacts that touch are rounding errors.
-        touches = is_active(chain, group, own, contact.gap) | (contact.gap <= 0.0)
+        touches = is_active(chain, group, forces, contact.gap) | (contact.gap <= 0.0)
         left = jnp.where(touches, 0.0, contact.gap)
         left = jnp.where(group.has_contact > 0.0, left, jnp.inf)
         gap = jnp.minimum(gap, jnp.min(left, axis=-1))

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from notchflex.solver.programs import shipped, store
+from notchflex.solver.programs import store
 
 SOLVE = """
 import notchflex as nf
@@ -16,8 +16,8 @@ print(Native.traced, Native.compiled, repr(float(state.total_angle)))
 """
 FROM = """
 from pathlib import Path
-from notchflex.solver.programs import shipped
-shipped.FOLDER = Path({!r})
+from notchflex.solver.programs import store
+store.SHIPPED = Path({!r})
 """
 
 
@@ -30,7 +30,7 @@ def solved(code, **settings):
 
 def test_a_recorded_program_is_not_traced_again(tmp_path):
     empty = FROM.format(str(tmp_path / "none"))
-    first = solved(empty + SOLVE, **{shipped.RECORD: str(tmp_path)})
+    first = solved(empty + SOLVE, **{store.RECORD: str(tmp_path)})
     again = solved(FROM.format(str(tmp_path)) + SOLVE)
     assert first[:2] == ["1", "1"]
     assert again[:2] == ["0", "1"]
@@ -38,25 +38,25 @@ def test_a_recorded_program_is_not_traced_again(tmp_path):
 
 
 def test_programs_of_other_code_are_not_taken(tmp_path, monkeypatch):
-    monkeypatch.setenv(shipped.RECORD, str(tmp_path))
-    monkeypatch.setattr(shipped, "FOLDER", tmp_path)
-    shipped.record("one", b"content")
-    assert shipped.read("one") == b"content"
+    monkeypatch.setenv(store.RECORD, str(tmp_path))
+    monkeypatch.setattr(store, "SHIPPED", tmp_path)
+    store.record("one", b"content")
+    assert store.read_shipped("one") == b"content"
     monkeypatch.setattr(store, "code_digest", lambda: "another version")
-    assert shipped.read("one") is None
+    assert store.read_shipped("one") is None
 
 
 @pytest.mark.parametrize("spoil", [lambda whole: whole[:-9], lambda whole: b"", lambda _: b"other"])
 def test_spoilt_programs_are_not_taken(tmp_path, monkeypatch, spoil):
-    monkeypatch.setenv(shipped.RECORD, str(tmp_path))
-    monkeypatch.setattr(shipped, "FOLDER", tmp_path)
-    shipped.record("one", b"content" * 100)
+    monkeypatch.setenv(store.RECORD, str(tmp_path))
+    monkeypatch.setattr(store, "SHIPPED", tmp_path)
+    store.record("one", b"content" * 100)
     (file,) = tmp_path.iterdir()
     file.write_bytes(spoil(file.read_bytes()))
-    assert shipped.read("one") is None
+    assert store.read_shipped("one") is None
 
 
 def test_an_installed_wheel_carries_the_programs_of_typical_calls():
-    if not shipped.FOLDER.is_dir():
+    if not store.SHIPPED.is_dir():
         pytest.skip("the package is run from its source, not installed from a wheel")
     assert solved(SOLVE)[0] == "0"

@@ -24,8 +24,8 @@ from notchflex.analysis.stepping import dead_band
 from notchflex.control.program.drive_step import FIRST_PART, GROWTH, NO_SLOPE, SLACK, drive_step
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.block_elimination import linear_step
 from notchflex.solver.continuation import LoadStepResult, solve_load_step
+from notchflex.solver.linear_step import linear_step
 from notchflex.solver.newton import limit_slack
 from notchflex.solver.programs.compiled import Native
 from notchflex.solver.programs.static_structure import PytreeLayout

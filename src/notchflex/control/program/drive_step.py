@@ -5,7 +5,7 @@ from __future__ import annotations
 from jaxtyping import Array, Float
 
 from notchflex._jax import jnp
-from notchflex.solver.block_elimination import gauss_jordan
+from notchflex.solver.linear_step import gauss_jordan
 
 MIN_DRIVES = 1e-10
 """Regularisation weight of the drives: selects the smallest redundant drives. It is too small to

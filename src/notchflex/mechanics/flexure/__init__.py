@@ -1,6 +1,6 @@
 """Flexures: one notch becomes a short rod with a few strain modes."""
 
-from notchflex._packages import import_all
+from notchflex._imports import import_all
 from notchflex.mechanics.flexure.rod import (
     LEVELS,
     MAX_REFINEMENT,

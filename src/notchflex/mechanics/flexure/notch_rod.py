@@ -125,7 +125,7 @@ class RodQuadrature:
         return rod_quadrature(tuple(map(float, range(len(self.ends)))), self.nodes, self.poses)
 
     @cached_property
-    def every(self) -> Float[Array, " every"]:
+    def positions(self) -> Float[Array, " every"]:
         """All points, in the order of the properties above."""
         parts = (self.at_nodes, self.at_poses, self.between, self.before)
         return xp.concatenate([positions for positions, _ in parts])
@@ -134,7 +134,7 @@ class RodQuadrature:
     def weight(self) -> Float[Array, " every"]:
         """Weights of all points in an integral over the nodes of the strains."""
         weights = self.at_nodes[1]
-        return xp.pad(weights, (0, len(self.every) - len(weights)))
+        return xp.pad(weights, (0, len(self.positions) - len(weights)))
 
     def fields(
         self,
@@ -198,7 +198,8 @@ def _pairs(
 rod_quadrature = cached(64)(RodQuadrature)
 """The same, kept: notches that only differ by site share it."""
 
-STRAIGHT = xp.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+_ABOUT_X, _ABOUT_Y, _ABOUT_Z, _ALONG_X, _ALONG_Y, _ALONG_Z = xp.eye(6)
+STRAIGHT = _ALONG_Z
 """Strains of a straight, unloaded rod: a stretch of 1 along z."""
 
 
@@ -209,9 +210,9 @@ class NeutralAxis(NamedTuple):
         quadrature: Points along it.
         start: Pose of the first section; its z is along the rod, its x points to the cut side.
         end: Pose of the distal body, in the frame of the last section.
-        curve: Poses along the free axis in the frame of its start, at `quadrature.every` and last
-            at its end: only motion relative to it is then integrated. None integrates all motion.
-        strain: Strains of the free rod at `quadrature.every`, (points, 6); None is straight.
+        curve: Poses along the free axis in the frame of its start, at `quadrature.positions` and
+            last at its end: only motion relative to it is then integrated. None integrates all.
+        strain: Strains of the free rod at `quadrature.positions`, (points, 6); None is straight.
     """
 
     quadrature: RodQuadrature
@@ -225,7 +226,7 @@ class StrainModes(NamedTuple):
     """Strain modes of a rod.
 
     Attributes:
-        basis: Strains (about x, y, z; along x, y, z) at `quadrature.every` per unit of each mode.
+        basis: Strains (about x, y, z; along x, y, z) at `quadrature.positions` per unit of a mode.
         levels: Numbers of modes, from the first, for tendons alone, for loads in the plane of
             bending (about y), and for loads in space (all).
     """
@@ -271,16 +272,15 @@ def legendre_modes(
         The modes; a unit of the first bends the rod by 1 rad.
     """
     length = quadrature.ends[-1]
-    polynomials = legendre(2.0 * quadrature.every / length - 1.0, max(bending, sideways, twist))
-    about_x, about_y, about_z, along_x, along_y, _ = np.eye(6)
+    polynomials = legendre(2.0 * quadrature.positions / length - 1.0, max(bending, sideways, twist))
     # Of dM/ds = n x e_z: a force along x lowers the moment about y, along y it raises that about x.
-    sheared = {0: -shear[0] * along_x, 1: shear[1] * along_y}
+    sheared = {0: -shear[0] * _ALONG_X, 1: shear[1] * _ALONG_Y}
     # Twist about the shear centre shears the neutral axis, which lies off it, sideways.
-    turning = about_z + shear_centre * along_y
+    turning = _ABOUT_Z + shear_centre * _ALONG_Y
     strains = [
         polynomials[:, degree, None] * strain + (sheared.get(number, 0.0) if degree == 1 else 0.0)
         for number, (strain, count) in enumerate(
-            ((about_y, bending), (about_x, sideways), (turning, twist))
+            ((_ABOUT_Y, bending), (_ABOUT_X, sideways), (turning, twist))
         )
         for degree in range(count)
     ]
@@ -313,7 +313,7 @@ def build_rod(
 
     Args:
         axis: Its neutral axis.
-        section: Its section: one for the whole rod, or one per point of `quadrature.every`.
+        section: Its section: one for the whole rod, or one per point of `quadrature.positions`.
         modes: Its strain modes.
         closure: Distance across the section, from the neutral axis toward the cut, of the fibre
             that has no length left when the notch is closed, mm. None where the notch has no solid
@@ -328,7 +328,7 @@ def build_rod(
     """
     points = axis.quadrature
     nodes = len(points.at_nodes[0])
-    strain = xp.tile(STRAIGHT, (len(points.every), 1)) if axis.strain is None else axis.strain
+    strain = xp.tile(STRAIGHT, (len(points.positions), 1)) if axis.strain is None else axis.strain
     # Written out, so that opposite directions are exact mirror images.
     cosine, sine = xp.cos(xp.radians(direction_deg)), xp.sin(xp.radians(direction_deg))
     turned = xp.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
@@ -374,8 +374,6 @@ def build_rod(
 # The direction of n couples stretch and shear (Gao 2017, eq. 1-5): independent polynomials for them
 # are far less accurate.
 
-_ABOUT_X, _ABOUT_Y, _ABOUT_Z, _ALONG_X, _ALONG_Y, _ALONG_Z = xp.eye(6)
-
 
 def course_poses(
     along: Array, above: Array, heading: Array, middle: Float[Array, " 3"], hand: float
@@ -411,7 +409,7 @@ def course_rod(
     length, lever = points.weight, along.translation - middle
     reach = xp.abs(lever).max(axis=0)
     polynomials = legendre(
-        2.0 * points.every / points.ends[-1] - 1.0, max(moment_modes - 1, force_modes)
+        2.0 * points.positions / points.ends[-1] - 1.0, max(moment_modes - 1, force_modes)
     )[..., None]
     higher = [polynomials[:, degree] for degree in range(2, moment_modes - 1)]
     lever_x, lever_z = lever[:, :1], lever[:, 2:]

@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 from jaxtyping import Array, Float, Int
 
 from notchflex._arrays import decide, xp
+from notchflex._imports import unregistered
 from notchflex._jax import Pytree, constant, jax, static
-from notchflex._packages import unregistered
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.material.law import FibreSection
 from notchflex.mechanics.motion import IN_PLANE, PLANE
@@ -220,20 +220,7 @@ class Site(NamedTuple):
 
 @singledispatch
 def rod(notch: Any, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
-    """Rod of one notch.
-
-    Args:
-        notch: A notch description, such as `notchflex.ArcNotch(...)`.
-        tube: The tube it is cut into.
-        refinement: 0 has the modes that serve for usual loads; 1, 2 ... has more.
-        site: What surrounds it, where its ends are elastic (`Notch.has_elastic_ends`).
-
-    Returns:
-        The rod, in mm and rad.
-
-    Raises:
-        TypeError: There is no rod for this kind of description.
-    """
+    """Rod of one notch."""
     del tube, refinement, site
     raise unregistered("rod", notch, "flexure", "rod")
 
@@ -246,34 +233,13 @@ def rod_at(site: Site | None, notch: Any, tube: Tube, refinement: int = 0) -> Ro
 
 @singledispatch
 def section_fibres(notch: Any, tube: Tube) -> FibresAt:
-    """Fibres of the sections of a notch, for materials that sum up stresses.
-
-    Args:
-        notch: A notch description.
-        tube: The tube it is cut into.
-
-    Returns:
-        The fibres about any axis, as a function of the distances of the edges of the section
-        from its neutral axis (`edge_near`, `edge_spine`), mm, and of their number.
-
-    Raises:
-        TypeError: The fibres of this kind of notch are not stated.
-    """
+    """Fibres about any axis, a function of the distances of the edges (mm) and their number."""
     del tube
     raise unregistered("section of fibres", notch, "flexure", "section_fibres")
 
 
 @singledispatch
 def validity_warnings(notch: Any, tube: Tube, site: Site) -> list[str]:
-    """List where the law of a notch with elastic ends was not checked.
-
-    Args:
-        notch: A notch description.
-        tube: The tube it is cut into.
-        site: What surrounds it.
-
-    Returns:
-        A sentence for each dimension outside the range that finite elements cover.
-    """
+    """List in sentences the dimensions for which the law of elastic ends was not checked."""
     del notch, tube, site
     return []

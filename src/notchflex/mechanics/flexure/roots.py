@@ -238,7 +238,7 @@ def rooted_strip_rod(
     counts = (3 + more, 2 + more, 6 + 3 * more, 2 + more, 3 + more)
     points = RodQuadrature(ends, counts, counts)
     # Along the strip and above its middle; the last two positions are the start and the end.
-    position, half = xp.append(points.every, xp.stack([0.0 * length, length])), 0.5 * length
+    position, half = xp.append(points.positions, xp.stack([0.0 * length, length])), 0.5 * length
     along = xp.clip(position - half, ends[1] - half, half - ends[1])
     above = position - half - along
     heading = xp.where(above != 0.0, 0.5 * np.pi, 0.0)

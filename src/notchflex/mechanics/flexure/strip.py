@@ -63,7 +63,7 @@ def strip_rod(
     length = notch.strip_length_in(tube)
     points = RodQuadrature((0.0, length), (nodes,), (nodes,))
     modes = legendre_modes(points, bending_modes, 3 + more_sideways, 2 + more_sideways)
-    along = xp.append(points.every, length)
+    along = xp.append(points.positions, length)
     axis = NeutralAxis(
         points,
         start=Motion(constant(_LYING), constant([-0.5 * length, 0.0, notch.height])),

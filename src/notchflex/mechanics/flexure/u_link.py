@@ -209,7 +209,7 @@ def u_link_rod(
     counts = (nodes[0], nodes[1], nodes[0])
     # One node less moves the tip of 27 links by 4e-8 mm, modes left out by 1e-5 mm.
     points = rod_quadrature(ends, counts, tuple(count - 1 for count in counts))
-    course = link.course(np.append(points.unit.every, [0.0, 3.0]))
+    course = link.course(np.append(points.unit.positions, [0.0, 3.0]))
     # Two walls as wide as the tube's wall there, joined beyond the lumen.
     along = course.along[:-2]
     outer = xp.sqrt(tube.outer_radius**2 - along**2)

@@ -1,6 +1,6 @@
 """Friction between tendon and tube: how far tension can fall over one contact."""
 
-from notchflex._packages import import_all
+from notchflex._imports import import_all
 from notchflex.mechanics.friction.corner import CornerLaw
 from notchflex.mechanics.friction.registry import FrictionLaw, friction_law
 

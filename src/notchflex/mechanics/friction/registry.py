@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 from jaxtyping import Array, Bool, Float
 
+from notchflex._imports import unregistered
 from notchflex._jax import Pytree, jnp
-from notchflex._packages import unregistered
 from notchflex.robot import Frictionless
 
 AtEdges = Float[Array, "*t 2"]
@@ -19,34 +19,22 @@ AtEdges = Float[Array, "*t 2"]
 class FrictionLaw(Pytree, ABC):
     """Friction of a tendon at the two edges of a gap.
 
-    At a sliding contact the higher tension is exp(bound) times the lower one plus the constant
-    loss; a contact sticks anywhere between the two directions of sliding. A law states `bounds`
-    and, where it has a loss in N, `constant_loss`.
-
     Attributes:
         remembers: Whether a solved state depends on the one before.
     """
+
+    # At a sliding contact the higher tension is exp(bound) times the lower one plus the constant
+    # loss; a contact sticks anywhere between the two directions of sliding. A law states `bounds`
+    # and, where it has a loss in N, `constant_loss`.
 
     remembers: ClassVar[bool] = True
 
     @abstractmethod
     def bounds(self, turning: AtEdges) -> AtEdges:
-        """Return the largest |ln(base-side tension / tip-side tension)| at both edges, >= 0.
-
-        Args:
-            turning: Angle by which the tendon turns where it leaves the proximal body, and where it
-                enters the distal body, rad.
-        """
+        """Return the largest |ln(tension ratio)| at both edges, by angles of turning, rad."""
 
     def constant_loss(self, turning: AtEdges) -> AtEdges | None:
-        """State the tension that sliding costs beside the ratio of `bounds`, N.
-
-        Args:
-            turning: As for `bounds`.
-
-        Returns:
-            The loss at both edges, >= 0; None where there is none.
-        """
+        """Return the tension that sliding costs beside `bounds`, N, >= 0; None for none."""
         del turning
 
     def offset(self) -> Float[Array, ""] | float:
@@ -73,27 +61,13 @@ class FrictionLaw(Pytree, ABC):
         return jnp.where(log_ratio >= 0.0, loading, unloading)
 
     def valid(self, turning: AtEdges) -> Bool[Array, "*t"]:
-        """Return where the law is valid; elsewhere `bounds` is finite but meaningless.
-
-        Args:
-            turning: As for `bounds`.
-        """
+        """Return where the law is valid; elsewhere `bounds` is finite but meaningless."""
         return jnp.ones_like(turning[..., 0], dtype=bool)
 
 
 @singledispatch
 def friction_law(friction: Any) -> FrictionLaw:
-    """Return the friction law of a description.
-
-    Args:
-        friction: A friction description, such as `notchflex.Capstan(0.13)`.
-
-    Returns:
-        The law, its constants as arrays.
-
-    Raises:
-        TypeError: There is no law for this kind of description.
-    """
+    """Return the friction law of a description."""
     raise unregistered("friction law", friction, "friction", "friction_law")
 
 

@@ -1,6 +1,6 @@
 """Materials: how a cross-section answers strain."""
 
-from notchflex._packages import import_all
+from notchflex._imports import import_all
 from notchflex.mechanics.material.law import (
     Fibres,
     FibreSection,

@@ -24,8 +24,8 @@ from typing import Any, ClassVar, NamedTuple
 from jaxtyping import Array, Float
 
 from notchflex._arrays import decide, xp
+from notchflex._imports import unregistered
 from notchflex._jax import Pytree, constant, jax, jnp
-from notchflex._packages import unregistered
 from notchflex.mechanics.section import gauss_on
 
 Scalar = Float[Array, ""]
@@ -80,9 +80,6 @@ class SectionEnds(NamedTuple):
 class NotchEnds(Pytree):
     """Compliance of the rings beside a notch, added to that of its section.
 
-    Compliances are fractions of that of the section along the length of the flexure: a stiffness is
-    that of the section over 1 + fraction. A fraction may be negative, above -1, for stiff ends.
-
     Attributes:
         weak: Fraction added in the bending of the notch.
         strong: In sideways bending.
@@ -98,6 +95,10 @@ class NotchEnds(Pytree):
         oblique: Moment about x by the twist, and torsion moment by the curvature about x, over
             Young's modulus, mm^4; its square is below the product of both stiffnesses.
     """
+
+    # Compliances are fractions of that of the section along the length of the flexure: a stiffness
+    # is that of the section over 1 + fraction. A fraction may be negative, above -1, for stiff
+    # ends.
 
     weak: Each | float = 0.0
     strong: Each | float = 0.0
@@ -132,9 +133,7 @@ class Fibres(Pytree):
 
 
 class FibreSection(Pytree):
-    """Properties of a cross-section about its neutral axis. Units mm.
-
-    The section's x points to the cut side, z along the rod. Leading axes are allowed.
+    """Properties of a cross-section about its neutral axis, mm; x to the cut, z along the rod.
 
     Attributes:
         area: Area, mm^2.
@@ -436,17 +435,7 @@ def moduli(material: Any) -> tuple[Array, Array]:
 
 @singledispatch
 def section_law(material: Any) -> SectionLaw:
-    """Return the section law of a material description.
-
-    Args:
-        material: A material description, such as `notchflex.Linear(60000.0)`.
-
-    Returns:
-        The law, its constants as arrays (MPa).
-
-    Raises:
-        TypeError: There is no law for this kind of description.
-    """
+    """Return the section law of a material description."""
     raise unregistered("section law", material, "material", "section_law")
 
 

@@ -56,13 +56,9 @@ class _NotchForm(NamedTuple):
 
 @Native
 def _flexures(numbers: Float[Array, " numbers"], form: _NotchForm) -> dict[str, Array]:
-    """Build the flexures of a notch, one for each site.
-
-    Args:
-        numbers: Those of the tube and the notch; of each site lengths and boundaries of the rings,
-            and Poisson's ratio.
-        form: What the program is compiled for.
-    """
+    """Build the flexures of a notch, one for each site."""
+    # The numbers are those of the tube and the notch; then of each site lengths and boundaries of
+    # the rings, and Poisson's ratio.
     of_parts, of_sites = jnp.split(numbers, [len(form.parts.places)])
     tube, notch = form.parts.with_numbers(of_parts)
 
@@ -90,11 +86,7 @@ def _flexures_along(
     numbers: Float[Array, " numbers"], change: Float[Array, " numbers"], form: _NotchForm
 ) -> dict[str, Array]:
     """Build the flexures of a notch, and differentiate them along a change of the numbers."""
-
-    def flexures(own: Array) -> tuple[Array, Array]:
-        made = _flexures.function(own, form)
-        return made["flexures"], made["alike"]
-
+    flexures = _differentiable(_flexures, form, "flexures")
     values, slopes, alike = jax.jvp(flexures, (numbers,), (change,), has_aux=True)
     return {"flexures": values, "slopes": slopes, "alike": alike}
 
@@ -141,13 +133,9 @@ def _joined_along(
     form: _JoinedForm,
 ) -> dict[str, Array]:
     """Differentiate a chain along a change of the numbers of its robot and of its flexures."""
-
-    def joined(own: Array, packed: Array) -> tuple[Array, Array]:
-        made = _joined.function(own, packed, form)
-        return made["chain"], made["alike"]
-
-    at, along = (numbers, flexures), (change, flexure_change)
-    _, slopes, alike = jax.jvp(joined, at, along, has_aux=True)
+    primals, tangents = (numbers, flexures), (change, flexure_change)
+    joined = _differentiable(_joined, form, "chain")
+    _, slopes, alike = jax.jvp(joined, primals, tangents, has_aux=True)
     return {"slopes": slopes, "alike": alike}
 
 
@@ -159,14 +147,20 @@ def _joined_back(
     form: _JoinedForm,
 ) -> dict[str, Array]:
     """Differentiate a weighted sum of a chain's numbers by those of its robot and its flexures."""
-
-    def joined(own: Array, packed: Array) -> tuple[Array, Array]:
-        made = _joined.function(own, packed, form)
-        return made["chain"], made["alike"]
-
+    joined = _differentiable(_joined, form, "chain")
     _, back, alike = jax.vjp(joined, numbers, flexures, has_aux=True)
     by_numbers, by_flexures = back(weights)
     return {"numbers": by_numbers, "flexures": by_flexures, "alike": alike}
+
+
+def _differentiable(program: Native, form: Any, name: str) -> Callable[..., tuple[Array, Array]]:
+    """Return a function of numbers: a result of a program, and whether all decisions are alike."""
+
+    def function(*numbers: Array) -> tuple[Array, Array]:
+        results = program.function(*numbers, form)
+        return results[name], results["alike"]
+
+    return function
 
 
 @contextmanager
@@ -240,8 +234,7 @@ def _first_alike(
     """Return what programs make of a robot: of those for its form the first that decide alike."""
     form = PartsForm.of(parts_of(robot), varied)
     numbers = form.numbers_of(form.parts)
-    loads = chain.level, chain.loaded, chain.follows, chain.refinement, chain.frame is None
-    known = _known(form, *loads)
+    known = _known(form, *chain.options.values())
     with tracing_told():
         for programs in known:
             if (result := work(programs, numbers)) is not None:
@@ -254,15 +247,7 @@ def _first_alike(
 
 
 def assembled_chain(robot: Robot, like: Chain) -> PreparedChain | None:
-    """Assemble the chain of a robot by programs.
-
-    Args:
-        robot: The robot.
-        like: A chain for the same level and kinds of loads.
-
-    Returns:
-        The chain, prepared; None where no program has its form.
-    """
+    """Assemble the chain of a robot by programs; None where no program has its form."""
 
     def chain_of(programs: AssembledRobots, numbers: np.ndarray) -> PreparedChain | None:
         chains, alike = programs.chains(numbers[None])
@@ -277,22 +262,12 @@ def chain_slopes(
     varied: Collection[Place],
     changes: Callable[[PartsForm], np.ndarray],
 ) -> Float[np.ndarray, "k chain"] | None:
-    """Differentiate the chain of a robot along changes of its numbers.
-
-    Args:
-        robot: The robot.
-        chain: Its chain, for the level and the kinds of loads.
-        varied: Places of the numbers that change.
-        changes: Gives k changes of all numbers of a form of parts.
-
-    Returns:
-        Slopes of all numbers of the chain, packed whole; None where no program has this form.
-    """
+    """Differentiate the chain of a robot along k changes of its numbers; None if untraced."""
 
     def slopes_of(programs: AssembledRobots, numbers: np.ndarray) -> np.ndarray | None:
         along = changes(programs.form)
         slopes, alike = programs.along(np.tile(numbers, (len(along), 1)), along)
-        return programs.joined.structure.whole(slopes) if alike.all() else None
+        return programs.joined.structure.expand(slopes) if alike.all() else None
 
     return _first_alike(robot, chain, varied, slopes_of)
 
@@ -304,15 +279,7 @@ def chain_gradient(
     weights: Float[np.ndarray, " chain"],
     changes: Callable[[PartsForm], Float[np.ndarray, "k numbers"]],
 ) -> Float[np.ndarray, " k"] | None:
-    """Differentiate a weighted sum of the numbers of a chain; see `chain_slopes`.
-
-    Args:
-        robot: The robot.
-        chain: Its chain, for the level and the kinds of loads.
-        varied: Places of the numbers that change.
-        weights: Of the numbers of the chain, packed whole.
-        changes: Gives k changes of all numbers of a form of parts.
-    """
+    """Differentiate a weighted sum of the numbers of a chain; see `chain_slopes`."""
 
     def gradient_of(programs: AssembledRobots, numbers: np.ndarray) -> np.ndarray | None:
         packed = programs.joined.structure.pack(weights)
@@ -346,16 +313,9 @@ class AssembledRobots:
 
     @classmethod
     def of(cls, robot: Robot, chain: Chain, varied: Collection[Place] = ()) -> AssembledRobots:
-        """Find the programs for robots of one form.
-
-        What their values decide, and which numbers of their arrays are 0, is that of a robot with
-        slightly other numbers: equal numbers or an exact 0 of one robot mean nothing.
-
-        Args:
-            robot: One of them.
-            chain: Its chain, for the level and the kinds of loads.
-            varied: Places of numbers that vary, even if they are 0 in this robot.
-        """
+        """Find the programs for robots of one form."""
+        # What their values decide, and which numbers of their arrays are 0, is that of a robot with
+        # slightly other numbers: equal numbers or an exact 0 of one robot mean nothing.
         form = PartsForm.of(parts_of(robot), varied)
         numbers = form.numbers_of(form.parts)
         shift = 1e-3 * np.random.default_rng(0).uniform(0.5, 1.0, len(numbers))
@@ -365,7 +325,7 @@ class AssembledRobots:
         first = dict[tuple[int, int], int]()  # of each distinct pair of a notch and its rings
         for number, (notch, site) in enumerate(zip(example.notches, sites, strict=True)):
             first.setdefault((id(notch), id(site)), number)
-        group_of = np.repeat(np.arange(len(robot.notch)), [one.repeat for one in robot.notch])
+        group_of = np.repeat(np.arange(len(robot.notch)), [group.repeat for group in robot.notch])
         options = chain.level, chain.refinement, robot.material.by_fibres
         made, trees = dict[tuple[int, _NotchForm], list[int]](), dict[int, Any]()
         for number in first.values():
@@ -378,20 +338,18 @@ class AssembledRobots:
             sited = int(site is not None)
             alike = _NotchForm(parts, sited, options, decided, _sparse(trees[number]))
             made.setdefault((id(notch), alike), []).append(number)
-        given = iter(trees.values())
-        loads: dict[str, Any] = {
-            "level": chain.level,
-            "loaded": chain.loaded,
-            "follows": chain.follows,
-            "refinement": chain.refinement,
-            "flat": chain.frame is not None,
-        }
+        made_flexures = iter(trees.values())
         with Decisions().deciding() as decisions:
-            joined = assemble(example, **loads, flexures=lambda *_: next(given))
+            joined = assemble(example, **chain.options, flexures=lambda *_: next(made_flexures))
         layouts = tuple(map(_sparse, trees.values()))
         prepared = PreparedChain(joined)
-        structure = prepared.static_structure
-        made_for = form, layouts, tuple(loads.items()), tuple(decisions.made), structure
+        made_for = _JoinedForm(
+            form,
+            layouts,
+            tuple(chain.options.items()),
+            tuple(decisions.made),
+            prepared.static_structure,
+        )
         ends = np.cumsum([0, *(layout.size for layout in layouts)]).tolist()
         packed = dict(zip(first.values(), map(np.arange, ends, ends[1:]), strict=True))
         groups = dict[_NotchForm, list[Any]]()
@@ -410,12 +368,12 @@ class AssembledRobots:
             _Notches(sited, *map(np.array, zip(*entries, strict=True)))
             for sited, entries in groups.items()
         ]
-        return cls(form, tuple(notches), _JoinedForm(*made_for), prepared)
+        return cls(form, tuple(notches), made_for, prepared)
 
     def prepared(self, chain: Float[np.ndarray, " chain"]) -> PreparedChain:
         """Return a chain as `chains` makes it, prepared for repeated solves."""
         structure = self.joined.structure
-        return self.example.with_numbers(structure.whole(chain, constants=True))
+        return self.example.with_numbers(structure.expand(chain, constants=True))
 
     @classmethod
     def tried(cls, robot: Robot, chain: Chain, varied: Collection[Place]) -> AssembledRobots | None:
@@ -429,11 +387,7 @@ class AssembledRobots:
     def chains(
         self, numbers: Float[np.ndarray, "robots numbers"]
     ) -> tuple[Float[np.ndarray, "robots chain"], Bool[np.ndarray, " robots"]]:
-        """Assemble the chains of robots, packed for programs.
-
-        Returns:
-            The chains, and which of them are of the form of the example; the others are wrong.
-        """
+        """Assemble packed chains; the flags tell which have the form of the example."""
         starts = range(0, len(numbers), _ROWS)
         pieces = [self._piece(numbers[start : start + _ROWS]) for start in starts]
         chains, alike = zip(*pieces, strict=True)
@@ -447,11 +401,7 @@ class AssembledRobots:
     def along(
         self, numbers: Float[np.ndarray, "k numbers"], changes: Float[np.ndarray, "k numbers"]
     ) -> tuple[Float[np.ndarray, "k chain"], Bool[np.ndarray, " k"]]:
-        """Differentiate the chains of robots along changes of their numbers.
-
-        Returns:
-            The slopes, packed for programs, and which of them are of the form of the example.
-        """
+        """Differentiate packed chains along changes of the numbers; flags as of `chains`."""
         # Lengths of rings are sums of numbers: imaginary parts pass them as slopes do. The first
         # row is without a change, as notches that a change does not touch.
         rows = np.concatenate([numbers[:1] + 0j, numbers + 1j * _SMALL * changes])
@@ -466,16 +416,7 @@ class AssembledRobots:
         weights: Float[np.ndarray, "robots chain"],
         changes: Float[np.ndarray, "k numbers"],
     ) -> tuple[Float[np.ndarray, "robots k"], Bool[np.ndarray, " robots"]]:
-        """Differentiate weighted sums of the numbers of chains.
-
-        Args:
-            numbers: Those of the robots.
-            weights: Of the numbers of the chains, packed for programs.
-            changes: Changes of the numbers of each robot.
-
-        Returns:
-            A derivative for each change, and which of the chains are of the form of the example.
-        """
+        """Differentiate weighted sums of packed chains along k changes; flags as of `chains`."""
         made = self._of_notches(numbers, _built)
         tables = map(_table, (numbers, made["flexures"], weights))
         back = _joined_back.rows(*tables, self.joined)
@@ -494,11 +435,9 @@ class AssembledRobots:
     def _of_notches(
         self, numbers: np.ndarray, program: Callable[[np.ndarray, _NotchForm], dict[str, Any]]
     ) -> dict[str, np.ndarray]:
-        """Return what a program makes of the notches of every robot, side by side.
-
-        Notches that are equal to those of the first robot are made once.
-        """
-        count, size = len(numbers), sum(one.size for one in self.joined.flexures)
+        """Return what a program makes of the notches of every robot, side by side."""
+        # Notches that are equal to those of the first robot are made once.
+        count, size = len(numbers), sum(layout.size for layout in self.joined.flexures)
         made: dict[str, Any] = {"alike": np.ones(count, bool)}
         for notches in self.notches:
             table = self._numbers_of(numbers, notches)
@@ -509,8 +448,8 @@ class AssembledRobots:
             index = np.where(others, after, first)
             made["alike"] &= results.pop("alike")[index].all(axis=1)
             for name, values in results.items():
-                every = made.setdefault(name, np.empty((count, size)))
-                every[:, notches.packed] = values[index]
+                table = made.setdefault(name, np.empty((count, size)))
+                table[:, notches.packed] = values[index]
         return made
 
     def _numbers_of(self, numbers: np.ndarray, notches: _Notches) -> np.ndarray:

@@ -21,7 +21,7 @@ import numpy as np
 from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code, target
 from notchflex._jax import jax, jit, jnp
 from notchflex.errors import InputError
-from notchflex.solver.programs import shipped, store
+from notchflex.solver.programs import store
 
 BACKEND = "NOTCHFLEX_BACKEND"
 """Environment variable: `native` (lanewise, the default) or `xla` compiles the programs."""
@@ -31,11 +31,7 @@ _warned: set[str] = set()
 
 
 def backend() -> str:
-    """Return the compiler of programs, "native" or "xla".
-
-    Raises:
-        InputError: `NOTCHFLEX_BACKEND` has another value.
-    """
+    """Return the compiler of programs, "native" or "xla"."""
     value = os.environ.get(BACKEND) or _COMPILERS[0]
     if value not in _COMPILERS:
         raise InputError.UNKNOWN_NAME(
@@ -45,14 +41,8 @@ def backend() -> str:
     return value
 
 
-def warn_of_xla(function: str, error: UnsupportedPrimitiveError, stacklevel: int = 2) -> None:
-    """Warn once for each unsupported primitive that XLA compiles a function.
-
-    Args:
-        function: Name of the function.
-        error: What lanewise does not support.
-        stacklevel: Callers between the warning and the code that it should name.
-    """
+def warn_of_xla(function: str, error: UnsupportedPrimitiveError) -> None:
+    """Warn once for each unsupported primitive that XLA compiles a function."""
     reason = error.primitive or str(error)
     if reason in _warned:
         return
@@ -61,7 +51,7 @@ def warn_of_xla(function: str, error: UnsupportedPrimitiveError, stacklevel: int
         f"XLA compiles {function}, which makes it some ten times slower: lanewise does not support "
         f"{error}",
         RuntimeWarning,
-        stacklevel=stacklevel + 1,
+        stacklevel=3,
     )
 
 
@@ -83,11 +73,7 @@ _lock = threading.RLock()
 
 
 class CompiledFunction:
-    """A program, and the structure of what it returns.
-
-    Args:
-        content: Result of `_content`, with machine code; plain data, reading it executes nothing.
-    """
+    """A program with machine code, and the structure of what it returns."""
 
     def __init__(self, content: bytes) -> None:
         """Read the program."""
@@ -118,7 +104,7 @@ def _structure(tree: Any) -> Any:
     if isinstance(tree, tuple):
         if hasattr(tree, "_fields"):
             raise TypeError("compiled functions return arrays, plain tuples or dictionaries")
-        return ["tuple", *(_structure(one) for one in tree)]
+        return ["tuple", *(_structure(branch) for branch in tree)]
     return ["array", list(tree.shape), np.dtype(tree.dtype).str]
 
 
@@ -155,15 +141,11 @@ class Packed(NamedTuple):
 
 
 class Native:
-    """A function of arrays and trees of arrays, compiled.
+    """A function of arrays and trees of arrays, compiled."""
 
-    Its arguments are `Packed`, or vectors; all others are hashable and compiled in. It returns an
-    array, or plain tuples and dictionaries of arrays. Axes as long as `lanes` of an argument's
-    layout, such as that of the flexures of a chain, are laid out side by side.
-
-    Args:
-        function: What to compile.
-    """
+    # Its arguments are `Packed`, or vectors; all others are hashable and compiled in. It returns an
+    # array, or plain tuples and dictionaries of arrays. Axes as long as `lanes` of an argument's
+    # layout, such as that of the flexures of a chain, are laid out side by side.
 
     programs: ClassVar[OrderedDict[Any, CompiledFunction | None]] = OrderedDict()
     compiled: ClassVar[int] = 0
@@ -183,31 +165,17 @@ class Native:
         return self.bound("once", *arguments)(vectors_of(arguments))
 
     def map(self, *arguments: Any) -> Any:
-        """Evaluate the function of every row, one after the other.
-
-        Returns:
-            The results, rows as leading axis of all.
-        """
+        """Evaluate the function of every row, one after the other."""
         return self.bound("map", *arguments)(vectors_of(arguments))
 
     def scan(self, *arguments: Any) -> Any:
-        """Evaluate the function row after row, with a vector carried from row to row.
-
-        Args:
-            arguments: The first is the vector carried into the first row. The function returns the
-                vector for the next row, and the results.
-
-        Returns:
-            The results, rows as leading axis of all.
-        """
+        """Evaluate the function row after row, with a vector carried from row to row."""
+        # The first argument is the vector carried into the first row. The function returns the
+        # vector for the next row, and the results.
         return self.bound("scan", *arguments)(vectors_of(arguments))
 
     def rows(self, *arguments: Any) -> Any:
-        """Evaluate the function of every row, side by side.
-
-        Returns:
-            The results, rows as leading axis of all.
-        """
+        """Evaluate the function of every row, side by side; results with rows as leading axis."""
         if jax.default_backend() == "cpu":
             return self.bound("rows", *arguments)(vectors_of(arguments))
         vectors, forms = vectors_of(arguments), _forms_of(arguments)
@@ -225,12 +193,7 @@ class Native:
         return jax.tree.map(lambda *leaves: np.concatenate(leaves)[:count], *results)
 
     def bound(self, how: str, *arguments: Any) -> Callable[[Sequence[Any]], Any]:
-        """Return the program for arguments, as a function of vectors of the same sizes.
-
-        Args:
-            how: "once" or the method that calls the function: "map", "scan" or "rows".
-            arguments: As the function takes them.
-        """
+        """Return the program, a function of vectors, for "once", "map", "scan" or "rows"."""
         forms = _forms_of(arguments)
         program = self._program(how, forms, vectors_of(arguments))
         return program or partial(self._by_xla, how, forms)
@@ -242,7 +205,7 @@ class Native:
         if runs_uncompiled():
             return None
         by_row = _by_row(forms)
-        shapes = tuple([one.shape[rows:] for one, rows in zip(vectors, by_row, strict=True)])
+        shapes = tuple([vector.shape[rows:] for vector, rows in zip(vectors, by_row, strict=True)])
         key = (self, how, shapes, forms)
         try:
             program = Native.programs[key]
@@ -267,14 +230,14 @@ class Native:
         on_processor = f"{key} {target()}"
         content = store.read(on_processor)
         if content is None:
-            text = shipped.read(key) or self._trace(key, how, shapes, forms)
+            text = store.read_shipped(key) or self._trace(key, how, shapes, forms)
             if text is None:
                 return None
             Native.compiled += 1
             head, body = _parts(text)
             # A program that is recorded for a wheel runs once.
             long = how == "rows" and body.count(b"\n") > _OPTIMISED
-            level = 0 if long or shipped.recording() else 2
+            level = 0 if long or store.recording() else 2
             content = _content(head, machine_code(body.decode(), level))
             store.write(on_processor, content)
         return CompiledFunction(content)
@@ -302,7 +265,7 @@ class Native:
         content = _content(
             [program.sizes, program.memory, by_row, _structure(tree)], program.text.encode()
         )
-        shipped.record(key, content)
+        store.record(key, content)
         return content
 
     def _of_vectors(self, forms: tuple[Any, ...]) -> Callable[..., Any]:
@@ -346,10 +309,10 @@ def _forms_of(arguments: Sequence[Any]) -> tuple[Any, ...]:
     """Return what a program is compiled for: arguments without their numbers."""
     return tuple(
         [
-            Packed(None) if hasattr(one, "shape")
-            else Packed(None, one.layout, one.by_row) if _is_packed(one)
-            else one
-            for one in arguments
+            Packed(None) if hasattr(argument, "shape")
+            else Packed(None, argument.layout, argument.by_row) if _is_packed(argument)
+            else argument
+            for argument in arguments
         ]
     )  # fmt: skip
 
@@ -365,10 +328,10 @@ def _one_by_one(
     tables = [vector if rows else None for vector, rows in zip(vectors, by_row, strict=True)]
 
     def step(carry: Any, row: list[Any]) -> Any:
-        every = [
+        arguments = [
             vector if entry is None else entry for vector, entry in zip(vectors, row, strict=True)
         ]
-        return function(carry, *every[1:]) if carries else (None, function(*every))
+        return function(carry, *arguments[1:]) if carries else (None, function(*arguments))
 
     return jax.lax.scan(step, vectors[0] if carries else None, tables)[1]
 
@@ -423,6 +386,6 @@ def on_cores(
         while begun:
             yield begun.popleft().result()
     finally:
-        for one in begun:
-            one.cancel()
+        for future in begun:
+            future.cancel()
         wait(begun)

@@ -58,11 +58,9 @@ class PreparedChain:
 
     @cached_property
     def long(self) -> PreparedChain:
-        """The robot padded to the number of flexures that programs are compiled for.
-
-        Its tendons have contacts at every edge of every gap; those of the own chain are selected
-        afterwards (`run.SolverRun`), so that a program does not depend on them.
-        """
+        """The robot padded to the number of flexures that programs are compiled for."""
+        # Its tendons have contacts at every edge of every gap; those of the chain itself are
+        # selected afterwards (`run.SolverRun`), so that a program does not depend on them.
         chain = self.chain
         more = padded(chain, capacity(chain.flexures), chain.contacts.shape[1])
         edges = np.tile(np.arange(2 * more.flexures), (chain.tendons, 1))
@@ -71,22 +69,19 @@ class PreparedChain:
     @cached_property
     def own_numbers(self) -> Int[np.ndarray, " dynamic"]:
         """Which number of the chain each dynamic number of the long chain is, from 1; or 0."""
-        return _dynamic_numbers(self.chain_layout, self.long.static_structure)
+        numbers = _own_numbers(self.chain_layout, self.long.chain_layout)
+        return self.long.static_structure.pack(numbers).astype(int)
 
     def with_numbers(self, numbers: Float[np.ndarray, " chain"]) -> PreparedChain:
-        """Return a chain of the same form, with the same constants.
-
-        Args:
-            numbers: The chain, packed whole.
-        """
+        """Return a chain of the same form, with the same constants."""
         which = _own_numbers(self.chain_layout, self.long.chain_layout)
         long_numbers = np.where(which > 0, numbers[which - 1], self.long.vector)
         pairs = (self, numbers), (self.long, long_numbers)
-        own, long = (PreparedChain(like.chain_layout.unpack(vector)) for like, vector in pairs)
-        for new, (like, vector) in zip((own, long), pairs, strict=True):
+        unpadded, long = (PreparedChain(like.chain_layout.unpack(vector)) for like, vector in pairs)
+        for new, (like, vector) in zip((unpadded, long), pairs, strict=True):
             new.__dict__.update({name: getattr(like, name) for name in _OF_FORM}, vector=vector)
-        own.__dict__["long"] = long
-        return own
+        unpadded.__dict__["long"] = long
+        return unpadded
 
     @cached_property
     def rest(self) -> SolverState:
@@ -146,35 +141,36 @@ class PreparedChain:
 
     def packed_commands(self, commands: Command) -> Packed:
         """Return loads, as programs of the long chain take them."""
-        own, long = self.command_layout(commands), self.long.command_layout(commands)
-        return Packed(pad_rows(commands.packed(), own, long), long, True)
+        unpadded, long = self.command_layout(commands), self.long.command_layout(commands)
+        return Packed(pad_rows(commands.packed(), unpadded, long), long, True)
 
 
 @lru_cache(maxsize=64)
-def _own_numbers(own: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, " long"]:
+def _own_numbers(unpadded: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, " long"]:
     """Return which number of a chain each number of its long chain is, from 1; 0 for others."""
-    every: Chain = long.unpack(np.zeros(long.size))
+    long_chain: Chain = long.unpack(np.zeros(long.size))
 
     def packed(numbers: Float[np.ndarray, " chain"]) -> Float[np.ndarray, " long"]:
-        chain = own.unpack(numbers)
-        wide = padded(chain, every.flexures, chain.contacts.shape[1])
-        return np.array(long.pack(dataclasses.replace(wide, contacts=every.contacts)))
+        chain = unpadded.unpack(numbers)
+        wide = padded(chain, long_chain.flexures, chain.contacts.shape[1])
+        return np.array(long.pack(dataclasses.replace(wide, contacts=long_chain.contacts)))
 
     # What is padded is constant.
-    which = packed(np.arange(1.0, own.size + 1.0)) - packed(np.zeros(own.size))
+    which = packed(np.arange(1.0, unpadded.size + 1.0)) - packed(np.zeros(unpadded.size))
     for indices, kind in zip(long.indices, long.kinds, strict=True):
         which[indices] *= kind == "f"
     return which.astype(int)
 
 
-@lru_cache(maxsize=64)
-def _dynamic_numbers(own: PytreeLayout, long: StaticStructure) -> Int[np.ndarray, " dynamic"]:
-    return long.pack(_own_numbers(own, long.form)).astype(int)
-
-
 # Cached properties that chains of one form share.
 _OF_FORM = (
-    *("chain_layout", "static_structure", "rest", "rest_vector", "rest_carried", "state", "shape"),
+    "chain_layout",
+    "static_structure",
+    "rest",
+    "rest_vector",
+    "rest_carried",
+    "state",
+    "shape",
     "_command_layouts",
 )
 
@@ -188,10 +184,7 @@ def prepare(
     refinement: int = 0,
     flat: bool = True,
 ) -> PreparedChain:
-    """Prepare a robot; for the arguments see `notchflex.mechanics.chain.assemble`.
-
-    The last robots are cached: a control loop solves the same one repeatedly.
-    """
+    """Prepare a robot as `assemble` takes it; control loops solve the same, which is cached."""
     return PreparedChain(
         assemble(robot, level, loaded=loaded, follows=follows, refinement=refinement, flat=flat)
     )

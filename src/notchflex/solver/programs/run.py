@@ -109,8 +109,8 @@ class SolverRun:
         return self._unpadded_state(self._prepared.long.state.size)
 
     def _unpadded_state(self, start: int) -> Float[np.ndarray, "s state"]:
-        own, long = self._prepared.state, self._prepared.long.state
-        return self.table[:, start + padded_indices(own, long)]
+        unpadded, long = self._prepared.state, self._prepared.long.state
+        return self.table[:, start + padded_indices(unpadded, long)]
 
     @cached_property
     def solved(self) -> SolverState:
@@ -120,25 +120,28 @@ class SolverRun:
     @cached_property
     def _derived(self) -> dict[str, np.ndarray]:
         """Derived quantities of the state before the first load and of each state, by name."""
-        own = self._prepared
-        states = own.packed_states(np.concatenate([self.first[None], self.states]))
-        every = _quantities.map(own.long.packed, states)
-        return {name: unpad_quantity(own.chain, name, values) for name, values in every.items()}
+        prepared = self._prepared
+        states = prepared.packed_states(np.concatenate([self.first[None], self.states]))
+        computed = _quantities.map(prepared.long.packed, states)
+        return {
+            name: unpad_quantity(prepared.chain, name, values) for name, values in computed.items()
+        }
 
     def quantity(self, name: str) -> np.ndarray:
         """Return a quantity of each state, by its name in the registry."""
         if name not in Shape._fields:
             return self._derived[name][1:]
-        own, long, number = self._prepared.shape, self._prepared.long, Shape._fields.index(name)
+        unpadded, long, number = (
+            self._prepared.shape,
+            self._prepared.long,
+            Shape._fields.index(name),
+        )
         # Flexures that only fill the chain up come last in every quantity.
-        shift = 2 * long.state.size + long.shape.ends[number] - own.ends[number]
-        return own.leaf(self.table[:, shift:], number)
+        shift = 2 * long.state.size + long.shape.ends[number] - unpadded.ends[number]
+        return unpadded.leaf(self.table[:, shift:], number)
 
     def before(self, name: str) -> np.ndarray:
-        """Return a quantity of the state before the first load.
-
-        Of the reported shape only tension and stroke exist; "material" is the material's memory.
-        """
+        """Return a quantity of the state before the first load: all but the shape of a solve."""
         start: SolverState = self._prepared.state.unpack(self.first)
         known = {
             "tension": start.point.base_tension,
@@ -150,11 +153,11 @@ class SolverRun:
     @cached_property
     def snapped(self) -> Float[np.ndarray, "s n"]:
         """Notches that snapped shut (1) or open (-1) on the way to each state; 0 for the others."""
-        own = self._prepared
-        if own.chain.rods.section.ends is None:
-            return np.zeros((len(self.table), own.chain.flexures))
-        states = map(own.packed_states, (self.states_before, self.states))
-        return _snapped.map(own.long.packed, *states)[:, : own.chain.flexures]
+        prepared = self._prepared
+        if prepared.chain.rods.section.ends is None:
+            return np.zeros((len(self.table), prepared.chain.flexures))
+        states = map(prepared.packed_states, (self.states_before, self.states))
+        return _snapped.map(prepared.long.packed, *states)[:, : prepared.chain.flexures]
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
         """Return the smallest real part of the eigenvalues, and the determinant's sign."""
@@ -173,18 +176,7 @@ def run(
     *,
     each_from_start: bool | Bool[np.ndarray, " s"],
 ) -> SolverRun:
-    """Solve loads in sequence, each from the state before or each from the same one.
-
-    Args:
-        prepared: The robot.
-        commands: The loads, as leading axis.
-        start: The state before the first; rest where None.
-        settings: Tolerance and limits.
-        each_from_start: Whether every load starts from `start`, or which loads do.
-
-    Returns:
-        One entry per load.
-    """
+    """Solve loads from `start` or rest, each from the state before or each from `start`."""
     long = prepared.long
     loads = prepared.packed_commands(commands)
     first, start_row, carried = prepared.rest_vector, long.rest_vector, long.rest_carried
@@ -219,11 +211,9 @@ def _follow(
     numbers: Float[Array, " settings"],
     state_layout: PytreeLayout,
 ) -> tuple[Float[Array, " state+1"], Float[Array, " row"]]:
-    """Solve one load; return both its states, their reported shape and the solver's status.
-
-    The last solved state is carried from load to load, with a flag that all loads since the start
-    converged.
-    """
+    """Solve one load; return both its states, their reported shape and the solver's status."""
+    # The last solved state is carried from load to load, with a flag that all loads since the start
+    # converged.
     settings = Settings.of(numbers)
     alive = (carried[-1] > 0.0) | (from_start[0] > 0.0)
     before = jnp.where(from_start[0] > 0.0, start, carried[:-1])
@@ -258,19 +248,15 @@ _quantities, _snapped = Native(quantities), Native(snapped_notches)
 def solve_contacts(
     prepared: PreparedChain, commands: Command, start: SolverState, settings: Settings
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find contact forces (N) and gaps (mm) of all notches, each load from the same state.
-
-    A small program beside `run`, for searches that ask only whether the notches are closed.
-
-    Returns:
-        Contact forces and gaps, loads by notches, and which loads converged.
-    """
+    """Find contact forces (N) and gaps (mm) of all notches, each load from the same state."""
+    # A small program beside `run`, for searches that ask only whether the notches are closed.
     command, row = prepared.packed_commands(commands), prepared.state.pack(start)
     last = prepared.packed_states(np.asarray(row))._replace(by_row=False)
-    found = _solve_contacts.map(prepared.long.packed, command, last, _numbers(settings))
-    force, gap, converged = found
-    own = prepared.chain.flexures
-    return force[:, :own], gap[:, :own], converged
+    force, gap, converged = _solve_contacts.map(
+        prepared.long.packed, command, last, _numbers(settings)
+    )
+    flexures = prepared.chain.flexures
+    return force[:, :flexures], gap[:, :flexures], converged
 
 
 @Native
@@ -280,5 +266,5 @@ def _solve_contacts(
     """Compute contact forces and gaps of one load, and whether it converged."""
     result = solve_load_step(chain, command, last, Settings.of(numbers))
     point, memory, _, applied = result.solved
-    at = evaluate(chain, point, memory, applied)
-    return (*notch_contact(chain, point.unknowns, at), result.converged)
+    evaluation = evaluate(chain, point, memory, applied)
+    return (*notch_contact(chain, point.unknowns, evaluation), result.converged)

@@ -27,11 +27,10 @@ from notchflex.mechanics.chain import Chain, structural
 
 
 class PytreeLayout:
-    """Layout of a tree of arrays in a vector of floats, leaf after leaf.
+    """Layout of a tree of arrays in a vector of floats, leaf after leaf."""
 
-    Layouts are cached: trees of the same structure share one object, so that compiled programs
-    distinguish them by identity.
-    """
+    # Layouts are cached: trees of the same structure share one object, so that compiled programs
+    # distinguish them by identity.
 
     _known: ClassVar[dict[Any, PytreeLayout]] = {}
 
@@ -63,10 +62,7 @@ class PytreeLayout:
         return cls._known[key]
 
     def pack(self, tree: Any, leading: int = 0) -> Any:
-        """Return the leaves of a tree as one vector, with a number of leading axes.
-
-        It is a NumPy vector where all leaves are NumPy arrays.
-        """
+        """Return the leaves as one vector after leading axes; of NumPy where all leaves are."""
         leaves = self.structure.flatten_up_to(tree)
         arrays = [xp.asarray(leaf) for leaf in leaves]
         flat = [array.reshape(*array.shape[:leading], -1) for array in arrays]
@@ -97,25 +93,20 @@ def as_kind(values: Array, kind: str) -> Array:
     return values.astype(int) if kind in "iu" else values
 
 
-# Padding at the end of the vector, so that programs may read whole SIMD vectors up to its end.
-_PADDING = 8
-
-
 class StaticStructure:
     """Which numbers of a chain are constants, and the layout of the others in a vector.
-
-    Constants are zeros that a chain has at every flexure because of how it is made
-    (`structural` in `mechanics/chain.py`), and whole numbers and flags that are the same at
-    every flexure. The others are laid out flexure after flexure, as programs read them.
-
-    The structure depends on the chain alone, so a chain has the same program whatever was solved
-    before, and in whatever batch.
 
     Attributes:
         form: Layout of the whole chain.
         size: Numbers in a vector.
         lanes: Sizes of the axes that run along the chain: its flexures, and its bodies.
     """
+
+    # Constants are zeros that a chain has at every flexure because of how it is made (`structural`
+    # in `mechanics/chain.py`), and whole numbers and flags that are the same at every flexure. The
+    # others are laid out flexure after flexure, as programs read them. The structure depends on the
+    # chain alone, so a chain has the same program whatever was solved before, and in whatever
+    # batch.
 
     _structures: ClassVar[dict[tuple[PytreeLayout, bytes, bytes], StaticStructure]] = {}
 
@@ -134,7 +125,8 @@ class StaticStructure:
         self._taken: Int[np.ndarray, " dynamic"] = order[~constant[order]]
         self._index = np.zeros(form.size, int)
         self._index[self._taken] = np.arange(len(self._taken))
-        self.size = len(self._taken) + _PADDING
+        # Padded, so that programs may read whole SIMD vectors up to its end.
+        self.size = len(self._taken) + WIDTH
 
     def __repr__(self) -> str:
         """Return the full content: the key of stored programs."""
@@ -145,13 +137,7 @@ class StaticStructure:
     def of(
         cls, chain: Chain, form: PytreeLayout, numbers: Float[np.ndarray, " chain"]
     ) -> StaticStructure:
-        """Return the structure of a chain; chains with equal structures share one object.
-
-        Args:
-            chain: The chain.
-            form: Its layout, whole.
-            numbers: The chain, packed whole.
-        """
+        """Return the structure of a chain; chains with equal structures share one object."""
         constant, numbers = form.pack(structural(chain)) > 0.0, without_rounding(form, numbers)
         for indices, kind in zip(form.indices, form.kinds, strict=True):
             rows = _by_flexure(indices, chain.flexures)
@@ -169,18 +155,18 @@ class StaticStructure:
         numbers: Float[np.ndarray, " chain"],
     ) -> StaticStructure:
         """Return the structure of which some numbers are constant; equal ones are one object."""
-        kept = np.where(constant, numbers, 0.0)
-        key = (form, constant.tobytes(), kept.tobytes())
+        constants = np.where(constant, numbers, 0.0)
+        key = (form, constant.tobytes(), constants.tobytes())
         if key not in cls._structures:
-            cls._structures[key] = cls(form, flexures, constant, kept)
+            cls._structures[key] = cls(form, flexures, constant, constants)
         return cls._structures[key]
 
     def pack(self, numbers: Any) -> Any:
         """Return the vectors of chains from their packed numbers (NumPy or JAX)."""
-        padding = np.zeros((*numbers.shape[:-1], _PADDING))
+        padding = np.zeros((*numbers.shape[:-1], WIDTH))
         return xp.concatenate([numbers[..., self._taken], padding], axis=-1)
 
-    def whole(
+    def expand(
         self, vectors: Float[np.ndarray, "*k dynamic"], *, constants: bool = False
     ) -> Float[np.ndarray, "*k chain"]:
         """Return packed numbers of whole chains, with the constants or, for slopes, 0 for them."""
@@ -241,9 +227,6 @@ _STEPS = ((0, WIDTH), (2 * WIDTH, 2 * WIDTH), (16 * WIDTH, 4 * WIDTH), (32 * WID
 def capacity(flexures: int) -> int:
     """Return the number of flexures that a program for some flexures is compiled for.
 
-    Args:
-        flexures: Number of flexures of the chain.
-
     Example:
         >>> [capacity(flexures) for flexures in (1, 5, 8, 27, 40, 100)]
         [7, 7, 15, 31, 47, 111]
@@ -254,26 +237,21 @@ def capacity(flexures: int) -> int:
 
 
 @lru_cache(maxsize=256)
-def padded_indices(own: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, " own"]:
-    """Return where the numbers of a layout are in that of a longer chain.
-
-    Args:
-        own: A layout of arrays with flexures or bodies as leading axis.
-        long: The same of a chain with more flexures beyond the tip.
-    """
+def padded_indices(unpadded: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, " own"]:
+    """Return where the numbers of a layout are in that of a chain with more flexures at the tip."""
     indices = [
         padded[tuple(slice(size) for size in part.shape)].ravel()
-        for part, padded in zip(own.indices, long.indices, strict=True)
+        for part, padded in zip(unpadded.indices, long.indices, strict=True)
     ]
     return np.concatenate([np.zeros(0, int), *indices])
 
 
 def pad_rows(
-    rows: Float[np.ndarray, "*s own"], own: PytreeLayout, long: PytreeLayout
+    rows: Float[np.ndarray, "*s own"], unpadded: PytreeLayout, long: PytreeLayout
 ) -> Float[np.ndarray, "*s long"]:
     """Return rows of a layout as those of a longer chain, 0 for the flexures added."""
-    if own is long:
+    if unpadded is long:
         return rows
     padded = np.zeros((*rows.shape[:-1], long.size))
-    padded[..., padded_indices(own, long)] = rows
+    padded[..., padded_indices(unpadded, long)] = rows
     return padded

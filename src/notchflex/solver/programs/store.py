@@ -1,12 +1,17 @@
-"""The folder of compiled programs: private to its user, verified, and bounded in size.
+"""Compiled programs on disk: those of a user as machine code, those of a wheel as LLVM text.
 
-Machine code is run only from a folder and files that belong to the user and that nobody else can
-write to; links are not followed.
+The folder of a user is private, verified, and bounded in size. Machine code is run only from a
+folder and files that belong to the user and that nobody else can write to; links are not followed.
+
+A wheel carries text, so that the first call need not trace a program. It serves every processor and
+every allowed LLVM; machine code is made when it is first needed. `packaging/hatch_build.py` records
+the programs of typical calls when a wheel is built.
 """
 
 from __future__ import annotations
 
 import hashlib
+import lzma
 import os
 import platform
 import stat
@@ -28,7 +33,10 @@ VARIABLE = "JAX_COMPILATION_CACHE_DIR"
 MAX_BYTES = 256 * 2**20
 """Size beyond which the least recently used programs are removed."""
 
-_DIGEST = 32  # bytes
+RECORD = "NOTCHFLEX_RECORD_PROGRAMS"
+"""Environment variable: the folder to which the text of every program is written."""
+
+SHIPPED = PACKAGE / "shipped_programs"
 _PREFIX = "program-"
 # Folders of notchflex that no program depends on. Programs depend on all of `lanewise`.
 _NOT_COMPILED = {"bench", "cli", "comparison", "fit", "plotting", "viewer"}
@@ -45,11 +53,9 @@ class Usage(NamedTuple):
 
 
 def chosen_folder() -> Path | None:
-    """Return the folder of the user's compiled code; None where it is not stored.
-
-    `JAX_COMPILATION_CACHE_DIR` chooses another folder than the user's cache folder. Its value may
-    be the address of a store that JAX can write to and this library cannot.
-    """
+    """Return the folder of the user's compiled code; None where it is not stored."""
+    # `JAX_COMPILATION_CACHE_DIR` chooses another folder than the user's cache folder. Its value may
+    # be the address of a store that JAX can write to and this library cannot.
     if VARIABLE in os.environ:
         chosen = os.environ[VARIABLE]
         return Path(chosen) if chosen and "://" not in chosen else None
@@ -79,7 +85,8 @@ def read(key: str) -> bytes | None:
                 os.utime(file.fileno() if _POSIX else root / _name(key))
     except OSError:
         return None
-    digest, content = content[:_DIGEST], content[_DIGEST:]
+    size = hashlib.sha256().digest_size
+    digest, content = content[:size], content[size:]
     return content if hashlib.sha256(content).digest() == digest else None
 
 
@@ -93,8 +100,12 @@ def write(key: str, content: bytes) -> None:
         try:
             with os.fdopen(folder.open(temporary, _NEW_FILE), "wb") as file:
                 file.write(hashlib.sha256(content).digest() + content)
-            old, new, at = folder.path(temporary), folder.path(_name(key)), folder.descriptor
-            os.replace(old, new, src_dir_fd=at, dst_dir_fd=at)
+            old, new, descriptor = (
+                folder.path(temporary),
+                folder.path(_name(key)),
+                folder.descriptor,
+            )
+            os.replace(old, new, src_dir_fd=descriptor, dst_dir_fd=descriptor)
         finally:
             with suppress(OSError):
                 os.unlink(folder.path(temporary), dir_fd=folder.descriptor)
@@ -103,18 +114,46 @@ def write(key: str, content: bytes) -> None:
 
 def usage() -> Usage:
     """Return number and size (bytes) of the stored programs for this processor."""
-    folder = program_folder()
-    files = [] if folder is None else _files(folder)
-    return Usage(len(files), sum(size for _, size, _ in files))
+    sizes = [size for _, size, _ in _files(program_folder())]
+    return Usage(len(sizes), sum(sizes))
 
 
 def clear() -> Usage:
     """Remove all stored programs of this processor; return their number and size."""
-    before, folder = usage(), program_folder()
-    for _, _, name in [] if folder is None else _files(folder):
+    before = usage()
+    for _, _, file in _files(program_folder()):
         with suppress(OSError):
-            os.unlink(os.path.join(folder or "", name))
+            os.unlink(file)
     return before
+
+
+def read_shipped(key: str) -> bytes | None:
+    """Return the text recorded under a key; None where it is missing or damaged."""
+    try:
+        return lzma.decompress((SHIPPED / _shipped_name(key)).read_bytes())
+    except (OSError, EOFError, lzma.LZMAError):
+        return None
+
+
+def recording() -> bool:
+    """Return whether a wheel is being built."""
+    return bool(os.environ.get(RECORD))
+
+
+def record(key: str, content: bytes) -> None:
+    """Record text under a key while a wheel is built."""
+    if recording():
+        path = Path(os.environ[RECORD]) / _shipped_name(key)
+        path.write_bytes(lzma.compress(content, preset=2))
+
+
+def count_shipped() -> int:
+    """Return the number of programs in the package."""
+    return sum(1 for _ in SHIPPED.glob("*.xz"))
+
+
+def _shipped_name(key: str) -> str:
+    return hashlib.sha256(f"{code_digest()} {key}".encode()).hexdigest()[:32] + ".xz"
 
 
 @cache
@@ -126,8 +165,8 @@ def code_digest() -> str:
     code = hashlib.sha256()
     for root in (os.fspath(PACKAGE), compiler.submodule_search_locations[0]):
         for folder, inner, files in os.walk(root):  # every process does this; pathlib takes longer
-            inner[:] = sorted(one for one in inner if folder != root or one not in _NOT_COMPILED)
-            for name in sorted(one for one in files if one.endswith(".py")):
+            inner[:] = sorted(name for name in inner if folder != root or name not in _NOT_COMPILED)
+            for name in sorted(name for name in files if name.endswith(".py")):
                 path = os.path.join(folder, name)
                 with open(path, "rb", buffering=0) as file:
                     code.update(os.path.relpath(path, root).encode() + b"\0" + file.read() + b"\0")
@@ -186,32 +225,34 @@ def _opened(folder: Path) -> Generator[_Opened]:
     if not _POSIX:
         yield _Opened(folder, None)
         return
-    at = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
-        if not _private(os.fstat(at), stat.S_ISDIR):
+        if not _private(os.fstat(descriptor), stat.S_ISDIR):
             raise PermissionError(
                 f"compiled programs are not kept in {folder}: it belongs to others or others can "
                 f"write to it; make it private (chmod go-w) or choose another with {VARIABLE}"
             )
-        yield _Opened(folder, at)
+        yield _Opened(folder, descriptor)
     finally:
-        os.close(at)
+        os.close(descriptor)
 
 
 def _private(status: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
     """Return whether a file or folder belongs to the user and nobody else can write to it."""
-    own = not _POSIX or (status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE)
-    return is_kind(status.st_mode) and own
+    is_owned = not _POSIX or (status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE)
+    return is_kind(status.st_mode) and is_owned
 
 
-def _files(folder: Path) -> list[tuple[float, int, str]]:
-    """Return time of the last use, size and name of every program."""
+def _files(folder: Path | None) -> list[tuple[float, int, str]]:
+    """Return time of the last use, size and path of every program; none without a folder."""
     files: list[tuple[float, int, str]] = []
+    if folder is None:
+        return files
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
             if entry.is_file(follow_symlinks=False):  # those of JAX too
                 about = entry.stat(follow_symlinks=False)
-                files.append((about.st_mtime, about.st_size, entry.name))
+                files.append((about.st_mtime, about.st_size, entry.path))
     return files
 
 
@@ -219,11 +260,11 @@ def _shrink(folder: Path) -> None:
     """Remove the least recently used programs until the rest is small enough."""
     files = sorted(_files(folder))
     left = sum(size for _, size, _ in files)
-    for _, size, name in files:
+    for _, size, file in files:
         if left <= MAX_BYTES:
             return
         with suppress(OSError):
-            (folder / name).unlink()
+            os.unlink(file)
             left -= size
 
 
@@ -238,10 +279,8 @@ def _user_cache() -> Path:
 
 @cache
 def _machine() -> str:
-    """Return a short name of the kind of processor, its instruction sets included.
-
-    A home folder may be shared by machines of different kinds.
-    """
+    """Return a short name of the kind of processor, its instruction sets included."""
+    # A home folder may be shared by machines of different kinds.
     facts = [platform.machine(), platform.processor()]
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")

@@ -69,7 +69,7 @@ def doctor(
 
 def examination() -> dict[str, Any]:
     """Return the findings of `doctor` as plain values."""
-    from notchflex.solver.programs import shipped, store
+    from notchflex.solver.programs import store
 
     terminal.use_compile_cache()
     from lanewise import target
@@ -105,7 +105,7 @@ def examination() -> dict[str, Any]:
             "programs": kept.programs,
             "bytes": kept.size,
             "most_bytes": store.MAX_BYTES,
-            "shipped": shipped.count(),
+            "shipped": store.count_shipped(),
         },
     }
 
