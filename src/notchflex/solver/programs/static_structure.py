@@ -46,6 +46,11 @@ class PytreeLayout:
         parts = np.split(np.arange(self.size), self.ends[1:-1])
         return [part.reshape(shape) for part, shape in zip(parts, self.shapes, strict=True)]
 
+    @cached_property
+    def starts(self) -> Int[np.ndarray, " numbers"]:
+        """Where the leaf begins that each number belongs to."""
+        return np.repeat(self.ends[:-1], np.diff(self.ends))
+
     def __repr__(self) -> str:
         """Return the full content: the key of stored programs."""
         return f"PytreeLayout({self.structure}, {self.shapes}, {self.kinds})"
@@ -138,12 +143,12 @@ class StaticStructure:
         cls, chain: Chain, form: PytreeLayout, numbers: Float[np.ndarray, " chain"]
     ) -> StaticStructure:
         """Return the structure of a chain; chains with equal structures share one object."""
-        constant, numbers = form.pack(structural(chain)) > 0.0, without_rounding(form, numbers)
-        for indices, kind in zip(form.indices, form.kinds, strict=True):
-            rows = _by_flexure(indices, chain.flexures)
-            constant[rows] &= _same(numbers[rows], kind)
-            if kind != "f":  # so few structures: a table of whole numbers is constant as a whole
-                constant[indices] = constant[indices].all()
+        may_be_constant, floats, first = _comparisons(form, chain.flexures)
+        numbers = without_rounding(form, numbers)
+        equal = (numbers == numbers[first]) & (~floats | (numbers == 0.0))
+        constant = may_be_constant & _all(equal, first)
+        # So few structures: a table of whole numbers is constant as a whole.
+        constant &= floats | _all(constant, form.starts)
         return cls.shared(form, chain.flexures, constant, numbers)
 
     @classmethod
@@ -200,18 +205,27 @@ def without_rounding(
     form: PytreeLayout, numbers: Float[np.ndarray, " chain"]
 ) -> Float[np.ndarray, " chain"]:
     """Return packed numbers, 0 where only rounding errors differ from 0."""
-    rounded = np.array(numbers)
+    size, largest = np.abs(numbers), np.zeros(len(numbers))
+    np.maximum.at(largest, form.starts, np.where(np.isfinite(size), size, 0.0))
+    return np.where(size <= 1e-14 * largest[form.starts], 0.0, numbers)
+
+
+@lru_cache(maxsize=64)
+def _comparisons(form: PytreeLayout, flexures: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which numbers may be constants, which are floats, and the first of each column."""
+    first = np.arange(form.size)
     for indices in form.indices:
-        size = np.abs(numbers[indices])
-        largest = np.max(size, where=np.isfinite(size), initial=0.0)
-        rounded[indices[size <= 1e-14 * largest]] = 0.0
-    return rounded
+        rows = _by_flexure(indices, flexures)
+        first[rows] = rows[:1]
+    floats = np.repeat([kind == "f" for kind in form.kinds], np.diff(form.ends))
+    return form.pack(structural(form.unpack(first.astype(float)))) > 0.0, floats, first
 
 
-def _same(values: Float[np.ndarray, "rows columns"], kind: str) -> Bool[np.ndarray, " columns"]:
-    """Return which numbers are equal at every flexure; for floats, which are 0."""
-    same = (values == values[:1]).all(axis=0)
-    return same & (values[0] == 0.0) if kind == "f" else same
+def _all(values: Bool[np.ndarray, " n"], group: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Return for each value whether all of its group are true."""
+    wrong = np.zeros(len(values), bool)
+    wrong[group[~values]] = True
+    return ~wrong[group]
 
 
 def _by_flexure(indices: np.ndarray, flexures: int) -> np.ndarray:
