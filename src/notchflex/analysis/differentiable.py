@@ -46,6 +46,7 @@ from notchflex.loads.load import check_is_robot, short_repr
 from notchflex.loads.load_path import TIP, load_path
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
+from notchflex.robot.numbers import places_by_name
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import Packed, number_of_cores, on_cores
 from notchflex.solver.programs.static_structure import as_kind
@@ -255,7 +256,9 @@ class Differentiable(Displayed):
     def model(self) -> ForwardModel:
         """The forward model of the robot and its loads."""
         free = any(name in TIP for name in self.start)
-        return ForwardModel(self.robot, self.load, self.settings, self.refinement, any_load=free)
+        # Programs assemble robots of its form: a notch whose number varies is a notch of its own.
+        robot, _ = places_by_name(self.robot, [name for name in self.start if name not in LOADS])
+        return ForwardModel(robot, self.load, self.settings, self.refinement, any_load=free)
 
     @cached_property
     def _solver(self) -> VectorSolver:
