@@ -6,7 +6,7 @@ Compiled programs differentiate the arrays of a robot, and the states along the 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import chain
@@ -28,10 +28,15 @@ from notchflex.robot import Robot
 from notchflex.robot.numbers import PartsForm, Place, differing, parts_of, places_by_name
 from notchflex.robot.value_names import number_at, parse_path
 from notchflex.solver.programs.assembled import chain_gradient, chain_slopes
+from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import SolverRun
 
 SLOPING = tuple(name for name in OUTPUTS if name in REGISTERED and REGISTERED[name].kind is float)
 """Quantities that have slopes."""
+
+# The slopes of a chain by so many numbers are cached for all loads and weights; by more it is
+# differentiated along what is needed. `notchflex bench` has both: links by 3 and by 27 numbers.
+_FEW = 8
 
 # Cost of the gradient of one number, in derivatives along single directions.
 _ADJOINT = 4
@@ -188,12 +193,10 @@ def _by_numbers(
     path: EquilibriumPath, names: Sequence[str], along: Float[np.ndarray, "k names"]
 ) -> list[Change]:
     """Differentiate arrays and loads of a path along changes of numbers of its robot."""
-    robot, places = places_by_name(path.robot, names)
-    traced, varied = _traced(robot, places)
-    traced_places = [places[number] for number in traced]
-    by_direction = _along(
-        path, robot, varied, lambda form: along[:, traced] @ _units(traced_places, form)
-    )
+    few = len(names) <= _FEW
+    directions = np.eye(len(names)) if few else along
+    traced, slopes = _slopes(path.robot, path.prepared, (*names,), directions.tobytes())
+    by_direction = None if slopes is None else _changes(path, along @ slopes if few else slopes)
     untraced = set(range(len(names))).difference([] if by_direction is None else traced)
     by_direction = by_direction or [Change(None, None)] * len(along)
     for number in sorted(untraced):
@@ -204,6 +207,22 @@ def _by_numbers(
             for change, size in zip(by_direction, along[:, number].tolist(), strict=True)
         ]
     return by_direction
+
+
+@lru_cache(maxsize=16)
+def _slopes(
+    robot: Robot, ready: PreparedChain, names: tuple[str, ...], directions: bytes
+) -> tuple[list[int], Float[np.ndarray, "k chain"] | None]:
+    """Return by which of some numbers programs differentiate, and slopes of the chain, cached."""
+    along = np.frombuffer(directions).reshape(-1, len(names))
+    robot, places = places_by_name(robot, names)
+    traced, varied = _traced(robot, places)
+    traced_places = [places[number] for number in traced]
+    if not varied:
+        return traced, None
+    return traced, chain_slopes(
+        robot, ready.chain, varied, lambda form: along[:, traced] @ _units(traced_places, form)
+    )
 
 
 def _traced(robot: Robot, places: Sequence[list[Place]]) -> tuple[list[int], list[Place]]:
@@ -229,20 +248,14 @@ def change_along(
         return slope(lambda v: form.numbers_of(parts_of(robot_at(v))), value, order=order)[None]
 
     varied = differing(parts_of(robot), parts_of(nearby(robot_at, value, order)))
-    by_programs = _along(path, robot, varied or (), difference)
-    return by_programs[0] if by_programs else differences(path, robot_at, value, order)
-
-
-def _along(
-    path: EquilibriumPath,
-    robot: Robot,
-    varied: Collection[Place],
-    along: Callable[[PartsForm], np.ndarray],
-) -> list[Change] | None:
-    """Differentiate along changes of numbers; None where there are none or the form changes."""
-    slopes = chain_slopes(robot, path.chain, varied, along) if varied else None
+    slopes = chain_slopes(robot, path.chain, varied, difference) if varied else None
     if slopes is None:
-        return None
+        return differences(path, robot_at, value, order)
+    return _changes(path, slopes)[0]
+
+
+def _changes(path: EquilibriumPath, slopes: Float[np.ndarray, "k chain"]) -> list[Change]:
+    """Return changes of a path's chain with those of the loads on it."""
     loads: Any = [None] * len(slopes)
     if path.chain.loaded:
         change = path.prepared.chain_layout.unpack(slopes)
@@ -316,13 +329,14 @@ def gradient_by(
 ) -> Float[np.ndarray, " k"]:
     """Return the derivatives of a weighted sum by numbers of the robot and of the loads."""
     numbers = [name for name in names if name not in LOADS]
-    robot, places = places_by_name(path.robot, numbers)
-    traced, varied = _traced(robot, places)
     by_number = None
     # Loads on what weighs something depend on the numbers of the robot.
-    if varied and len(traced) == len(numbers) and not path.chain.loaded:
-        units = partial(_units, places)
-        by_number = chain_gradient(robot, path.chain, varied, by.chain, units)
+    if len(numbers) > _FEW and not path.chain.loaded:
+        robot, places = places_by_name(path.robot, numbers)
+        traced, varied = _traced(robot, places)
+        if len(traced) == len(numbers):
+            units = partial(_units, places)
+            by_number = chain_gradient(robot, path.chain, varied, by.chain, units)
     if by_number is None:
         directions = _by_numbers(path, numbers, np.eye(len(numbers)))
         by_number = np.array([by.along(change) for change in directions])
