@@ -338,7 +338,7 @@ def gradient_by(
             units = partial(_units, places)
             by_number = chain_gradient(robot, path.chain, varied, by.chain, units)
     if by_number is None:
-        directions = _by_numbers(path, numbers, np.eye(len(numbers)))
+        directions = changes(path, numbers)
         by_number = np.array([by.along(change) for change in directions])
     rest = iter(by_number)
     columns = [
