@@ -37,7 +37,7 @@ from notchflex.analysis.solve import check_refinement, follow_path
 from notchflex.analysis.varied import FEW, Chains, VariedRobots, prepare_kind, single_chains
 from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.command import DRAWN, acting, row_commands
+from notchflex.loads.command import LoadKind, acting, row_commands
 from notchflex.loads.load import NO_VECTOR, check_integer, one_or_several, short_repr
 from notchflex.loads.load_path import TENDONS, TIP, join_paths, load_path
 from notchflex.results.path import EquilibriumPath
@@ -590,7 +590,7 @@ class BatchTable:
         chains, alike = self.chains.packed(batch.robot_of[rows])
         steps, bodies = batch.loads.steps_of(batch.path_of[rows]), self.chains.bodies(chains)
         load, tip = batch.loads.load, batch.loads.tip
-        commands = row_commands(load, steps, bodies, tip, draws=bool(self.kind & DRAWN))
+        commands = row_commands(load, steps, bodies, tip, draws=bool(self.kind & LoadKind.DRAWN))
         layout = self.chains.ready.command_layout(commands)
         packed_commands = np.asarray(layout.pack(commands, leading=2))
         outputs = follow_row.rows(

@@ -41,7 +41,7 @@ from notchflex.analysis.tangent import (
 from notchflex.analysis.varied import VariedRobots, single_chains
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.command import DRAWN, FOLLOWING, LOADED, SIDEWAYS
+from notchflex.loads.command import LoadKind
 from notchflex.loads.load import check_is_robot, short_repr
 from notchflex.loads.load_path import TIP, load_path
 from notchflex.results.path import EquilibriumPath
@@ -472,10 +472,10 @@ class VectorSolver:
         rows = BatchRows(robots, loads, robot_of.reshape(-1), row_numbers, *settings)
         chain = path.chain
         kind = (
-            LOADED * chain.loaded
-            | SIDEWAYS * (chain.level == "space")
-            | FOLLOWING * chain.follows
-            | DRAWN * path.load.draws
+            LoadKind.LOADED * chain.loaded
+            | LoadKind.SIDEWAYS * (chain.level == "space")
+            | LoadKind.FOLLOWING * chain.follows
+            | LoadKind.DRAWN * path.load.draws
         )
         chains = single_chains({0: path.prepared})
         if of_robots:

@@ -125,9 +125,7 @@ class ForwardModel:
 
 def prepared_like(robot: Robot, like: PreparedChain) -> PreparedChain:
     """Prepare a robot for the same loads as another one; raise where its form differs."""
-    chain = like.chain
-    options = chain.level, chain.loaded, chain.follows, chain.refinement, chain.frame is not None
-    ready = prepare(robot, *options)
+    ready = prepare(robot, *like.chain.options.values())
     if ready.chain_layout is not like.chain_layout:
         raise InputError.UNSUPPORTED(
             "with these values the robot has another form; it must stay the same"

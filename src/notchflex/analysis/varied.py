@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from notchflex.analysis.solve import level_of
 from notchflex.errors import ErrorCode, InputError
-from notchflex.loads.command import FOLLOWING, LOADED, SIDEWAYS
+from notchflex.loads.command import LoadKind
 from notchflex.mechanics.chain import Chain
 from notchflex.robot import Robot
 from notchflex.robot.numbers import PartsForm, Place, parts_of, places_by_name
@@ -256,9 +256,9 @@ class RobotForm(NamedTuple):
 
 def prepare_kind(robot: Robot, kind: int, refinement: int) -> PreparedChain:
     """Prepare a robot for a kind of loads: bits of `loads.command.acting`."""
-    loaded = bool(kind & LOADED)
-    level = level_of(robot, loaded, loaded and bool(kind & SIDEWAYS))
-    return prepare(robot, level, loaded, loaded and bool(kind & FOLLOWING), refinement)
+    loaded = bool(kind & LoadKind.LOADED)
+    level = level_of(robot, loaded, loaded and bool(kind & LoadKind.SIDEWAYS))
+    return prepare(robot, level, loaded, loaded and bool(kind & LoadKind.FOLLOWING), refinement)
 
 
 @lru_cache(maxsize=8)

@@ -202,9 +202,6 @@ class LoadKind(IntFlag):
     DRAWN = 8
 
 
-LOADED, SIDEWAYS, FOLLOWING, DRAWN = LoadKind
-
-
 def acting(
     load: LoadPath,
     robot: Robot,
@@ -218,14 +215,14 @@ def acting(
         raise InputError.WRONG_SHAPE(
             f"a load commands more tendons than {robot.name} has: {tendons}"
         )
-    kinds = DRAWN * ~np.isnan(load.stroke[steps]).all(axis=-1).ravel()
+    kinds = LoadKind.DRAWN * ~np.isnan(load.stroke[steps]).all(axis=-1).ravel()
     for external, places, at_tip in _each(load, steps, tip):
         _check(external, robot)
         pushed = np.any(at_tip, axis=0)
         kinds[places] += (
-            LOADED * (pushed | (not external.is_nothing))
-            + SIDEWAYS * _sideways(external, robot, load.base_to_world, at_tip)
-            + FOLLOWING * (pushed & external.following | external.follows)
+            LoadKind.LOADED * (pushed | (not external.is_nothing))
+            + LoadKind.SIDEWAYS * _sideways(external, robot, load.base_to_world, at_tip)
+            + LoadKind.FOLLOWING * (pushed & external.following | external.follows)
         )
     return kinds.reshape(steps.shape)
 

@@ -23,7 +23,7 @@ from jaxtyping import Array, Bool, Float, Int
 from lanewise import WIDTH
 from notchflex._arrays import xp
 from notchflex._jax import jax
-from notchflex.mechanics.chain import Chain, structural
+from notchflex.mechanics.chain import structural
 
 
 class PytreeLayout:
@@ -140,16 +140,16 @@ class StaticStructure:
 
     @classmethod
     def of(
-        cls, chain: Chain, form: PytreeLayout, numbers: Float[np.ndarray, " chain"]
+        cls, form: PytreeLayout, flexures: int, numbers: Float[np.ndarray, " chain"]
     ) -> StaticStructure:
         """Return the structure of a chain; chains with equal structures share one object."""
-        may_be_constant, floats, first = _comparisons(form, chain.flexures)
+        may_be_constant, floats, first = _comparisons(form, flexures)
         numbers = without_rounding(form, numbers)
         equal = (numbers == numbers[first]) & (~floats | (numbers == 0.0))
         constant = may_be_constant & _all(equal, first)
         # So few structures: a table of whole numbers is constant as a whole.
         constant &= floats | _all(constant, form.starts)
-        return cls.shared(form, chain.flexures, constant, numbers)
+        return cls.shared(form, flexures, constant, numbers)
 
     @classmethod
     def shared(
