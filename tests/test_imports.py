@@ -25,6 +25,8 @@ ORDER = (
     "solver",
     "results",
     "analysis",
+    "search",
+    "specification",
     "pieces",
     "fit",
     "comparison",
@@ -46,7 +48,7 @@ ORDER = (
 
 MOST_FILES = 17
 
-SATELLITES = ORDER[ORDER.index("pieces") :]
+SATELLITES = ORDER[ORDER.index("search") :]
 
 INNER_NAMES = 118
 """Names of the core that satellites import from elsewhere than `notchflex` and

@@ -4,10 +4,12 @@ import os
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+import notchflex
 from notchflex.solver.programs import store
 
 posix = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owner and mode here")
@@ -166,3 +168,13 @@ def test_programs_are_found_by_the_code_of_mechanics_and_compiler(monkeypatch, t
     (tmp_path / "solver" / "newton.py").write_text("changed = True\n")
     monkeypatch.setattr(store, "PACKAGE", tmp_path)
     assert digest() != before
+
+
+def test_folders_with_programs_are_those_of_the_digest():
+    source = Path(notchflex.__file__).parent
+    defining = {
+        file.relative_to(source).parts[0]
+        for file in source.rglob("*.py")
+        if "import Native" in file.read_text(encoding="utf-8")
+    }
+    assert defining <= store._COMPILED

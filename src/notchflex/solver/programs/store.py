@@ -38,8 +38,9 @@ RECORD = "NOTCHFLEX_RECORD_PROGRAMS"
 
 SHIPPED = PACKAGE / "shipped_programs"
 _PREFIX = "program-"
-# Folders of notchflex that no program depends on. Programs depend on all of `lanewise`.
-_NOT_COMPILED = {"bench", "cli", "comparison", "fit", "plotting", "viewer"}
+# Folders of notchflex that define programs, or what programs are made of. Programs depend on all of
+# `lanewise`, too.
+_COMPILED = {"robot", "mechanics", "loads", "solver", "results", "analysis", "control"}
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 _POSIX = hasattr(os, "geteuid") and os.open in os.supports_dir_fd
@@ -165,7 +166,9 @@ def code_digest() -> str:
     code = hashlib.sha256()
     for root in (os.fspath(PACKAGE), compiler.submodule_search_locations[0]):
         for folder, inner, files in os.walk(root):  # every process does this; pathlib takes longer
-            inner[:] = sorted(name for name in inner if folder != root or name not in _NOT_COMPILED)
+            if folder == os.fspath(PACKAGE):
+                inner[:] = _COMPILED.intersection(inner)
+            inner.sort()
             for name in sorted(name for name in files if name.endswith(".py")):
                 path = os.path.join(folder, name)
                 with open(path, "rb", buffering=0) as file:

@@ -1,0 +1,1 @@
+"""Searches of satellites: bounded least squares, one driver of SLSQP, one set of starts."""

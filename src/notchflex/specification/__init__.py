@@ -1,0 +1,1 @@
+"""Which quantity, at which state, which entry, within which limits: in files, Python and words."""
