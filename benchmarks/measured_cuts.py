@@ -16,8 +16,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import notchflex as nf
-from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.cut.measure_cut import LENGTHS, MeasuredCut, combined, fit_straight
+from notchflex.photographs.chain_table import chain_table
+from notchflex.photographs.measure_cut import LENGTHS, MeasuredCut, combined, fit_straight
 from photographs.renderer import Scene, render
 
 TURN = 20.0  # deg

@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import notchflex as nf
-from notchflex.photographs.chain.chain_table import ChainTable, chain_table
+from notchflex.photographs.chain_table import ChainTable, chain_table
 from notchflex.photographs.measure import measure_picture
 from photographs.renderer import Scene, render
 

@@ -10,9 +10,9 @@ import pytest
 import notchflex as nf
 from notchflex.cli.app import run
 from notchflex.photographs import board_of
-from notchflex.photographs.board.sighting import NOT_FLAT, NOT_SEEN, Ruler, sight
-from notchflex.photographs.chain.chain_table import chain_table
+from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.measure import measure_picture
+from notchflex.photographs.sighting import NOT_FLAT, NOT_SEEN, Ruler, sight
 from photographs.renderer import Scene, _camera, _project, render
 from photographs.test_measure import ANGLES, ROBOT
 from refusals import refused

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.photographs.chain.camera import NUMBERS
-from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.chain.outline import axis_points, on_axis_points, straight_chain
+from notchflex.photographs.camera import NUMBERS
+from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.measure import measure_picture
+from notchflex.photographs.outline import axis_points, on_axis_points, straight_chain
 from photographs.renderer import Scene, render
 from refusals import refused
 

@@ -9,8 +9,8 @@ import pytest
 
 import notchflex as nf
 from notchflex.cli.app import run
-from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.cut.measure_cut import StraightFit, combined, depths, seen_edges
+from notchflex.photographs.chain_table import chain_table
+from notchflex.photographs.measure_cut import StraightFit, combined, depths, seen_edges
 from notchflex.photographs.measured import MeasuredPhotograph
 from photographs.renderer import Scene, render
 from refusals import refused

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.photographs.chain.camera import NUMBERS
-from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.chain.outline import SIDE, SPINE, OutlineModel
+from notchflex.photographs.camera import NUMBERS
+from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.edges import Edges
-from notchflex.photographs.fitting import Fit, cost, covariance, misfit
-from notchflex.photographs.missing import missing
+from notchflex.photographs.fitting import Fit
+from notchflex.photographs.judging import missing
+from notchflex.photographs.outline import SIDE, SPINE, OutlineModel
 
-MODEL = OutlineModel(chain_table(nf.load_robot("pacheco2021-a")), base=1.0)
+MODEL = OutlineModel(chain_table(nf.load_robot("pacheco2021-a")))
 SCALE = 60.0  # px/mm
 
 
@@ -25,28 +25,28 @@ def made_up(residual, cut=0.0):
     looked = np.ones(len(offset), bool)
     jacobian = np.random.default_rng(0).normal(size=(len(offset), len(numbers)))
     outline = MODEL.outline(numbers)
-    return Fit(numbers, outline, Edges(offset, looked, looked.astype(float)), jacobian, offset, 1.0)
+    return Fit(MODEL, numbers, outline, jacobian, Edges(offset, looked, looked.astype(float)))
 
 
 def test_a_shift_of_all_lines_is_no_misfit():
     """Blur, or a tube thinner than in its file, shifts all lines; one line shifted alone counts."""
-    assert cost(made_up(1.6), MODEL) < 0.01
-    assert covariance(made_up(1.6), MODEL)[1] < 0.1
+    assert made_up(1.6).cost < 0.01
+    assert made_up(1.6).noise < 0.1
     one = np.where((MODEL.kind == SPINE) & (MODEL.ring == 2), 2.0, 0.0)
-    assert cost(made_up(one), MODEL) > 0.01
-    assert cost(made_up(5.0), MODEL) > 0.3
+    assert made_up(one).cost > 0.01
+    assert made_up(5.0).cost > 0.3
 
 
 def test_notches_unlike_the_robot_file_are_a_misfit():
     """Mirror images fit alike with deeper notches: 0.05 mm is 5 standard deviations of a cut."""
-    more = misfit(made_up(0.0, cut=0.05), MODEL, 0.1) - misfit(made_up(0.0), MODEL, 0.1)
+    more = made_up(0.0, cut=0.05).misfit(0.1) - made_up(0.0).misfit(0.1)
     assert more == pytest.approx((0.05 / (0.006 * 1.62)) ** 2, rel=0.02)
 
 
 def test_notches_of_another_depth_are_refused():
-    assert missing(MODEL, made_up(0.0)) == ""
+    assert missing(made_up(0.0)) == ""
     inner = (MODEL.kind == SPINE) & (MODEL.which > 0.0)
-    assert "depth" in missing(MODEL, made_up(np.where(inner, np.nan, 0.0)))
+    assert "depth" in missing(made_up(np.where(inner, np.nan, 0.0)))
 
 
 def test_one_side_of_one_ring_may_look_like_the_background():
@@ -57,7 +57,7 @@ def test_one_side_of_one_ring_may_look_like_the_background():
         off = np.zeros(len(side))
         for ring, which in lines:
             off[side & (MODEL.ring == ring) & (MODEL.which == which)] = np.nan
-        return missing(MODEL, made_up(off))
+        return missing(made_up(off))
 
     assert hidden((3, 1.0)) == ""
     assert "before notch 1" in hidden((0, 1.0), (3, 1.0))

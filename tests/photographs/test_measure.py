@@ -13,10 +13,9 @@ from PIL import ImageFile
 
 import notchflex as nf
 from notchflex.cli.app import run
-from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.chain.outline import OutlineModel
-from notchflex.photographs.lines import lines_of
+from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.measure import measure_picture
+from notchflex.photographs.outline import OutlineModel
 from notchflex.photographs.overlay import overlay_names
 from notchflex.photographs.reading import read_photograph
 from photographs.renderer import Scene, render
@@ -289,8 +288,7 @@ def test_base_and_tip_that_look_alike_are_told_apart_or_refused():
 
 def test_a_line_far_off_counts_less():
     """Shift and turn of every line are found; a line that is shifted far has a larger spread."""
-    model = OutlineModel(chain_table(ROBOT))
-    lines = lines_of(model)
+    lines = OutlineModel(chain_table(ROBOT)).lines
     random = np.random.default_rng(0)
     shift, turn = 0.3 + 0.05 * random.normal(size=(2, lines.number))
     shift[2] += 1.5
@@ -305,7 +303,7 @@ def test_a_line_far_off_counts_less():
 
 def test_weak_edges_count_less():
     """Where a highlight meets an edge it is weak and shifted: a third of the edges do not count."""
-    lines = lines_of(OutlineModel(chain_table(ROBOT)))
+    lines = OutlineModel(chain_table(ROBOT)).lines
     weak = lines.place < -1.0 / 3.0
     offset = np.where(weak, 1.0, 0.2)
     errors, _ = lines.errors(offset, 5.0, np.where(weak, 0.05, 1.0))

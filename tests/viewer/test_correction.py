@@ -12,9 +12,9 @@ import pytest
 
 from chromium import PATIENCE
 from notchflex.cli.app import run
-from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.measure import measure_picture, refused_photograph
-from notchflex.photographs.measured import MeasuredPhotographs
+from notchflex.photographs.chain_table import chain_table
+from notchflex.photographs.measure import measure_picture
+from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from photographs.renderer import render
 from photographs.test_chain import ANGLES, BY_HAND, ROBOT, SCENE, cluttered
 
@@ -31,9 +31,9 @@ def unmeasured(tmp_path):
     files = [str(tmp_path / f"wrist_{number}.png") for number in (1, 2)]
     for file in files:
         cv2.imwrite(file, cluttered())
-    return MeasuredPhotographs(
-        ROBOT, tuple(refused_photograph(file, table, "nothing found") for file in files)
-    )
+    notches = table.notches
+    refused = [MeasuredPhotograph.refused(file, notches, "nothing found") for file in files]
+    return MeasuredPhotographs(ROBOT, tuple(refused))
 
 
 def test_points_are_dragged_then_fitted_then_accepted(unmeasured, capsys):

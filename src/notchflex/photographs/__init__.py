@@ -1,8 +1,8 @@
 """Photographs: the notch angles of bent robots, the notches of straight ones, with deviations."""
 
-from notchflex.photographs.board.layout import Board, board_of
-from notchflex.photographs.cut.measure_cut import MeasuredCut, measure_cut
+from notchflex.photographs.board import Board, board_of
 from notchflex.photographs.measure import measure
+from notchflex.photographs.measure_cut import MeasuredCut, measure_cut
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 
 __all__ = [

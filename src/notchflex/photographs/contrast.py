@@ -21,12 +21,12 @@ class Contrast:
     Attributes:
         value: Distance of every pixel from the background over all colours, grey levels.
         threshold: Contrast above which a pixel is not background.
-        noise: Contrast of the background itself (median).
+        middle: Middle of the photograph, px, (2,).
     """
 
     value: Image
     threshold: float
-    noise: float
+    middle: NDArray[np.float64]
 
     def reduced(self, factor: float) -> Contrast:
         """Return the same of a photograph made smaller."""
@@ -37,7 +37,7 @@ class Contrast:
         small: Any = cv2.resize(
             self.value, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA
         )
-        return Contrast(small, self.threshold, self.noise)
+        return Contrast(small, self.threshold, (self.middle + 0.5) * factor - 0.5)
 
 
 def contrast(photograph: NDArray[np.uint8]) -> Contrast:
@@ -60,7 +60,8 @@ def contrast(photograph: NDArray[np.uint8]) -> Contrast:
     # Otsu's threshold between background and the rest, not below the noise of the background.
     capped = np.clip(low, 0.0, 255.0).astype(np.uint8)
     otsu, _ = cv2.threshold(capped, 0, 255, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
-    return Contrast(value, max(0.6 * float(otsu), 4.0 * noise, 5.0), noise)
+    middle = (np.array([width, height]) - 1.0) / 2.0
+    return Contrast(value, max(0.6 * float(otsu), 4.0 * noise, 5.0), middle)
 
 
 def _surface(image: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.photographs.chain.outline import Numbers, Outline
+from notchflex.photographs.chain_table import Numbers
 from notchflex.photographs.contrast import Contrast
+from notchflex.photographs.outline import Outline
 
 STEP = 0.5
 """Distance of samples along a normal, px."""
@@ -33,7 +34,7 @@ class Edges(NamedTuple):
     strength: Numbers
 
 
-def find_edges(contrast: Contrast, outline: Outline, reach: float, middle: Numbers) -> Edges:
+def find_edges(contrast: Contrast, outline: Outline, reach: float) -> Edges:
     """Find the edge of the robot nearest to every point of an outline.
 
     Outside an edge lies background; the edge is where the contrast rises most steeply.
@@ -42,7 +43,6 @@ def find_edges(contrast: Contrast, outline: Outline, reach: float, middle: Numbe
         contrast: Contrast of the photograph against its background.
         outline: Where the outline is expected; its first view counts.
         reach: How far from there an edge is looked for, px.
-        middle: Middle of the photograph, px, (2,).
     """
     import cv2
 
@@ -50,10 +50,9 @@ def find_edges(contrast: Contrast, outline: Outline, reach: float, middle: Numbe
     room = np.minimum(outline.room, 1e6)
     looked = (room > _MIN_ROOM) & (outline.breadth > 3.0)
     steps = np.arange(-reach - _BESIDE, reach + 2.0 * _BESIDE + STEP, STEP)
-    at = outline.point[0] + middle
-    inside = (at > 2.0).all(1) & (at[:, 0] < width - 3.0) & (at[:, 1] < height - 3.0)
-    looked &= inside
-    where = at[:, None] + steps[None, :, None] * outline.normal[:, None]
+    place = outline.point[0] + contrast.middle
+    looked &= ((place > 2.0) & (place < [width - 3.0, height - 3.0])).all(axis=1)
+    where = place[:, None] + steps[None, :, None] * outline.normal[:, None]
     profile: Any = cv2.remap(
         contrast.value,
         where[..., 0].astype(np.float32),

@@ -8,46 +8,42 @@ off has a spread of its own size and counts less.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.photographs.chain.chain_table import Numbers
-from notchflex.photographs.chain.outline import OutlineModel
+from notchflex.photographs.chain_table import Numbers
 
-FIRST_SPREAD = (0.3, 0.08)
-"""Spreads of the shift and of the turn of a line before they are known, px."""
-
+_FIRST_SPREAD = (0.3, 0.08)  # px: spreads of shift and turn of a line before they are known
 _MIN_SPREAD, _MAX_SPREAD = (0.06, 0.04), 2.0  # px
 _MIN_POINTS = 5
-_ROBUST = 2.5  # spreads: lines farther off count less
+_FAR_LINE = 2.5  # spreads: lines farther off count less
 _ROUNDS = 4
 
 
-class Lines(NamedTuple):
+class Lines:
     """Lines of an outline with N points.
+
+    Args:
+        names: Name of the line of each point, (N,).
+        place: Place of each point along it, (N,).
+        shift: How far blur and shading may shift all lines alike, px.
 
     Attributes:
         which: Number of the line of each point, (N,).
         place: Place of each point on its line, -1 to 1, (N,).
         number: Number of lines.
-        shift: Spread of the shift that all lines share, px.
+        columns: What one px of each shift, of each turn and of the common shift adds, (N, m).
     """
 
-    which: NDArray[np.int_]
-    place: Numbers
-    number: int
-    shift: float
-
-    def columns(self) -> Numbers:
-        """Return what one px of each shift, of each turn and of the common shift adds, (N, m)."""
-        columns = np.zeros((len(self.which), 2 * self.number + 1))
-        row = np.arange(len(self.which))
-        columns[row, self.which] = 1.0
-        columns[row, self.number + self.which] = self.place
-        columns[:, -1] = 1.0
-        return columns
+    def __init__(self, names: NDArray[np.int_], place: Numbers, shift: float) -> None:
+        self.which = np.unique(names, return_inverse=True)[1]
+        self.number, self._shift = int(self.which.max()) + 1, shift
+        lines = [place[self.which == line] for line in range(self.number)]
+        low, high = np.array([(places.min(), places.max()) for places in lines])[self.which].T
+        self.place = 2.0 * (place - low) / (high - low) - 1.0
+        on_line = np.eye(self.number)[self.which]
+        common = np.ones((len(place), 1))
+        self.columns = np.hstack([on_line, on_line * self.place[:, None], common])
 
     def errors(
         self, offset: Numbers, robust: float, strength: Numbers | float = 1.0
@@ -65,13 +61,13 @@ class Lines(NamedTuple):
         is_edge = np.isfinite(offset)
         value, position = np.where(is_edge, offset, 0.0), self.place
 
-        def total(one: Numbers) -> Numbers:
-            return np.bincount(self.which, one, self.number).astype(float)
+        def total(values: Numbers) -> Numbers:
+            return np.bincount(self.which, values, self.number).astype(float)
 
         is_fitted = total(is_edge.astype(float)) >= _MIN_POINTS
-        shift, turn = np.zeros(self.number), np.zeros(self.number)
-        starts = [value[is_edge & (self.which == one)] for one in range(self.number)]
-        shift[:] = [np.median(one) if len(one) else 0.0 for one in starts]
+        lines = [value[is_edge & (self.which == line)] for line in range(self.number)]
+        shift = np.array([np.median(values) if len(values) else 0.0 for values in lines])
+        turn = np.zeros(self.number)
         left = value - shift[self.which]
         for _ in range(_ROUNDS):
             weight = is_edge * strength**2 / (1.0 + (left / robust) ** 2)
@@ -94,29 +90,24 @@ class Lines(NamedTuple):
             fitted: How many unknowns were fitted to the lines, which makes their errors look
                 small; None in first rounds, whose errors say little about the lines.
         """
-        finite = errors[np.isfinite(errors[:, 0])]
-        own = relative(errors)
-        typical = np.array(FIRST_SPREAD)
-        if fitted is not None and len(finite):
-            freedom = max(0.25, 1.0 - fitted / max(1, 2 * len(finite)))
-            typical = 1.4826 * np.nanmedian(np.abs(own), axis=0) / np.sqrt(freedom)
+        finite = np.count_nonzero(np.isfinite(errors[:, 0]))
+        apart = from_median(errors)
+        typical = np.array(_FIRST_SPREAD)
+        if fitted is not None and finite:
+            freedom = max(0.25, 1.0 - fitted / (2 * finite))
+            typical = 1.4826 * np.nanmedian(np.abs(apart), axis=0) / np.sqrt(freedom)
             typical = np.clip(np.nan_to_num(typical, nan=_MAX_SPREAD), _MIN_SPREAD, _MAX_SPREAD)
-        far = np.nan_to_num(np.abs(own), nan=_MAX_SPREAD)
-        spread = np.hypot(typical, far / _ROBUST)
-        return np.concatenate([spread[:, 0], spread[:, 1], [self.shift]])
+        far = np.nan_to_num(np.abs(apart), nan=_MAX_SPREAD)
+        spread = np.hypot(typical, far / _FAR_LINE)
+        return np.concatenate([spread[:, 0], spread[:, 1], [self._shift]])
 
 
-def lines_of(model: OutlineModel) -> Lines:
-    """Return the lines of an outline."""
-    name = model.kind * 10000 + model.ring * 2 + (model.which > 0)
-    names, which = np.unique(name, return_inverse=True)
-    low = np.array([model.place[which == one].min() for one in range(len(names))])
-    high = np.array([model.place[which == one].max() for one in range(len(names))])
-    position = 2.0 * (model.place - low[which]) / (high - low)[which] - 1.0
-    return Lines(which, position, len(names), model.shift)
-
-
-def relative(errors: Numbers) -> Numbers:
-    """Return shifts and turns of lines, (number, 2), with the shifts from their median."""
+def median_shift(errors: Numbers) -> float:
+    """Return the median shift of all lines, px."""
     finite = errors[np.isfinite(errors[:, 0]), 0]  # none where a start lies beside the tube
-    return errors - np.array([np.median(finite) if len(finite) else 0.0, 0.0])
+    return float(np.median(finite)) if len(finite) else 0.0
+
+
+def from_median(errors: Numbers) -> Numbers:
+    """Return shifts and turns of lines, (number, 2), with the shifts from their median."""
+    return errors - np.array([median_shift(errors), 0.0])

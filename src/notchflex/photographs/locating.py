@@ -13,13 +13,13 @@ from scipy.ndimage import binary_closing
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from notchflex.photographs.board.sighting import RulerReading
-from notchflex.photographs.chain.camera import NUMBERS
-from notchflex.photographs.chain.chain_table import ChainTable, Numbers
-from notchflex.photographs.chain.outline import BASE, OutlineModel, axis_points, on_axis_points
+from notchflex.photographs.camera import NUMBERS
+from notchflex.photographs.chain_table import ChainTable, Numbers
 from notchflex.photographs.contrast import Contrast
-from notchflex.photographs.fitting import Fit, cost, covariance, misfit, refine
-from notchflex.photographs.missing import MAX_RESIDUAL, missing
+from notchflex.photographs.fitting import Fit, refine
+from notchflex.photographs.judging import missing
+from notchflex.photographs.outline import OutlineModel, axis_points, on_axis_points
+from notchflex.photographs.sighting import RulerReading
 
 COARSE = 360
 """Longer side of the photograph in which robots are searched, px."""
@@ -49,28 +49,26 @@ class Ribbon(NamedTuple):
     quality: float
 
 
-def starts(table: ChainTable, contrast: Contrast, middle: Numbers) -> list[Numbers]:
+def starts(table: ChainTable, contrast: Contrast) -> list[Numbers]:
     """Return numbers from which fits are started, the most likely first.
 
     Args:
         table: The robot.
         contrast: Contrast of the photograph, made smaller to `COARSE` px.
-        middle: Middle of that photograph, px.
     """
-    ribbons = sorted(_ribbons(table, contrast), key=lambda one: -one.quality)
     different: list[Ribbon] = []  # in their free end or their width
-    for one in ribbons:
-        ends = [np.linalg.norm(one.centre[0] - other.centre[0]) for other in different]
-        widths = [abs(math.log(one.width / other.width)) for other in different]
-        if all(e > one.width or w > 0.15 for e, w in zip(ends, widths, strict=True)):
-            different.append(one)
-    views: list[Numbers] = []
-    for ribbon in different[:3]:
-        for side, slip in itertools.product((1.0, -1.0), _SLIPS):
-            numbers = _numbers(table, ribbon, side, slip, middle)
-            if numbers is not None:
-                views.append(numbers)
-    return views
+    for ribbon in sorted(_ribbons(table, contrast), key=lambda ribbon: -ribbon.quality):
+        if all(
+            np.linalg.norm(ribbon.centre[0] - kept.centre[0]) > ribbon.width
+            or abs(math.log(ribbon.width / kept.width)) > 0.15
+            for kept in different
+        ):
+            different.append(ribbon)
+    views = [
+        _numbers(table, ribbon, side, slip, contrast.middle)
+        for ribbon, side, slip in itertools.product(different[:3], (1.0, -1.0), _SLIPS)
+    ]
+    return [numbers for numbers in views if numbers is not None]
 
 
 def _ribbons(table: ChainTable, contrast: Contrast) -> Iterator[Ribbon]:
@@ -101,9 +99,9 @@ def _levels(part: NDArray[np.bool_]) -> Iterator[tuple[Numbers, Numbers]]:
     for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
         y, x = rows + dy, columns + dx
         is_inside = (y < part.shape[0]) & (x >= 0) & (x < part.shape[1])
-        other = np.where(is_inside, number[np.minimum(y, part.shape[0] - 1), x % part.shape[1]], -1)
-        has = other >= 0
-        ends.append(np.stack([np.nonzero(has)[0], other[has]]))
+        near = np.where(is_inside, number[np.minimum(y, part.shape[0] - 1), x % part.shape[1]], -1)
+        has = near >= 0
+        ends.append(np.stack([np.nonzero(has)[0], near[has]]))
         lengths.append(np.full(int(has.sum()), math.hypot(dx, dy)))
     pairs = np.concatenate(ends, axis=1)
     graph = coo_matrix((np.concatenate(lengths), (pairs[0], pairs[1])), (count, count)).tocsr()
@@ -118,7 +116,7 @@ def _levels(part: NDArray[np.bool_]) -> Iterator[tuple[Numbers, Numbers]]:
         bins = (distance / _BIN).astype(int)
         area = np.bincount(bins)
         centre = np.stack(
-            [np.bincount(bins, one) / np.maximum(area, 1) for one in (columns, rows)], axis=1
+            [np.bincount(bins, place) / np.maximum(area, 1) for place in (columns, rows)], axis=1
         )
         yield centre, area / _BIN
 
@@ -133,12 +131,12 @@ def _stretches(table: ChainTable, centre: Numbers, width: Numbers) -> Iterator[R
         for begin, end in zip(changes[::2], changes[1::2], strict=True):
             if (end - begin) * _BIN < _SHORTEST * wanted * ratio:
                 continue
-            own = float(np.percentile(width[begin:end], 55))
-            if not 0.94 < own / wanted < 1.07:
+            usual = float(np.percentile(width[begin:end], 55))
+            if not 0.94 < usual / wanted < 1.07:
                 continue
-            long = min(end - begin, round(1.1 * own * ratio / _BIN))
-            even = np.abs(width[begin : begin + long] / own - 1.0) < 0.12
-            yield Ribbon(centre[begin:end], own, float(even.mean()))
+            long = min(end - begin, round(1.1 * usual * ratio / _BIN))
+            even = np.abs(width[begin : begin + long] / usual - 1.0) < 0.12
+            yield Ribbon(centre[begin:end], usual, float(even.mean()))
 
 
 def _numbers(
@@ -162,16 +160,27 @@ def _numbers(
     neutral = np.maximum.accumulate(neutral) + 1e-9 * np.arange(len(neutral))
     ends = table.length - np.concatenate([[0.0], np.cumsum(table.height + table.uncut)])
     behind = np.concatenate([[ends[0] + 0.3 * table.outer], ends[1:] + 0.5 * table.uncut])
-    at = np.interp(behind, neutral, heading)
-    angles = side * np.diff(at) * table.side
+    directions = np.interp(behind, neutral, heading)
+    angles = side * np.diff(directions) * table.side
     position = np.array([np.interp(ends[0], neutral, smooth[1:, axis]) for axis in (0, 1)])
     over = ends[0] - neutral[-1]
     if over > 0.0:
-        position = position - over * scale * np.array([math.cos(at[0]), math.sin(at[0])])
+        position = position - over * scale * np.array(
+            [math.cos(directions[0]), math.sin(directions[0])]
+        )
     if over > 0.4 * table.length:
         return None
     roll = math.radians(5.0) if side > 0.0 else math.pi + math.radians(5.0)
-    view = [*(position - middle), at[0], math.log(scale), roll, 0.0, 0.003 / table.outer, 0.0, 0.0]
+    view = [
+        *(position - middle),
+        directions[0],
+        math.log(scale),
+        roll,
+        0.0,
+        0.003 / table.outer,
+        0.0,
+        0.0,
+    ]
     return np.array([*view, *np.clip(angles, -0.3, 1.6)])
 
 
@@ -185,19 +194,20 @@ def _smoothed(points: Numbers, half: int) -> Numbers:
     return np.stack([np.convolve(padded[:, axis], kernel, "valid") for axis in (0, 1)], axis=1)
 
 
-def with_tilts(numbers: Numbers, size: float) -> list[Numbers]:
-    """Return a start with the robot tilted toward the camera, and away from it."""
-    tilted = [numbers.copy(), numbers.copy()]
-    tilted[0][5], tilted[1][5] = size, -size
-    return tilted
-
-
 def reversed_view(numbers: Numbers) -> Numbers:
     """Return the view that looks the same from far away: opposite roll and tilt."""
     turned = numbers.copy()
     turn = math.pi if math.cos(turned[4]) < 0.0 else 0.0
     turned[4], turned[5] = 2.0 * turn - turned[4], -turned[5]
     return turned
+
+
+def scaled(numbers: Numbers, factor: float) -> Numbers:
+    """Return the view in a photograph that was made smaller."""
+    smaller = numbers.copy()
+    smaller[:2] *= factor
+    smaller[3] += math.log(factor)
+    return smaller
 
 
 _COARSE_WIDTH = 40.0  # of the tube in the first fits, px
@@ -220,24 +230,22 @@ _SAME = math.radians(1.5)
 
 
 class Located(NamedTuple):
-    """The best fit of a robot, its model, and how all fits differ from it.
+    """The best fit of a robot, and how all fits differ from it.
 
     Attributes:
         fit: The best.
-        model: The outline that was fitted.
-        rival: By how much more every fit misses the edges (`misfit`), with the largest difference
+        rivals: By how much more every fit misses the edges (`misfit`), with the largest difference
             of its angles from those of the best, rad.
         factor: By how much the photograph was made smaller for it.
     """
 
     fit: Fit
-    model: OutlineModel
-    rival: tuple[tuple[float, float], ...]
+    rivals: tuple[tuple[float, float], ...]
     factor: float
 
 
 def locate(
-    table: ChainTable, contrast: Contrast, reading: RulerReading, given: Sequence[Numbers] = ()
+    table: ChainTable, contrast: Contrast, reading: RulerReading, chain: Numbers | None = None
 ) -> Located | None:
     """Find a robot in a photograph; None if nothing there looks like a tube of its proportions.
 
@@ -245,53 +253,48 @@ def locate(
         table: The robot.
         contrast: Contrast of the photograph.
         reading: What is known of its scale and tilt.
-        given: Numbers from which fits are started; if there are none, starts are searched.
+        chain: Points of the tube axis from which fits are started, px from the middle, (n + 2, 2);
+            without them starts are searched.
     """
-    height, width = contrast.value.shape
-    middle = np.array([width - 1.0, height - 1.0]) / 2.0
-    factor = min(1.0, COARSE / max(width, height))
-    coarse = [*given, *_coarse(table, contrast, factor, middle, given)]
+    by_hand = [] if chain is None else on_axis_points(table, chain)
+    coarse = [*by_hand, *_coarse(table, contrast, by_hand)]
     if not coarse:
         return None
     # Where both ends look the same, a chain from tip to base fits nearly as well.
     coarse += on_axis_points(table, axis_points(table, coarse[0])[::-1])[:1]
-    wide = 2.0 * table.outer * math.exp(coarse[0][3])
-    fine = min(1.0, _FINE_WIDTH / wide)
-    view_prior = reading.prior(coarse[0][:2] + middle).smaller(fine)
-    contrast, middle = contrast.reduced(fine), (middle + 0.5) * fine - 0.5
-    model = OutlineModel(table, base=BASE * table.outer, prior=view_prior)
-    fits = _fine(model, contrast, middle, [_scaled(numbers, fine) for numbers in coarse])
+    fine = min(1.0, _FINE_WIDTH / (2.0 * table.outer * math.exp(coarse[0][3])))
+    view_prior = reading.prior(coarse[0][:2] + contrast.middle).smaller(fine)
+    contrast, model = contrast.reduced(fine), OutlineModel(table, prior=view_prior)
+    fits = _fine(model, contrast, [scaled(numbers, fine) for numbers in coarse])
     latest = fits
     for _ in range(_MOVES):
-        if all(missing(model, fit) for fit in fits):
-            near = min(latest, key=lambda fit: cost(fit, model))
-            latest = _slipped(model, contrast, near, middle)
+        if all(map(missing, fits)):
+            latest = _slipped(contrast, min(latest, key=lambda fit: fit.cost))
             fits += latest
-    whole = [fit for fit in fits if not missing(model, fit)] or fits
-    first = min(whole, key=lambda fit: cost(fit, model))
-    noise = max(EDGE_NOISE, covariance(first, model)[1])
-    best = min(whole, key=lambda fit: misfit(fit, model, noise))
+    whole = [fit for fit in fits if not missing(fit)] or fits
+    noise = max(EDGE_NOISE, min(whole, key=lambda fit: fit.cost).noise)
+    best = min(whole, key=lambda fit: fit.misfit(noise))
     # Fitted again from views that are turned a little.
     views = best.numbers + np.zeros((len(_VIEWS), 1))
     views[:, 4:6] += _VIEWS
-    turned = [refine(model, contrast, one, _LAST_REACHES, middle, MAX_RESIDUAL) for one in views]
-    whole += [fit for fit in turned if not missing(model, fit)]
-    misfits = [misfit(fit, model, noise) for fit in whole]
+    turned = [refine(model, contrast, view, _LAST_REACHES) for view in views]
+    whole += [fit for fit in turned if not missing(fit)]
+    misfits = [fit.misfit(noise) for fit in whole]
     least = min(misfits)
     best = whole[misfits.index(least)]
     rivals = [
-        (one - least, _differ(best.numbers, fit.numbers))
-        for one, fit in zip(misfits, whole, strict=True)
+        (more - least, _differ(best.numbers, fit.numbers))
+        for more, fit in zip(misfits, whole, strict=True)
     ]
-    return Located(best, model, tuple(rivals), fine)
+    return Located(best, tuple(rivals), fine)
 
 
-def _slipped(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers) -> list[Fit]:
+def _slipped(contrast: Contrast, fit: Fit) -> list[Fit]:
     """Fit again from chains that lie one pitch nearer to the tip or the base, and the other way.
 
     Where a ring looks like the background, a fit may end a ring beside its place, or at the base.
     """
-    table, scale = model.table, math.exp(fit.numbers[3])
+    model, table, scale = fit.model, fit.model.table, math.exp(fit.numbers[3])
     points, height = axis_points(table, fit.numbers), scale * float(table.height.mean())
     pitch = scale * table.length / table.notches
     side, fits = math.cos(fit.numbers[4]), []
@@ -302,9 +305,9 @@ def _slipped(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers)
         (points[::-1], -height, -side),
     ):
         both = on_axis_points(table, _moved(chain, way))
-        numbers = next(one for one in both if hand * math.cos(one[4]) > 0.0)
-        quick = refine(model, contrast, numbers, _FINE_REACHES, middle, MAX_RESIDUAL, quick=True)
-        fits.append(refine(model, contrast, quick.numbers, _LAST_REACHES, middle, MAX_RESIDUAL))
+        numbers = next(view for view in both if hand * math.cos(view[4]) > 0.0)
+        quick = refine(model, contrast, numbers, _FINE_REACHES, quick=True)
+        fits.append(refine(model, contrast, quick.numbers, _LAST_REACHES))
     return fits
 
 
@@ -313,80 +316,56 @@ def _moved(points: Numbers, way: float) -> Numbers:
     ends = [2.0 * points[:1] - points[1:2], 2.0 * points[-1:] - points[-2:-1]]
     line = np.vstack([ends[0], points, ends[1]])
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    return np.stack([np.interp(along[1:-1] + way, along, one) for one in line.T], axis=1)
+    return np.stack([np.interp(along[1:-1] + way, along, axis) for axis in line.T], axis=1)
 
 
-def _fine(
-    model: OutlineModel, contrast: Contrast, middle: Numbers, coarse: list[Numbers]
-) -> list[Fit]:
+def _fine(model: OutlineModel, contrast: Contrast, coarse: list[Numbers]) -> list[Fit]:
     """Fit in full from the best of some starts, each tilted to and away from the camera."""
-    quick = [
-        min(
-            (
-                refine(model, contrast, start, _FINE_REACHES, middle, MAX_RESIDUAL, quick=True)
-                for start in with_tilts(numbers, _TILT)
-            ),
-            key=lambda fit: cost(fit, model),
-        )
-        for numbers in coarse
+    quick: list[Fit] = []
+    for numbers in coarse:
+        tilted = np.tile(numbers, (2, 1))
+        tilted[:, 5] = _TILT, -_TILT
+        fits = [refine(model, contrast, view, _FINE_REACHES, quick=True) for view in tilted]
+        quick.append(min(fits, key=lambda fit: fit.cost))
+    limit = min(fit.cost for fit in quick) + _WORSE
+    whole = [not missing(fit) for fit in quick]
+    near = [
+        fit.numbers
+        for fit, is_whole in zip(quick, whole, strict=True)
+        if fit.cost < limit or is_whole or not any(whole)
     ]
-    limit = min(cost(fit, model) for fit in quick) + _WORSE
-    near = [fit.numbers for fit in quick if cost(fit, model) < limit or not missing(model, fit)]
-    if all(missing(model, fit) for fit in quick):
-        near = [fit.numbers for fit in quick]
     return [
-        refine(model, contrast, start, _LAST_REACHES, middle, MAX_RESIDUAL)
+        refine(model, contrast, view, _LAST_REACHES)
         for numbers in near
-        for start in (numbers, reversed_view(numbers))
+        for view in (numbers, reversed_view(numbers))
     ]
 
 
-def _coarse(
-    table: ChainTable,
-    contrast: Contrast,
-    factor: float,
-    middle: Numbers,
-    given: Sequence[Numbers],
-) -> list[Numbers]:
-    model = OutlineModel(table, 8, 6, base=BASE * table.outer)
-    candidates: list[tuple[float, Numbers]] = []
-    low = contrast.reduced(factor)
-    low_middle = (middle + 0.5) * factor - 0.5
+def _coarse(table: ChainTable, contrast: Contrast, by_hand: Sequence[Numbers]) -> list[Numbers]:
+    """Return the best views that differ, fitted in a small photograph from many starts."""
+    model = OutlineModel(table, 8, 6)
+    factor = min(1.0, COARSE / max(contrast.value.shape))
+    views = by_hand
+    if not views:
+        ribbons = starts(table, contrast.reduced(factor))
+        views = [scaled(numbers, 1.0 / factor) for numbers in ribbons]
+    fits: list[tuple[float, Numbers]] = []
     images: dict[float, Contrast] = {}
-    first = [_scaled(numbers, factor) for numbers in given]
-    for start in first or starts(table, low, low_middle):
-        wide = 2.0 * table.outer * math.exp(start[3]) / factor
-        rough = min(1.0, _COARSE_WIDTH / wide)
+    for start in views:
+        rough = min(1.0, _COARSE_WIDTH / (2.0 * table.outer * math.exp(start[3])))
         rough = min(1.0, 2.0 ** (round(2.0 * math.log2(rough)) / 2.0))
         image = images.setdefault(rough, contrast.reduced(rough))
-        numbers = _scaled(start, rough / factor)
-        fit = refine(
-            model,
-            image,
-            numbers,
-            _COARSE_REACHES,
-            (middle + 0.5) * rough - 0.5,
-            MAX_RESIDUAL,
-            quick=True,
-        )
-        candidates.append((cost(fit, model), _scaled(fit.numbers, 1.0 / rough)))
-    candidates.sort(key=lambda one: one[0])
+        fit = refine(model, image, scaled(start, rough), _COARSE_REACHES, quick=True)
+        fits.append((fit.cost, scaled(fit.numbers, 1.0 / rough)))
     kept: list[Numbers] = []
-    for _, numbers in candidates:
-        if all(_differ(numbers, other) > _SAME for other in kept):
+    for _, numbers in sorted(fits, key=lambda fit: fit[0]):
+        if all(_differ(numbers, view) > _SAME for view in kept):
             kept.append(numbers)
     return kept[:_KEPT]
 
 
-def _scaled(numbers: Numbers, factor: float) -> Numbers:
-    scaled = numbers.copy()
-    scaled[:2] *= factor
-    scaled[3] += math.log(factor)
-    return scaled
-
-
-def _differ(one: Numbers, other: Numbers) -> float:
+def _differ(first: Numbers, second: Numbers) -> float:
     """Return by how much angles differ, rad: toward the same side of the photograph."""
-    shapes = [np.sign(math.cos(numbers[4])) * numbers[NUMBERS:] for numbers in (one, other)]
+    shapes = [np.sign(math.cos(numbers[4])) * numbers[NUMBERS:] for numbers in (first, second)]
     apart = float(np.abs(shapes[0] - shapes[1]).max())
-    return apart if math.cos(one[4]) * math.cos(other[4]) > 0.0 else max(apart, 2.0 * _SAME)
+    return apart if math.cos(first[4]) * math.cos(second[4]) > 0.0 else max(apart, 2.0 * _SAME)

@@ -5,30 +5,29 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from notchflex import InputError, Robot, tip_from_angles
-from notchflex.photographs.board.layout import Board
-from notchflex.photographs.board.sighting import NO_RULER, Ruler
-from notchflex.photographs.chain.camera import NUMBERS
-from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_table
-from notchflex.photographs.chain.outline import axis_points, on_axis_points
-from notchflex.photographs.contrast import contrast
-from notchflex.photographs.fitting import covariance
+from notchflex.photographs.board import Board
+from notchflex.photographs.camera import NUMBERS
+from notchflex.photographs.chain_table import ChainTable, Numbers, chain_table
+from notchflex.photographs.contrast import Contrast, contrast
+from notchflex.photographs.fitting import MAX_RESIDUAL
 from notchflex.photographs.judging import UNCERTAINTY, rejection_reason
+from notchflex.photographs.loads import loads_of
 from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
-from notchflex.photographs.missing import MAX_RESIDUAL
+from notchflex.photographs.outline import axis_points
 from notchflex.photographs.reading import read_photograph
-from notchflex.photographs.taken import loads_of
+from notchflex.photographs.sighting import NO_RULER, Ruler
+from notchflex.support import check_number
 
-NO_TUBE = "no tube of the proportions of the robot is seen"
-WORKED_ON = 8.0e6
-"""Pixels of a photograph beyond which it is made smaller before it is measured."""
+MOST_PIXELS = 8.0e6
+"""A photograph of more pixels is made smaller before it is measured."""
 
 
 def measure(
@@ -79,20 +78,30 @@ def measure(
         >>> found = nf.measure("pull_1N.jpg", nf.load_robot("wrist.toml"))  # doctest: +SKIP
         >>> found.write_csv("measured.csv")  # doctest: +SKIP
     """
-    one = isinstance(photographs, (str, os.PathLike))
-    names = [os.fspath(name) for name in ([photographs] if one else photographs)]
-    if not names:
-        raise InputError.NO_DATA("there is no photograph to measure; name one or more")
+    names = names_of(photographs)
     table, ruler = chain_table(robot), Ruler(scale, board)
     uncertainty = checked_uncertainty(uncertainty_deg)
-    given = loads_of(names, robot, loads, pattern, exif, columns)
+    columns_of_loads = loads_of(names, robot, loads, pattern, exif, columns)
     measured: list[MeasuredPhotograph] = []
-    for number, name in enumerate(names):
+    for number, name in enumerate(names, 1):
         picture = read_photograph(name)
         measured.append(measure_picture(picture, table, name, ruler, uncertainty=uncertainty))
         if progress is not None:
-            progress("measuring", number + 1, len(names))
-    return MeasuredPhotographs(robot, tuple(measured), given)
+            progress("measuring", number, len(names))
+    return MeasuredPhotographs(robot, tuple(measured), columns_of_loads)
+
+
+def names_of(photographs: Sequence[str | os.PathLike[str]] | str | os.PathLike[str]) -> list[str]:
+    """Return the names of one file or several.
+
+    Raises:
+        InputError: There is none.
+    """
+    is_single = isinstance(photographs, (str, os.PathLike))
+    names = [os.fspath(name) for name in ([photographs] if is_single else photographs)]
+    if not names:
+        raise InputError.NO_DATA("there is no photograph to measure; name one or more")
+    return names
 
 
 def checked_uncertainty(value: float) -> float:
@@ -101,11 +110,9 @@ def checked_uncertainty(value: float) -> float:
     Raises:
         InputError: It is not a number above 0.
     """
-    number: Any = value
-    if isinstance(number, bool) or not isinstance(number, (int, float, np.number)):
-        raise InputError.WRONG_TYPE(f"uncertainty_deg must be a number of deg, not {value!r}")
+    number = check_number(value, "uncertainty_deg", "a number of deg")
     if not number > 0.0:
-        raise InputError.OUT_OF_RANGE(f"uncertainty_deg must be above 0 deg, not {value:g}")
+        raise InputError.OUT_OF_RANGE(f"uncertainty_deg must be above 0 deg, not {number:g}")
     return math.radians(number)
 
 
@@ -133,71 +140,85 @@ def measure_picture(
     Raises:
         InputError: The points of the chain are invalid.
     """
-    picture, factor = smaller(picture)
-    middle = (np.array([picture.shape[1], picture.shape[0]]) - 1.0) / 2.0
-    given = () if chain is None else on_axis_points(table, (chain + 0.5) * factor - 0.5 - middle)
-    reading = ruler.read(picture, factor)
-    if isinstance(reading, str):
-        return refused_photograph(name, table, reading)
-    located = locate(table, reading.hidden(contrast(picture)), reading, given)
-    if located is None:
-        return refused_photograph(name, table, NO_TUBE)
-    factor *= located.factor
-    both, noise = covariance(located.fit, located.model)
-    angles = slice(NUMBERS, NUMBERS + table.notches)
-    deviation = np.sqrt(np.maximum(np.diag(both)[angles], 0.0))
-    reason = rejection_reason(located, deviation, noise, uncertainty)
-    middle = (np.array([picture.shape[1], picture.shape[0]]) * located.factor - 1.0) / 2.0
-    return judged_photograph(name, located, both[angles, angles], (reason, noise, factor), middle)
+    seen = see(picture, table, ruler, chain)
+    if isinstance(seen, str):
+        return MeasuredPhotograph.refused(name, table.notches, seen)
+    spread = seen.located.fit.covariance()[NUMBERS:, NUMBERS:]
+    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
+    fit, rivals, _ = seen.located
+    reason = rejection_reason(fit, rivals, deviation, uncertainty)
+    return judged_photograph(name, seen, spread, reason)
 
 
-def smaller(picture: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
-    """Return a photograph of `WORKED_ON` pixels at most, and by how much it was made smaller."""
+class SeenRobot(NamedTuple):
+    """A robot in a photograph.
+
+    Attributes:
+        located: The fit.
+        contrast: Contrast of the whole photograph, without a board.
+        factor: By how much the photograph was made smaller for it.
+    """
+
+    located: Located
+    contrast: Contrast
+    factor: float
+
+
+def see(
+    picture: NDArray[np.uint8], table: ChainTable, ruler: Ruler, chain: Numbers | None = None
+) -> SeenRobot | str:
+    """Find the robot in a photograph; return why not if it is not found."""
     import cv2
 
-    factor = min(1.0, math.sqrt(WORKED_ON / (picture.shape[0] * picture.shape[1])))
-    if factor == 1.0:
-        return picture, factor
-    resized: Any = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-    return resized, factor
+    factor = min(1.0, math.sqrt(MOST_PIXELS / (picture.shape[0] * picture.shape[1])))
+    smaller: Any = picture
+    if factor < 1.0:
+        smaller = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+    if chain is not None:
+        middle = (np.array(smaller.shape[1::-1]) - 1.0) / 2.0
+        chain = (chain + 0.5) * factor - 0.5 - middle
+    reading = ruler.read(smaller, factor)
+    if isinstance(reading, str):
+        return reading
+    whole = reading.hidden(contrast(smaller))
+    located = locate(table, whole, reading, chain)
+    if located is None:
+        return "no tube of the proportions of the robot is seen"
+    return SeenRobot(located, whole, factor)
 
 
 def judged_photograph(
-    name: str,
-    located: Located,
-    spread: Numbers,
-    judged: tuple[str, float, float],
-    middle: Numbers,
+    name: str, seen: SeenRobot, spread: Numbers, reason: str
 ) -> MeasuredPhotograph:
     """Return what a fit says about a photograph.
 
     Args:
         name: What the photograph is called.
-        located: The fit.
+        seen: The fit.
         spread: Covariance of the angles, rad^2, (n, n).
-        judged: Why the photograph is refused ("" if not), noise of the edges (px), and by how much
-            the photograph was made smaller.
-        middle: Middle of the photograph that was made smaller, px.
+        reason: Why the photograph is refused; "" if it is not.
     """
-    reason, noise, factor = judged
-    fit, table = located.fit, located.model.table
+    fit, factor = seen.located.fit, seen.factor * seen.located.factor
+    table = fit.model.table
     angles = fit.numbers[NUMBERS : NUMBERS + table.notches]
 
     def placed(points: Numbers) -> Numbers:
-        return (points + middle + 0.5) / factor - 0.5
+        """Return points of the photograph as it was read, px."""
+        middle = (seen.contrast.middle + 0.5) * seen.located.factor
+        return (points + middle) / factor - 0.5
 
     view: dict[str, Any] = {
         "scale": math.exp(fit.numbers[3]) / factor,
         "roll": math.remainder(fit.numbers[4], math.pi),
         "tilt": float(fit.numbers[5]),
-        "noise": noise / factor,
+        "noise": fit.noise / factor,
         "found": fit.score,
         "outline": placed(fit.outline.point[0]),
         "chain": placed(axis_points(table, fit.numbers)),
         "seen": np.abs(fit.residual) < MAX_RESIDUAL,
     }
     if reason:
-        return refused_photograph(name, table, reason, **view)
+        return MeasuredPhotograph.refused(name, table.notches, reason, **view)
     steps = 1e-4 * np.vstack([np.zeros(len(angles)), np.eye(len(angles))])
     tips, _ = tip_from_angles(table.robot, angles + steps)
     slopes = (tips[1:] - tips[0]).T / 1e-4
@@ -206,11 +227,3 @@ def judged_photograph(
     return MeasuredPhotograph(
         name, "", angles.copy(), np.sqrt(np.diag(spread)), tips[0], deviation, **view
     )
-
-
-def refused_photograph(
-    name: str, table: ChainTable, reason: str, **view: Any
-) -> MeasuredPhotograph:
-    """Return a photograph of which nothing is reported, with the reason."""
-    nothing, nowhere = np.full(table.notches, np.nan), np.full(3, np.nan)
-    return MeasuredPhotograph(name, reason, nothing, nothing, nowhere, nowhere, **view)

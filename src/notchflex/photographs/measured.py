@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from notchflex import Robot
 from notchflex.fit.measurements.columns import measured_columns
-from notchflex.support import write_columns
+from notchflex.support import document_head, write_columns
 
 PHOTOGRAPH = "photograph"
 """Column with the name of the file; `calibrate` passes over it."""
@@ -62,6 +63,36 @@ class MeasuredPhotograph:
         """Whether angles are reported."""
         return not self.reason
 
+    @classmethod
+    def refused(cls, source: str, notches: int, reason: str, **view: Any) -> MeasuredPhotograph:
+        """Return a photograph of which nothing is reported, with the reason."""
+        nothing, nowhere = np.full(notches, np.nan), np.full(3, np.nan)
+        return cls(source, reason, nothing, nothing, nowhere, nowhere, **view)
+
+    def view(self) -> dict[str, Any]:
+        """Return how the robot is seen, by the keys of the JSON document."""
+        return {
+            "scale_px_mm": self.scale,
+            "roll_deg": math.degrees(self.roll),
+            "tilt_deg": math.degrees(self.tilt),
+            "edge_noise_px": self.noise,
+            "outline_found": self.found,
+        }
+
+    def entry(self) -> dict[str, Any]:
+        """Return the entry of the JSON document, without the loads."""
+        head: dict[str, Any] = {"photograph": self.source, "measured": self.measured}
+        if not self.measured:
+            return {**head, "reason": self.reason}
+        return {
+            **head,
+            "notch_angle_deg": np.degrees(self.notch_angle),
+            "notch_angle_sd_deg": np.degrees(self.notch_angle_deviation),
+            "tip_position_mm": self.tip_position,
+            "tip_position_sd_mm": self.tip_deviation,
+            **self.view(),
+        }
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPhotographs:
@@ -90,29 +121,43 @@ class MeasuredPhotographs:
     @property
     def measured(self) -> tuple[MeasuredPhotograph, ...]:
         """Those that were measured."""
-        return tuple(one for one in self.photographs if one.measured)
+        return tuple(photograph for photograph in self.photographs if photograph.measured)
 
     @property
     def refused(self) -> tuple[MeasuredPhotograph, ...]:
         """Those that were refused; each has its `reason`."""
-        return tuple(one for one in self.photographs if not one.measured)
+        return tuple(photograph for photograph in self.photographs if not photograph.measured)
 
     def columns(self) -> dict[str, list[Any]]:
         """Return the columns of the CSV that `calibrate` reads, the measured photographs only."""
-        rows = [number for number, one in enumerate(self.photographs) if one.measured]
-        table: dict[str, list[Any]] = {PHOTOGRAPH: [one.source for one in self.measured]}
+        is_measured = [photograph.measured for photograph in self.photographs]
+        table: dict[str, list[Any]] = {
+            PHOTOGRAPH: [photograph.source for photograph in self.measured]
+        }
         for name, texts in self.loads.items():
-            table[name] = [texts[row] for row in rows]
+            table[name] = list(compress(texts, is_measured))
         notches, tendons = self.robot.number_of_notches, self.robot.number_of_tendons
         for column in measured_columns(notches, tendons, ()):
             if column.quantity != "notch_angle":
                 continue
-            (notch,) = column.index
-            table[column.name] = [math.degrees(one.notch_angle[notch]) for one in self.measured]
-            table[column.deviation] = [
-                math.degrees(one.notch_angle_deviation[notch]) for one in self.measured
-            ]
+            for name, field_name in (
+                (column.name, "notch_angle"),
+                (column.deviation, "notch_angle_deviation"),
+            ):
+                values = [getattr(seen, field_name)[column.index] for seen in self.measured]
+                table[name] = np.degrees(values).tolist()
         return table
+
+    def document(self) -> dict[str, Any]:
+        """Return the JSON document: all photographs, the refused with their reasons."""
+        entries = [
+            {
+                **photograph.entry(),
+                "loads": {name: texts[row] for name, texts in self.loads.items()},
+            }
+            for row, photograph in enumerate(self.photographs)
+        ]
+        return {**document_head(self.robot), "photographs": entries}
 
     def write_csv(self, target: str) -> None:
         """Write the measured photographs as the CSV that `calibrate` reads, `-` for output.

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.photographs.cut.measure_cut import MeasuredCut
+from notchflex.photographs.measure_cut import MeasuredCut
 from notchflex.photographs.measured import MeasuredPhotograph
 from notchflex.support import replacing
 
@@ -27,12 +27,10 @@ def overlay_names(sources: Sequence[str]) -> list[str]:
         ['x-1.png', 'x-2.png', 'y.png']
     """
     stems = [Path(source).stem or "photograph" for source in sources]
-    counts: dict[str, int] = {}
-    names: list[str] = []
-    for stem in stems:
-        counts[stem] = counts.get(stem, 0) + 1
-        names.append(f"{stem}-{counts[stem]}.png" if stems.count(stem) > 1 else f"{stem}.png")
-    return names
+    return [
+        f"{stem}-{stems[: row + 1].count(stem)}.png" if stems.count(stem) > 1 else f"{stem}.png"
+        for row, stem in enumerate(stems)
+    ]
 
 
 def write_overlay(

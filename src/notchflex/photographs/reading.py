@@ -24,7 +24,7 @@ _DAMAGED = (
     SyntaxError, ValueError, TypeError, OSError, EOFError, LookupError, ArithmeticError,
     struct.error, zlib.error,
 )  # fmt: skip
-_WIDTH, _HEIGHT, _EXIF_PART = 256, 257, 0x8769
+_SIDES, _EXIF_PART = (256, 257), 0x8769  # tags of TIFF
 
 
 class Head(NamedTuple):
@@ -33,7 +33,7 @@ class Head(NamedTuple):
     Attributes:
         width: Width, pixels; 0 where it is not stated.
         height: Height, pixels; likewise.
-        tags: Values of the tags of its EXIF, or of a TIFF, by their numbers.
+        tags: Values of the tags of its EXIF, by their numbers; of a TIFF always.
         order: Order of the bytes in them, "<" or ">".
     """
 
@@ -50,42 +50,30 @@ def head_of(data: bytes, exif: bool = False) -> Head | None:
     picture, and never if it has more than `MOST_PIXELS`.
     """
     need("PIL", "photographs", "reading photographs")
+    from PIL import Image, JpegImagePlugin, PngImagePlugin
+
+    block = Image.Exif()
     with warnings.catch_warnings():  # Pillow warns of damaged tags, which it leaves out
         warnings.simplefilter("ignore")
         try:
-            return _head(data, exif)
+            if data[:4] in (b"II*\0", b"MM\0*"):
+                block.load(data)
+                width, height = (block.get(tag) for tag in _SIDES)
+            else:
+                # `Image.open` would refuse large pictures without telling how large they are.
+                is_jpeg, file = data[:2] == b"\xff\xd8", io.BytesIO(data)
+                reader: Any = (
+                    JpegImagePlugin.JpegImageFile if is_jpeg else PngImagePlugin.PngImageFile
+                )
+                picture = reader(file)
+                width, height = picture.size
+                if exif and width * height <= MOST_PIXELS:
+                    block = picture.getexif()
+            tags = {**block.get_ifd(_EXIF_PART), **block}
         except _DAMAGED:
             return None
-
-
-def _head(data: bytes, exif: bool) -> Head:
-    from PIL import JpegImagePlugin, PngImagePlugin
-
-    if data[:4] in (b"II*\0", b"MM\0*"):
-        tags, order = _tags(data)
-        return Head(_side(tags.get(_WIDTH)), _side(tags.get(_HEIGHT)), tags, order)
-    # `Image.open` would refuse large pictures without telling how large they are.
-    if data[:2] == b"\xff\xd8":
-        picture: Any = JpegImagePlugin.JpegImageFile(io.BytesIO(data))
-    else:
-        picture = PngImagePlugin.PngImageFile(io.BytesIO(data))
-        if exif and "exif" not in picture.info and picture.width * picture.height <= MOST_PIXELS:
-            picture.load()
-    tags, order = _tags(picture.info.get("exif", b"")) if exif else ({}, "<")
-    return Head(picture.width, picture.height, tags, order)
-
-
-def _side(value: object) -> int:
-    return value if isinstance(value, int) and value > 0 else 0
-
-
-def _tags(block: bytes) -> tuple[Mapping[int, Any], str]:
-    """Return the tags of an EXIF block, or of a TIFF, and the order of its bytes."""
-    from PIL import Image
-
-    found = Image.Exif()
-    found.load(block)
-    return {**found.get_ifd(_EXIF_PART), **found}, found.endian or "<"
+    width, height = (side if isinstance(side, int) and side > 0 else 0 for side in (width, height))
+    return Head(width, height, tags, block.endian or "<")
 
 
 LARGEST_FILE = 400_000_000

@@ -29,7 +29,6 @@ def write_cut(
         robot: The robot file with the measured lengths.
         overlays: A file for each photograph, or none.
     """
-    from notchflex.photographs.documents import cut_document
     from notchflex.photographs.overlay import cut_lines, write_overlay
     from notchflex.photographs.reading import read_photograph
 
@@ -37,7 +36,7 @@ def write_cut(
         overlays[0].parent.mkdir(exist_ok=True)
     for file, one in zip(overlays, cut.photographs, strict=False):
         write_overlay(file, read_photograph(one.source), one, cut_lines(cut))
-    outputs.write_json(lambda: cut_document(cut))
+    outputs.write_json(cut.document)
     if cut.reason:
         terminal.warn(f"the cut is refused: {cut.reason}.")
         unwritten = [name for name in (output, robot) if name is not None]

@@ -251,7 +251,6 @@ def _check_options(cut: bool, turn: tuple[float, ...], robot: str | None, loaded
 def _write(
     photographs: MeasuredPhotographs, outputs: Outputs, output: str | None, files: tuple[Path, ...]
 ) -> None:
-    from notchflex.photographs.documents import measured_document
     from notchflex.photographs.overlay import write_overlay
     from notchflex.photographs.reading import read_photograph
 
@@ -259,7 +258,7 @@ def _write(
         files[0].parent.mkdir(exist_ok=True)
     for file, one in zip(files, photographs.photographs, strict=False):
         write_overlay(file, read_photograph(one.source), one)
-    outputs.write_json(lambda: measured_document(photographs))
+    outputs.write_json(photographs.document)
     if output is not None and photographs.measured:
         photographs.write_csv(output)
     if outputs.prints_tables and output != "-":

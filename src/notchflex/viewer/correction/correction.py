@@ -12,14 +12,14 @@ from html import escape
 import numpy as np
 
 from notchflex import InputError
-from notchflex.photographs.board.layout import Board
-from notchflex.photographs.board.sighting import Ruler
-from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.chain.outline import straight_chain
+from notchflex.photographs.board import Board
+from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.judging import UNCERTAINTY
-from notchflex.photographs.measure import checked_uncertainty, measure_picture, refused_photograph
+from notchflex.photographs.measure import checked_uncertainty, measure_picture
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
+from notchflex.photographs.outline import straight_chain
 from notchflex.photographs.reading import read_photograph
+from notchflex.photographs.sighting import Ruler
 from notchflex.viewer.correction.picture_plane import PicturePlane
 from notchflex.viewer.page.readout import notice
 from notchflex.viewer.server import HOST, PORT, check_host, check_installed, serve
@@ -105,7 +105,7 @@ class Correction:
         except KeyboardInterrupt:
             # A fit of the photograph that is shown was not accepted.
             self.results[self.number :] = [
-                refused_photograph(one.source, self._table, NOT_LOOKED_AT)
+                MeasuredPhotograph.refused(one.source, self._table.notches, NOT_LOOKED_AT)
                 for one in self.results[self.number :]
             ]
         finally:
@@ -141,7 +141,9 @@ class Correction:
     def leave_out(self) -> None:
         """Refuse the photograph, and go on to the next one."""
         now = self.results[self.number]
-        self.results[self.number] = refused_photograph(now.source, self._table, LEFT_OUT)
+        self.results[self.number] = MeasuredPhotograph.refused(
+            now.source, self._table.notches, LEFT_OUT
+        )
         self._next()
 
     def look(self) -> None:

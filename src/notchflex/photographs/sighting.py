@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from notchflex import InputError
-from notchflex.photographs.board.layout import Board
-from notchflex.photographs.chain.camera import NO_PRIOR, ViewPrior
-from notchflex.photographs.chain.chain_table import Numbers
+from notchflex.photographs.board import Board
+from notchflex.photographs.camera import NO_PRIOR, ViewPrior
+from notchflex.photographs.chain_table import Numbers
 from notchflex.photographs.contrast import Contrast
+from notchflex.support import check_number
 
 NOT_SEEN = "no marker of the board is seen; check its layout, and that all of it is sharp and lit"
 NOT_FLAT = "the markers do not lie as on the board; check its layout, and that it is flat"
@@ -52,7 +53,7 @@ class Sighting:
         """Return what the board says of a robot at a place of the photograph, px."""
         scale = self._scale(self.numbers, position)
         steps = self.numbers + _STEP * np.eye(7)
-        slopes = np.array([self._scale(one, position) - scale for one in steps]) / _STEP
+        slopes = np.array([self._scale(numbers, position) - scale for numbers in steps]) / _STEP
         scale_deviation = math.sqrt(float(slopes @ self.spread @ slopes))
         deviation = np.sqrt(np.diag(self.spread))
         away = math.exp(self.numbers[3] - scale)
@@ -97,12 +98,12 @@ def sight(picture: NDArray[np.uint8], board: Board) -> Sighting | str:
     grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
     markers: Any = detector.detectMarkers(grey)
     names = np.zeros(0, int) if markers[1] is None else np.ravel(markers[1])
-    own = names < board.columns * board.rows
-    if not own.any():
+    is_known = names < board.columns * board.rows
+    if not is_known.any():
         return NOT_SEEN
-    corners = np.array(markers[0], float).reshape(-1, 4, 2)[own]
+    corners = np.array(markers[0], float).reshape(-1, 4, 2)[is_known]
     middle = (np.array([picture.shape[1], picture.shape[0]]) - 1.0) / 2.0
-    points = board.corners()[names[own]].reshape(-1, 2)
+    points = board.corners()[names[is_known]].reshape(-1, 2)
     fitted = _fitted(points, corners.reshape(-1, 2) - middle)
     if fitted is None:
         return NOT_FLAT
@@ -122,10 +123,10 @@ def _fitted(points: Numbers, corners: Numbers) -> tuple[Numbers, Numbers] | None
         near = (numbers[6] - _CAMERA) / _CAMERA_SPREAD
         return np.concatenate([off, numbers[4:6] / _SLOPE, [near]])
 
-    first_found = _least(residuals, np.array([*start, 0.0, 0.0, _CAMERA]))
+    upright = _least(residuals, np.array([*start, 0.0, 0.0, _CAMERA]))
     # Seen from far away, a plane with the opposite tilt looks the same.
-    other = first_found.x * [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0]
-    best, mirrored = sorted((first_found, _least(residuals, other)), key=lambda one: one.cost)
+    opposite = _least(residuals, upright.x * [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
+    best, mirrored = sorted((upright, opposite), key=lambda result: result.cost)
     off = np.linalg.norm(_projected(best.x, points) - corners, axis=1)
     side = float(np.linalg.norm(points[1] - points[0])) * math.exp(best.x[3])
     if off.max() > _MAX_OFF * side:
@@ -181,12 +182,10 @@ class Ruler:
         Raises:
             InputError: Both are given, or one is not a scale or not a board.
         """
-        scale: Any = self.scale
-        if scale is not None:
+        if self.scale is not None:
             if self.board is not None:
                 raise InputError.CONFLICT("a board gives the scale too; leave out scale or board")
-            if isinstance(scale, bool) or not isinstance(scale, (int, float, np.number)):
-                raise InputError.WRONG_TYPE(f"scale must be a number of px/mm, not {scale!r}")
+            scale = check_number(self.scale, "scale", "a number of px/mm")
             if not 0.0 < scale < math.inf:
                 raise InputError.OUT_OF_RANGE(f"scale must be above 0 px/mm, not {scale:g}")
         if self.board is not None:

@@ -87,15 +87,14 @@ def chain_table(robot: Robot) -> ChainTable:
     Raises:
         InputError: Notches of another kind than "arc", or not all cut in one plane.
     """
-    notches = robot.notches
-    arcs = [one for one in notches if isinstance(one, ArcNotch)]
-    if len(arcs) < len(notches):
-        other = next(one.kind for one in notches if not isinstance(one, ArcNotch))
+    arcs = [notch for notch in robot.notches if isinstance(notch, ArcNotch)]
+    if len(arcs) < len(robot.notches):
+        kind = next(notch.kind for notch in robot.notches if not isinstance(notch, ArcNotch))
         raise InputError.UNSUPPORTED(
-            f"{robot.name} has notches of kind {other!r}; photographs are measured for robots "
+            f"{robot.name} has notches of kind {kind!r}; photographs are measured for robots "
             'whose notches are all of kind "arc"'
         )
-    turns = np.radians([one.direction_deg - arcs[0].direction_deg for one in arcs])
+    turns = np.radians([arc.direction_deg - arcs[0].direction_deg for arc in arcs])
     if np.abs(np.sin(turns)).max() > _IN_PLANE:
         raise InputError.UNSUPPORTED(
             f"the notches of {robot.name} do not all bend in one plane; one photograph from the "
@@ -107,10 +106,10 @@ def chain_table(robot: Robot) -> ChainTable:
         tube.outer_radius,
         tube.inner_radius,
         np.sign(np.cos(turns)),
-        np.array([one.section_depth(tube) for one in arcs]),
-        np.array([one.cut == "on-axis" for one in arcs]),
-        np.array([one.height for one in arcs]),
-        np.array([one.uncut_length for one in arcs]),
+        np.array([arc.section_depth(tube) for arc in arcs]),
+        np.array([arc.cut == "on-axis" for arc in arcs]),
+        np.array([arc.height for arc in arcs]),
+        np.array([arc.uncut_length for arc in arcs]),
         _steps(robot, math.radians(arcs[0].direction_deg)),
     )
 

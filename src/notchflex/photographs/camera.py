@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from notchflex.photographs.chain.chain_table import Numbers
+from notchflex.photographs.chain_table import Numbers
 
 VIEW = ("x", "y", "direction", "log_scale", "roll", "tilt", "perspective", "kerf", "cut")
 """Numbers of a view, before the angles: place of the start of the first notch from the middle of
@@ -24,18 +26,20 @@ class View:
     """The numbers of b views of a robot of n notches."""
 
     def __init__(self, numbers: Numbers, notches: int) -> None:
-        one = dict(zip(VIEW, numbers.T, strict=False))
+        named = dict(zip(VIEW, numbers.T, strict=False))
         self.angles = numbers[:, NUMBERS : NUMBERS + notches]
-        own = numbers[:, NUMBERS + notches :]
-        if not own.size:
-            own = np.zeros((len(numbers), 3 * notches + 1))
-        kerf, cut, self.moved = np.split(own, [notches, 2 * notches], axis=1)
-        self.scale = np.exp(one["log_scale"])
+        lengths = numbers[:, NUMBERS + notches :]
+        if not lengths.size:
+            lengths = np.zeros((len(numbers), 3 * notches + 1))
+        kerf, cut, self.moved = np.split(lengths, [notches, 2 * notches], axis=1)
+        self.scale = np.exp(named["log_scale"])
         self.place = numbers[:, :2]
-        self.perspective = one["perspective"]
-        self.kerf, self.cut = one["kerf"][:, None] + kerf, one["cut"][:, None] + cut
-        rotation = _rotation(one["direction"], one["roll"], one["tilt"])
-        self.x, self.y, self.z = rotation[..., 0], rotation[..., 1], rotation[..., 2]
+        self.perspective = named["perspective"]
+        self.kerf, self.cut = named["kerf"][:, None] + kerf, named["cut"][:, None] + cut
+        # Axes of the base in camera axes (right, down, forward). At first z points right, x down.
+        turns = np.stack([named["direction"], -named["tilt"], named["roll"]], axis=1)
+        axes = Rotation.from_euler("ZYX", turns).as_matrix()
+        self.z, self.x, self.y = np.moveaxis(axes, -1, 0)
 
     def seen(self, point: Numbers) -> Numbers:
         """Project points of camera axes, mm from the start of the first notch, (b, N, 3)."""
@@ -54,19 +58,9 @@ class View:
 
 
 class Frame:
-    """Frames of points on bodies, in camera axes."""
+    """Frames of points in the plane (x, z), (b, N, 2), turned by angles, (b, N); camera axes."""
 
-    def __init__(self, view: View, start: Numbers, turned: Numbers, ring: NDArray[np.int_]) -> None:
-        self._set(view, start[:, ring], turned[:, ring])
-
-    @classmethod
-    def of(cls, view: View, start: Numbers, turned: Numbers) -> Frame:
-        """Return frames at points of the plane (x, z), (b, N, 2), turned by angles, (b, N)."""
-        frame = cls.__new__(cls)
-        frame._set(view, start, turned)
-        return frame
-
-    def _set(self, view: View, start: Numbers, turned: Numbers) -> None:
+    def __init__(self, view: View, start: Numbers, turned: Numbers) -> None:
         x, z = view.x[:, None], view.z[:, None]
         cos, sin = np.cos(turned)[..., None], np.sin(turned)[..., None]
         self.view = view
@@ -74,66 +68,35 @@ class Frame:
         self.axis = cos * z + sin * x
         self.x = cos * x - sin * z
 
-    def at(self, along: Numbers) -> Numbers:
+    def on_axis(self, along: Numbers) -> Numbers:
         """Return points on the tube axis, at lengths from the start of the body, mm."""
         return self.origin + along[..., None] * self.axis
 
     def lateral(self, centre: Numbers) -> tuple[Numbers, Numbers]:
         """Return unit vectors across the axis: across the line of sight too, and toward the eye."""
         ray = self.view.ray(centre)
-        across = _unit(_cross(self.axis, ray))
+        across = _unit(np.cross(self.axis, ray))
         across *= np.where(dot(across, self.x) < 0.0, -1.0, 1.0)[..., None]
         toward = dot(ray, self.axis)[..., None] * self.axis - ray
         return across, _unit(toward)
 
 
-def dot(one: Numbers, other: Numbers) -> Numbers:
+def dot(left: NDArray[Any], right: NDArray[Any]) -> Numbers:
     """Return the scalar products of vectors, (..., 3)."""
-    return np.einsum("...i,...i->...", one, other)
+    return np.einsum("...i,...i->...", left, right)
 
 
-def _unit(vector: Numbers) -> Numbers:
+def _unit(vector: NDArray[Any]) -> Numbers:
     return vector / np.sqrt(dot(vector, vector))[..., None]
-
-
-def _cross(one: Numbers, other: Numbers) -> Numbers:
-    """Return the vector products; `np.cross` takes three times as long."""
-    ax, ay, az = one[..., 0], one[..., 1], one[..., 2]
-    bx, by, bz = other[..., 0], other[..., 1], other[..., 2]
-    product = np.empty(np.broadcast_shapes(one.shape, other.shape))
-    product[..., 0], product[..., 1], product[..., 2] = (
-        ay * bz - az * by,
-        az * bx - ax * bz,
-        ax * by - ay * bx,
-    )
-    return product
-
-
-def _rotation(direction: Numbers, roll: Numbers, tilt: Numbers) -> Numbers:
-    """Return the axes of the base in camera axes (right, down, forward), as columns, (b, 3, 3)."""
-    zero, one = np.zeros_like(roll), np.ones_like(roll)
-    cos, sin = np.cos(roll), np.sin(roll)
-    rolled = _matrix([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
-    # z of the base to the right, x down, y forward
-    laid = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    cos, sin = np.cos(tilt), np.sin(tilt)
-    tilted = _matrix([[cos, zero, -sin], [zero, one, zero], [sin, zero, cos]])
-    cos, sin = np.cos(direction), np.sin(direction)
-    turned = _matrix([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
-    return turned @ tilted @ laid @ rolled
-
-
-def _matrix(rows: list[list[Numbers]]) -> Numbers:
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 @dataclass(frozen=True)
 class ViewPrior:
-    """Prior of the view at one position of a photograph, from a board or a ruler.
+    """Prior of the view at one position of a photograph, from a board or a number.
 
     Attributes:
         scale: Pixels per mm there; NaN if it is not known.
-        scale_deviation: Standard deviation of its logarithm.
+        scale_deviation: Standard deviation of its logarithm; infinite if it is not known.
         slope: How a plane through the robot leads away from the camera along the axes of the
             photograph, (2,): mm deeper for every mm to the right, and down.
         slope_deviation: Standard deviation of the tilt that follows from it, rad; infinite if it
@@ -149,11 +112,6 @@ class ViewPrior:
     perspective: float = 0.0
     perspective_deviation: float = math.inf
 
-    @property
-    def has_scale(self) -> bool:
-        """Whether the scale is known."""
-        return math.isfinite(self.scale_deviation)
-
     def tilt(self, direction: float) -> float:
         """Return the tilt of a tube that lies in the plane, by its direction, rad."""
         return math.atan(self.slope[0] * math.cos(direction) + self.slope[1] * math.sin(direction))
@@ -162,13 +120,5 @@ class ViewPrior:
         """Return the same for a photograph that was made smaller by a factor."""
         return replace(self, scale=self.scale * factor)
 
-    def contradicted(self, numbers: Numbers) -> bool:
-        """Whether a fit has another scale."""
-        return (
-            self.has_scale
-            and abs(numbers[3] - math.log(self.scale)) > _APART * self.scale_deviation
-        )
-
 
 NO_PRIOR = ViewPrior()
-_APART = 3.0  # standard deviations

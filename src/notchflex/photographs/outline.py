@@ -8,7 +8,6 @@ arc of the wall, bent to a circle.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,17 +15,21 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from notchflex import InputError
-from notchflex.photographs.chain.camera import NO_PRIOR, NUMBERS, Frame, View, ViewPrior, dot
-from notchflex.photographs.chain.chain_table import ChainTable, Numbers
+from notchflex.photographs.camera import NO_PRIOR, NUMBERS, Frame, View, ViewPrior, dot
+from notchflex.photographs.chain_table import ChainTable, Numbers
+from notchflex.photographs.lines import Lines
 
 SIDE, FACE, SPINE = 0, 1, 2
 """Kinds of outline: the sides of a ring, its ends, the two edges of a spine."""
 
+BASE = 1.2
+"""Length of the straight tube before the first notch that is looked at, outer radii."""
+
+MIN_ANGLE, MAX_ANGLE = -0.6, 1.9
+"""Angles of notches that are looked for, rad."""
+
 _SPINE_END = 0.2
 """Part of a spine at either end that is not used: fillets and the corners of rings."""
-
-
-_Index = dict[tuple[int, int, float, int], int]
 
 
 class Outline(NamedTuple):
@@ -46,7 +49,6 @@ class Outline(NamedTuple):
     breadth: Numbers
 
 
-@dataclass(frozen=True)
 class OutlineModel:
     """The outline of a robot as a function of its view and its notch angles.
 
@@ -54,48 +56,50 @@ class OutlineModel:
         table: The robot.
         per_side: Points on each side of a ring.
         per_face: Points on each end of a ring.
-        base: Length of the straight tube before the first notch that is looked at, mm.
         corner: Part of an end next to the spine that is not used, outer radii.
         shift: How far blur and shading may shift all edges alike, px (standard deviation).
         prior: Prior of the view: scale, tilt, distance of the camera.
+
+    Attributes:
+        kind: Kind of each of the N points: `SIDE`, `FACE` or `SPINE`, (N,).
+        ring: Its ring or notch, (N,).
+        which: Its side or end: -1 or 1, (N,).
+        place: Place along it, 0 to 1, (N,).
+        lines: The lines on which the points lie.
     """
 
-    table: ChainTable
-    per_side: int = 24
-    per_face: int = 16
-    base: float = 1.0
-    corner: float = 0.12
-    shift: float = 0.7
-    prior: ViewPrior = NO_PRIOR
-
-    def __post_init__(self) -> None:
-        """Number all points: kind, ring or notch, side or end, place along it."""
-        n = self.table.notches
-        rings, sides = np.arange(n + 1), np.array([-1.0, 1.0])
-        along = np.linspace(0.06, 0.94, self.per_side)
-        across = np.linspace(0.0, 1.0, self.per_face)
-        spine = np.linspace(_SPINE_END, 1.0 - _SPINE_END, max(3, self.per_side // 3))
+    def __init__(
+        self,
+        table: ChainTable,
+        per_side: int = 24,
+        per_face: int = 16,
+        corner: float = 0.12,
+        shift: float = 0.7,
+        prior: ViewPrior = NO_PRIOR,
+    ) -> None:
+        self.table, self.corner, self.prior = table, corner, prior
+        rings, sides = np.arange(table.notches + 1), [-1, 1]
+        along = np.linspace(0.06, 0.94, per_side)
+        across = np.linspace(0.0, 1.0, per_face)
+        spine = np.linspace(_SPINE_END, 1.0 - _SPINE_END, max(3, per_side // 3))
         blocks = [
             _block(SIDE, rings, sides, along),
-            _block(FACE, rings[1:], [-1.0], across),
-            _block(FACE, rings, [1.0], across),
+            _block(FACE, rings[1:], [-1], across),
+            _block(FACE, rings, [1], across),
             _block(SPINE, rings[1:], sides, spine),
         ]
-        kind, ring, which, place = (np.concatenate(one) for one in zip(*blocks, strict=True))
-        object.__setattr__(self, "kind", kind.astype(int))
-        object.__setattr__(self, "ring", ring.astype(int))
-        object.__setattr__(self, "which", which)
-        object.__setattr__(self, "place", place)
-        index = self._index()
-        object.__setattr__(self, "across", self._other(index))
-        object.__setattr__(self, "facing", self._facing(index))
-
-    kind: NDArray[np.int_] = None  # type: ignore[assignment]
-    ring: NDArray[np.int_] = None  # type: ignore[assignment]
-    which: Numbers = None  # type: ignore[assignment]
-    place: Numbers = None  # type: ignore[assignment]
-    across: NDArray[np.int_] = None  # type: ignore[assignment]
-    facing: NDArray[np.int_] = None  # type: ignore[assignment]
+        names = np.concatenate([name for name, _ in blocks], axis=1)
+        self.kind, self.ring, self.which, _ = names
+        self.place = np.concatenate([place for _, place in blocks])
+        names_of_lines = self.kind * 10000 + self.ring * 2 + (self.which > 0)
+        self.lines = Lines(names_of_lines, self.place, shift)
+        number = {name: row for row, name in enumerate(zip(*names.tolist(), strict=True))}
+        # The other end of the tube before the first notch is hidden: its sides give the inside.
+        hidden = number[SIDE, 0, -1, 0]
+        self._across = np.array([number.get((k, r, -w, p), hidden) for k, r, w, p in number])
+        self._facing = np.array(
+            [number.get((k, r + w, -w, p), -1) if k == FACE else -1 for k, r, w, p in number]
+        )
 
     def outline(self, numbers: Numbers) -> Outline:
         """Return the outline of views and angles.
@@ -122,41 +126,13 @@ class OutlineModel:
 
     def _oriented(self, projected: Numbers, normal: Numbers, view: View) -> tuple[Numbers, ...]:
         """Turn normals outward; find the room outside and the breadth inside of each point."""
-        inward = ((projected[self.across] - projected) * normal).sum(axis=1)
+        inward = ((projected[self._across] - projected) * normal).sum(axis=1)
         outward = -np.sign(inward)
         normal = normal * np.where(outward == 0.0, 1.0, outward)[:, None]
         room = np.full(len(projected), np.inf)
-        has = self.facing >= 0
-        room[has] = ((projected[self.facing[has]] - projected[has]) * normal[has]).sum(axis=1)
+        has = self._facing >= 0
+        room[has] = ((projected[self._facing[has]] - projected[has]) * normal[has]).sum(axis=1)
         return normal, room, np.abs(inward)
-
-    def _other(self, index: _Index) -> NDArray[np.int_]:
-        """Return the point across the robot of each point."""
-        other = np.arange(len(self.kind))
-        for key, number in index.items():
-            kind, ring, which, place = key
-            other[number] = index.get((kind, ring, -which, place), number)
-            if kind == FACE and ring == 0:  # its other end is the collet: sides give the inside
-                other[number] = index[(SIDE, 0, -1.0, 0)]
-        return other
-
-    def _facing(self, index: _Index) -> NDArray[np.int_]:
-        """Return the point across the notch of each point of an end; -1 where there is none."""
-        facing = np.full(len(self.kind), -1)
-        for (kind, ring, which, place), number in index.items():
-            if kind == FACE:
-                facing[number] = index.get((FACE, ring + int(which), -which, place), -1)
-        return facing
-
-    def _index(self) -> _Index:
-        counts: dict[tuple[int, int, float], int] = {}
-        index: _Index = {}
-        for number, key in enumerate(
-            zip(self.kind.tolist(), self.ring.tolist(), self.which.tolist(), strict=True)
-        ):
-            counts[key] = counts.get(key, -1) + 1
-            index[(*key, counts[key])] = number
-        return index
 
     def _sides(
         self, view: View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
@@ -164,8 +140,8 @@ class OutlineModel:
         ring = self.ring[part]
         begin, end = self._ends(view)
         first, last = begin[:, ring], end[:, ring]
-        frame = Frame(view, start, turned, ring)
-        centre = frame.at(first + (last - first) * self.place[part])
+        frame = Frame(view, start[:, ring], turned[:, ring])
+        centre = frame.on_axis(first + (last - first) * self.place[part])
         lateral, _ = frame.lateral(centre)
         across = self.table.outer * self.which[part]
         return centre + across[:, None] * lateral, frame.axis
@@ -173,7 +149,7 @@ class OutlineModel:
     def _ends(self, view: View) -> tuple[Numbers, Numbers]:
         """Return where the rings begin and end, along each from its start, mm, (b, n + 1)."""
         n, half = self.table.notches, 0.5 * view.kerf
-        begin = np.full((len(half), n + 1), -self.base)
+        begin = np.full((len(half), n + 1), -BASE * self.table.outer)
         begin[:, 1:] = half + view.moved[:, :n]
         end = np.append(0.0, self.table.uncut) + view.moved
         end[:, :n] -= half
@@ -185,8 +161,8 @@ class OutlineModel:
         ring, which = self.ring[part], self.which[part]
         n = self.table.notches
         begin, end = self._ends(view)
-        frame = Frame(view, start, turned, ring)
-        centre = frame.at(np.where(which > 0, end[:, ring], begin[:, ring]))
+        frame = Frame(view, start[:, ring], turned[:, ring])
+        centre = frame.on_axis(np.where(which > 0, end[:, ring], begin[:, ring]))
         lateral, toward = frame.lateral(centre)
         notch = np.clip(np.where(which > 0, ring, ring - 1), 0, n - 1)
         tip = (which > 0) & (ring == n)
@@ -220,7 +196,7 @@ class OutlineModel:
         reach = (length * place * np.sinc(0.5 * at / np.pi))[..., None]
         heading = angle0 + 0.5 * at
         corner = before + reach * np.stack([np.sin(heading), np.cos(heading)], axis=-1)
-        frame = Frame.of(view, corner, angle0 + at)
+        frame = Frame(view, corner, angle0 + at)
         centre = frame.origin
         lateral, _ = frame.lateral(centre)
         side = self.table.side[notch]
@@ -261,17 +237,15 @@ def spine_edge(
 
 
 def _block(
-    kind: int, rings: NDArray[np.int_], which: list[float] | Numbers, place: Numbers
-) -> tuple[Numbers, ...]:
-    grid = np.meshgrid(rings, which, place, indexing="ij")
-    return np.full(grid[0].size, float(kind)), *(one.ravel().astype(float) for one in grid)
+    kind: int, rings: NDArray[np.int_], which: list[int], place: Numbers
+) -> tuple[NDArray[np.int_], Numbers]:
+    """Return kind, ring, side and number of all points of a kind, (4, N), and their places."""
+    grid = np.meshgrid([kind], rings, which, np.arange(len(place)), indexing="ij")
+    names = np.reshape(grid, (4, -1))
+    return names, place[names[3]]
 
-
-BASE = 1.2
-"""Length of the straight tube before the first notch that is looked at, outer radii."""
 
 _ROLL = math.radians(5.0)  # of starts: views that are rolled a little are found from there
-_MIN_ANGLE, _MAX_ANGLE = -0.6, 1.9  # rad: angles of notches
 
 
 def axis_points(table: ChainTable, numbers: Numbers) -> Numbers:
@@ -288,8 +262,8 @@ def axis_points(table: ChainTable, numbers: Numbers) -> Numbers:
     start, turned = table.poses(view.angles)
     bodies = np.concatenate([[0], np.arange(table.notches + 1)])
     along = np.concatenate([[-BASE * table.outer, 0.0], table.uncut])
-    frame = Frame(view, start, turned, bodies)
-    return view.seen(frame.at(along))[0]
+    frame = Frame(view, start[:, bodies], turned[:, bodies])
+    return view.seen(frame.on_axis(along))[0]
 
 
 def on_axis_points(table: ChainTable, points: Numbers) -> list[Numbers]:
@@ -322,7 +296,7 @@ def on_axis_points(table: ChainTable, points: Numbers) -> list[Numbers]:
     candidates: list[tuple[float, Numbers]] = []
     for side, roll in ((1.0, _ROLL), (-1.0, math.pi + _ROLL)):
         view = [0.0, 0.0, 0.0, 0.0, roll, 0.0, 0.003 / table.outer, 0.0, 0.0]
-        first = np.clip(side * np.diff(heading) * table.side, _MIN_ANGLE, _MAX_ANGLE)
+        first = np.clip(side * np.diff(heading) * table.side, MIN_ANGLE, MAX_ANGLE)
         start = np.array([*points[1], heading[0], math.log(scale), *first])
         free = [0, 1, 2, 3, *range(NUMBERS, NUMBERS + table.notches)]
         numbers = np.array([*view, *first])
@@ -332,9 +306,9 @@ def on_axis_points(table: ChainTable, points: Numbers) -> list[Numbers]:
             return (axis_points(table, numbers) - points).ravel()
 
         bound = np.full(len(start), np.inf)
-        bound[4:] = _MAX_ANGLE
+        bound[4:] = MAX_ANGLE
         lower = np.full(len(start), -np.inf)
-        lower[4:] = _MIN_ANGLE
+        lower[4:] = MIN_ANGLE
         solved = least_squares(off, start, bounds=(lower, bound), x_scale="jac", max_nfev=60)
         numbers[free] = solved.x
         candidates.append((float(solved.cost), numbers))

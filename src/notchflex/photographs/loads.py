@@ -30,7 +30,7 @@ def exif_texts(photograph: bytes) -> list[str]:
     if code == "utf-16":
         code = "utf-16-le" if head.order == "<" else "utf-16-be"
     texts = text.decode(code or "utf-8", "replace"), description.decode("utf-8", "replace")
-    return [text for one in texts if (text := one.replace("\0", " ").strip())]
+    return [words for text in texts if (words := text.replace("\0", " ").strip())]
 
 
 def _bytes(value: object) -> bytes:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,20 +19,18 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from notchflex import ArcNotch, InputError, Robot
-from notchflex.photographs.board.layout import Board
-from notchflex.photographs.board.sighting import NO_RULER, Ruler
-from notchflex.photographs.chain.camera import NUMBERS
-from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_table
-from notchflex.photographs.chain.outline import OutlineModel, spine_edge
-from notchflex.photographs.contrast import contrast
-from notchflex.photographs.fitting import Fit, covariance, misfit, refine
+from notchflex.photographs.board import Board
+from notchflex.photographs.camera import NUMBERS
+from notchflex.photographs.chain_table import ChainTable, Numbers, chain_table
+from notchflex.photographs.fitting import refine
 from notchflex.photographs.judging import rejection_reason
-from notchflex.photographs.locating import EDGE_NOISE, locate, reversed_view
-from notchflex.photographs.measure import NO_TUBE, judged_photograph, refused_photograph, smaller
+from notchflex.photographs.locating import EDGE_NOISE, reversed_view, scaled
+from notchflex.photographs.measure import judged_photograph, names_of, see
 from notchflex.photographs.measured import MeasuredPhotograph
-from notchflex.photographs.missing import MAX_RESIDUAL
+from notchflex.photographs.outline import OutlineModel, spine_edge
 from notchflex.photographs.reading import read_photograph
-from notchflex.support import robot_text, write_columns, write_text
+from notchflex.photographs.sighting import NO_RULER, Ruler
+from notchflex.support import document_head, robot_text, write_columns, write_text
 
 LENGTHS = ("height", "depth", "uncut_length")
 """The measured lengths, by their names in a robot file."""
@@ -86,8 +84,17 @@ class MeasuredCut:
             InputError: The file cannot be written.
         """
         columns = self.columns()
-        notches = columns["notch"].astype(int)
-        write_columns(target, {**columns, "notch": notches})
+        write_columns(target, {**columns, "notch": columns["notch"].astype(int)})
+
+    def document(self) -> dict[str, Any]:
+        """Return the JSON document: the notches, or why they were refused."""
+        photographs = [
+            {"photograph": one.source, "turn_deg": math.degrees(turn), **one.view()}
+            for one, turn in zip(self.photographs, self.turns, strict=True)
+        ]
+        document: dict[str, Any] = {"measured": self.measured, "photographs": photographs}
+        document |= self.columns() if self.measured else {"reason": self.reason}
+        return {**document_head(self.robot), **document}
 
     def as_cut(self) -> Robot:
         """Return the robot with the measured heights, depths and uncut lengths.
@@ -159,90 +166,64 @@ def fit_straight(
 ) -> StraightFit:
     """Fit heights, depths and places of all notches to a photograph, (height, width, 3)."""
     n = table.notches
-    picture, factor = smaller(picture)
-    reading = ruler.read(picture, factor)
-    if isinstance(reading, str):
-        return _refused(refused_photograph(name, table, reading), n)
-    whole = reading.hidden(contrast(picture))
-    located = locate(table, whole, reading)
-    if located is None:
-        return _refused(refused_photograph(name, table, NO_TUBE), n)
+    seen = see(picture, table, ruler)
+    if isinstance(seen, str):
+        return _refused(name, n, seen)
+    located = seen.located
     if np.abs(located.fit.numbers[NUMBERS:]).max() > 1.5 * _MAX_ANGLE:
-        return _refused(refused_photograph(name, table, _BENT), n)
-    numbers = np.concatenate([located.fit.numbers, np.zeros(3 * n + 1)])
-    wide = 2.0 * table.outer * math.exp(numbers[3]) / located.factor
+        return _refused(name, n, _BENT)
+    full = scaled(located.fit.numbers, 1.0 / located.factor)
+    wide = 2.0 * table.outer * math.exp(full[3])
     fine = min(1.0, _WIDTH / wide)
-    numbers[:2] *= fine / located.factor
-    numbers[3] += math.log(fine / located.factor)
-    image = whole.reduced(fine)
-    middle = (np.array(image.value.shape[::-1]) - 1.0) / 2.0
-    reach = max(_LAST, _REACH * wide * fine)
-    reaches = [reach, reach, reach, *(_ROUNDS * [_LAST])]
-    view_prior = located.model.prior.smaller(fine / located.factor)
-    model = replace(located.model, corner=_CORNER, shift=_SHIFT, prior=view_prior)
-    fit = _best(
-        [
-            refine(model, image, start, reaches, middle, MAX_RESIDUAL)
-            for start in _tilted(table, numbers)
-        ],
-        model,
-    )
-    result = located._replace(fit=fit, model=model, factor=fine)
-    both, noise = covariance(fit, model)
+    reaches = [*3 * [max(_LAST, _REACH * wide * fine)], *_ROUNDS * [_LAST]]
+    view_prior = located.fit.model.prior.smaller(fine / located.factor)
+    model = OutlineModel(table, corner=_CORNER, shift=_SHIFT, prior=view_prior)
+    start = np.concatenate([scaled(full, fine), np.zeros(3 * n + 1)])
+    image = seen.contrast.reduced(fine)
+    fits = [refine(model, image, view, reaches) for view in _tilted(table, start)]
+    noise = max(EDGE_NOISE, min(fit.noise for fit in fits))
+    fit = min(fits, key=lambda fit: fit.misfit(noise))
+    spread = fit.covariance()
     angles = slice(NUMBERS, NUMBERS + n)
-    deviation = np.sqrt(np.maximum(np.diag(both)[angles], 0.0))
-    reason = rejection_reason(result, deviation, noise)
+    deviation = np.sqrt(np.maximum(np.diag(spread)[angles], 0.0))
+    reason = rejection_reason(fit, located.rivals, deviation)
     if not reason and np.abs(fit.numbers[angles]).max() > _MAX_ANGLE:
         reason = _BENT
-    judged = (reason, noise, factor * fine)
-    photograph = judged_photograph(name, result, both[angles, angles], judged, middle)
-    rows, edges = _lengths(n, len(numbers)), _edges(table, fit.numbers)
-    steps = _STEP * np.eye(len(numbers))
-    shifts = [_edges(table, fit.numbers + step) - edges for step in steps]
-    slopes = np.stack(shifts, axis=1) / _STEP
-    return StraightFit(
-        photograph,
-        rows @ fit.numbers,
-        rows @ both @ rows.T,
-        edges,
-        slopes @ both @ slopes.T,
-    )
+    seen = seen._replace(located=located._replace(fit=fit, factor=fine))
+    photograph = judged_photograph(name, seen, spread[angles, angles], reason)
+    rows, edges = _lengths(n, len(start)), _edges(table, fit.numbers)
+    steps = _STEP * np.eye(len(start))
+    slopes = np.stack([_edges(table, fit.numbers + step) - edges for step in steps], axis=1) / _STEP
+    lengths, of_lengths = rows @ fit.numbers, rows @ spread @ rows.T
+    return StraightFit(photograph, lengths, of_lengths, edges, slopes @ spread @ slopes.T)
 
 
-def _refused(photograph: MeasuredPhotograph, n: int) -> StraightFit:
-    none, spread = np.full(n, np.nan), np.zeros((0, 0))
-    return StraightFit(photograph, np.tile(none, 2), spread, none, spread)
+def _refused(name: str, n: int, reason: str) -> StraightFit:
+    photograph = MeasuredPhotograph.refused(name, n, reason)
+    nothing, spread = np.full(n, np.nan), np.zeros((0, 0))
+    return StraightFit(photograph, np.tile(nothing, 2), spread, nothing, spread)
 
 
-def _tilted(table: ChainTable, numbers: Numbers) -> list[Numbers]:
+def _tilted(table: ChainTable, numbers: Numbers) -> Numbers:
     """Return starts whose views differ: edges of a straight robot hardly show them at first."""
-    tilted: list[Numbers] = []
     roll, tilt = float(numbers[4]), float(numbers[5])
     mirrored = float(reversed_view(numbers)[4])
-    for view in ((roll, tilt), (roll, -tilt), (roll, 0.0), (mirrored, 0.0)):
-        start = numbers.copy()
-        start[4:7] = *view, 0.003 / table.outer
-        tilted.append(start)
-    return tilted
-
-
-def _best(fits: list[Fit], model: OutlineModel) -> Fit:
-    noise = max(EDGE_NOISE, min(covariance(fit, model)[1] for fit in fits))
-    return min(fits, key=lambda fit: misfit(fit, model, noise))
+    starts = np.tile(numbers, (4, 1))
+    starts[:, 4:6] = (roll, tilt), (roll, -tilt), (roll, 0.0), (mirrored, 0.0)
+    starts[:, 6] = 0.003 / table.outer
+    return starts
 
 
 def _lengths(n: int, count: int) -> Numbers:
     """Return heights and uncut lengths as sums of the numbers that were fitted, (2 n, count)."""
     first, moved = NUMBERS + n, NUMBERS + 3 * n
     rows = np.zeros((2 * n, count))
-    for notch in range(n):
-        rows[notch, [7, first + notch]] = 1.0
-    for notch in range(n):
-        uncut = rows[n + notch]
-        uncut[moved + notch + 1], uncut[moved + notch] = 1.0, -1.0
-        uncut -= 0.5 * rows[notch]
-        if notch + 1 < n:
-            uncut -= 0.5 * rows[notch + 1]
+    height, uncut = rows[:n], rows[n:]
+    notch = np.arange(n)
+    height[:, 7] = height[notch, first + notch] = 1.0
+    uncut[notch, moved + notch + 1], uncut[notch, moved + notch] = 1.0, -1.0
+    uncut -= 0.5 * height
+    uncut[:-1] -= 0.5 * height[1:]
     return rows
 
 
@@ -305,7 +286,7 @@ def depths(
         start = np.zeros(len(scales))
         start[n] = roll / _ROLL
         results.append(least_squares(residuals, start))
-    best = min(results, key=lambda one: one.cost)
+    best = min(results, key=lambda result: result.cost)
     covariance = np.linalg.inv(best.jac.T @ best.jac)
     return (
         (best.x * scales)[:n],
@@ -358,38 +339,35 @@ def measure_cut(
         >>> cut = nf.measure_cut(["a.jpg", "b.jpg"], robot, turn_deg=20)  # doctest: +SKIP
         >>> cut.write_robot("wrist-as-cut.toml")  # doctest: +SKIP
     """
-    one = isinstance(photographs, (str, os.PathLike))
-    names = [os.fspath(name) for name in ([photographs] if one else photographs)]
+    names = names_of(photographs)
     turns = _turns(len(names), turn_deg)
     table, ruler = chain_table(robot), Ruler(scale, board)
     fits: list[StraightFit] = []
-    for number, name in enumerate(names):
+    for number, name in enumerate(names, 1):
         fits.append(fit_straight(read_photograph(name), table, name, ruler))
         if progress is not None:
-            progress("measuring", number + 1, len(names))
+            progress("measuring", number, len(names))
     return combined(table, fits, turns)
 
 
 def _turns(count: int, turn_deg: float | Sequence[float]) -> Numbers:
-    if count == 0:
-        raise InputError.NO_DATA("there is no photograph to measure; name one or more")
     try:
-        given: NDArray[np.float64] = np.atleast_1d(np.asarray(turn_deg, float))
+        turns: NDArray[np.float64] = np.atleast_1d(np.asarray(turn_deg, float))
     except (TypeError, ValueError):
         raise InputError.WRONG_TYPE(
             f"turn_deg must be a number or a list of numbers, not {turn_deg!r}"
         ) from None
-    if given.ndim > 1 or len(given) != count - 1:
+    if turns.ndim > 1 or len(turns) != count - 1:
         raise InputError.WRONG_SHAPE(
             f"{count} photographs need {count - 1} turns, one for each after the first; got "
-            f"{given.size}"
+            f"{turns.size}"
         )
-    if not (np.abs(given) <= MAX_TURN_DEG).all():
+    if not (np.abs(turns) <= MAX_TURN_DEG).all():
         raise InputError.OUT_OF_RANGE(
             f"turns must lie between -{MAX_TURN_DEG:g} and {MAX_TURN_DEG:g} deg, not "
-            f"{', '.join(f'{turn:g}' for turn in given)}"
+            f"{', '.join(f'{turn:g}' for turn in turns)}"
         )
-    return np.radians(np.concatenate([[0.0], given]))
+    return np.radians(np.concatenate([[0.0], turns]))
 
 
 def combined(table: ChainTable, fits: Sequence[StraightFit], turns: Numbers) -> MeasuredCut:
@@ -448,5 +426,5 @@ def _cut(
 ) -> MeasuredCut:
     nothing = np.full(table.notches, math.nan)
     names = [*LENGTHS, *(f"{name}_deviation" for name in LENGTHS)]
-    given = {name: values.get(name, nothing) for name in names}
-    return MeasuredCut(table.robot, photographs, turns, reason, **given)
+    lengths = {name: values.get(name, nothing) for name in names}
+    return MeasuredCut(table.robot, photographs, turns, reason, **lengths)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex import InputError
-from notchflex.photographs.chain.chain_table import Numbers
-from notchflex.support import need, write_text
+from notchflex.photographs.chain_table import Numbers
+from notchflex.support import check_integer, check_number, need, write_text
 
 DICTIONARIES = (
     *(f"{bits}x{bits}_{count}" for bits in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),
@@ -55,20 +55,15 @@ class Board:
             InputError: A number is out of range, or the dictionary is unknown or too small.
         """
         for name in ("columns", "rows"):
-            count = getattr(self, name)
-            if (
-                isinstance(count, bool)
-                or not isinstance(count, int)
-                or not 1 <= count <= _MAX_SQUARES
-            ):
+            count = check_integer(getattr(self, name), f"{name} of a board")
+            if not 1 <= count <= _MAX_SQUARES:
                 raise InputError.OUT_OF_RANGE(
                     f"{name} of a board must be a whole number from 1 to {_MAX_SQUARES}, "
                     f"not {count!r}"
                 )
         for name in ("marker", "gap"):
-            length = getattr(self, name)
-            number = isinstance(length, (int, float)) and not isinstance(length, bool)
-            if not number or not 0.0 < length <= 1000.0:
+            length = check_number(getattr(self, name), f"{name} of a board", "a length in mm")
+            if not 0.0 < length <= 1000.0:
                 raise InputError.OUT_OF_RANGE(
                     f"{name} of a board must be a length from 0 to 1000 mm, not {length!r}"
                 )
@@ -122,11 +117,11 @@ class Board:
         """Return which cells of every marker are white, with its black border, (m, c, c)."""
         dictionary = self.opencv_dictionary()
         side = dictionary.markerSize + 2
-        numbers = range(self.columns * self.rows)
-        return (
-            np.array([dictionary.generateImageMarker(one, side, borderBits=1) for one in numbers])
-            > 0
-        )
+        markers = [
+            dictionary.generateImageMarker(number, side, borderBits=1)
+            for number in range(self.columns * self.rows)
+        ]
+        return np.array(markers) > 0
 
     def svg(self) -> str:
         """Return a drawing in its true size, in mm, with a white border."""
@@ -178,33 +173,17 @@ def board_of(text: str) -> Board:
         >>> board_of("4x3,marker=5,gap=1.5").text()
         '4x3,marker=5,gap=1.5'
     """
-    grid, *others = (part.strip() for part in text.split(","))
-    given: dict[str, Any] = {}
-    for part in others:
-        key, _, value = part.partition("=")
-        given[key.strip()] = value.strip()
-    columns, cross, rows = grid.partition("x")
-    keys = {"marker", "gap", "dictionary"}
-    if (
-        not (cross and columns.isdecimal() and rows.isdecimal())
-        or not {
-            "marker",
-            "gap",
-        }
-        <= set(given)
-        <= keys
-        or len(given) < len(others)
-    ):
+    grid, *assignments = (part.strip() for part in text.split(","))
+    values = dict(re.findall(r"(\w+)\s*=\s*([^\s,]+)", text))
+    counts = re.fullmatch(r"(\d+)x(\d+)", grid)
+    number = r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?"
+    lengths = [values.pop(name, "") for name in ("marker", "gap")]
+    is_number = all(re.fullmatch(number, length, re.IGNORECASE) for length in lengths)
+    is_complete = len(values) + 2 == len(assignments) and set(values) <= {"dictionary"}
+    if counts is None or not is_number or not is_complete:
         raise InputError.BAD_SYNTAX(
             f"{text!r} is not a board; give columns x rows, and marker and gap in mm, {_WAYS}"
         )
-    for name in ("marker", "gap"):
-        try:
-            given[name] = float(given[name])
-        except ValueError:
-            given[name] = math.nan
-        if not math.isfinite(given[name]):
-            raise InputError.BAD_SYNTAX(
-                f"{name} of the board {text!r} is not a length in mm, {_WAYS}"
-            )
-    return Board(int(columns), int(rows), **given)
+    columns, rows = map(int, counts.groups())
+    marker, gap = map(float, lengths)
+    return Board(columns, rows, marker, gap, **values)

@@ -1,1 +1,0 @@
-"""A board of markers beside the robot: it gives the scale and the tilt of a photograph."""

@@ -1,1 +1,0 @@
-"""The projected chain: poses of the bodies, the camera, and the outline that it sees."""

@@ -1,1 +1,0 @@
-"""Notches as they were cut, from photographs of the straight robot."""
