@@ -11,8 +11,7 @@ import numpy as np
 
 from notchflex.photographs.camera import NUMBERS
 from notchflex.photographs.chain_table import Numbers
-from notchflex.photographs.contrast import Contrast
-from notchflex.photographs.edges import Edges, find_edges
+from notchflex.photographs.edges import Contrast, Edges, find_edges
 from notchflex.photographs.lines import from_median, median_shift
 from notchflex.photographs.outline import MAX_ANGLE, MIN_ANGLE, Outline, OutlineModel
 

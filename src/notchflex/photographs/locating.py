@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from notchflex.photographs.camera import NUMBERS
 from notchflex.photographs.chain_table import ChainTable, Numbers
-from notchflex.photographs.contrast import Contrast
+from notchflex.photographs.edges import Contrast
 from notchflex.photographs.fitting import Fit, refine
 from notchflex.photographs.judging import missing
 from notchflex.photographs.outline import OutlineModel, axis_points, on_axis_points

@@ -15,7 +15,7 @@ from notchflex import InputError, Robot, tip_from_angles
 from notchflex.photographs.board import Board
 from notchflex.photographs.camera import NUMBERS
 from notchflex.photographs.chain_table import ChainTable, Numbers, chain_table
-from notchflex.photographs.contrast import Contrast, contrast
+from notchflex.photographs.edges import Contrast, contrast
 from notchflex.photographs.fitting import MAX_RESIDUAL
 from notchflex.photographs.judging import UNCERTAINTY, rejection_reason
 from notchflex.photographs.loads import loads_of

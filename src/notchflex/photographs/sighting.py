@@ -15,7 +15,7 @@ from notchflex import InputError
 from notchflex.photographs.board import Board
 from notchflex.photographs.camera import NO_PRIOR, ViewPrior
 from notchflex.photographs.chain_table import Numbers
-from notchflex.photographs.contrast import Contrast
+from notchflex.photographs.edges import Contrast
 from notchflex.support import check_number
 
 NOT_SEEN = "no marker of the board is seen; check its layout, and that all of it is sharp and lit"
