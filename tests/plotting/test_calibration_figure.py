@@ -11,7 +11,7 @@ from scipy.stats import t
 from fitted import NAMES, fitted
 from notchflex.fit import Interval
 from notchflex.plotting import calibration_picture, picture
-from notchflex.plotting.sheet import Area
+from notchflex.plotting.marks import Area
 from notchflex.plotting.style import VERMILLION
 
 
@@ -107,7 +107,7 @@ def test_legend_fits_on_the_paper():
     found = fitted()
     own = calibration_picture(found)
     # Least of all are the total angle and its residuals.
-    for made in (own, replace(own, width=6.0, height=3.0, cells=own.cells[:2])):
+    for made in (own, replace(own, column_width=2.5, row_height=2.4, cells=own.cells[:2])):
         figure = made.figure()
         figure.draw_without_rendering()
         (legend,) = figure.legends

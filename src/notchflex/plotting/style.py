@@ -33,6 +33,9 @@ VERMILLION = "#D55E00"
 PURPLE = "#CC79A7"
 GREY = "#7F7F7F"
 
+MODEL_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
+"""Colours of models, robots or workspaces beside each other."""
+
 DIVERGING = "PuOr"
 """matplotlib's name of the colours from -1 to 1: orange, white, purple."""
 

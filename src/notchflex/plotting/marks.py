@@ -1,7 +1,7 @@
-"""Describes a picture: panels of lines, areas and arrows with their axes, on a grid.
+"""What a picture is made of: marks in panels with their axes, on a grid under a heading.
 
-matplotlib arranges and draws it (`renderers/with_matplotlib.py`). The interactive version
-(`renderers/with_plotly.py`) takes over that arrangement and draws the same marks.
+matplotlib arranges and draws it (`with_matplotlib.py`). The interactive version (`with_plotly.py`)
+takes over that arrangement and draws the same marks.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Colour = str | tuple[float, ...]
-Points = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 # notation: lengths of strokes and gaps, in widths of the line.
 SOLID: tuple[float, ...] = ()
@@ -22,7 +22,7 @@ DASHED, DOTTED, DASH_DOT = (4.0, 2.0), (1.0, 1.6), (6.4, 1.6, 1.0, 1.6)
 FINE, MIXED = (3.0, 2.0), (5.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 
 MARKERS = "osD^vP*X"
-"""Markers of the points of a line."""
+"""Markers of the points of a curve."""
 
 INSIDE, BESIDE, BELOW = "inside", "beside", "below"
 """Positions of the legend of a panel."""
@@ -32,7 +32,7 @@ INSIDE, BESIDE, BELOW = "inside", "beside", "below"
 class Mark:
     """Fields of every mark: legend entry, group and drawing order (higher in front).
 
-    A browser shows and hides the marks of one group together.
+    A browser shows and hides the marks of one group together; the group is the name if not given.
     """
 
     name: str = ""
@@ -45,7 +45,7 @@ class Curve(Mark):
     """Points that are connected, marked or both, (k, 2) in the plane or (k, 3) in space.
 
     A row of NaN is a gap; without points it is a legend entry only. Without `dash` it has markers
-    alone; with `hover` a browser shows the numbers under the pointer.
+    alone. A browser shows the numbers under the pointer.
     """
 
     points: Any
@@ -55,14 +55,18 @@ class Curve(Mark):
     marker: str = ""  # one of `MARKERS`
     size: float = 3.0  # of the markers [pt]
     hollow: bool = False
-    hover: bool = False
     error: Any = None  # half heights of error bars, (k,), NaN for none
 
     @property
-    def rows(self) -> Points:
+    def rows(self) -> Array:
         """The points as an array, (k, 2) or (k, 3)."""
         points = np.asarray(self.points, float)
         return points if points.size else np.zeros((0, 2))
+
+
+def line(x: Any, y: Any, colour: Colour, *style: Any, **options: Any) -> Curve:
+    """Return the curve of y over x; `style` and `options` are those of `Curve`."""
+    return Curve(np.stack([x, y], axis=1), colour, *style, **options)
 
 
 def dots(points: Any, colour: Colour, size: float = 3.0, **options: Any) -> Curve:
@@ -75,21 +79,27 @@ def dots(points: Any, colour: Colour, size: float = 3.0, **options: Any) -> Curv
 class Area(Mark):
     """Filled polygons in the plane, each (k, 2); none for a legend entry only."""
 
-    polygons: Sequence[Points]
-    face: Colour
-    edge: Colour
+    polygons: Sequence[Array]
+    colour: Colour
     opacity: float = 0.85
-    width: float = 0.8
+    width: float = 0.0  # of the edge, in its colour [pt]
+    face: Colour = ""  # the colour of the edge if ""
+
+
+def band(x: Any, low: Any, high: Any, colour: Colour, opacity: float, **options: Any) -> Area:
+    """Return the area between two curves over x, where both have numbers."""
+    is_finite = np.isfinite(low) & np.isfinite(high)
+    ends = [np.stack([x, end], axis=1)[is_finite] for end in (low, high)]
+    return Area([np.concatenate([ends[0], ends[1][::-1]])], colour, opacity, **options)
 
 
 @dataclass(frozen=True)
 class Faces(Mark):
     """Quadrilaterals in space, (m, 4, 3), with a colour each; `colour` is that of the legend."""
 
-    corners: Points
+    corners: Array
     colours: Sequence[Colour]
     colour: Colour
-    layer: int = field(default=0, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -99,28 +109,29 @@ class Arrow(Mark):
     The axes include `reach`, (k, 2), in place of its ends.
     """
 
-    start: Points
-    end: Points
+    start: Any
+    end: Any
     colour: Colour
     bend: float = 0.0
     width: float = 1.4
-    reach: Points | None = None
+    reach: Array | None = None
+    head: float = 9.0  # its size [pt]
     layer: int = field(default=9, kw_only=True)
 
 
 @dataclass(frozen=True)
 class Span(Mark):
-    """A line across the whole panel at one value of an axis (`low` == `high`), or a band.
+    """A line across the whole panel at one value of an axis, or a band up to another one.
 
-    `axis` is "x" for a vertical one, "y" for a horizontal one. Its group is its name if "".
+    `axis` is "x" for a vertical one, "y" for a horizontal one.
     """
 
     axis: str
     low: float
-    high: float
     colour: Colour
     dash: tuple[float, ...] = SOLID
     width: float = 0.8
+    high: float | None = None
     opacity: float = 1.0
     layer: int = field(default=0, kw_only=True)
 
@@ -132,7 +143,6 @@ class Bars(Mark):
     values: Sequence[float]
     names: Sequence[str]
     colours: Sequence[Colour]
-    layer: int = field(default=0, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -142,55 +152,63 @@ class Correlations(Mark):
     A browser shows the `names` under the pointer. `rows` are labels; columns are numbered from 1.
     """
 
-    values: Points
+    values: Array
     names: Sequence[str]
     rows: Sequence[str]
-    layer: int = field(default=0, kw_only=True)
 
     @property
     def texts(self) -> list[list[str]]:
         """The values as text."""
-        return [[f"{one:.2f}" if np.isfinite(one) else "-" for one in row] for row in self.values]
+        return [[f"{r:.2f}" if np.isfinite(r) else "-" for r in row] for row in self.values]
 
     @property
     def font_size(self) -> float:
         """Font size [pt] at which a value fits its cell."""
-        count = len(self.names)
-        return 8.0 if count < 6 else 36.0 / count
+        return min(8.0, 36.0 / len(self.names))
 
 
 @dataclass(frozen=True)
-class Note(Mark):
-    """A sentence in the centre of an empty panel, or in its upper left corner."""
+class Text(Mark):
+    """A text at a point of the panel; `inside` gives it in parts of the panel, from 0 to 1.
+
+    `align` is where the point lies in the text, such as "left top".
+    """
 
     text: str
+    at: tuple[float, float] = (0.5, 0.5)
     colour: Colour = "black"
-    corner: bool = False
-    layer: int = field(default=0, kw_only=True)
+    align: str = "center center"
+    inside: bool = True
+    size: float = 9.0  # pt
+    bold: bool = False
+    turned: bool = False  # by a right angle
+    layer: int = field(default=20, kw_only=True)
 
 
 @dataclass(frozen=True)
 class Panel:
-    """Axes in the plane or in space, with units in their labels, and the marks in them."""
+    """Axes in the plane or in space, with units in their labels, and the marks in them.
+
+    Its legend has the marks with names.
+    """
 
     items: Sequence[Mark]
     x_label: str
     y_label: str
     z_label: str = ""  # "" in the plane
     title: str = ""
-    legend: str = ""  # `INSIDE`, `BESIDE`, `BELOW`, or "" for none
+    legend: str = BESIDE  # `INSIDE`, `BESIDE`, `BELOW`, or "" for none
     equal: bool = False  # both axes have the same scale
-    scale: str = ""  # panels with the same name show the same part of the plane
+    shared: str = ""  # axes with the same limits in all panels that share them, as "xy"
+    whole: str = ""  # axes with integers only, as "xy"
     x_range: tuple[float | None, float | None] | None = None  # None fits the marks
     y_range: tuple[float | None, float | None] | None = None
-    whole: str = ""  # axes with integers only, as "xy"
-    shared: str = ""  # axes with the same limits in all panels that share them, as "xy"
-    most_x: int | None = None  # maximum number of ticks on the x axis
+    z_range: tuple[float | None, float | None] | None = None
 
     @property
-    def in_space(self) -> bool:
-        """Whether it has three axes."""
-        return bool(self.z_label)
+    def axes(self) -> str:
+        """The names of its axes."""
+        return "xyz" if self.z_label else "xy"
 
 
 @dataclass(frozen=True)
@@ -203,11 +221,9 @@ class Cell:
     height: int = 1
 
 
-def grid(panels: Sequence[Panel], columns: int, first: int = 0) -> list[Cell]:
-    """Arrange panels row by row in columns, counted from `first`."""
-    return [
-        Cell(panel, index // columns, first + index % columns) for index, panel in enumerate(panels)
-    ]
+def grid(panels: Sequence[Panel], columns: int) -> list[Cell]:
+    """Arrange panels row by row in columns."""
+    return [Cell(panel, *divmod(index, columns)) for index, panel in enumerate(panels)]
 
 
 def stack(panels: Iterable[Panel], column: int = 0, height: int = 1) -> list[Cell]:
@@ -217,16 +233,22 @@ def stack(panels: Iterable[Panel], column: int = 0, height: int = 1) -> list[Cel
 
 @dataclass(frozen=True)
 class Sheet:
-    """Panels on a grid under a heading, of a size on paper [in], with a common legend below."""
+    """Panels on a grid under a heading, with a common legend below."""
 
     title: str
-    width: float
-    height: float
     cells: Sequence[Cell]
     legend: Sequence[Curve | Area] = ()
+    column_width: float = 4.4  # in
+    row_height: float = 3.2  # in
 
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the grid."""
-        rows = max(one.row + one.height for one in self.cells)
-        return rows, max(one.column + 1 for one in self.cells)
+        rows = max(cell.row + cell.height for cell in self.cells)
+        return rows, max(cell.column for cell in self.cells) + 1
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height on paper [in]."""
+        rows, columns = self.shape
+        return 1.0 + self.column_width * columns, 0.6 + self.row_height * rows
