@@ -5,9 +5,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.mechanics.chain import assemble
-from notchflex.plotting.outline import outline
-from notchflex.plotting.outline import body_faces
-from notchflex.plotting.outline import shape_from_angles, tendon_line
+from notchflex.plotting.outline import body_faces, outline, shape_from_angles, tendon_line
 
 
 def shape_of(name, angle=0.0):

@@ -7,10 +7,9 @@ from fake_path import CLOSING, fake_path
 from notchflex.loads.load import BodyForce, ExternalLoad
 from notchflex.plotting import path_figure, path_picture, save
 from notchflex.plotting.curves import abscissa, branches, steps_by_branch
-from notchflex.plotting.outline import bending_plane, outline
-from notchflex.plotting.shapes import load_label, representative_steps
-from notchflex.plotting.outline import shape_at
 from notchflex.plotting.marks import Area, Span
+from notchflex.plotting.outline import bending_plane, outline, shape_at
+from notchflex.plotting.shapes import load_label, representative_steps
 from notchflex.robot import Linear
 from refusals import refused
 

@@ -23,8 +23,8 @@ from notchflex.plotting import (
     save_animation,
     state_picture,
 )
-from notchflex.plotting.path import MAX_FRAMES, frames_of
 from notchflex.plotting.marks import Area, Bars, Curve, Panel, grid
+from notchflex.plotting.path import MAX_FRAMES, frames_of
 from notchflex.plotting.style import for_browser as html
 from notchflex.results.quantities import QUANTITIES
 from refusals import refused

@@ -35,6 +35,7 @@ from notchflex.plotting.outline import (
     tendon_line,
     tube_wall,
 )
+from notchflex.plotting.output import Picture
 from notchflex.plotting.path import (
     beside_picture,
     path_figure,
@@ -42,7 +43,6 @@ from notchflex.plotting.path import (
     save_animation,
     state_picture,
 )
-from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes import AppliedLoad, applied_loads, state_shape
 from notchflex.plotting.studies import (
     batch_picture,

@@ -27,8 +27,8 @@ from notchflex.plotting.marks import (
     grid,
     line,
 )
-from notchflex.plotting.path import TIP_LABELS
 from notchflex.plotting.output import Picture
+from notchflex.plotting.path import TIP_LABELS
 from notchflex.plotting.style import (
     BLUE,
     GREEN,

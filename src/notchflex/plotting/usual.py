@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from notchflex import Equilibrium, EquilibriumPath, InputError, Robot
 from notchflex.plotting.curves import quantities_panel
 from notchflex.plotting.fits import calibration_picture, comparison_picture, friction_picture
+from notchflex.plotting.output import Picture
 from notchflex.plotting.path import (
     bands_picture,
     beside_picture,
@@ -18,7 +19,6 @@ from notchflex.plotting.path import (
     path_picture,
     robot_picture,
 )
-from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes import robot_shape, state_shape
 from notchflex.plotting.studies import batch_picture, tolerance_picture, workspace_picture
 from notchflex.plotting.style import house_style
