@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -168,14 +169,10 @@ def branch_lines(
     """
     y = np.where(path.converged, y, np.nan)
     parts = list(branches(load_parameter(path)))
-    named = {""} if name is None and len(parts) == 1 else set[str]()
     for part, way in parts:
-        label = way if name is None else name
-        options: dict[str, Any] = {"group": label, "dash": LINE[way]}
-        options["marker"] = "o" if part.stop - part.start == 1 else ""
-        options["name"] = "" if label in named or "" in named else label
-        named.add(label)
-        yield line(x[part], y[part], colour or COLOUR[way], **(options | style))
+        usual = {"name": "" if len(parts) == 1 else way} if name is None else {"name": name}
+        usual |= {"marker": "o" if part.stop - part.start == 1 else ""}
+        yield line(x[part], y[part], colour or COLOUR[way], LINE[way], **(usual | style))
 
 
 def way_entries(path: EquilibriumPath) -> list[Curve]:
@@ -187,9 +184,8 @@ def way_entries(path: EquilibriumPath) -> list[Curve]:
 def failures(path: EquilibriumPath, x: Array) -> Iterator[Span]:
     """Mark the steps that did not converge by dotted vertical lines."""
     failed = x[~np.asarray(path.converged)]
-    for order, value in enumerate(failed[np.isfinite(failed)].tolist()):
-        name = "" if order else "not converged"
-        yield Span("x", value, "#666666", DOTTED, name=name, group="not converged")
+    for value in failed[np.isfinite(failed)].tolist():
+        yield Span("x", value, "#666666", DOTTED, name="not converged")
 
 
 def load_panel(
@@ -234,10 +230,10 @@ def _bands(
     path: EquilibriumPath, x: Array, low: Array, high: Array, colour: Colour | None, group: str
 ) -> Iterator[Mark]:
     low = np.where(path.converged, low, np.nan)
-    for order, (part, way) in enumerate(branches(load_parameter(path))):
-        style: dict[str, Any] = {"group": group, "layer": 1}
-        style["name"] = "" if order or group else "5 to 95 % of draws"
-        yield band(x[part], low[part], high[part], colour or COLOUR[way], 0.18, **style)
+    name = "" if group else "5 to 95 % of draws"
+    for part, way in branches(load_parameter(path)):
+        shade = colour or COLOUR[way]
+        yield band(x[part], low[part], high[part], shade, 0.18, name=name, group=group, layer=1)
 
 
 def path_panels(path: EquilibriumPath, bands: Mapping[str, Band] | None) -> list[Panel]:
@@ -298,8 +294,8 @@ def pulled_tendons(path: EquilibriumPath) -> list[int]:
 def span_line(path: EquilibriumPath, step: int, tendon: int, colour: Colour, **style: Any) -> Curve:
     """Return the tension of a tendon (from 0) from span to span at one step."""
     tension = path.span_tension[step, tendon, : spans_of(path, tendon)]
-    options: dict[str, Any] = {"marker": "o", "size": 1.8} | style
-    return line(np.arange(len(tension)), tension, colour, **options)
+    style = {"marker": "o", "size": 1.8} | style
+    return line(np.arange(len(tension)), tension, colour, **style)
 
 
 def span_panel(items: Sequence[Mark], which: str = "") -> Panel:
@@ -339,11 +335,17 @@ def front_panel(path: EquilibriumPath) -> Panel:
         which = f", tendon {tendon + 1}" if len(tendons) > 1 else ""
         marker = "os^D"[order % 4]
         for curve in branch_lines(path, x, counts[:, tendon], marker=marker, size=2.2):
-            items.append(replace(curve, name=curve.name and curve.name + which, group=""))
+            items.append(replace(curve, name=curve.name and curve.name + which))
     most = max(spans_of(path, tendon) - 1 for tendon in tendons)
-    title = f"contacts with reversed friction, of {most}"
-    options: dict[str, Any] = {"shared": "x", "whole": "y", "y_range": (-0.03 * most, 1.03 * most)}
-    return Panel(items, x_label, "reversed contacts [number]", title=title, **options)
+    return Panel(
+        items,
+        x_label,
+        "reversed contacts [number]",
+        title=f"contacts with reversed friction, of {most}",
+        shared="x",
+        whole="y",
+        y_range=(-0.03 * most, 1.03 * most),
+    )
 
 
 def reversed_contacts(path: EquilibriumPath) -> Array:
@@ -366,69 +368,51 @@ def reverses_step_by_step(path: EquilibriumPath) -> bool:
     return False
 
 
-@dataclass(frozen=True)
-class Series:
-    """Values of one quantity with k entries along a path of S steps, in the units of pictures."""
-
-    label: str  # of the axis, with symbol and unit
-    names: Sequence[str]  # legend entries; "" for a quantity with one number
-    headers: Sequence[str]  # CSV columns; "" for none
-    values: Array  # (S, k)
-    per: tuple[str, ...] = ()  # meaning of the entries, such as ("notch",)
-
-
 def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
     """Return one quantity of a path over another; loading and unloading have their own lines."""
-    across, upward = series_of(path, x), series_of(path, y)
-    pairs = _pairs(x, across, upward)
+    (x_label, across, of), (y_label, upward, entries_per) = (_series(path, name) for name in (x, y))
+    if len(across) > 1 and of == ("tendon",) != entries_per:  # only tendons that are pulled
+        across = [entry for entry in across if np.ptp(entry.values) > 0.0] or across
+    if len(across) == 1:
+        across = across * len(upward)
+    elif of != entries_per:
+        columns = ", ".join(entry.header for entry in across if entry.header) or "tension, stroke"
+        raise InputError.WRONG_SHAPE(
+            f"{x} has {len(across)} entries; take one of them for the horizontal axis: {columns}"
+        )
     items: list[Mark] = []
-    for (column, row), shade in zip(pairs, sequence_colours(len(pairs)), strict=True):
-        style = {"colour": shade, "name": upward.names[row]} if len(pairs) > 1 else {}
-        items += branch_lines(path, across.values[:, column], upward.values[:, row], **style)
-    if len(pairs) > 1:
+    for one, other, shade in zip(across, upward, sequence_colours(len(upward)), strict=True):
+        style: list[Any] = [shade, other.name] if len(upward) > 1 else []
+        items += branch_lines(path, one.values, other.values, *style)
+    if len(upward) > 1:
         items += way_entries(path)
-    if len({column for column, _ in pairs}) == 1:
-        items += failures(path, across.values[:, pairs[0][0]])
-    return Panel(items, across.label, upward.label, whole="x" * (x == STEP))
+    if len({entry.header for entry in across}) == 1:
+        items += failures(path, across[0].values)
+    return Panel(items, x_label, y_label, whole="x" * (x == STEP))
 
 
-def series_of(path: EquilibriumPath, name: str) -> Series:
-    """Return a quantity of a path by its name, or one of its entries by its CSV column."""
+def _series(path: EquilibriumPath, name: str) -> tuple[str, list[Any], tuple[str, ...]]:
+    """Return the label, the entries and their kind of a quantity of a path.
+
+    It has the name of the quantity, or the CSV column of one of its entries.
+    """
     if name == STEP:
-        return Series(STEP, [""], [""], np.arange(1.0, len(path) + 1.0)[:, None])
+        number = np.arange(1.0, len(path) + 1.0)
+        return STEP, [SimpleNamespace(header="", name="", values=number)], ()
     listed = [one for one in QUANTITIES.values() if is_listed(one) and one.kind is not str]
-    headers: list[str] = []
+    choice = [quantity.name for quantity in listed]
     for quantity in listed:
         entries = list(entries_of(path, quantity))
-        columns = [entry.header for entry in entries]
-        if name == quantity.name or name in filter(None, columns):
-            label, per = quantity.label, quantity.per
-            if name != quantity.name:
-                entries, per = [entries[columns.index(name)]], ()
-                label = entry_label(quantity, entries[0].name)
-            values = np.stack([np.asarray(entry.values, float) for entry in entries], axis=1)
-            return Series(label, [entry.name for entry in entries], columns, values, per)
-        headers += filter(None, columns)
+        if quantity.name == name:
+            return quantity.label, entries, quantity.per
+        for entry in entries:
+            if entry.header and entry.header == name:
+                return entry_label(quantity, entry.name), [entry], ()
+        choice += [entry.header for entry in entries if entry.header]
     if name in QUANTITIES:
         raise InputError.UNSUPPORTED(
             f"{name} can't be drawn as lines; draw a quantity such as total_angle"
         )
-    choice = [*(quantity.name for quantity in listed), *headers, STEP]
+    choice.append(STEP)
     meant = nearest(str(name), choice, 3) or f"; there are {', '.join(choice)}"
     raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r} to draw{meant}")
-
-
-def _pairs(x: str, across: Series, upward: Series) -> list[tuple[int, int]]:
-    """Return pairs of entries of x and y: the same tendons or notches, or all over one."""
-    count = across.values.shape[1]
-    if count > 1 and across.per == upward.per:
-        return [(index, index) for index in range(count)]
-    used = list(range(count))
-    if count > 1 and across.per == ("tendon",):  # only tendons that are pulled
-        used = np.flatnonzero(np.ptp(across.values, axis=0) > 0.0).tolist()
-    if len(used) != 1:
-        columns = ", ".join(filter(None, across.headers)) or "tension, stroke"
-        raise InputError.WRONG_SHAPE(
-            f"{x} has {count} entries; take one of them for the horizontal axis: {columns}"
-        )
-    return [(used[0], row) for row in range(upward.values.shape[1])]

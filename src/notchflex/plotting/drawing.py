@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from notchflex import Robot
-from notchflex.plotting.marks import Area, Arrow, Colour, Curve, Mark, Text
+from notchflex.plotting.marks import Area, Arrow, Colour, Curve, Mark, Text, box
 from notchflex.plotting.notch_views import NotchView, notch_view
 from notchflex.plotting.style import BLUE, VERMILLION, house_style
 from notchflex.plotting.with_matplotlib import draw_marks
@@ -40,9 +40,8 @@ _SHORTEST = 0.3  # a shorter dimension has its arrows outside [in]
 
 def label(at: Point, text: str, align: str = "center center", **options: Any) -> Text:
     """Return a text on a white background."""
-    return Text(
-        text, tuple(at), align=align, **({"colour": INK, "size": TEXT} | options), inside=False
-    )
+    options = {"colour": INK, "size": TEXT, "inside": False} | options
+    return Text(text, tuple(at), align=align, **options)
 
 
 def _moved(point: Point, right: float, up: float) -> Any:
@@ -325,8 +324,7 @@ def _side_view(row: NotchRow, start: Any) -> Iterator[Mark]:
     def level(y: float, before: float = 0.0, behind: float = 0.0) -> Any:
         return start + np.array([(-before, y), (length + behind, y)])
 
-    corners = np.array([(0.0, -outer), (length, -outer), (length, outer), (0.0, outer)])
-    yield Area([start + corners], _TUBE, 1.0)
+    yield Area([start + box(0.0, -outer, length, outer)], _TUBE, 1.0)
     for sign in (-1.0, 1.0):
         yield _ink(level(sign * outer))
         yield _stroke(level(sign * inner), width=0.6, dash=_HIDDEN)

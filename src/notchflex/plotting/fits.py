@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,14 +21,13 @@ from notchflex.plotting.marks import (
     SOLID,
     Area,
     Array,
-    Bars,
-    Correlations,
     Curve,
     Mark,
     Panel,
     Span,
     Text,
     band,
+    bar_panel,
     dots,
     grid,
     line,
@@ -40,6 +40,7 @@ from notchflex.plotting.style import (
     MODEL_COLOURS,
     ORANGE,
     VERMILLION,
+    diverging_colour,
     sequence_colours,
 )
 from notchflex.support import DEGREES, QUANTITIES
@@ -72,72 +73,67 @@ def comparison_picture(
         others: Label to comparison of other models with the same measurement.
     """
     models = {"model": comparison, **(others or {})}
-    looks = list(zip(MODEL_COLOURS, _MODEL_LINES, strict=True))
-    entries = [
-        Curve([], *looks[index % len(looks)], name=label, layer=3)
-        for index, label in enumerate(models)
-    ]
-    trials = list(dict.fromkeys(comparison.measured.pull))
-    measured = [
-        dots([], GREY, 3.2, marker=MARKERS[index % len(MARKERS)], hollow=True,
-             name=f"measured, trial {label}" if len(trials) > 1 else "measured")
-        for index, label in enumerate(trials)
+    looks = zip(models, cycle(MODEL_COLOURS), cycle(_MODEL_LINES), strict=False)
+    entries = [Curve([], colour, dash, name=name, layer=3) for name, colour, dash in looks]
+    pulls = list(dict.fromkeys(comparison.measured.pull))
+    trials = [
+        dots([], GREY, 3.2, marker=marker, hollow=True,
+             name=f"measured, trial {pull}" if len(pulls) > 1 else "measured")
+        for pull, marker in zip(pulls, cycle(MARKERS), strict=False)
     ]  # fmt: skip
+    x, x_label = _measured_load(comparison)
+    trial, measured = np.array(comparison.measured.pull), _angles(comparison, "measured_")
+    errors = [*comparison.rmse_notches, comparison.rmse_total]
     panels: list[Panel] = []
-    for notch in (*range(comparison.robot.number_of_notches), None):
-        panel = _angle_panel(
-            comparison, models, notch, dict(zip(trials, measured, strict=True)), entries
+    for column, error in enumerate(errors):
+        if np.isnan(measured[:, column]).all():
+            continue
+        points = np.stack([x, measured[:, column]], axis=1)
+        items: list[Mark] = [
+            replace(entry, points=points[trial == pull])
+            for entry, pull in zip(trials, pulls, strict=True)
+        ]
+        for entry, model in zip(entries, models.values(), strict=True):
+            computed = np.stack([x, _angles(model)[:, column]], axis=1)
+            solved = np.flatnonzero(model.converged)
+            runs = _runs(solved, x, trial, comparison.measured.from_rest)
+            items += [replace(entry, points=computed[run]) for run in runs]
+        name = f"notch {column + 1}" if column < len(errors) - 1 else "total"
+        title = f"{name}, error {float(error) * DEGREES:.2f}° rms"
+        angles = [curve.rows[:, 1].min(initial=0.0) for curve in items if isinstance(curve, Curve)]
+        panels.append(
+            Panel(
+                items,
+                x_label,
+                "angle [deg]",
+                title=title,
+                legend="",
+                y_range=(0.0, None) if np.nanmin(angles) >= 0.0 else None,
+                shared="x",
+            )
         )
-        panels += [panel] if panel.items else []
     panels.append(_centre_lines(comparison))
     if others:
         panels.append(_errors(models, [entry.colour for entry in entries]))
-    columns = min(5, math.ceil(len(panels) / 2))
     error = f"tip {comparison.rmse_tip:.2f} mm"
     if math.isnan(comparison.rmse_tip):
         error = f"total {comparison.rmse_total * DEGREES:.2f}°"
     title = f"{comparison.robot.name}: {error} rms over {comparison.points} points"
-    legend = [*measured[: len(MARKERS)], *entries]
-    return Picture(title, grid(panels, columns), legend, **_SIZES)
+    cells = grid(panels, min(5, math.ceil(len(panels) / 2)))
+    return Picture(title, cells, [*trials[: len(MARKERS)], *entries], **_SIZES)
 
 
-def _angle_panel(
-    comparison: Comparison,
-    models: Mapping[str, Comparison],
-    notch: int | None,
-    trials: Mapping[str, Curve],
-    entries: Sequence[Curve],
-) -> Panel:
-    """Return the angles of a notch, or the total angle, measured and of the models."""
-    x, x_label = _measured_load(comparison)
-    trial, row = np.array(comparison.measured.pull), slice(None) if notch is None else notch
-    kind = "total_angle" if notch is None else "notch_angle"
+def _angles(comparison: Comparison, prefix: str = "") -> Array:
+    """Return the angles of the notches, and the total angle behind them, deg."""
+    parts = [getattr(comparison, f"{prefix}{name}_angle") for name in ("notch", "total")]
+    return np.column_stack(parts) * DEGREES
 
-    def angles(model: Comparison, prefix: str = "") -> Array:
-        return DEGREES * getattr(model, prefix + kind).reshape(len(x), -1)[:, row].reshape(-1)
 
-    measured = angles(comparison, "measured_")
-    items: list[Mark] = []
-    for label, entry in trials.items():
-        points = np.stack([x, measured], axis=1)[(trial == label) & np.isfinite(measured)]
-        items.append(replace(entry, points=points))
-    for model, entry in zip(models.values(), entries, strict=True):
-        computed = np.stack([x, angles(model)], axis=1)
-        items += [replace(entry, points=computed[part]) for part in _lines(model, x)]
-    if np.isnan(measured).all():
-        items = []
-    error = comparison.rmse_total if notch is None else comparison.rmse_notches[notch]
-    title = "total" if notch is None else f"notch {notch + 1}"
-    least = np.nanmin([measured, *map(angles, models.values())], initial=0.0)
-    return Panel(
-        items,
-        x_label,
-        "angle [deg]",
-        title=f"{title}, error {float(error) * DEGREES:.2f}° rms",
-        legend="",
-        y_range=(0.0, None) if least >= 0.0 else None,  # from 0 if no angle is negative
-        shared="x",
-    )
+def _runs(rows: Any, x: Array, pull: Any, from_rest: bool) -> list[Any]:
+    """Return the rows of each line of a model: all by load if from rest, else by pull."""
+    if from_rest:
+        return [rows[np.argsort(x[rows], kind="stable")]]
+    return [rows[pull[rows] == label] for label in dict.fromkeys(pull[rows].tolist())]
 
 
 def _measured_load(comparison: Comparison) -> tuple[Array, str]:
@@ -149,15 +145,6 @@ def _measured_load(comparison: Comparison) -> tuple[Array, str]:
         if len(complete):
             return values[:, complete[0]], QUANTITIES[name].label
     return np.arange(1.0, len(measured) + 1.0), "row of the table"
-
-
-def _lines(comparison: Comparison, x: Array) -> list[Any]:
-    """Return the points of each line of the model: all by load if from rest, else by trial."""
-    converged = np.flatnonzero(comparison.converged)
-    if comparison.measured.from_rest:
-        return [converged[np.argsort(x[converged], kind="stable")]]
-    trial = np.array(comparison.measured.pull)
-    return [converged[trial[converged] == label] for label in comparison.measured.pulls]
 
 
 def _centre_lines(comparison: Comparison) -> Panel:
@@ -191,9 +178,7 @@ def _errors(models: Mapping[str, Comparison], colours: list[Any]) -> Panel:
     if np.isnan(values).all():
         values = [model.rmse_total * DEGREES for model in models.values()]
         label, title = "total angle error [deg]", "error of the total angle, rms"
-    most = 1.2 * max((value for value in values if value > 0.0), default=1.0)
-    bars = Bars(values, list(models), colours)
-    return Panel([bars], label, "", title=title, x_range=(0.0, most))
+    return bar_panel(values, list(models), colours, label, title=title)
 
 
 _MEASURED, _MODEL, _BAND, _END = "measured", "model", "band", "end of the interval"
@@ -263,10 +248,14 @@ def _data_panel(fit: Calibration, label: str, quantity: str, part: int) -> Panel
     residuals, (name, unit, scale) = fit.residuals, edge(quantity)
     x, x_label = _abscissa(fit, label)
     half = fit.half_width(residuals.slopes) * scale
-    items: list[Mark] = []
+    samples, items = [sample.measured for sample in fit.problem.samples.every], list[Mark]()
     shown = np.flatnonzero(_rows_of(fit, label, quantity) & (residuals.part == part))
-    for number, rows in _fitted_lines(fit, shown, x):
-        sample = fit.problem.samples.every[number].measured
+    runs: list[Any] = []
+    for number in np.unique(residuals.sample[shown]).tolist():
+        of_sample = shown[residuals.sample[shown] == number]
+        runs += _runs(of_sample, x, residuals.pull, samples[number].from_rest)
+    for rows in runs:
+        sample = samples[residuals.sample[rows[0]]]
         table = sample.observed[quantity]
         measured = table.reshape(len(table), -1)[residuals.row[rows], part] * scale
         model = measured + residuals.values[rows] * scale
@@ -277,10 +266,9 @@ def _data_panel(fit: Calibration, label: str, quantity: str, part: int) -> Panel
         for pull in dict.fromkeys(residuals.pull[rows].tolist()):
             of_pull = residuals.pull[rows] == pull
             title = f"{_MEASURED}, pull {sample.pull[residuals.row[rows][of_pull][0]]}"
-            style: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "hollow": True}
-            style |= {"name": title, "group": _MEASURED, "layer": 4}
-            points = np.stack([x[rows], measured], axis=1)[of_pull]
-            items.append(dots(points, GREY, 3.2, **style))
+            points, marker = np.stack([x[rows], measured], 1)[of_pull], MARKERS[pull % len(MARKERS)]
+            entry = dots(points, GREY, 3.2, marker=marker, hollow=True, name=title, layer=4)
+            items.append(replace(entry, group=_MEASURED))
     title = part_title(quantity, 0 if quantity.startswith("total_") else part + 1)
     if quantity in ("tip_position", "tip_rotation"):
         title = f"{name}, {'xyz'[part]}"
@@ -332,18 +320,6 @@ def _rows_of(fit: Calibration, label: str, *quantities: str) -> Any:
     return of_robot & np.isin(fit.residuals.quantity, numbers)
 
 
-def _fitted_lines(fit: Calibration, shown: Any, x: Array) -> Iterator[tuple[int, Any]]:
-    """Yield the sample and the residuals of each line: by load if from rest, else by pull."""
-    residuals = fit.residuals
-    for number in np.unique(residuals.sample[shown]).tolist():
-        rows = shown[residuals.sample[shown] == number]
-        if fit.problem.samples.every[number].measured.from_rest:
-            yield number, rows[np.argsort(x[rows], kind="stable")]
-        else:
-            for pull in np.unique(residuals.pull[rows]):
-                yield number, rows[residuals.pull[rows] == pull]
-
-
 def _abscissa(fit: Calibration, label: str) -> tuple[Array, str]:
     """Return tension or stroke of a tendon at every residual of a robot, and its label."""
     residuals = fit.residuals
@@ -386,8 +362,7 @@ def _likelihood_panel(fit: Calibration, name: str) -> Panel:
         if end is not None
     ]
     if sides := [side for side, end in ends.items() if end is None]:
-        style: dict[str, Any] = {"align": "left top", "at": (0.03, 0.95)}
-        items.append(Text(f"open {' and '.join(sides)}", colour=VERMILLION, **style))
+        items.append(Text(f"open {' and '.join(sides)}", (0.03, 0.95), VERMILLION, "left top"))
     return Panel(
         items,
         f"{_short(name)} [{fit.units[name] or '-'}]",
@@ -399,15 +374,26 @@ def _likelihood_panel(fit: Calibration, name: str) -> Panel:
 
 def _correlation_panel(fit: Calibration) -> Panel:
     """Return the correlation matrix of the constants."""
-    rows, label = [str(number + 1) for number in range(len(fit.names))], ""
-    if fit.intervals:  # numbered as the profiles; names would make all panels narrow
-        label = "constants, numbered as their profiles"
-    else:
-        few = len(fit.names) < 6  # else a row has no room for two lines
-        names = [_short(name) if few else name for name in fit.names]
-        rows = [f"{name}  {number}" for name, number in zip(names, rows, strict=True)]
-    matrix = Correlations(fit.correlation, fit.names, rows)
-    return Panel([matrix], label, "", title="correlation")
+    label = "constants, numbered as their profiles"
+    if not fit.intervals:
+        label = "\n".join(f"{number}: {name}" for number, name in enumerate(fit.names, 1))
+    count, items = len(fit.names), list[Mark]()
+    numbers = [str(number + 1) for number in range(count)]
+    for (row, column), value in np.ndenumerate(fit.correlation):
+        x, y = column, count - 1 - row
+        corners = np.array(
+            [(x - 0.5, y - 0.5), (x + 0.5, y - 0.5), (x + 0.5, y + 0.5), (x - 0.5, y + 0.5)]
+        )
+        names = f"{fit.names[row]}, {fit.names[column]}"
+        is_known = np.isfinite(value)
+        colour = diverging_colour(value) if is_known else "white"
+        items.append(Area([corners], colour, 1.0, group=names))
+        text, shade = f"{value:.2f}" if is_known else "-", "white" if abs(value) > 0.7 else "black"
+        part = (x + 0.5) / count, (y + 0.5) / count
+        items.append(Text(text, part, shade, size=min(8.0, 36.0 / count)))
+    ticks = {"x": numbers, "y": numbers[::-1]}
+    limits = (-0.5, count - 0.5)
+    return Panel(items, label, "", title="correlation", ticks=ticks, x_range=limits, y_range=limits)
 
 
 def _short(name: str) -> str:
@@ -462,8 +448,8 @@ def _readings(rig: FrictionRig, x: Array) -> list[Mark]:
     error = deviation if np.isfinite(deviation).any() else None
     items.append(dots(points, "#333333", name="reading", error=error))
     if rig.outliers:
-        style: dict[str, Any] = {"hollow": True, "layer": 3, "name": "outlier"}
-        items.append(dots(points[list(rig.outliers)], VERMILLION, 8.0, **style))
+        points = points[list(rig.outliers)]
+        items.append(dots(points, VERMILLION, 8.0, hollow=True, name="outlier", layer=3))
     return items
 
 

@@ -6,14 +6,15 @@ takes over that arrangement and draws the same marks.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Colour = str | tuple[float, ...]
+from notchflex.plotting.style import Colour
+
 Array = NDArray[np.float64]
 
 # notation: lengths of strokes and gaps, in widths of the line.
@@ -32,7 +33,8 @@ INSIDE, BESIDE, BELOW = "inside", "beside", "below"
 class Mark:
     """Fields of every mark: legend entry, group and drawing order (higher in front).
 
-    A browser shows and hides the marks of one group together; the group is the name if not given.
+    A legend has a name once. A browser shows and hides the marks of one group together, which is
+    the name if not given.
     """
 
     name: str = ""
@@ -95,10 +97,9 @@ def band(x: Any, low: Any, high: Any, colour: Colour, opacity: float, **options:
 
 @dataclass(frozen=True)
 class Faces(Mark):
-    """Quadrilaterals in space, (m, 4, 3), with a colour each; `colour` is that of the legend."""
+    """Quadrilaterals in space, (m, 4, 3), shaded by their angle to the light."""
 
     corners: Array
-    colours: Sequence[Colour]
     colour: Colour
 
 
@@ -137,37 +138,6 @@ class Span(Mark):
 
 
 @dataclass(frozen=True)
-class Bars(Mark):
-    """Horizontal bars from top to bottom, with their values."""
-
-    values: Sequence[float]
-    names: Sequence[str]
-    colours: Sequence[Colour]
-
-
-@dataclass(frozen=True)
-class Correlations(Mark):
-    """A coloured matrix of correlations, (n, n), each with its value; NaN where there is none.
-
-    A browser shows the `names` under the pointer. `rows` are labels; columns are numbered from 1.
-    """
-
-    values: Array
-    names: Sequence[str]
-    rows: Sequence[str]
-
-    @property
-    def texts(self) -> list[list[str]]:
-        """The values as text."""
-        return [[f"{r:.2f}" if np.isfinite(r) else "-" for r in row] for row in self.values]
-
-    @property
-    def font_size(self) -> float:
-        """Font size [pt] at which a value fits its cell."""
-        return min(8.0, 36.0 / len(self.names))
-
-
-@dataclass(frozen=True)
 class Text(Mark):
     """A text at a point of the panel; `inside` gives it in parts of the panel, from 0 to 1.
 
@@ -201,6 +171,8 @@ class Panel:
     equal: bool = False  # both axes have the same scale
     shared: str = ""  # axes with the same limits in all panels that share them, as "xy"
     whole: str = ""  # axes with integers only, as "xy"
+    ticks: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Labels at 0, 1, 2, ... of the axes that have some, in place of numbers and grid."""
     x_range: tuple[float | None, float | None] | None = None  # None fits the marks
     y_range: tuple[float | None, float | None] | None = None
     z_range: tuple[float | None, float | None] | None = None
@@ -209,6 +181,29 @@ class Panel:
     def axes(self) -> str:
         """The names of its axes."""
         return "xyz" if self.z_label else "xy"
+
+
+def box(left: float, low: float, right: float, high: float) -> Array:
+    """Return the corners of a rectangle."""
+    return np.array([(left, low), (right, low), (right, high), (left, high)])
+
+
+def bar_panel(
+    values: Sequence[float],
+    names: Sequence[str],
+    colours: Sequence[Colour],
+    label: str,
+    extra: Sequence[Mark] = (),
+    **options: Any,
+) -> Panel:
+    """Return horizontal bars from top to bottom, with their values; `options` are of `Panel`."""
+    marks = [*extra]
+    for row, (value, colour) in enumerate(zip(values[::-1], colours[::-1], strict=True)):
+        marks.append(Area([box(0.0, row - 0.3, value, row + 0.3)], colour, 1.0))
+        marks.append(Text(f" {value:.2f}", (value, row), align="left center", inside=False))
+    most = max([value for value in values if value > 0.0], default=1.0)
+    options = {"x_range": (0.0, 1.2 * most), "ticks": {"y": names[::-1]}} | options
+    return Panel(marks, label, "", **options)
 
 
 @dataclass(frozen=True)

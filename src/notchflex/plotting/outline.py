@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from notchflex import EquilibriumPath, Robot, RobotShape, Tube
-from notchflex.plotting.marks import Array
+from notchflex.plotting.marks import Array, box
 from notchflex.support import FlexureShape
 
 if TYPE_CHECKING:
@@ -117,7 +117,6 @@ class ShapeOutline:
     bores: list[Array]  # inner wall of every body, one for each side with a wall
     flexures: list[Array]  # the strip of every notch
     tendons: list[Array]
-    lips: list[Array]  # where the edges of every notch meet when it closes
     centre_line: Array  # from base to tip
     held: Array  # the clamp below the base
 
@@ -162,9 +161,8 @@ def outline(shape: RobotShape, view: float) -> ShapeOutline:
         ],
         flexures=[project(strip(one), view) for one in shape.flexures],
         tendons=[project(tendon_line(shape, i), view) for i in range(len(shape.robot.tendon))],
-        lips=[project(lips(shape, notch), view) for notch in range(len(shape.flexures))],
         centre_line=project(_centre_line(shape), view),
-        held=place(0, [(-side, 0.0), (side, 0.0), (side, below), (-side, below)]),
+        held=place(0, box(-side, below, side, 0.0)),
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.animation import PillowWriter
 from matplotlib.figure import Figure
 
-from notchflex import Band, Bands, Equilibrium, EquilibriumPath, InputError, Robot
+from notchflex import Band, EquilibriumPath, InputError, Robot
 from notchflex.plotting.curves import (
     LINE,
     LOADING,
@@ -33,10 +33,8 @@ from notchflex.plotting.curves import (
 )
 from notchflex.plotting.marks import (
     BELOW,
-    Area,
     Colour,
     Curve,
-    Faces,
     Mark,
     Panel,
     Text,
@@ -45,7 +43,13 @@ from notchflex.plotting.marks import (
     stack,
 )
 from notchflex.plotting.output import Picture
-from notchflex.plotting.shapes import representative_steps, robot_shape, shape_panel, state_shape
+from notchflex.plotting.shapes import (
+    load_label,
+    representative_steps,
+    robot_shape,
+    shape_panel,
+    state_shape,
+)
 from notchflex.plotting.style import (
     BLACK,
     BLUE,
@@ -113,16 +117,6 @@ def path_picture(
     return Picture(heading, cells, row_height=1.5)
 
 
-def bands_picture(bands: Bands) -> Picture:
-    """Describe the picture of bands: that of the path that they surround."""
-    return path_picture(bands.path, bands=bands)
-
-
-def equilibrium_picture(state: Equilibrium) -> Picture:
-    """Describe the picture of a state: that of its path, with the state in it."""
-    return state_picture(state.path, state.step)
-
-
 def state_picture(path: EquilibriumPath, step: int, *, title: str | None = None) -> Picture:
     """Describe the picture of one state of a path.
 
@@ -150,14 +144,17 @@ def _angle_curve(path: EquilibriumPath, step: int, colour: Colour, **style: Any)
     return line(np.arange(1, len(angle) + 1), angle, colour, marker="o", **style)
 
 
+def _notches_of(items: list[Mark], **options: Any) -> Panel:
+    return Panel(items, NOTCH_LABEL, QUANTITIES["notch_angle"].label, whole="x", **options)
+
+
 def _notch_angles(path: EquilibriumPath, step: int) -> Panel:
-    items: list[Mark] = [Text("not converged")]
-    if path.converged[step]:
-        items = [curve := _angle_curve(path, step, BLUE, size=4.0)]
-        if np.any(closed := np.asarray(path.closed[step])):
-            style: dict[str, Any] = {"name": "closed notch", "layer": 3}
-            items.append(dots(curve.rows[closed], VERMILLION, 5.0, **style))
-    return Panel(items, NOTCH_LABEL, QUANTITIES["notch_angle"].label, whole="x")
+    if not path.converged[step]:
+        return _notches_of([Text("not converged")])
+    items: list[Mark] = [curve := _angle_curve(path, step, BLUE, size=4.0)]
+    if np.any(closed := np.asarray(path.closed[step])):
+        items.append(dots(curve.rows[closed], VERMILLION, 5.0, name="closed notch", layer=3))
+    return _notches_of(items)
 
 
 def _tension_along(path: EquilibriumPath, step: int) -> Panel:
@@ -200,7 +197,7 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
         )
     shapes: list[Panel] = []
     total, tips, angles, tensions = (list[Mark]() for _ in range(4))
-    labels: set[str] = set()
+    labels, total_label, least = set[str](), QUANTITIES["total_angle"].label, 0.0
     for (name, path), colour in zip(paths.items(), MODEL_COLOURS, strict=False):
         steps = representative_steps(path, most=3)
         pale = np.linspace(0.55, 0.0, len(steps))[:, None]
@@ -208,36 +205,31 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
         shapes.append(shape_panel(path, steps, title=name, colours=shades, legend=BELOW))
         x, label = abscissa(path)
         labels.add(label)
-        angle = path.total_angle * QUANTITIES["total_angle"].scale
+        angle = scaled(path, "total_angle", path.total_angle)[:, 0]
         total += [*branch_lines(path, x, angle, colour, "", group=name), *failures(path, x)]
         tip = path.tip_position[:, [0, 2]]
-        tips += branch_lines(path, *tip.T, colour, "", group=name)
+        tips += branch_lines(path, tip[:, 0], tip[:, 1], colour, "", group=name)
         for step in steps[-1:]:  # the most bent
             tips.append(dots(tip[[step]], colour, 4.0, group=name))
             angles.append(_angle_curve(path, step, colour, group=name))
+            least = min(least, float(path.notch_angle[step].min()))
             pulled = np.flatnonzero(path.tension[step] > SLACK)[:1].tolist()
             tensions += [span_line(path, step, one, colour, group=name) for one in pulled]
     # One label for all, if they are drawn against the same quantity.
     x_label = labels.pop() if len(labels) == 1 else "load of each"
-    bent = {"title": "most bent state, first pulled tendon"}
-    cells = [cell for column, panel in enumerate(shapes) for cell in stack([panel], column, 2)]
-    angle_labels = QUANTITIES["total_angle"].label, QUANTITIES["notch_angle"].label
-    cells += stack(
-        [
-            Panel(total, x_label, angle_labels[0]),
-            Panel(
-                angles or [Text("no step was solved")],
-                NOTCH_LABEL,
-                angle_labels[1],
-                whole="x",
-                title="most bent state",
-            ),
-        ],
-        len(paths),
-    )
+    bent, y_range = "most bent state", (0.0, None) if least >= 0.0 else None
+    notches = angles or [Text("no step was solved")]
     tension = span_panel(tensions or [Text("no tendon is pulled")])
-    tip_panel = Panel(tips, *TIP_LABELS, equal=True)
-    cells += stack([tip_panel, replace(tension, **bent)], len(paths) + 1)
+    columns = [
+        *([shape] for shape in shapes),
+        [Panel(total, x_label, total_label), _notches_of(notches, title=bent, y_range=y_range)],
+        [Panel(tips, *TIP_LABELS, equal=True), replace(tension, title=f"{bent}, first tendon")],
+    ]
+    cells = [
+        cell
+        for column, panels in enumerate(columns)
+        for cell in stack(panels, column, 2 // len(panels))
+    ]
     legend = [
         Curve([], colour, name=name) for name, colour in zip(paths, MODEL_COLOURS, strict=False)
     ]
@@ -314,11 +306,8 @@ def save_animation(
     ):
         for number, step in enumerate(steps):
             panel = shape_panel(path, [step], colours=[BLUE], legend="")
-            label = next(
-                mark.name for mark in panel.items if isinstance(mark, Area | Faces) and mark.name
-            )
             robot.clear()
-            draw_panel(robot, replace(panel, title=label, **limits))
+            draw_panel(robot, replace(panel, title=load_label(path, step), **limits))
             for ball, height in zip(balls, heights, strict=True):
                 ball.set_data(np.full(height.shape[1], x[step]), height[step])
             for _ in range(standing if number in (0, len(steps) - 1) else 1):

@@ -52,7 +52,6 @@ MAX_SHAPES = 5
 
 # Longest arrow in lengths of the robot, and shortest arrow in lengths of the longest.
 _ARROW, _SHORTEST = 0.18, 0.25
-_LIGHT = np.array([0.35, -0.75, 0.55]) / np.linalg.norm([0.35, -0.75, 0.55])
 
 
 class AppliedLoad(NamedTuple):
@@ -215,47 +214,32 @@ def _from_the_side(
 def _in_space(shape: RobotShape, colour: Colour, label: str, order: int) -> Iterator[Mark]:
     base, *bodies = body_faces(shape)
     if not order:  # the base does not move: it is drawn once
-        yield Faces(base, _lit(base, GREY), GREY)
+        yield Faces(base, GREY)
     faces = np.concatenate([*bodies, *flexure_faces(shape)])
-    yield Faces(faces, _lit(faces, colour), colour, name=label)
+    yield Faces(faces, colour, name=label)
     for number in range(len(shape.robot.tendon)):
         yield Curve(tendon_line(shape, number), ORANGE, width=0.9, group=label, layer=5)
-
-
-def _lit(faces: Array, colour: Colour) -> list[Colour]:
-    """Return the colours of the faces by their angle to the light."""
-    normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
-    size = np.linalg.norm(normal, axis=1)
-    facing = np.abs(normal @ _LIGHT) / np.where(size > 0.0, size, 1.0)
-    dark = 0.8 * np.array(rgb(colour))
-    pale = 1.0 - 0.45 * (1.0 - dark)
-    return [tuple(dark + part * (pale - dark)) for part in facing]
 
 
 def _load_arrows(
     loads: Sequence[AppliedLoad], view: float | None, longest: float, layer: int
 ) -> Iterator[Arrow]:
     """Yield forces as arrows; moments as arcs from the side, and as thin arrows in space."""
-    named: set[str] = set()
     for load in loads:
         is_force = load.name == "force"
-        style: dict[str, Any] = {"layer": layer, "group": load.label}
-        if load.label not in named:
-            space = "" if is_force or view is not None else ", about its arrow"
-            style["name"] = load.label + space
-        named.add(load.label)
+        label = load.label + ("" if is_force or view is not None else ", about its arrow")
+        style: dict[str, Any] = {"layer": layer, "name": label}
         largest = max(other.size for other in loads if other.name == load.name)
         size = longest * max(load.size / largest, _SHORTEST)  # never too short to see
         end, colour = load.point + size * load.vector / load.size, _LOAD_COLOUR[load.kind]
         if view is None:
             yield Arrow(load.point, end, colour, width=1.8 if is_force else 0.9, **style)
-            continue
-        start = project(load.point, view)
-        if is_force:
-            yield Arrow(start, project(end, view), colour, **style)
-            continue
-        # Seen with z up and the view to the right, a moment about the normal turns z to the right.
-        turn = np.cross(across_of(view), load.vector)[2]
-        side = np.array([0.4 * longest * (-1.0 if turn > 0.0 else 1.0), 0.0])
-        reach = np.array([start - longest, start + longest])
-        yield Arrow(start - side, start + side, colour, bend=0.9, reach=reach, **style)
+        elif is_force:
+            yield Arrow(project(load.point, view), project(end, view), colour, **style)
+        else:
+            # Seen with z up and the view to the right, a moment about the normal turns z right.
+            turn = np.cross(across_of(view), load.vector)[2]
+            start = project(load.point, view)
+            side = np.array([0.4 * longest * (-1.0 if turn > 0.0 else 1.0), 0.0])
+            reach = np.array([start - longest, start + longest])
+            yield Arrow(start - side, start + side, colour, bend=0.9, reach=reach, **style)

@@ -16,13 +16,14 @@ from notchflex.plotting.marks import (
     DASHED,
     Area,
     Array,
-    Bars,
     Curve,
     Mark,
     Panel,
     Span,
     Text,
     band,
+    bar_panel,
+    box,
     dots,
     grid,
     line,
@@ -123,9 +124,9 @@ def _over_rows(name: str, x: Array, table: Array, label: str) -> Panel:
     shown = evenly(range(count), min(count, MAX_COLUMNS))
     items: list[Mark] = []
     for column, colour in zip(shown, sequence_colours(len(shown)), strict=True):
-        style: dict[str, Any] = {"marker": "o", "size": 2.0, "width": 0.8}
-        style["name"] = f"{quantity.per[0]} {column + 1}" if count > 1 else ""
-        items.append(line(x[order], table[order, column], colour if count > 1 else BLUE, **style))
+        name, shade = (f"{quantity.per[0]} {column + 1}", colour) if count > 1 else ("", BLUE)
+        y = table[order, column]
+        items.append(line(x[order], y, shade, width=0.8, marker="o", size=2.0, name=name))
     return Panel(items, label, quantity.label)
 
 
@@ -254,11 +255,11 @@ def tolerance_picture(found: ToleranceAnalysis) -> Picture:
     shown = np.sort(np.argsort(-outside, kind="stable")[:MAX_LIMITS])
     panels = [_histogram(found, int(index)) for index in shown]
     worst, sources = int(np.argmax(outside)), [found.sources[index] for index in order]
-    parts = np.nan_to_num(found.sobol.total[worst])[order]
-    exact = 100.0 * np.asarray(found.control.exact)[order]
-    bars = [Bars(values.tolist(), sources, [SKY] * len(order)) for values in (parts, exact)]
+    parts = np.nan_to_num(found.sobol.total[worst])[order].tolist()
+    exact = (100.0 * found.control.exact[order]).tolist()
     label = f"part of the variance of {found.criteria[worst].name.replace('_', ' ')} [-]"
-    panels.append(Panel(bars[:1], label, "", x_range=(0.0, None), title="total Sobol index"))
+    colours = [SKY] * len(order)
+    panels.append(bar_panel(parts, sources, colours, label, title="total Sobol index"))
     levels = [(found.accepted_fraction, GREEN), (found.wanted_yield, PURPLE)]
     marks = [
         Span("x", 100.0 * level, colour, width=1.4, layer=4)
@@ -266,7 +267,7 @@ def tolerance_picture(found: ToleranceAnalysis) -> Picture:
         if level is not None
     ]
     title = "yield if one dimension were exact"
-    panels.append(Panel([bars[1], *marks], "yield [%]", "", title=title))
+    panels.append(bar_panel(exact, sources, colours, "yield [%]", marks, title=title))
     low, high = (100.0 * end for end in found.interval)
     title = (
         f"{found.robot.name}: yield {100.0 * found.accepted_fraction:.1f} % "
@@ -297,17 +298,13 @@ def _histogram(analysis: ToleranceAnalysis, index: int) -> Panel:
     items: list[Mark] = []
     for name, part, colour in (("within", inside, BLUE), ("outside", ~inside, ORANGE)):
         bins = np.flatnonzero(part & (count > 0))
-        rectangles = [
-            np.stack([edges[[at, at, at + 1, at + 1]], tops[at] * np.array([0, 1, 1, 0])], axis=1)
-            for at in bins
-        ]
+        rectangles = [box(edges[bin], 0.0, edges[bin + 1], tops[bin]) for bin in bins]
         items += [Area(rectangles, colour, group=name)] if rectangles else []
-    style: dict[str, Any] = {"width": 1.4, "layer": 4}
-    ends = [end for end in (lower, upper) if np.isfinite(end)]
-    items += [Span("x", end, VERMILLION, group="limit", **style) for end in ends]
-    items.append(Span("x", analysis.linear.nominal[index] * scale, GREEN, group="drawing", **style))
+    nominal = analysis.linear.nominal[index] * scale
+    for level, colour in ((lower, VERMILLION), (upper, VERMILLION), (nominal, GREEN)):
+        items += [Span("x", level, colour, width=1.4, layer=4)] if np.isfinite(level) else []
     for end in analysis.linear.worst_case[index] * scale:
-        items.append(Span("x", end, GREY, DASHED, layer=3, group="worst case"))
+        items.append(Span("x", end, GREY, DASHED, layer=3))
     return Panel(items, label, "robots [%]", y_range=(0.0, None))
 
 
@@ -414,5 +411,5 @@ def _classes(points: Array, name: str) -> Iterator[Mark]:
     for order, colour in enumerate(sequence_colours(_CLASSES)):
         if len(mine := points[number == order, :2]):
             label = f"{ends[order]:.3g} to {ends[order + 1]:.3g}"
-            style: dict[str, Any] = {"name": label, "group": f"{name} {order}", "layer": 2 + order}
-            yield dots(mine, colour, 2.5, **style)
+            group = f"{name} {order}"
+            yield dots(mine, colour, 2.5, name=label, group=group, layer=2 + order)

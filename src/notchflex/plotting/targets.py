@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,6 @@ from notchflex.plotting.marks import (
     BELOW,
     DASHED,
     Array,
-    Bars,
     Cell,
     Colour,
     Curve,
@@ -21,6 +21,7 @@ from notchflex.plotting.marks import (
     Span,
     Text,
     band,
+    bar_panel,
     dots,
     grid,
     line,
@@ -67,8 +68,7 @@ def design_picture(design: Design, *, title: str = "") -> Picture:
     ):
         if path is not None and path.converged.any():
             solved = [step for step in steps if path.converged[step]]
-            style: dict[str, Any] = {"title": label, "colours": [colour] * 3, "legend": BELOW}
-            panel = shape_panel(path, solved, **style)
+            panel = shape_panel(path, solved, title=label, colours=[colour] * 3, legend=BELOW)
             shapes.append(replace(panel, items=[*panel.items, *_target_curves(design, path)]))
     numbers = [_numbers(wish) for wish in design.wishes if len(wish.achieved) > 1][:1]
     cells = [Cell(panel, 0, column, 2) for column, panel in enumerate(shapes)]
@@ -100,14 +100,11 @@ def _variables(design: Design) -> Panel:
     )
     names = [f"{v.name}\n{v.value:.4g} {v.unit}".rstrip() for v in chosen]
     # The values before stand below the bars, clear of the numbers at their ends.
-    points = np.stack([before, np.arange(len(chosen)) + 0.38], axis=1)
-    items: list[Mark] = [
-        Bars(after, names, [SKY] * len(chosen)),
-        Span("x", 1.0, BLACK),
-        dots(points, BLACK, 4.0, hollow=True, layer=4),
-    ]
+    points = np.stack([before[::-1], np.arange(len(chosen)) - 0.38], axis=1)
+    extra = [Span("x", 1.0, BLACK), dots(points, BLACK, 4.0, hollow=True, layer=4)]
     label = "from least (0) to greatest (1) value; circle: before"
-    return Panel(items, label, "", title="variables", x_range=(0.0, 1.15))
+    colours, limits = [SKY] * len(chosen), (0.0, 1.15)
+    return bar_panel(after, names, colours, label, extra, title="variables", x_range=limits)
 
 
 def _numbers(wish: WishResult) -> Panel:
@@ -170,8 +167,10 @@ def following_picture(found: Following, *, title: str = "") -> Picture:
     return Picture(title or f"Targets followed by {found.robot.name}", cells, row_height=2.3)
 
 
-def _tendon_curves(x: Array, tension: Array, colours: list[Colour], marker: str = "") -> list[Mark]:
-    names = [f"tendon {tendon + 1}" for tendon in range(len(colours))] if len(colours) > 1 else [""]
+def _tendon_curves(
+    x: Array, tension: Array, colours: Sequence[Colour], marker: str = ""
+) -> list[Mark]:
+    names = [f"tendon {tendon + 1}" * (len(colours) > 1) for tendon in range(len(colours))]
     return [
         line(x, values, colour, name=name, marker=marker)
         for values, colour, name in zip(tension.T, colours, names, strict=True)
@@ -193,10 +192,10 @@ def _tips(following: Following) -> Panel:
     if len(missed):
         items.append(dots(missed[:, axes], VERMILLION, 4.0, name="nearest", layer=4))
     if len(axes) == 2:
-        labels = [f"tip position {AXES[axis]} [mm]" for axis in axes]
-        return Panel(items, *labels, equal=True, legend=BELOW)
+        x_label, y_label = (f"tip position {AXES[axis]} [mm]" for axis in axes)
+        return Panel(items, x_label, y_label, equal=True, legend=BELOW)
     # In space the labels stand close to each other, and the upright one needs room beside it.
-    return Panel(items, *(f"{axis} [mm]" for axis in AXES))
+    return Panel(items, "x [mm]", "y [mm]", "z [mm]")
 
 
 def _errors(following: Following, number: Array) -> Panel:
@@ -207,8 +206,8 @@ def _errors(following: Following, number: Array) -> Panel:
     ):
         if unit in following.units:  # zero has no place on a logarithmic axis
             error, level = np.log10(np.maximum(error, 1e-16)), np.log10(max(tolerance, 1e-16))
-            style: dict[str, Any] = {"marker": "o", "size": 2.0, "name": f"error, {unit}"}
-            items.append(line(number, error, colour, **style))
+            name = f"error, {unit}"
+            items.append(line(number, error, colour, marker="o", size=2.0, name=name))
             items.append(Span("y", float(level), GREY, name=f"tolerance, {unit}"))
     return Panel(items, _NUMBER, "log10 of the error [mm, deg]", shared="x")
 

@@ -12,13 +12,7 @@ from notchflex import Equilibrium, EquilibriumPath, InputError, Robot
 from notchflex.plotting.curves import quantities_panel
 from notchflex.plotting.fits import calibration_picture, comparison_picture, friction_picture
 from notchflex.plotting.output import Picture
-from notchflex.plotting.path import (
-    bands_picture,
-    beside_picture,
-    equilibrium_picture,
-    path_picture,
-    robot_picture,
-)
+from notchflex.plotting.path import beside_picture, path_picture, robot_picture, state_picture
 from notchflex.plotting.shapes import robot_shape, state_shape
 from notchflex.plotting.studies import batch_picture, tolerance_picture, workspace_picture
 from notchflex.plotting.style import house_style
@@ -34,9 +28,9 @@ from notchflex.plotting.with_matplotlib import draw_panel, projection
 _KINDS: dict[str, Any] = {
     "Robot": robot_picture,
     "EquilibriumPath": path_picture,
-    "Equilibrium": equilibrium_picture,
+    "Equilibrium": lambda state: state_picture(state.path, state.step),
     "Batch": batch_picture,
-    "Bands": bands_picture,
+    "Bands": lambda bands: path_picture(bands.path, bands=bands),
     "Comparison": comparison_picture,
     "Calibration": calibration_picture,
     "FrictionRig": friction_picture,
@@ -120,6 +114,7 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
             "axes can be given for a path, a state or a robot; the picture of a "
             f"{type(thing).__name__} has axes of its own: plot(it)"
         )
+    figure: Any = None
     if ax is None:
         # Made outside our style: pyplot chooses its backend, and with it whether figures show
         # themselves, when it makes the first figure, and leaving the style would undo that.
@@ -128,7 +123,7 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
         size = (5.6, 5.6) if panel.equal or panel.z_label else (6.0, 4.0)
         figure = pyplot.figure(figsize=size, layout="constrained")
     with house_style():
-        axes: Any = figure.add_subplot(**projection(panel)) if ax is None else ax
+        axes: Any = ax or figure.add_subplot(**projection(panel))
         if panel.z_label and axes.name != "3d":
             raise InputError.UNSUPPORTED(
                 "this robot bends out of one plane; give axes made with projection='3d'"

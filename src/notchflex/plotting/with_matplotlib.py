@@ -16,8 +16,6 @@ from notchflex.plotting.marks import (
     BESIDE,
     Area,
     Arrow,
-    Bars,
-    Correlations,
     Curve,
     Faces,
     Mark,
@@ -26,14 +24,7 @@ from notchflex.plotting.marks import (
     Span,
     Text,
 )
-from notchflex.plotting.style import (
-    DIVERGING,
-    for_paper,
-    heading_lines,
-    house_style,
-    new_figure,
-    rgb,
-)
+from notchflex.plotting.style import for_paper, heading_lines, house_style, new_figure, rgb
 
 
 def figure_of(picture: Sheet) -> Figure:
@@ -79,6 +70,10 @@ def draw_panel(axes: Any, panel: Panel) -> None:
         getattr(axes, f"set_{name}label")(label, **{"labelpad": 12.0} if name == "z" else {})
         if name in panel.whole:
             getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(integer=True))
+        if name in panel.ticks:
+            texts = [for_paper(text) for text in panel.ticks[name]]
+            getattr(axes, f"set_{name}ticks")(range(len(texts)), texts)
+            axes.grid(visible=False, axis=name)
         if limits := getattr(panel, f"{name}_range"):
             getattr(axes, f"set_{name}lim")(*limits)
     if panel.z_label:
@@ -86,22 +81,25 @@ def draw_panel(axes: Any, panel: Panel) -> None:
         extent = np.array([np.ptp(axis.get_view_interval()) for axis in every])
         axes.set_box_aspect(extent, zoom=0.92)
         for axis, part in zip(every, extent / extent.max(), strict=True):
-            axis.set_major_locator(MaxNLocator(max(2, round(6.0 * part))))
+            axis.set_major_locator(MaxNLocator(max(1, round(6.0 * part))))
         axes.view_init(elev=18.0, azim=-60.0)
     elif panel.equal:
         axes.set_aspect("equal", adjustable="datalim")
     if panel.title:
         axes.set_title(for_paper(panel.title), loc="left")
-    if not (panel.legend and axes.get_legend_handles_labels()[0]):
+    entries: dict[str, Any] = {}
+    for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
+        entries.setdefault(name, handle)
+    if not (panel.legend and entries):
         return
+    place: dict[str, Any] = {"loc": "best"}
     if panel.legend == BELOW:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.085))
+        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.085)}
     elif panel.legend == BESIDE:
         # In space the labels of the vertical axis are there too.
         corner = (1.25 if panel.z_label else 1.0, 1.0)
-        axes.legend(loc="upper left", bbox_to_anchor=corner, borderaxespad=0.2)
-    else:
-        axes.legend(loc="best")
+        place = {"loc": "upper left", "bbox_to_anchor": corner, "borderaxespad": 0.2}
+    axes.legend(entries.values(), entries, **place)
 
 
 def draw_marks(axes: Any, marks: Any) -> None:
@@ -109,9 +107,8 @@ def draw_marks(axes: Any, marks: Any) -> None:
     faces = [mark for mark in marks if isinstance(mark, Faces)]
     if faces:  # in one collection, so that all of them are sorted by their distance
         corners = np.concatenate([mark.corners for mark in faces])
-        colours = [colour for mark in faces for colour in mark.colours]
-        style: dict[str, Any] = {"facecolors": colours, "edgecolors": colours, "linewidths": 0.2}
-        axes.add_collection3d(Poly3DCollection(corners, **style))
+        colours = [mark.colour for mark in faces for _ in mark.corners]
+        axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, shade=True))
         axes.auto_scale_xyz(*corners.reshape(-1, 3).T)
     for mark in marks:
         _draw(axes, mark)
@@ -130,8 +127,8 @@ def _draw(axes: Any, mark: Mark) -> None:
                 half = np.nan_to_num(mark.error)  # a bar without height is not seen
                 axes.errorbar(*rows.T, yerr=half, fmt="none", zorder=mark.layer, **bars)
         case Area():
-            for index, polygon in enumerate(mark.polygons):
-                axes.add_patch(_polygon(mark, polygon, "" if index else mark.name))
+            for polygon in mark.polygons:
+                axes.add_patch(_polygon(mark, polygon))
         case Faces():
             style = {"color": mark.colour, "linewidth": 5.0}
             axes.plot([], [], [], **style, **named)
@@ -145,15 +142,6 @@ def _draw(axes: Any, mark: Mark) -> None:
             else:
                 style |= {"alpha": mark.opacity, "linewidth": 0.0}
                 getattr(axes, f"ax{way}span")(mark.low, mark.high, **style)
-        case Bars():
-            positions = np.arange(len(mark.values))
-            bars = axes.barh(positions, mark.values, color=mark.colours, height=0.6)
-            axes.bar_label(bars, fmt="{:.2f}", padding=3, fontsize=8.0)
-            axes.set_yticks(positions, [for_paper(name) for name in mark.names])
-            axes.invert_yaxis()
-            axes.grid(visible=False, axis="y")
-        case Correlations():
-            _draw_correlations(axes, mark)
         case Text():
             _write(axes, mark)
         case _:
@@ -163,10 +151,10 @@ def _draw(axes: Any, mark: Mark) -> None:
 def _legend_entry(mark: Curve | Area) -> Any:
     if isinstance(mark, Curve):
         return Line2D([], [], **_line_style(mark))
-    return _polygon(mark, np.zeros((1, 2)), mark.name)
+    return _polygon(mark, np.zeros((1, 2)))
 
 
-def _polygon(mark: Area, points: Any, name: str) -> Polygon:
+def _polygon(mark: Area, points: Any) -> Polygon:
     return Polygon(
         points,
         facecolor=(*rgb(mark.face or mark.colour), mark.opacity),
@@ -174,7 +162,7 @@ def _polygon(mark: Area, points: Any, name: str) -> Polygon:
         linewidth=mark.width,
         joinstyle="round",
         zorder=mark.layer,
-        label=for_paper(name) or None,
+        label=for_paper(mark.name) or None,
     )
 
 
@@ -208,19 +196,6 @@ def _draw_arrow(axes: Any, mark: Arrow, named: dict[str, Any]) -> None:
     axes.update_datalim(np.stack([start, end]) if mark.reach is None else mark.reach)
     if mark.name:
         axes.plot([], [], color=mark.colour, marker=">", markersize=4.0, **named)
-
-
-def _draw_correlations(axes: Any, mark: Correlations) -> None:
-    axes.imshow(mark.values, cmap=DIVERGING, vmin=-1.0, vmax=1.0)
-    for (row, column), value in np.ndenumerate(mark.values):
-        shade = "white" if abs(value) > 0.7 else "black"
-        style: dict[str, Any] = {"fontsize": mark.font_size, "color": shade}
-        axes.text(column, row, mark.texts[row][column], ha="center", va="center", **style)
-    positions = range(len(mark.names))
-    axes.set_xticks(positions, [str(number + 1) for number in positions])
-    axes.set_yticks(positions, [for_paper(row) for row in mark.rows])
-    axes.tick_params(labelsize=min(7.0, 3.1 * mark.font_size))
-    axes.grid(visible=False)
 
 
 def _write(axes: Any, mark: Text) -> None:

@@ -15,8 +15,6 @@ import numpy as np
 from notchflex.plotting.marks import (
     Area,
     Arrow,
-    Bars,
-    Correlations,
     Curve,
     Faces,
     Mark,
@@ -24,8 +22,9 @@ from notchflex.plotting.marks import (
     Sheet,
     Span,
     Text,
+    box,
 )
-from notchflex.plotting.style import diverging_colours, for_browser, heading_lines, rgb
+from notchflex.plotting.style import for_browser, heading_lines, rgb
 from notchflex.plotting.with_matplotlib import figure_of
 from notchflex.support import need, write_text
 
@@ -58,7 +57,7 @@ def interactive_of(picture: Sheet) -> Any:
     heading = heading_lines(picture.title, picture.size[0])
     layout: Layout = {
         "font": {"size": 9.0 * POINT, "family": "DejaVu Sans, Verdana, sans-serif"},
-        "template": "simple_white", "hovermode": "closest", "annotations": [], "shapes": [],
+        "template": "simple_white", "hovermode": "closest", "annotations": [],
         # The width is that of the window; `meta` holds the one of the arrangement.
         "autosize": True, "height": height, "meta": {"width": width},
         "margin": {"t": 0, "b": 0, "l": 0, "r": 0},
@@ -72,12 +71,17 @@ def interactive_of(picture: Sheet) -> Any:
         panel = cell.panel
         where = _add_axes(panel, axes, str(number) if number > 1 else "", layout)
         where |= _add_legend(axes.get_legend(), f"legend{number + 1}", layout)
+        named = {""}
         for mark in sorted(panel.items, key=lambda mark: mark.layer):
-            traces += (trace | where for trace in _traces(mark, panel, where, layout))
+            for trace in _traces(mark, panel, where, layout):
+                traces.append(trace | {"showlegend": mark.name not in named} | where)
+                named.add(mark.name)
     for legend in paper.legends:
         _add_legend(legend, "legend", layout)
         layout["legend"] |= {"orientation": "h", "x": 0.5, "xanchor": "center"}
-        traces += (_entry(mark) | {"legend": "legend"} for mark in picture.legend)
+        traces += (
+            _entry(mark) | {"legend": "legend", "showlegend": True} for mark in picture.legend
+        )
     return go.Figure(traces, layout)
 
 
@@ -107,7 +111,7 @@ def _add_axes(panel: Panel, axes: Any, number: str, layout: Layout) -> Layout:
             {"text": for_browser(panel.title), "x": box.x0, "xref": "paper", "xanchor": "left",
              "y": box.y1, "yref": "paper", "yanchor": "bottom", "showarrow": False}
         )  # fmt: skip
-    scales: dict[str, Layout] = {}
+    scales: dict[str, Any] = {}
     for name in panel.axes:
         label, limits = getattr(panel, f"{name}_label"), getattr(axes, f"get_{name}lim")()
         scales[f"{name}axis"] = {
@@ -115,6 +119,9 @@ def _add_axes(panel: Panel, axes: Any, number: str, layout: Layout) -> Layout:
             "gridcolor": "#e6e6e6", "showgrid": True, "range": list(limits), "nticks": 8,
             "tickformat": "d" if name in panel.whole else "",
         }  # fmt: skip
+        if texts := [for_browser(text) for text in panel.ticks.get(name, ())]:
+            scales[f"{name}axis"] |= {"tickvals": [*range(len(texts))], "ticktext": texts}
+            scales[f"{name}axis"] |= {"showgrid": False, "ticks": ""}
     if panel.z_label:
         span = {name: float(np.ptp(scales[f"{name}axis"]["range"])) for name in "xyz"}
         layout[f"scene{number}"] = {
@@ -150,7 +157,7 @@ def _add_legend(legend: Any, name: str, layout: Layout) -> Layout:
 
 
 def _traces(mark: Mark, panel: Panel, where: Layout, layout: Layout) -> Iterator[Layout]:
-    """Yield the traces of a mark; shapes, texts and tick labels are added to `layout`."""
+    """Yield the traces of a mark; texts are added to `layout`."""
     match mark:
         case Curve() | Area():
             yield _entry(mark, panel)
@@ -158,24 +165,16 @@ def _traces(mark: Mark, panel: Panel, where: Layout, layout: Layout) -> Iterator
             yield _mesh(mark)
         case Arrow():
             yield from _arrow(mark)
-        case Span():
-            layout["shapes"].append(_shape(mark, where))
-            if mark.name:  # a shape has no entry in a legend
-                named: Layout = {"name": mark.name, "group": mark.group}
-                line = Curve([], mark.colour, mark.dash, mark.width, **named)
-                area = Area([], mark.colour, mark.opacity, **named)
-                yield _entry(line if mark.high is None else area)
-        case Bars():
-            names = _label_ticks(layout, where, "y", mark.names)
-            yield {
-                "type": "bar", "orientation": "h", "x": list(mark.values), "width": 0.6,
-                "marker": {"color": [css(colour) for colour in mark.colours]},
-                "text": [f"{value:.2f}" for value in mark.values], "customdata": names,
-                "textposition": "outside", "cliponaxis": False, "showlegend": False,
-                "hovertemplate": "%{customdata}: %{x}<extra></extra>",
-            }  # fmt: skip
-        case Correlations():
-            yield _correlations(mark, where, layout)
+        case Span():  # over all that the panel shows
+            ends = _axis(layout, where, "y" if mark.axis == "x" else "x")["range"]
+            high = mark.low if mark.high is None else mark.high
+            corners = box(mark.low, ends[0], high, ends[1])
+            corners = corners if mark.axis == "x" else corners[:, ::-1]
+            style: Layout = {"name": mark.name, "group": mark.group}
+            if mark.high is None:
+                yield _line(Curve(corners[1:3], mark.colour, mark.dash, mark.width, **style), panel)
+            else:
+                yield _area(Area([corners], mark.colour, mark.opacity, **style))
         case Text():
             anchor = mark.align.replace("center", "middle").split()
             part = " domain" if mark.inside else ""
@@ -211,10 +210,11 @@ def _line(mark: Curve, panel: Panel) -> Layout:
         **_named(mark),
     }  # fmt: skip
     if mark.dash and not panel.z_label:
-        trace["line"]["dash"] = _dashes(mark)
+        dashes = [f"{POINT * mark.width * length:.1f}px" for length in mark.dash]
+        trace["line"]["dash"] = ",".join(dashes)
     if mark.error is not None:
-        style = {"type": "data", "width": 0, "thickness": 0.7 * POINT, "color": colour}
-        trace["error_y"] = {"array": np.asarray(mark.error), **style}
+        style: Layout = {"type": "data", "width": 0, "thickness": 0.7 * POINT, "color": colour}
+        trace["error_y"] = style | {"array": np.asarray(mark.error)}
         trace["text"] = [f" ± {half:.2g}" if np.isfinite(half) else "" for half in mark.error]
         trace["hovertemplate"] += "%{text}"
     trace["hovertemplate"] += "<extra></extra>"
@@ -227,8 +227,8 @@ def _area(mark: Area) -> Layout:
     rows = [part for ring in mark.polygons for part in (ring, ring[:1], gap)]
     x, y = np.concatenate(rows or [gap]).T
     return {
-        "type": "scatter", "mode": "lines", "fill": "toself", "x": x, "y": y, "hoverinfo": "skip",
-        "fillcolor": css(mark.face or mark.colour, mark.opacity),
+        "type": "scatter", "mode": "lines", "fill": "toself", "x": x, "y": y, "hoverinfo": "name",
+        "hoveron": "fills", "fillcolor": css(mark.face or mark.colour, mark.opacity),
         "line": {"color": css(mark.colour), "width": POINT * mark.width}, **_named(mark),
     }  # fmt: skip
 
@@ -236,12 +236,9 @@ def _area(mark: Area) -> Layout:
 def _mesh(mark: Faces) -> Layout:
     first = 4 * np.arange(len(mark.corners))
     triangles = np.repeat(first, 2), *(np.ravel([first + a, first + a + 1], "F") for a in (1, 2))
-    colours = [css(colour) for colour in mark.colours for _ in range(2)]
     return {
         "type": "mesh3d", **dict(zip("xyz", mark.corners.reshape(-1, 3).T, strict=True)),
-        **dict(zip("ijk", triangles, strict=True)), "facecolor": colours, "flatshading": True,
-        "lighting": {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0}, "hoverinfo": "skip",
-        # The faces have colours of their own; this one is that of the legend.
+        **dict(zip("ijk", triangles, strict=True)), "flatshading": True, "hoverinfo": "skip",
         "color": css(mark.colour), **_named(mark),
     }  # fmt: skip
 
@@ -256,7 +253,7 @@ def _arrow(mark: Arrow) -> Iterator[Layout]:
         yield {"type": "scatter3d", "mode": "lines", **ends, **style}
         yield {
             "type": "cone", "anchor": "tip", "sizemode": "raw", "showscale": False,
-            "colorscale": [[0, colour], [1, colour]], "hoverinfo": "skip", "showlegend": False,
+            "colorscale": [[0, colour], [1, colour]], "hoverinfo": "skip",
             **dict(zip("xyzuvw", np.concatenate([end, 0.3 * step])[:, None], strict=True)),
         }  # fmt: skip
         return
@@ -264,60 +261,20 @@ def _arrow(mark: Arrow) -> Iterator[Layout]:
     control = 0.5 * (start + end) + mark.bend * np.array([step[1], -step[0]])
     part = np.linspace(0.0, 1.0, 21)[:, None]
     x, y = ((1 - part) ** 2 * start + 2 * part * (1 - part) * control + part**2 * end).T
-    head = {"symbol": "arrow", "angleref": "previous", "color": colour}
-    head["size"] = [0.0] * 20 + [1.2 * mark.head]
+    sizes = [0.0] * 20 + [1.2 * mark.head]
+    head = {"symbol": "arrow", "angleref": "previous", "color": colour, "size": sizes}
     yield {"type": "scatter", "mode": "lines+markers", "x": x, "y": y, "marker": head, **style}
 
 
-def _shape(mark: Span, where: Layout) -> Layout:
-    """Return what goes across the whole panel; it is shown and hidden with its group."""
-    along, across = ("x", "y") if mark.axis == "x" else ("y", "x")
-    shape: Layout = {
-        f"{along}0": mark.low, f"{along}1": mark.low if mark.high is None else mark.high,
-        f"{along}ref": where[f"{along}axis"], f"{across}ref": f"{where[f'{across}axis']} domain",
-        f"{across}0": 0, f"{across}1": 1,
-    }  # fmt: skip
-    if group := mark.group or mark.name:
-        shape["legendgroup"] = for_browser(group)
-    if mark.high is None:
-        line = {"color": css(mark.colour), "width": POINT * mark.width}
-        return shape | {"type": "line", "line": line | {"dash": _dashes(mark) or "solid"}}
-    fill = css(mark.colour, mark.opacity)
-    return shape | {"type": "rect", "line": {"width": 0}, "layer": "below", "fillcolor": fill}
-
-
-def _correlations(mark: Correlations, where: Layout, layout: Layout) -> Layout:
-    _label_ticks(layout, where, "x", [str(number + 1) for number in range(len(mark.names))])
-    _label_ticks(layout, where, "y", mark.rows)
-    names = [for_browser(name) for name in mark.names]
-    return {
-        "type": "heatmap", "z": mark.values, "zmin": -1.0, "zmax": 1.0, "showscale": False,
-        "colorscale": [[i / 20, css(colour)] for i, colour in enumerate(diverging_colours(21))],
-        "text": mark.texts, "texttemplate": "%{text}",
-        "textfont": {"size": POINT * mark.font_size},
-        "customdata": [[f"{row}<br>{column}" for column in names] for row in names],
-        "hovertemplate": "%{customdata}<br>%{text}<extra></extra>",
-    }  # fmt: skip
-
-
-def _label_ticks(layout: Layout, where: Layout, name: str, labels: Any) -> list[str]:
-    """Give an axis labels at whole numbers in place of a grid; return them as plotly has them."""
-    texts = [for_browser(label) for label in labels]
-    axis = layout[f"{name}axis{where[f'{name}axis'][1:]}"]
-    axis |= {"tickvals": list(range(len(texts))), "ticktext": texts, "showgrid": False, "ticks": ""}
-    axis["tickfont"] = {"size": POINT * min(7.0, 110.0 / len(texts))}
-    return texts
+def _axis(layout: Layout, where: Layout, name: str) -> Layout:
+    """Return the layout of the axis x or y of a panel, whose name for plotly is like x2."""
+    return layout[f"{name}axis{where[f'{name}axis'][1:]}"]
 
 
 def _named(mark: Mark) -> Layout:
     """Return the legend entry of a mark, and the group with which it is shown and hidden."""
     group = for_browser(mark.group or mark.name)
-    named = {"name": for_browser(mark.name) or group, "showlegend": bool(mark.name)}
-    return named | ({"legendgroup": group} if group else {})
-
-
-def _dashes(mark: Curve | Span) -> str:
-    return ",".join(f"{POINT * mark.width * length:.1f}px" for length in mark.dash or ())
+    return {"name": for_browser(mark.name) or group} | ({"legendgroup": group} if group else {})
 
 
 def css(colour: Any, opacity: float = 1.0) -> str:
