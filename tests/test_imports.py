@@ -68,8 +68,6 @@ _TYPE = "for the type only: a path calls this file and hands itself over"
 EXCEPTIONS: dict[tuple[str, str], str] = {
     ("__main__", "cli"): "`python -m notchflex` is the command line",
     ("_plot", "plotting"): _PICTURE,
-    ("_plot", "plotting.axes_of_quantities"): _PICTURE,
-    ("_plot", "plotting.picture"): _PICTURE,
     ("robot.notches.arc", "mechanics.cuts"): (
         "whether lips touch at rest depends on the centroid of the section; seldom asked for"
     ),

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import notchflex as nf
-from notchflex.plotting.sweeps.columns import sweep_picture
+from notchflex.plotting import sweep_picture
 
 DOCS = Path(__file__).resolve().parents[1]
 IMAGES = DOCS / "images"

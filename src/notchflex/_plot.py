@@ -53,8 +53,7 @@ def plot(
         'tendon stroke $u$ [mm]'
     """
     need("matplotlib", "plot", "plot")
-    from notchflex.plotting.axes_of_quantities import plot_on_axes
-    from notchflex.plotting.picture import picture
+    from notchflex.plotting import picture, plot_on_axes
 
     if x is None and y is None and ax is None:
         return picture(thing)

@@ -8,7 +8,7 @@ import notchflex as nf
 from notchflex.analysis.bands import closing_bands
 from notchflex.analysis.draws import tolerances_of
 from notchflex.plotting import picture
-from notchflex.plotting.sheet import Area
+from notchflex.plotting.marks import Area
 from notchflex.robot import from_table, to_table
 from notchflex.robot.problems import amount
 from notchflex.robot.value_names import number_at

@@ -22,12 +22,17 @@ from notchflex.fit import (
 from notchflex.fit.documents import calibration_document
 from notchflex.fit.estimation.problem import FitProblem
 from notchflex.fit.model.samples import Samples
-from notchflex.plotting.fits.calibration import data_panel, residual_panel
-from notchflex.plotting.sheet import Curve
+from notchflex.plotting import Curve, calibration_picture
 from refusals import refused
 
 WRIST = nf.load_robot(ROBOT)
 FRICTION, MODULUS = NAMES
+
+
+def panel_of(found, title):
+    """The panel of its picture with a title."""
+    cells = calibration_picture(found).cells
+    return next(cell.panel for cell in cells if cell.panel.title == title)
 
 
 def said_of(found):
@@ -81,7 +86,7 @@ def test_coordinates_may_be_missing_one_by_one_also_on_a_turned_base(tmp_path):
     left = at.observed["tip_position"][:, :2] - some[:, :2]
     np.testing.assert_allclose(found.residuals.values, left.ravel(), atol=1e-7)
     # drawn in the world too, as it was measured
-    drawn = data_panel(found, WRIST.name, "tip_position", 0).items
+    drawn = panel_of(found, "tip position, x").items
     marks = next(one for one in drawn if isinstance(one, Curve) and one.hollow)
     np.testing.assert_allclose(marks.rows[:, 1], some[:, 0])
 
@@ -234,7 +239,7 @@ def test_totals_that_are_sums_are_not_counted(capsys):
     assert "30 numbers measured (and 6 total angles, the sum of the notches)" in (
         capsys.readouterr().out
     )
-    panel = residual_panel(found, WRIST.name)
+    panel = panel_of(found, "model less measured")
     drawn = sum(len(one.rows) for one in panel.items if isinstance(one, Curve))
     assert drawn == 30
 

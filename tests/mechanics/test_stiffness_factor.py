@@ -8,7 +8,7 @@ import pytest
 import notchflex as nf
 from notchflex._jax import jax
 from notchflex.mechanics.chain import assemble
-from notchflex.plotting.shapes.robot_shape import shape_from_angles
+from notchflex.plotting import shape_from_angles
 from notchflex.robot import robot_from_text, robot_text
 
 FACTOR = "notch.stiffness_factor"

@@ -11,7 +11,7 @@ from scipy.stats import t
 from fitted import NAMES, fitted
 from notchflex.fit import Interval
 from notchflex.plotting import calibration_picture, picture
-from notchflex.plotting.sheet import Area
+from notchflex.plotting.marks import Area
 from notchflex.plotting.style import VERMILLION
 
 
@@ -107,7 +107,7 @@ def test_legend_fits_on_the_paper():
     found = fitted()
     own = calibration_picture(found)
     # Least of all are the total angle and its residuals.
-    for made in (own, replace(own, width=6.0, height=3.0, cells=own.cells[:2])):
+    for made in (own, replace(own, column_width=2.5, row_height=2.4, cells=own.cells[:2])):
         figure = made.figure()
         figure.draw_without_rendering()
         (legend,) = figure.legends
@@ -128,13 +128,14 @@ def test_browser_shows_band_ends_and_correlations():
     np.testing.assert_allclose(band.y[:count], area.polygons[0][:, 1], rtol=1e-5)
     legend = {one.legendgroup: one.name for one in shown.data if one.showlegend}
     assert legend[band.legendgroup] == "95 % band of the model"
-    upright = [one for one in shown.layout.shapes if one.type == "line" and one.x0 == one.x1]
+    upright = [one for one in shown.data if one.x is not None and one.x[0] == one.x[-1]]
     ends = [end for one in found.intervals.values() for end in (one.lower, one.upper)]
-    assert [one.x0 for one in upright] == ends
+    assert [one.x[0] for one in upright] == pytest.approx(ends)
     assert {legend[one.legendgroup] for one in upright} == {"end of the 95 % interval"}
-    (square,) = (one for one in shown.data if one.type == "heatmap")
-    np.testing.assert_allclose(np.array(square.z, float), found.correlation, rtol=1e-5)
-    assert square.customdata[0][1] == "friction.coefficient<br>material.elastic_modulus"
+    squares = [one.name for one in shown.data if one.xaxis == "x10"]
+    assert squares[1] == "friction.coefficient, material.elastic_modulus"
+    texts = [one.text for one in shown.layout.annotations if one.xref == "x10 domain"]
+    assert texts == [f"{value:.2f}" for value in found.correlation.ravel()]
     points = [one for one in shown.data if (one.name or "") == "measured, pull a"]
     assert len(points) == 6  # five notches and the total
 

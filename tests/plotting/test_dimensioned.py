@@ -9,10 +9,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import notchflex as nf
 from notchflex.plotting import save
-from notchflex.plotting.drawings.dimensioned import MAX_SHAPES, dimensioned_figure
-from notchflex.plotting.drawings.notch_views import notch_view
-from notchflex.plotting.shapes.outline import outline
-from notchflex.plotting.shapes.robot_shape import shape_from_angles
+from notchflex.plotting.drawing import MAX_SHAPES, dimensioned_figure
+from notchflex.plotting.notch_views import notch_view
+from notchflex.plotting.outline import outline, shape_from_angles
 from notchflex.robot.kinds import Notch
 from refusals import refused
 
@@ -96,11 +95,11 @@ def test_cut_face_of_an_on_axis_cut_shows_both_corners():
     view = view_of(nf.load_robot("pacheco2021-a"))
     # Outer corner: radius - depth; the radial edge meets the bore at the same angle.
     assert view.section_from == pytest.approx(0.81 - 1.40)
-    assert view.cuts[0].face[0, 1] == pytest.approx(0.81 - 1.40)
-    assert view.cuts[0].edge[1, 1] == pytest.approx((0.81 - 1.40) * 0.70 / 0.81)
+    assert view.faces[0][0, 1] == pytest.approx(0.81 - 1.40)
+    assert view.cuts[0][1, 1] == pytest.approx((0.81 - 1.40) * 0.70 / 0.81)
     shallow = view_of(nf.load_robot("pacheco2021-a").with_value("notch.depth", 0.5))
-    assert shallow.cuts[0].face is None  # the wall hides it
-    assert shallow.cuts[0].edge[1, 1] == pytest.approx(0.31)
+    assert not shallow.faces  # the wall hides it
+    assert shallow.cuts[0][1, 1] == pytest.approx(0.31)
 
 
 def wall_ends(robot, side):
@@ -113,7 +112,7 @@ def wall_ends(robot, side):
 
 
 def openings(view, side):
-    return [place for cut in view.cuts[:3] for place, across in cut.edge[[0, -1]] if across == side]
+    return [place for cut in view.cuts[:3] for place, across in cut[[0, -1]] if across == side]
 
 
 # The model has no thickness of a strip between its two notches, so that its far one is not drawn
@@ -133,7 +132,7 @@ def test_cuts_lie_where_the_bodies_of_the_model_end(name, sides):
 def test_pair_of_a_strip_looks_the_same_after_half_a_turn():
     upper, lower, *_ = view_of(nf.load_robot("liu2022")).cuts
     middle = np.array([3.5 + 0.5 * 1.5, 0.0])
-    assert 2.0 * middle - upper.edge == pytest.approx(lower.edge[[2, 1, 0]])
+    assert 2.0 * middle - upper == pytest.approx(lower[[2, 1, 0]])
 
 
 def test_long_pieces_are_broken_and_others_true_to_scale():
@@ -176,6 +175,6 @@ def test_drawing_is_written(tmp_path, suffix):
 def test_depth_from_a_calliper_on_radial_edges():
     """The formula of docs/your_own_wrist.md: the jaws touch the inner corners."""
     view = view_of(nf.load_robot("pacheco2021-a"))
-    thickness = 0.81 + view.cuts[0].edge[1, 1]
+    thickness = 0.81 + view.cuts[0][1, 1]
     assert thickness == pytest.approx(0.300, abs=5e-4)
     assert 0.81 + (0.81 - thickness) * 0.81 / 0.70 == pytest.approx(1.40)

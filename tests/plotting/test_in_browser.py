@@ -25,16 +25,12 @@ def page(browser, tmp_path):
 
 
 def test_fit_is_drawn_and_its_parts_are_hidden(page):
-    levels_and_stripe = 2 + 1 + 1  # of both profiles, of the residuals
-    ends = 4
-    shapes = page.locator(".shapelayer path")
-    assert shapes.count() == levels_and_stripe + ends
-    squares = page.locator(".heatmaplayer .hm image")
-    assert squares.count() == 1
+    lines = page.locator(".scatterlayer .trace").count()
+    ends = 4  # of two constants
     entry = page.locator(".legend .traces", has_text="end of the 95 % interval")
     entry.locator(".legendtoggle").click()
     page.wait_for_function(
-        f"document.querySelectorAll('.shapelayer path').length == {levels_and_stripe}"
+        f"document.querySelectorAll('.scatterlayer .trace').length == {lines - ends}"
     )
     assert page.complaints == []
     assert all(url.startswith("file:") for url in page.asked)

@@ -5,9 +5,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.mechanics.chain import assemble
-from notchflex.plotting.shapes.outline import outline
-from notchflex.plotting.shapes.panel import body_faces
-from notchflex.plotting.shapes.robot_shape import shape_from_angles, tendon_line
+from notchflex.plotting.outline import body_faces, lips, outline, shape_from_angles, tendon_line
 
 
 def shape_of(name, angle=0.0):
@@ -93,10 +91,9 @@ def test_a_bent_link_still_ends_at_its_bodies():
 def test_notches_close_where_they_are_open(links, strips):
     radii = [2.995, 5.0]
     for shape, radius in zip((links, strips), radii, strict=True):
-        side = outline(shape, 0.0)
-        for lip in side.lips:
-            assert abs(lip[0]) == pytest.approx(radius)
-    assert outline(links, 0.0).lips[0][0] < 0.0 < outline(links, 0.0).lips[1][0]
+        for notch in range(len(shape.flexures)):
+            assert abs(lips(shape, notch)[0]) == pytest.approx(radius)
+    assert lips(links, 0)[0] < 0.0 < lips(links, 1)[0]
 
 
 def test_walls_in_space_are_half_round_where_slots_alternate(links):

@@ -23,8 +23,8 @@ from notchflex.plotting import (
     save_animation,
     state_picture,
 )
-from notchflex.plotting.animation import MAX_FRAMES, frames_of
-from notchflex.plotting.sheet import Area, Bars, Curve, Panel, grid
+from notchflex.plotting.marks import Area, Curve, Panel, bar_panel, grid
+from notchflex.plotting.path import MAX_FRAMES, frames_of
 from notchflex.plotting.style import for_browser as html
 from notchflex.results.quantities import QUANTITIES
 from refusals import refused
@@ -112,7 +112,7 @@ def test_both_programs_show_the_same_curves(drawn, kind):
     assert len(figure.axes) == len(own.cells)
     for axes, cell in zip(figure.axes, own.cells, strict=True):
         lines = [one.rows for one in cell.panel.items if isinstance(one, Curve) and len(one.rows)]
-        if cell.panel.in_space:
+        if cell.panel.z_label:
             continue
         on_paper = [np.stack(line.get_data(), axis=1) for line in axes.get_lines()]
         shown = [
@@ -236,19 +236,18 @@ def test_rig_in_a_browser_is_that_on_paper(drawn):
     assert shown.layout.yaxis2.matches == "y"
     assert shown.layout.yaxis.range == shown.layout.yaxis2.range
     assert tuple(shown.layout.yaxis.range) == pytest.approx(left.get_ylim(), rel=1e-3)
-    stripes = [one for one in shown.layout.shapes if one.type == "rect"]
-    half = (-rig.spread, rig.spread)
-    for stripe in (stripes[0], stripes[2]):
-        assert (stripe.y0, stripe.y1) == tuple(rig.coefficient + np.array(half))
-    assert (stripes[1].y0, stripes[1].y1) == rig.interval
-    levels = [one for one in shown.layout.shapes if one.type == "line"]
-    assert [one.y0 for one in levels] == [rig.coefficient] * 2
+    stripes = [one for one in shown.data if one.fill == "toself"]
+    ends = [(np.nanmin(one.y), np.nanmax(one.y)) for one in stripes]
+    spread = (rig.coefficient - rig.spread, rig.coefficient + rig.spread)
+    np.testing.assert_allclose(ends, [spread, rig.interval] * 2, rtol=1e-5)
+    levels = [one for one in shown.data if one.name.startswith("<i>")]
+    assert [one.y[0] for one in levels] == pytest.approx([rig.coefficient] * 2)
     named = {one.name for one in shown.data if one.showlegend and one.xaxis == "x2"}
     assert named == {
         text.get_text().replace(r"$\mu$", "<i>μ</i>") for text in right.get_legend().texts
     }
     groups = {one.legendgroup for one in shown.data if one.showlegend}
-    assert {one.legendgroup for one in shown.layout.shapes} <= groups
+    assert {one.legendgroup for one in [*stripes, *levels]} <= groups
     deviation = rig.readings.coefficient_deviation
     readings = next(one for one in shown.data if one.name == "reading")
     assert np.isnan(readings.error_y.array[0])
@@ -261,9 +260,9 @@ def test_rig_in_a_browser_is_that_on_paper(drawn):
 
 def test_names_at_an_axis_have_room_in_a_browser():
     def place(name):
-        panel = Panel([Bars([1.0], [name], ["red"])], "mm", "")
+        panel = bar_panel([1.0], [name], ["red"], "mm")
         plain = Panel([Curve([[0.0, 0.0], [1.0, 1.0]], "red")], "x", "y")
-        layout = Picture("", 6.0, 3.0, grid([plain, panel], 2)).interactive().layout
+        layout = Picture("", grid([plain, panel], 2)).interactive().layout
         return (layout.xaxis2.domain[0] - layout.xaxis.domain[1]) * layout.meta["width"]
 
     assert place("long name " * 4) - place("short") > 6.0 * 35
@@ -304,7 +303,7 @@ def test_animation_moves_and_ends_where_the_path_ends(tmp_path):
 def test_animation_takes_its_time_and_stands_at_both_ends(tmp_path, monkeypatch, steps):
     from PIL import Image
 
-    monkeypatch.setattr("notchflex.plotting.animation.DOTS_PER_INCH", 12)
+    monkeypatch.setattr("notchflex.plotting.path.DOTS_PER_INCH", 12)
     file = tmp_path / "x.gif"
     save_animation(fake_path(steps), file)
     with Image.open(file) as moving:

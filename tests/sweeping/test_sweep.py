@@ -19,7 +19,7 @@ import notchflex as nf
 from notchflex.cli import run
 from notchflex.pieces import folder as pieces
 from notchflex.pieces.folder import locked
-from notchflex.plotting.sweeps.columns import _label
+from notchflex.plotting import sweep_picture
 from refusals import refused as expect_refused
 from swept import TABLE, digests, plan
 
@@ -363,7 +363,8 @@ def test_command_line(tmp_path, monkeypatch, capsys):
 
 def test_labels_of_a_picture_are_those_of_quantities(whole):
     found = nf.read_sweep(whole)
-    texts = [_label(found, one) for one in ("notch.depth", *found.columns, "row")]
+    shown = ("notch.depth", *found.columns, "row")
+    texts = [sweep_picture(found, one, "row").cells[0].panel.x_label for one in shown]
     assert texts == [
         "notch.depth [mm]",
         r"total bending angle $\theta$ [deg]",

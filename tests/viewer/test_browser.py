@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.curves import LOADING, UNLOADING
+from notchflex.plotting import LOADING, UNLOADING
 from notchflex.robot import robot_from_text
 from visit import Visit, changed
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.sheet import Curve, Panel
+from notchflex.plotting import Curve, Panel
 from notchflex.viewer import Session
 from notchflex.viewer.page.chart import chart, ticks
 from robots import ready
@@ -68,7 +68,7 @@ def test_the_loop_tells_loading_from_unloading_and_keeps_the_loop_before():
 
 
 def test_colours_of_contacts_and_strains():
-    from notchflex.plotting.style import BLUE, GREEN, GREY, VERMILLION
+    from notchflex.plotting import BLUE, GREEN, GREY, VERMILLION
     from notchflex.viewer.scene.marks import BEYOND, METAL, contact_colours, strain_colour
 
     robot = ready("A").with_value("friction.wrap", "geometric")
@@ -135,7 +135,7 @@ def test_no_sign_before_a_zero(name):
 
 
 def test_every_colour_means_one_thing():
-    from notchflex.plotting.curves import COLOUR
+    from notchflex.plotting import COLOUR
     from notchflex.viewer.page.readout import BALL, entries
 
     told = entries(ready("A"))

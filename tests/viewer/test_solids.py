@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.shapes.robot_shape import shape_at
+from notchflex.plotting import shape_at
 from notchflex.viewer.scene.scene import PIECES, ROUND, at_rest, body_solids, skins
 from robots import ready
 

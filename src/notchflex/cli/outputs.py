@@ -116,7 +116,7 @@ class Outputs:
         """Draw and write the usual picture of a result, if `--plot` was given."""
 
         def picture() -> Picture:
-            from notchflex.plotting.picture import picture
+            from notchflex.plotting import picture
 
             return picture(result)
 

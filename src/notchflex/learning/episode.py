@@ -331,14 +331,18 @@ def frame(rows: EpisodeRows, row: int) -> UInt8[np.ndarray, "h w 3"]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from notchflex.plotting.path import state_shape
-    from notchflex.plotting.renderers.with_matplotlib import draw_panel
-    from notchflex.plotting.shapes.outline import bending_plane, project
-    from notchflex.plotting.sheet import dots
-    from notchflex.plotting.style import VERMILLION, house_style
+    from notchflex.plotting import (
+        VERMILLION,
+        bending_plane,
+        dots,
+        draw_panel,
+        house_style,
+        project,
+        state_shape,
+    )
 
     panel, far = state_shape(rows.path(row), 0), _ROOM * rows.settings.length
-    view: Any = None if panel.in_space else bending_plane(rows.settings.model)
+    view: Any = None if panel.z_label else bending_plane(rows.settings.model)
     target = rows.target[row][None]
     points = target if view is None else project(target, view)
     mark = dots(points, VERMILLION, 7.0, name="target", layer=20)
@@ -346,9 +350,9 @@ def frame(rows: EpisodeRows, row: int) -> UInt8[np.ndarray, "h w 3"]:
     with house_style():
         figure = Figure(figsize=(_SIZE, _SIZE), dpi=_DOTS, layout="constrained")
         canvas = FigureCanvasAgg(figure)
-        axes: Any = figure.add_subplot(projection="3d" if panel.in_space else None)
+        axes: Any = figure.add_subplot(projection="3d" if panel.z_label else None)
         draw_panel(axes, panel)
-        if panel.in_space:
+        if panel.z_label:
             axes.set(xlim=(-far, far), ylim=(-far, far), zlim=(-0.4 * far, 1.6 * far))
             axes.set_box_aspect((1.0, 1.0, 1.0))
         else:

@@ -1,38 +1,81 @@
 """Pictures of results, for paper and for a browser (`pip install 'notchflex[plot]'`)."""
 
-from notchflex.plotting.animation import save_animation
-from notchflex.plotting.batch import batch_picture
-from notchflex.plotting.beside import beside_picture
-from notchflex.plotting.drawings.dimensioned import dimensioned_figure
-from notchflex.plotting.fits.calibration import calibration_picture
-from notchflex.plotting.fits.comparison import comparison_figure, comparison_picture
-from notchflex.plotting.fits.friction import friction_picture
-from notchflex.plotting.following import following_picture, sensed_picture
+from notchflex.plotting.curves import COLOUR, LOADING, UNLOADING, branches
+from notchflex.plotting.drawing import (
+    INK,
+    LETTER,
+    MM,
+    TEXT,
+    dimensioned_figure,
+    draw_row,
+    label,
+    notch_rows,
+    paper,
+    scale_text,
+    usual_scale,
+)
+from notchflex.plotting.fits import (
+    calibration_picture,
+    comparison_figure,
+    comparison_picture,
+    friction_picture,
+)
+from notchflex.plotting.marks import Curve, Mark, Panel, dots, line
+from notchflex.plotting.outline import (
+    HELD,
+    bending_plane,
+    body_corners,
+    fair_growth,
+    lips,
+    prism,
+    project,
+    shape_at,
+    shape_from_angles,
+    strip,
+    tendon_line,
+    tube_wall,
+)
 from notchflex.plotting.output import Picture
-from notchflex.plotting.path import path_figure, path_picture, state_picture
-from notchflex.plotting.picture import picture
-from notchflex.plotting.style import save
-from notchflex.plotting.tolerances.tolerances import tolerance_picture
-from notchflex.plotting.workspace import workspace_picture, workspaces_picture
+from notchflex.plotting.path import (
+    beside_picture,
+    path_figure,
+    path_picture,
+    save_animation,
+    state_picture,
+)
+from notchflex.plotting.shapes import AppliedLoad, applied_loads, state_shape
+from notchflex.plotting.studies import (
+    batch_picture,
+    sweep_picture,
+    tolerance_picture,
+    workspace_picture,
+    workspaces_picture,
+)
+from notchflex.plotting.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    house_style,
+    save,
+)
+from notchflex.plotting.targets import following_picture, sensed_picture
+from notchflex.plotting.usual import picture, plot_on_axes
+from notchflex.plotting.with_matplotlib import draw_marks, draw_panel
 
 __all__ = [
-    "Picture",
-    "batch_picture",
-    "beside_picture",
-    "calibration_picture",
-    "comparison_figure",
-    "comparison_picture",
-    "dimensioned_figure",
-    "following_picture",
-    "friction_picture",
-    "path_figure",
-    "path_picture",
-    "picture",
-    "save",
-    "save_animation",
-    "sensed_picture",
-    "state_picture",
-    "tolerance_picture",
-    "workspace_picture",
-    "workspaces_picture",
-]
+    "BLACK", "BLUE", "COLOUR", "GREEN", "GREY", "HELD", "INK", "LETTER", "LOADING", "MM", "ORANGE",
+    "PURPLE", "SKY", "TEXT", "UNLOADING", "VERMILLION", "AppliedLoad", "Curve", "Mark", "Panel",
+    "Picture", "applied_loads", "batch_picture", "bending_plane", "beside_picture", "body_corners",
+    "branches", "calibration_picture", "comparison_figure", "comparison_picture",
+    "dimensioned_figure", "dots", "draw_marks", "draw_panel", "draw_row", "fair_growth",
+    "following_picture", "friction_picture", "house_style", "label", "line", "lips", "notch_rows",
+    "paper", "path_figure", "path_picture", "picture", "plot_on_axes", "prism", "project", "save",
+    "save_animation", "scale_text", "sensed_picture", "shape_at", "shape_from_angles",
+    "state_picture", "state_shape", "strip", "sweep_picture", "tendon_line", "tolerance_picture",
+    "tube_wall", "usual_scale", "workspace_picture", "workspaces_picture",
+]  # fmt: skip

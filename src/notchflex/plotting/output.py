@@ -5,27 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from notchflex.plotting.sheet import Sheet
+from matplotlib.figure import Figure
+
+from notchflex.plotting.marks import Sheet
+from notchflex.plotting.style import save
+from notchflex.plotting.with_matplotlib import figure_of
+from notchflex.plotting.with_plotly import interactive_of, save_html
 from notchflex.support import check_picture
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-SCREEN_DOTS = 72
-"""Dots per inch of a picture in a notebook."""
 
 
 @dataclass(frozen=True, repr=False)
 class Picture(Sheet):
     """Panels on a grid, under a heading, for matplotlib, plotly and notebooks."""
-
-    def figure(self) -> Figure:
-        """Return it as a figure of matplotlib."""
-        from notchflex.plotting.renderers.with_matplotlib import figure_of
-
-        return figure_of(self)
 
     def __repr__(self) -> str:
         """Return its title and how to save it."""
@@ -35,8 +28,12 @@ class Picture(Sheet):
     def _repr_png_(self) -> bytes:
         """Return it as a notebook shows it."""
         written = BytesIO()
-        self.figure().savefig(written, format="png", dpi=SCREEN_DOTS)
+        self.figure().savefig(written, format="png", dpi=72)
         return written.getvalue()
+
+    def figure(self) -> Figure:
+        """Return it as a figure of matplotlib."""
+        return figure_of(self)
 
     def interactive(self) -> Any:
         """Return it as a figure of plotly.
@@ -44,8 +41,6 @@ class Picture(Sheet):
         Raises:
             InputError: plotly is not installed.
         """
-        from notchflex.plotting.renderers.with_plotly import interactive_of
-
         return interactive_of(self)
 
     def save(self, target: str | FilePath) -> None:
@@ -61,10 +56,6 @@ class Picture(Sheet):
         """
         check_picture(str(target), "the picture")
         if FilePath(target).suffix.lower() == ".html":
-            from notchflex.plotting.renderers.with_plotly import save_html
-
             save_html(self, target)
         else:
-            from notchflex.plotting.style import save
-
             save(self.figure(), target)

@@ -1,51 +1,72 @@
-"""The pictures of a path, of one of its states, and of a robot without loads."""
+"""The pictures of a path, of one of its states, of a robot, and of several paths."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
+from matplotlib.animation import PillowWriter
+from matplotlib.figure import Figure
 
-from notchflex import Robot
+from notchflex import Band, EquilibriumPath, InputError, Robot
 from notchflex.plotting.curves import (
+    LINE,
     LOADING,
     NOTCH_LABEL,
     SLACK,
     UNLOADING,
-    driven_by_stroke,
-    front_panel,
+    abscissa,
+    branch_lines,
+    evenly,
+    failures,
     notches_panel,
-    profile_panel,
-    pulled_tendons,
-    reverses_step_by_step,
-    shaded,
+    path_panels,
+    scaled,
     span_line,
+    span_panel,
     steps_by_branch,
-    strain_panel,
-    stroke_panel,
     total_panel,
 )
+from notchflex.plotting.marks import (
+    BELOW,
+    Colour,
+    Curve,
+    Mark,
+    Panel,
+    Text,
+    dots,
+    line,
+    stack,
+)
 from notchflex.plotting.output import Picture
-from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
-from notchflex.plotting.sheet import BESIDE, Curve, Mark, Note, Panel, dots, stack
-from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.support import QUANTITIES
+from notchflex.plotting.shapes import (
+    load_label,
+    representative_steps,
+    robot_shape,
+    shape_panel,
+    state_shape,
+)
+from notchflex.plotting.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    MODEL_COLOURS,
+    VERMILLION,
+    house_style,
+    rgb,
+    sequence_colours,
+)
+from notchflex.plotting.with_matplotlib import draw_panel, figure_of
+from notchflex.support import MOVING, QUANTITIES, check_picture, replacing
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from notchflex import Band, EquilibriumPath
-
-MAX_PROFILES = 2
-"""Tendons whose tension is drawn over the stroke, and from span to span."""
+TIP_LABELS = tuple(f"tip position {axis} [mm]" for axis in "xz")
 
 MAX_TENDONS = 8
 """Tendons of one state whose tension is drawn."""
-
-_TWO_ROWS = 4
-"""More curves than this are drawn three to a column."""
 
 
 def path_figure(path: EquilibriumPath, *, title: str | None = None) -> Figure:
@@ -79,38 +100,21 @@ def path_picture(
         bands: Bands of tolerances by quantity, shaded behind angles and strains.
     """
     ways = steps_by_branch(path)
-    steps = {"": representative_steps(path)}
     if len(ways) > 1:
-        steps = {way: representative_steps(path, among=ways[way]) for way in (LOADING, UNLOADING)}
-    view = plane_of(path)
-    shapes = [shape_panel(path, some, view, title=name) for name, some in steps.items()]
-    panels = _curves(path, ways, bands)
+        shapes = [
+            shape_panel(path, representative_steps(path, among=ways[way]), title=way)
+            for way in (LOADING, UNLOADING)
+        ]
+    else:
+        shapes = [shape_panel(path, representative_steps(path))]
+    panels = path_panels(path, bands) if len(path) > 1 else []
     # The shapes one above the other in the first column, the curves column by column beside them.
-    rows = 3 if len(panels) > _TWO_ROWS else 2
+    rows = 3 if len(panels) > 4 else 2
     cells = stack(shapes, height=2 * rows // len(shapes))
     for start in range(0, len(panels), rows):
         cells += stack(panels[start : start + rows], 1 + start // rows, 2)
-    columns = cells[-1].column + 1
     heading = path.robot.name if title is None else title
-    return Picture(heading, 2.6 + 4.0 * columns, 0.8 + 2.9 * rows, cells)
-
-
-def _curves(
-    path: EquilibriumPath, ways: dict[str, list[int]], bands: Mapping[str, Band] | None
-) -> list[Panel]:
-    if len(path) == 1:
-        return []
-    panels = [
-        shaded(total_panel(path), path, bands, "total_angle"),
-        shaded(notches_panel(path), path, bands, "notch_angle"),
-    ]
-    panels += [stroke_panel(path, tendon) for tendon in driven_by_stroke(path)[:MAX_PROFILES]]
-    panels.append(shaded(strain_panel(path), path, bands, "peak_strain"))
-    if len(ways) > 1 and pulled_tendons(path):
-        panels += [profile_panel(path, tendon) for tendon in pulled_tendons(path)[:MAX_PROFILES]]
-        if reverses_step_by_step(path):
-            panels.append(front_panel(path))
-    return panels
+    return Picture(heading, cells, row_height=1.5)
 
 
 def state_picture(path: EquilibriumPath, step: int, *, title: str | None = None) -> Picture:
@@ -124,57 +128,195 @@ def state_picture(path: EquilibriumPath, step: int, *, title: str | None = None)
         step: Index of the step, from 0.
         title: Heading; the name of the robot if None.
     """
-    curves = [notch_angles(path, step), tension_along(path, step)]
+    curves = [_notch_angles(path, step), _tension_along(path, step)]
     cells = [*stack([state_shape(path, step)], height=2), *stack(curves, 1)]
-    return Picture(path.robot.name if title is None else title, 9.6, 6.4, cells)
+    return Picture(path.robot.name if title is None else title, cells)
 
 
 def robot_picture(robot: Robot) -> Picture:
     """Describe the picture of a robot without loads."""
-    return Picture(robot.name, 5.6, 6.4, stack([robot_shape(robot)]))
+    return Picture(robot.name, stack([robot_shape(robot)]), row_height=6.0)
 
 
-def robot_shape(robot: Robot) -> Panel:
-    """Return the shape of a robot without loads."""
-    from notchflex import Load, solve
-
-    free = solve(robot, Load())
-    return replace(state_shape(free.path, free.step), legend="")
-
-
-def state_shape(path: EquilibriumPath, step: int) -> Panel:
-    """Return the shape of one state, to scale, with its loads."""
-    return shape_panel(path, [step] if path.converged[step] else [], plane_of(path))
-
-
-def notch_angles(path: EquilibriumPath, step: int) -> Panel:
+def _angle_curve(path: EquilibriumPath, step: int, colour: Colour, **style: Any) -> Curve:
     """Return the angle of every notch in one state, base to tip."""
-    quantity = QUANTITIES["notch_angle"]
-    labels = NOTCH_LABEL, quantity.label
+    angle = scaled(path, "notch_angle", path.notch_angle)[step]
+    return line(np.arange(1, len(angle) + 1), angle, colour, marker="o", **style)
+
+
+def _notches_of(items: list[Mark], **options: Any) -> Panel:
+    return Panel(items, NOTCH_LABEL, QUANTITIES["notch_angle"].label, whole="x", **options)
+
+
+def _notch_angles(path: EquilibriumPath, step: int) -> Panel:
     if not path.converged[step]:
-        return Panel([Note("not converged")], *labels)
-    angle = path.notch_angle[step] * quantity.scale
-    points = np.stack([np.arange(1, len(angle) + 1), angle], axis=1)
-    items: list[Mark] = [Curve(points, BLUE, marker="o", size=4.0, hover=True)]
-    closed = np.asarray(path.closed[step])
-    if closed.any():
-        name = "closed notch"
-        items.append(dots(points[closed], VERMILLION, 5.0, name=name, group=name, layer=3))
-    legend = BESIDE if closed.any() else ""
-    return Panel(items, *labels, legend=legend, x_range=(0.5, len(angle) + 0.5), whole="x")
+        return _notches_of([Text("not converged")])
+    items: list[Mark] = [curve := _angle_curve(path, step, BLUE, size=4.0)]
+    if np.any(closed := np.asarray(path.closed[step])):
+        items.append(dots(curve.rows[closed], VERMILLION, 5.0, name="closed notch", layer=3))
+    return _notches_of(items)
 
 
-def tension_along(path: EquilibriumPath, step: int) -> Panel:
-    """Return the tension of every pulled tendon from span to span in one state."""
-    labels = "span of tendon [number], 0 at the base", QUANTITIES["span_tension"].label
-    pulled = [int(i) for i in np.flatnonzero(path.tension[step] > SLACK)][:MAX_TENDONS]
-    if not path.converged[step] or not pulled:
-        note = "all tendons are slack" if path.converged[step] else "not converged"
-        return Panel([Note(note)], *labels)
-    several = path.tension.shape[1] > 1
-    items: list[Mark] = []
+def _tension_along(path: EquilibriumPath, step: int) -> Panel:
+    if not path.converged[step]:
+        return span_panel([Text("not converged")])
+    pulled = np.flatnonzero(path.tension[step] > SLACK)[:MAX_TENDONS].tolist()
+    items: list[Mark] = [] if pulled else [Text("all tendons are slack")]
     for tendon, colour in zip(pulled, sequence_colours(len(pulled)), strict=True):
-        name = f"tendon {tendon + 1}" if several else ""
-        items.append(span_line(path, step, tendon, colour, size=2.2, name=name, group=name))
-    legend = BESIDE if several else ""
-    return Panel(items, *labels, legend=legend, y_range=(0.0, None), whole="x")
+        name = f"tendon {tendon + 1}" if path.tension.shape[1] > 1 else ""
+        items.append(span_line(path, step, tendon, colour, size=2.2, name=name))
+    return span_panel(items)
+
+
+def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> Picture:
+    """Describe several solved paths: different robots, or different models of one robot.
+
+    Every robot to scale at a few loads, in the colour of its curves: total angle and position of
+    the tip over the loads, and for the most bent state the angle of every notch and the tension
+    along the first pulled tendon. Solid lines are loading, dashed ones unloading.
+
+    Args:
+        paths: Label to path, two to five of them.
+        title: Heading.
+
+    Raises:
+        InputError: Too few or too many paths.
+
+    Example:
+        >>> import notchflex as nf
+        >>> wrist = nf.load_robot("pacheco2021-a")
+        >>> loop = nf.pull(0.0, 2.0, steps=5).release()
+        >>> slick = wrist.with_value("friction.coefficient", 0.0)
+        >>> paths = {"mu 0.13": nf.simulate(wrist, loop), "mu 0": nf.simulate(slick, loop)}
+        >>> [cell.panel.title for cell in beside_picture(paths).cells[:2]]
+        ['mu 0.13', 'mu 0']
+    """
+    if not 2 <= len(paths) <= len(MODEL_COLOURS):
+        raise InputError.OUT_OF_RANGE(
+            f"a picture shows 2 to {len(MODEL_COLOURS)} robots beside each other; got {len(paths)}."
+        )
+    shapes: list[Panel] = []
+    total, tips, angles, tensions = (list[Mark]() for _ in range(4))
+    labels, total_label, least = set[str](), QUANTITIES["total_angle"].label, 0.0
+    for (name, path), colour in zip(paths.items(), MODEL_COLOURS, strict=False):
+        steps = representative_steps(path, most=3)
+        pale = np.linspace(0.55, 0.0, len(steps))[:, None]
+        shades = [tuple(shade) for shade in pale + (1.0 - pale) * np.array(rgb(colour))]
+        shapes.append(shape_panel(path, steps, title=name, colours=shades, legend=BELOW))
+        x, label = abscissa(path)
+        labels.add(label)
+        angle = scaled(path, "total_angle", path.total_angle)[:, 0]
+        total += [*branch_lines(path, x, angle, colour, "", group=name), *failures(path, x)]
+        tip = path.tip_position[:, [0, 2]]
+        tips += branch_lines(path, tip[:, 0], tip[:, 1], colour, "", group=name)
+        for step in steps[-1:]:  # the most bent
+            tips.append(dots(tip[[step]], colour, 4.0, group=name))
+            angles.append(_angle_curve(path, step, colour, group=name))
+            least = min(least, float(path.notch_angle[step].min()))
+            pulled = np.flatnonzero(path.tension[step] > SLACK)[:1].tolist()
+            tensions += [span_line(path, step, one, colour, group=name) for one in pulled]
+    # One label for all, if they are drawn against the same quantity.
+    x_label = labels.pop() if len(labels) == 1 else "load of each"
+    bent, y_range = "most bent state", (0.0, None) if least >= 0.0 else None
+    notches = angles or [Text("no step was solved")]
+    tension = span_panel(tensions or [Text("no tendon is pulled")])
+    columns = [
+        *([shape] for shape in shapes),
+        [Panel(total, x_label, total_label), _notches_of(notches, title=bent, y_range=y_range)],
+        [Panel(tips, *TIP_LABELS, equal=True), replace(tension, title=f"{bent}, first tendon")],
+    ]
+    cells = [
+        cell
+        for column, panels in enumerate(columns)
+        for cell in stack(panels, column, 2 // len(panels))
+    ]
+    legend = [
+        Curve([], colour, name=name) for name, colour in zip(paths, MODEL_COLOURS, strict=False)
+    ]
+    if any(len(steps_by_branch(path)) > 1 for path in paths.values()):
+        legend += [Curve([], GREY, LINE[way], name=way) for way in (LOADING, UNLOADING)]
+    heading = title or "; ".join(dict.fromkeys(path.robot.name for path in paths.values()))
+    return Picture(heading, cells, legend, column_width=3.7)
+
+
+MAX_FRAMES = 48
+"""Steps of a long path that are shown."""
+
+DOTS_PER_INCH = 80
+
+SECONDS, STANDING_SECONDS = 4.2, 0.9
+"""Shortest duration of the whole, and of the first and the last frame [s]."""
+
+
+def save_animation(
+    path: EquilibriumPath,
+    target: str | FilePath,
+    *,
+    title: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Write a path as a GIF: the robot moves, and dots run along its curves.
+
+    It takes four seconds or more; the first and the last frame are shown longer.
+
+    Args:
+        path: Solved path; of a long one an even selection of steps is shown.
+        target: Name of a file that ends in .gif; it is written completely or not at all.
+        title: Heading; the name of the robot if None.
+        progress: Called with the number of finished frames and of all frames.
+
+    Raises:
+        InputError: Another suffix, nothing to show, or the file cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> import notchflex as nf
+        >>> path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 2.0, steps=3).release())
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     save_animation(path, f"{folder}/loop.gif")
+    """
+    check_picture(str(target), "the animation", kinds=MOVING)
+    steps = frames_of(path)
+    if len(steps) < 2:
+        raise InputError.TOO_FEW_DATA(
+            f"an animation needs two steps that were solved; this path has {len(steps)}. "
+            "Draw a picture instead."
+        )
+    # Legends would jump, as they change from frame to frame.
+    widest = shape_panel(path, representative_steps(path), title=" ", legend="")
+    panels = [total_panel(path), notches_panel(path)]
+    heading = path.robot.name if title is None else title
+    figure = figure_of(Picture(heading, [*stack([widest], height=2), *stack(panels, 1)]))
+    figure.draw_without_rendering()  # arranges the axes, once for all frames
+    figure.set_layout_engine("none")
+    robot, *curves = figure.axes
+    limits = {f"{name}_range": getattr(robot, f"get_{name}lim")() for name in widest.axes}
+    balls = [axes.plot([], [], "o", color=BLACK, markersize=5.0, zorder=9)[0] for axes in curves]
+    x = abscissa(path)[0]
+    heights = [scaled(path, name, getattr(path, name)) for name in ("total_angle", "notch_angle")]
+    # A frame lasts longer if there are fewer; the first and the last one last several.
+    frame = min(max(0.1, SECONDS / 1.5 / len(steps)), 0.4)
+    rest = SECONDS - (len(steps) - 2) * frame
+    standing = math.ceil(max(STANDING_SECONDS, rest / 2.0) / frame)
+    writer = PillowWriter(fps=1.0 / frame)  # pyright: ignore[reportArgumentType]
+    with (
+        replacing(target) as temporary,
+        house_style(),
+        writer.saving(figure, str(temporary), DOTS_PER_INCH),
+    ):
+        for number, step in enumerate(steps):
+            panel = shape_panel(path, [step], colours=[BLUE], legend="")
+            robot.clear()
+            draw_panel(robot, replace(panel, title=load_label(path, step), **limits))
+            for ball, height in zip(balls, heights, strict=True):
+                ball.set_data(np.full(height.shape[1], x[step]), height[step])
+            for _ in range(standing if number in (0, len(steps) - 1) else 1):
+                writer.grab_frame()
+            if progress:
+                progress(number + 1, len(steps))
+
+
+def frames_of(path: EquilibriumPath) -> list[int]:
+    """Return an even selection of the converged steps, with the first and the last."""
+    solved = np.flatnonzero(np.asarray(path.converged))
+    return solved[evenly(range(len(solved)), MAX_FRAMES)].tolist()

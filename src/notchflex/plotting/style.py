@@ -23,6 +23,8 @@ from matplotlib.figure import Figure
 
 from notchflex.support import PAPER, QUANTITIES, check_picture, replacing
 
+Colour = str | tuple[float, ...]
+
 # notation: the eight colours of Okabe and Ito (2008), made for all kinds of colour vision.
 BLACK = "#000000"
 ORANGE = "#E69F00"
@@ -33,8 +35,8 @@ VERMILLION = "#D55E00"
 PURPLE = "#CC79A7"
 GREY = "#7F7F7F"
 
-DIVERGING = "PuOr"
-"""matplotlib's name of the colours from -1 to 1: orange, white, purple."""
+MODEL_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
+"""Colours of models, robots or workspaces beside each other."""
 
 DOTS_PER_INCH = 200
 
@@ -77,15 +79,15 @@ def rgb(colour: Any) -> tuple[float, float, float]:
     return to_rgb(colour)
 
 
-def sequence_colours(count: int) -> list[tuple[float, float, float, float]]:
+def sequence_colours(count: int) -> list[Colour]:
     """Return `count` colours from dark to light, also in grey print."""
     # The lightest fifth of the map is too pale for lines on white paper.
     return [tuple(c) for c in matplotlib.colormaps["viridis"](np.linspace(0.0, 0.82, count))]
 
 
-def diverging_colours(count: int) -> list[tuple[float, float, float, float]]:
-    """Return `count` colours for values from -1 to 1, white in the middle."""
-    return [tuple(c) for c in matplotlib.colormaps[DIVERGING](np.linspace(0.0, 1.0, count))]
+def diverging_colour(value: float) -> Colour:
+    """Return the colour of a value from -1 (orange) to 1 (purple), white in the middle."""
+    return matplotlib.colormaps["PuOr"](0.5 + 0.5 * value)
 
 
 def save(figure: Figure, target: str | FilePath) -> None:

@@ -167,7 +167,7 @@ def _look(
         found = read_sweep(folder)
     if plot is not None and output is not None:
         with terminal.working(f"drawing {output}"):
-            from notchflex.plotting.sweeps.columns import sweep_picture
+            from notchflex.plotting import sweep_picture
 
             sweep_picture(found, *plot).save(output)
         if json is None:

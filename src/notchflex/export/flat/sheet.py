@@ -16,16 +16,20 @@ from notchflex import __version__
 from notchflex.export.flat.drawing import pattern_drawing, plain, title_lines
 from notchflex.export.flat.pattern import FlatPattern, PatternCut, flat_pattern
 from notchflex.export.formats import Document, Paper, PatternOptions, Subject
-from notchflex.plotting.drawings import dimension_lines as draw
-from notchflex.plotting.drawings.dimensioned import (
+from notchflex.plotting import (
+    INK,
+    LETTER,
     MM,
+    TEXT,
+    draw_marks,
     draw_row,
+    house_style,
+    label,
     notch_rows,
     paper,
     scale_text,
     usual_scale,
 )
-from notchflex.plotting.style import house_style
 from notchflex.support import robot_digest
 
 if TYPE_CHECKING:
@@ -68,7 +72,7 @@ class DrawingPage:
 
     def write(self, left: float, at: float, text: str, size: float = _WORD, **style: Any) -> None:
         """Write a text, in lines of the height `NOTE`, below or at a height [in]."""
-        style = {"va": "top", "color": draw.INK, "parse_math": False} | style
+        style = {"va": "top", "color": INK, "parse_math": False} | style
         self.axes.text(left, at, text, fontsize=size, linespacing=60.0 * NOTE / size, **style)
 
 
@@ -90,7 +94,7 @@ def new_page(size: Paper, subject: str, scale: str) -> DrawingPage:
 
 def folded(lines: Sequence[str], width: float) -> list[str]:
     """Return notes in lines that are not longer than a width [in]."""
-    letters = int(width / (draw.LETTER * _WORD / draw.TEXT))
+    letters = int(width / (LETTER * _WORD / TEXT))
     return [part for line in lines for part in wrap(line, letters, subsequent_indent="    ")]
 
 
@@ -112,11 +116,11 @@ def add_title_block(page: DrawingPage, pattern: FlatPattern, sheet: str) -> None
         "sheet": sheet,
     }
     width, _ = SIZES[pattern.options.paper]
-    for number, (label, value) in enumerate(cells.items()):
+    for number, (name, value) in enumerate(cells.items()):
         left = width - _EDGE - _CELL * (3 - number % 3)
         low = _EDGE + _LINE * (number // 3)
         _frame(page.axes, left, low, _CELL, _LINE, 0.7)
-        texts = (5.4, label, 5.5), (1.6, plain(value or "")[:_MOST], draw.TEXT)
+        texts = (5.4, name, 5.5), (1.6, plain(value or "")[:_MOST], TEXT)
         for up, text, size in texts:
             page.write(MM * (left + 1.0), MM * (low + up), text, size, va="baseline")
 
@@ -124,7 +128,7 @@ def add_title_block(page: DrawingPage, pattern: FlatPattern, sheet: str) -> None
 def _frame(axes: Axes, left: float, low: float, width: float, height: float, line: float) -> None:
     """Draw a frame [mm]."""
     corner = MM * left, MM * low
-    axes.add_patch(Rectangle(corner, MM * width, MM * height, fill=False, lw=line, ec=draw.INK))
+    axes.add_patch(Rectangle(corner, MM * width, MM * height, fill=False, lw=line, ec=INK))
 
 
 _ROW, _HEAD = 0.2, 0.36  # heights in a table [in]
@@ -196,8 +200,7 @@ def _pattern_page(pattern: FlatPattern) -> DrawingPage:
     for line in drawing.lines:
         closing = line.points[:1] if line.closed else ()
         axes.plot(*zip(*line.points, *closing, strict=True), clip_on=False, **_LOOKS[line.layer])
-    for one in pattern.cuts:
-        draw.label(axes, *one.middle, one.name, fontsize=6.5)
+    draw_marks(axes, [label(one.middle, one.name, size=6.5) for one in pattern.cuts])
     axes.spines[:].set_visible(False)
     axes.tick_params(labelsize=7.0)
     axes.set_xlabel("along the tube [mm]", fontsize=7.0)

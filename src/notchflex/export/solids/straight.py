@@ -23,8 +23,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from notchflex import InputError, Robot, RobotShape, Tube, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject
-from notchflex.plotting.shapes.outline import fair_growth, prism, tube_wall
-from notchflex.plotting.shapes.robot_shape import shape_at, shape_from_angles
+from notchflex.plotting import fair_growth, prism, shape_at, shape_from_angles, tube_wall
 from notchflex.support import NotchCut, outline, robot_digest
 
 if TYPE_CHECKING:

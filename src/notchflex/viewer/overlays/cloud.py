@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex import InputError, Load, Robot
-from notchflex.plotting.style import BLUE, ORANGE
+from notchflex.plotting import BLUE, ORANGE
 from notchflex.viewer.controls import POINTING, ControlRanges, Controls
 from notchflex.viewer.overlays.background import Background
 from notchflex.viewer.scene.marks import rgb

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex import Load, Robot
-from notchflex.plotting.style import GREEN
+from notchflex.plotting import GREEN
 from notchflex.sensing import SensedForce, SensorNoise, sense
 from notchflex.viewer.controls import POINTING
 from notchflex.viewer.overlays.background import Background

@@ -13,8 +13,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.curves import COLOUR, branches
-from notchflex.plotting.sheet import Curve, Mark, Panel, dots
+from notchflex.plotting import COLOUR, Curve, Mark, Panel, branches, dots
 from notchflex.support import QUANTITIES
 from notchflex.viewer.scene.marks import TENDON, contact_colours, css
 from notchflex.viewer.session import Session

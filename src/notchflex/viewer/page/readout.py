@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from notchflex import Robot
-from notchflex.plotting.curves import COLOUR
-from notchflex.plotting.style import BLUE, VERMILLION
+from notchflex.plotting import BLUE, COLOUR, VERMILLION
 from notchflex.support import CONTACT_STATES, QUANTITIES
 from notchflex.viewer.page.chart import axis
 from notchflex.viewer.scene.marks import (

@@ -12,10 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex import InputError
-from notchflex.plotting.renderers.with_matplotlib import draw_panel
-from notchflex.plotting.shapes.panel import applied_loads
-from notchflex.plotting.shapes.robot_shape import shape_at
-from notchflex.plotting.style import house_style
+from notchflex.plotting import applied_loads, draw_panel, house_style, shape_at
 from notchflex.support import robot_text, write_path_csv
 from notchflex.viewer.page.chart import loop
 from notchflex.viewer.page.readout import BALL, entries, rows, strain_scale

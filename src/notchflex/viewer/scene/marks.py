@@ -10,8 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex import Equilibrium, EquilibriumPath, RobotShape
-from notchflex.plotting.shapes.robot_shape import lips, tendon_line
-from notchflex.plotting.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
+from notchflex.plotting import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    lips,
+    tendon_line,
+)
 
 Colour = tuple[int, int, int]
 

@@ -14,11 +14,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from notchflex import EquilibriumPath, Robot, RobotShape
-from notchflex.plotting.shapes.outline import body_corners, prism, tube_wall
-from notchflex.plotting.shapes.panel import AppliedLoad, applied_loads
-from notchflex.plotting.shapes.robot_shape import HELD, rotation_of, shape_at, shape_from_angles
+from notchflex.plotting import (
+    HELD,
+    AppliedLoad,
+    applied_loads,
+    body_corners,
+    prism,
+    shape_at,
+    shape_from_angles,
+    strip,
+    tube_wall,
+)
 from notchflex.support import FlexureShape
 from notchflex.viewer.controls import GRAVITY, POINTING, ControlRanges, Controls, round_up
 from notchflex.viewer.scene.marks import LOAD, METAL, Marks, Shown, linear, strain_colour
@@ -59,8 +68,7 @@ def _body(rest: RobotShape, body: int) -> tuple[Points, Triangles]:
         # A flexure on a spine lies between the bodies; one across the tube overlaps with them.
         if 0 <= flexure < len(rest.flexures) and not spine[flexure]:
             one = rest.flexures[flexure]
-            line = np.concatenate([one.fibre(-one.spine), one.fibre(one.near)[::-1]])
-            local = (line - rest.position[body]) @ rest.rotation[body]
+            local = (strip(one) - rest.position[body]) @ rest.rotation[body]
             corners = np.stack([local @ _across(view), local[:, 2]], axis=-1)
             solid = solid - _through(corners, view, rest)
     mesh = solid.to_mesh64()
@@ -359,7 +367,7 @@ class Scene:
             self._base_frame.visible = self._tip_frame.visible = self.shown.frames
 
     def _turn(self, pointing: str) -> None:
-        self._pose = rotation_of(np.array(POINTING[pointing]))
+        self._pose = Rotation.from_rotvec(POINTING[pointing]).as_matrix()
         self._root.wxyz = quaternions(self._pose[None])[0]
         outer = self.robot.tube.outer_radius
         lowest = {"up": HELD * outer, "sideways": 0.35 * self.length, "down": 1.1 * self.length}
@@ -415,7 +423,7 @@ class Scene:
 
     def eye(self, pointing: str, side: bool = False, aspect: float = 1.0) -> CameraPose:
         """Return the first camera, with room for the robot to bend; see `first_eye`."""
-        turn = rotation_of(np.array(POINTING[pointing]))
+        turn = Rotation.from_rotvec(POINTING[pointing]).as_matrix()
         return first_eye(self.robot.notches[0].direction_deg, self.length, turn, side, aspect)
 
     def picture_eye(self, toward: NDArray[np.float64], fov: float, aspect: float) -> CameraPose:

@@ -1,0 +1,431 @@
+"""A dimensioned drawing of a robot: for every shape of notch a side view and a cross-section.
+
+It is in inches of paper, so that a letter has the same size as the drawing around it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from textwrap import shorten
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from notchflex import Robot
+from notchflex.plotting.marks import Area, Arrow, Colour, Curve, Mark, Text, box
+from notchflex.plotting.notch_views import NotchView, notch_view
+from notchflex.plotting.style import BLUE, VERMILLION, house_style
+from notchflex.plotting.with_matplotlib import draw_marks
+from notchflex.support import Notch, number_at, round_number, with_limits
+
+Point = Any
+"""Two coordinates [in]."""
+
+TEXT = 8.0
+"""Size of the letters, in points."""
+LETTER = 0.064
+"""Width of a letter, in inches, on average and a little more."""
+INK = "#222222"
+_FINE, _BEYOND, _TUBE = "#555555", "#EAF1F6", "#C9DDEB"
+_CENTRE, _HIDDEN = (9.0, 2.0, 1.5, 2.0), (4.0, 2.5)  # dashes
+
+_LEVEL = 0.25  # distance of one dimension line from the next [in]
+_SHORTEST = 0.3  # a shorter dimension has its arrows outside [in]
+
+
+def label(at: Point, text: str, align: str = "center center", **options: Any) -> Text:
+    """Return a text on a white background."""
+    options = {"colour": INK, "size": TEXT, "inside": False} | options
+    return Text(text, tuple(at), align=align, **options)
+
+
+def _moved(point: Point, right: float, up: float) -> Any:
+    return np.add(point, (right, up))
+
+
+def _stroke(points: Any, colour: Colour = _FINE, width: float = 0.5, dash: Any = ()) -> Curve:
+    return Curve(points, colour, dash, width)
+
+
+def _ink(points: Any, width: float = 1.0) -> Curve:
+    return _stroke(points, INK, width)
+
+
+def _arrow(start: Point, end: Point, colour: Colour = _FINE, width: float = 0.7) -> Arrow:
+    return Arrow(start, end, colour, width=width, head=max(6.0, 5.5 * width))
+
+
+def _dimension(
+    start: float, end: float, at: float, edge: float, upright: bool = False
+) -> Iterator[Mark]:
+    """Yield a dimension line from `start` to `end` along the tube, at a height, without its text.
+
+    Its extension lines start at the height `edge`. An upright one is across the tube.
+    """
+
+    def place(along: float, across: float) -> tuple[float, float]:
+        return (across, along) if upright else (along, across)
+
+    for end_at in (start, end):
+        yield _stroke([place(end_at, edge), place(end_at, at + math.copysign(0.05, at - edge))])
+    first, last = place(start, at), place(end, at)
+    if end - start >= _SHORTEST:
+        yield from (_arrow(first, last), _arrow(last, first))
+        return
+    yield _arrow(place(start - 0.17, at), first)
+    yield _arrow(place(end + 0.17, at), last)
+    yield _stroke([first, last], width=0.7)
+
+
+def levels(intervals: Sequence[tuple[float, float, str]]) -> list[int]:
+    """Return levels of dimensions (left end, right end [in], text) at which no texts overlap.
+
+    Example:
+        >>> levels([(0.0, 2.0, "height 1"), (2.0, 4.0, "length 2"), (4.0, 4.1, "thickness 3")])
+        [0, 0, 1]
+    """
+    occupied: list[list[tuple[float, float]]] = []
+    numbers: list[int] = []
+    for start, end, text in intervals:
+        middle, half = 0.5 * (start + end), 0.5 * LETTER * len(text) + 0.04
+        # Arrows outside of a short dimension need room too.
+        out = 0.2 if end - start < _SHORTEST else 0.0
+        low, high = min(start - out, middle - half), max(end + out, middle + half)
+        numbers.append(
+            next(
+                number
+                for number, row in enumerate([*occupied, []])
+                if all(high <= left + 1e-9 or low >= right - 1e-9 for left, right in row)
+            )
+        )
+        occupied += [[]] if numbers[-1] == len(occupied) else []
+        occupied[numbers[-1]].append((low, high))
+    return numbers
+
+
+def _broken(x: float, low: float, high: float) -> Iterator[Mark]:
+    """Yield the mark of an omitted part: a white band between two zigzag lines."""
+    y = np.linspace(low - 0.06, high + 0.06, 13)
+    aside = 0.035 * np.where(np.arange(13) % 2 == 0, -1.0, 1.0)
+    left, right = (np.column_stack([x + side + aside, y]) for side in (-0.035, 0.035))
+    yield Area([np.concatenate([left, right[::-1]])], "white", 1.0)
+    yield from (_stroke(left, INK), _stroke(right, INK))
+
+
+MAX_SHAPES = 6
+"""Maximum number of shapes of notches in a drawing; a sentence names the others."""
+MM = 1.0 / 25.4
+"""Inches of a millimetre."""
+# Largest outer diameter, as a part of the width of a row, and that width [in].
+_DIAMETER, _WIDTH = 0.26, 10.0
+# Room for the diameters, for a column of lengths and beside the cross-section [in].
+_LEFT, _COLUMN, _RIGHT = 1.05, 0.85, 1.6
+_WORDS = 4.2  # least distance of a cross-section from the start, for the texts below [in]
+
+
+def dimensioned_figure(robot: Robot) -> Figure:
+    """Draw the tube and every shape of notch with their dimensions, to scale [mm].
+
+    Args:
+        robot: The robot; its dimensions have the names of the robot file.
+
+    Returns:
+        The drawing; `notchflex.plotting.save` writes it.
+
+    Raises:
+        InputError: A kind of notch has no drawing.
+
+    Example:
+        >>> import notchflex as nf
+        >>> figure = dimensioned_figure(nf.load_robot("pacheco2021-a"))
+        >>> "height 0.8" in [text.get_text() for text in figure.axes[0].texts]
+        True
+    """
+    rows, notes = notch_rows(robot)
+    with house_style():
+        total = sum(row.height for row in rows) + 0.6 + 0.15 * len(notes)
+        figure, axes = paper(max(row.width for row in rows), total)
+        head = label((0.25, total - 0.25), robot.name, "left center", size=11.0)
+        foot = label((0.25, 0.1), "\n".join(notes), "left bottom", size=7.5, colour=_FINE)
+        draw_marks(axes, [head, foot])
+        top = total - 0.45
+        for row in rows:
+            draw_row(axes, row, top)
+            top -= row.height
+    return figure
+
+
+def paper(width: float, height: float) -> tuple[Figure, Axes]:
+    """Return an empty figure of a size, and axes in inches of it."""
+    figure = Figure(figsize=(width, height))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, width), ylim=(0.0, height))
+    axes.set_axis_off()
+    return figure, axes
+
+
+def usual_scale(most: float) -> float:
+    """Return the largest scale of ISO 5455 that is not above one [in/mm]."""
+    return MM * round_number(most / MM)
+
+
+def scale_text(scale: float) -> str:
+    """Return a scale [in/mm] as a drawing states it.
+
+    Example:
+        >>> scale_text(20.0 * MM), scale_text(0.2 * MM)
+        ('20:1', '1:5')
+    """
+    ratio = scale / MM
+    return f"{ratio:g}:1" if ratio >= 1.0 else f"1:{1.0 / ratio:g}"
+
+
+@dataclass(frozen=True)
+class NotchRow:
+    """The views of one shape of notch, side by side, within a width [in]."""
+
+    robot: Robot
+    names: str
+    notch: Notch
+    view: NotchView
+    most: float
+
+    @property
+    def scale(self) -> float:
+        """The scale [in/mm]."""
+        outer = self.robot.tube.outer_diameter
+        room = self.most - _LEFT - _COLUMN * len(self.view.across) - 0.35 - _RIGHT
+        return usual_scale(min(_DIAMETER * self.most / outer, room / (self.view.length + outer)))
+
+    @property
+    def height(self) -> float:
+        """Its height [in]."""
+        above = _LEVEL * max(levels(self.along), default=0)
+        below = 0.17 * len(self.view.notes)
+        return 1.71 + above + self.scale * self.robot.tube.outer_diameter + below
+
+    @property
+    def along(self) -> list[tuple[float, float, str]]:
+        """Ends of the dimensions along the tube [in], and their texts."""
+        scale = self.scale
+        return [(_LEFT + scale * d.start, _LEFT + scale * d.end, d.text) for d in self.view.along]
+
+    @property
+    def section(self) -> float:
+        """Where the middle of the cross-section is [in]."""
+        columns = self.scale * self.view.length + _COLUMN * len(self.view.across)
+        return _LEFT + max(columns + 0.35 + self.scale * self.robot.tube.outer_radius, _WORDS)
+
+    @property
+    def width(self) -> float:
+        """Its width [in]."""
+        return self.section + self.scale * self.robot.tube.outer_radius + _RIGHT
+
+
+def notch_rows(robot: Robot, width: float = _WIDTH) -> tuple[list[NotchRow], list[str]]:
+    """Return a row for every shape of notch, and the notes that belong to them.
+
+    Raises:
+        InputError: A kind of notch has no drawing.
+    """
+    shapes: dict[Notch, tuple[list[str], int]] = {}
+    first = 1
+    for index, notch in enumerate(robot.notch):
+        last = first + notch.repeat - 1
+        single = dataclasses.replace(notch, repeat=1, precurvature_deg=0.0)
+        numbers, _ = shapes.setdefault(single, ([], index))
+        numbers.append(str(first) if first == last else f"{first}–{last}")
+        first = last + 1
+    after = (*robot.notch[1:], None)
+    named = [(", ".join(numbers), index) for numbers, index in shapes.values()]
+    rows: list[NotchRow] = []
+    for names, index in named[:MAX_SHAPES]:
+        view = notch_view(robot.notch[index], robot, index == 0, after[index])
+        rows.append(NotchRow(robot, names, robot.notch[index], view, width))
+    notes = ["Lengths in mm, under the names of the robot file; to scale except where broken."]
+    if any(notch.precurvature_deg for notch in robot.notch):
+        notes[0] += " Drawn without precurvature."
+    if others := [names for names, _ in named[MAX_SHAPES:]]:
+        notes.append(f"Not shown: notches {shorten(', '.join(others), 100)}.")
+    if any(one.sd is not None for one in robot.tolerance):
+        notes.append("Tolerances that are standard deviations are drawn as ± twice them.")
+    single = [
+        f"{one.value} {with_limits(robot.tolerance, one.value, number_at(robot, one.value))}"
+        for one in robot.tolerance
+        if "[" in one.value
+    ]
+    return rows, [*notes, f"Of single parts: {', '.join(single)}."] if single else notes
+
+
+def draw_row(axes: Axes, row: NotchRow, top: float) -> None:
+    """Draw the views of one notch below a height."""
+    stages = max(levels(row.along), default=0)
+    outer = row.scale * row.robot.tube.outer_radius
+    axis = top - 0.62 - _LEVEL * (1 + stages) - outer
+    centre = np.array([row.section, axis])
+    for marks in (
+        [label((0.25, top - 0.12), _heading(row), "left center", size=9.0, bold=True)],
+        _side_view(row, np.array([_LEFT, axis])),
+        _dimensions(row, axis),
+        _section_view(row, centre),
+        _section_tendons(row, centre),
+    ):
+        draw_marks(axes, list(marks))
+
+
+def _heading(row: NotchRow) -> str:
+    names = shorten(row.names, 48, placeholder=" ...")
+    number = "notch" if names.isdigit() else "notches"
+    variant = f", {row.view.variant}" if row.view.variant else ""
+    bends = f"bends toward {row.notch.direction_deg:g}°"
+    absent = "".join(f", {name} 0" for name in row.view.absent)
+    head = f'{number} {names}: kind "{row.notch.kind}"{variant}, {bends}{absent}'
+    return f"{head}, scale {scale_text(row.scale)}"
+
+
+def _dimensions(row: NotchRow, axis: float) -> Iterator[Mark]:
+    tube, view, scale = row.robot.tube, row.view, row.scale
+    right, outer = _LEFT + scale * view.length, scale * tube.outer_radius
+    for (start, end, text), stage in zip(row.along, levels(row.along), strict=True):
+        height = axis + outer + 0.2 + _LEVEL * stage
+        yield from _dimension(start, end, height, axis + outer)
+        yield label((0.5 * (start + end), height + 0.035), text, "center bottom")
+    for size, at, name in (
+        (tube.outer_diameter, _LEFT - 0.6, "outer"),
+        (tube.inner_diameter, _LEFT - 0.25, "inner"),
+    ):
+        limits = with_limits(row.robot.tolerance, f"tube.{name}_diameter", size)
+        low, high = axis - 0.5 * scale * size, axis + 0.5 * scale * size
+        yield from _dimension(low, high, at, _LEFT, upright=True)
+        yield label((at - 0.1, axis), f"{name} diameter {limits}", turned=True)
+    columns = [right + 0.15 + _COLUMN * (0.5 + number) for number in range(len(view.across))]
+    for start, height, column in view.projected:
+        y = axis + scale * height
+        yield _stroke([(_LEFT + scale * start, y), (columns[column] + 0.05, y)])
+    for at, column in zip(columns, view.across, strict=True):
+        for dimension in column:
+            low, high = axis + scale * dimension.start, axis + scale * dimension.end
+            yield from _dimension(low, high, at, at - 0.1, upright=True)
+            for y in {low, high} & {axis - outer, axis + outer}:
+                yield _stroke([(right, y), (at, y)])
+            x, align = (at, "center center") if high - low > 0.5 else (at + 0.07, "left center")
+            yield label((x, 0.5 * (low + high)), dimension.text, align)
+
+
+def _side_view(row: NotchRow, start: Any) -> Iterator[Mark]:
+    robot, view, scale = row.robot, row.view, row.scale
+    outer, inner = scale * robot.tube.outer_radius, scale * robot.tube.inner_radius
+    length = scale * view.length
+
+    def level(y: float, before: float = 0.0, behind: float = 0.0) -> Any:
+        return start + np.array([(-before, y), (length + behind, y)])
+
+    yield Area([start + box(0.0, -outer, length, outer)], _TUBE, 1.0)
+    for sign in (-1.0, 1.0):
+        yield _ink(level(sign * outer))
+        yield _stroke(level(sign * inner), width=0.6, dash=_HIDDEN)
+    for cut in view.cuts:
+        edge = start + scale * cut
+        out = np.array([0.0, np.sign(cut[0, 1]) * 0.02])  # over the line of the surface
+        yield Area([np.concatenate([edge[:1] + out, edge, edge[-1:] + out])], "white", 1.0)
+        yield _ink(edge)
+    yield from (_ink(start + scale * face, 0.7) for face in view.faces)
+    for tendon in robot.tendon:
+        turn = math.radians(tendon.direction_deg - row.notch.direction_deg)
+        y = scale * tendon.radius * math.cos(turn)
+        yield _stroke(level(y, 0.16, 0.06), VERMILLION, 1.1)
+    yield _stroke(level(0.0, 0.12, 0.1), dash=_CENTRE)
+    for x, free in ((0.0, view.held), (length, view.tip)):
+        if free:
+            yield _ink(start + np.array([(x, -outer), (x, outer)]))
+    for place in view.breaks:
+        yield from _broken(start[0] + scale * place, start[1] - outer, start[1] + outer)
+    if view.held:  # hatched, as what is fixed
+        for y in np.arange(-outer, outer, 0.12):
+            yield _ink(start + np.array([(-0.1, y), (0.0, y + 0.1)]), 0.5)
+    legend = _moved(start, 0.0, -(outer + 0.47))
+    yield _arrow(legend, _moved(legend, 0.5, 0.0), INK, 1.0)
+    yield label(_moved(legend, 0.56, 0.0), "z, toward the tip", "left center")
+    yield _stroke(legend + np.array([(1.8, 0.0), (2.1, 0.0)]), VERMILLION, 1.1)
+    yield label(_moved(legend, 2.16, 0.0), "tendon", "left center")
+    section = _moved(start, scale * view.section_at, 0.0)
+    foot = _moved(section, 0.0, -(outer + 0.2))
+    yield _stroke([_moved(section, 0.0, outer + 0.06), foot], dash=_CENTRE)
+    yield _ink([_moved(section, 0.0, -(outer + 0.05)), foot], 1.4)
+    yield _arrow(_moved(foot, 0.24, 0.0), foot, INK)
+    yield label(_moved(foot, 0.32, 0.0), "A", bold=True)
+
+
+def _section_view(row: NotchRow, centre: Any) -> Iterator[Mark]:
+    """Yield the cross-section as seen from the tip, with the bend upward."""
+    tube, view, scale = row.robot.tube, row.view, row.scale
+    outer, inner = scale * tube.outer_radius, scale * tube.inner_radius
+    up = 1.0 if view.toward else -1.0  # the side on which a section remains
+    half = math.acos(up * view.section_from / tube.outer_radius)
+    level = math.cos(half) * outer / inner  # of a straight edge, in radii of the bore
+    half_inner = half if view.radial else math.acos(min(max(level, -1.0), 1.0))
+    part = np.linspace(-1.0, 1.0, 121)
+
+    def arc(radius: float, most: float) -> Any:
+        return centre + radius * np.column_stack([np.sin(most * part), up * np.cos(most * part)])
+
+    yield Area([arc(outer, math.pi)], _FINE, 1.0, 0.6, face=_BEYOND)
+    yield Area([arc(inner, math.pi)], _FINE, 1.0, 0.6, face="white")
+    ring = arc(outer, half)
+    if view.radial or level < 1.0:  # else less than the wall is left
+        ring = np.concatenate([ring, arc(inner, half_inner)[::-1]])
+    yield Area([ring], INK, 1.0, 0.8, face=BLUE)
+    for way in np.eye(2):
+        ends = (outer + 0.1) * np.stack([-way, way])
+        yield _stroke(centre + ends, dash=_CENTRE)
+    # The dimension of the angle of what remains.
+    edge = arc(outer + 0.12, half)
+    yield _stroke(edge, width=0.7)
+    yield from (_arrow(edge[8], edge[0]), _arrow(edge[-9], edge[-1]))
+    for end in (0, -1):
+        way = (edge[end] - centre) / (outer + 0.12)
+        yield _stroke(centre + np.outer([outer + 0.02, outer + 0.17], way))
+    length = 2.0 * half * tube.outer_radius
+    words = f"remaining arc {math.degrees(2.0 * half):.4g}°, {length:.4g} at the outer surface"
+    foot = _moved(centre, 0.0, -(outer + 0.3))
+    for text in (words, *view.notes, "A–A, seen from the tip"):
+        yield label(foot, text, bold=text.startswith("A–A"))
+        foot = _moved(foot, 0.0, -0.17)
+    top = _moved(centre, 0.0, outer)
+    yield _arrow(_moved(top, 0.0, 0.1), _moved(top, 0.0, 0.42), VERMILLION, 2.0)
+    direction = row.notch.direction_deg
+    text = f"bends toward\ndirection {direction:g}°"
+    yield label(_moved(top, 0.12, 0.3), text, "left center")
+    corner = _moved(centre, outer + 1.15, -0.3 * outer)
+    for name, turn in (("x", 90.0), ("y", 180.0)):  # the axes of the base
+        angle = math.radians(turn - direction)
+        way = np.array([math.cos(angle), math.sin(angle)])
+        yield _arrow(corner, corner + 0.28 * way, INK)
+        yield label(corner + 0.37 * way, name)
+
+
+def _section_tendons(row: NotchRow, centre: Any) -> Iterator[Mark]:
+    """Yield the tendons, and the radius of the one nearest to the side of the bend."""
+    outer = row.scale * row.robot.tube.outer_radius
+    aside = centre[0] + outer + 0.28
+    turns = [math.radians(t.direction_deg - row.notch.direction_deg) for t in row.robot.tendon]
+    nearest = max(range(len(turns)), key=lambda number: math.cos(turns[number]))
+    for number, (tendon, turn) in enumerate(zip(row.robot.tendon, turns, strict=True)):
+        place = centre + row.scale * tendon.radius * np.array([-math.sin(turn), math.cos(turn)])
+        yield Curve([place], VERMILLION, None, marker="o", size=5.0, layer=14)
+        if number != nearest:
+            continue
+        limits = with_limits(row.robot.tolerance, "tendon.radius", tendon.radius)
+        if abs(math.sin(turn)) < 1e-6 and math.cos(turn) > 0.0:
+            for point in (place, centre):
+                yield _stroke([point, (aside + 0.05, point[1])])
+            yield from _dimension(centre[1], place[1], aside, aside - 0.1, upright=True)
+            at = (aside + 0.06, 0.5 * (centre[1] + place[1]))
+        else:
+            yield _arrow(centre, place)
+            at = (aside + 0.02, place[1])
+        yield label(at, f"tendon\nradius\n{limits}", "left center")

@@ -1,1 +1,0 @@
-"""Pictures of comparisons, calibrations and the friction rig."""

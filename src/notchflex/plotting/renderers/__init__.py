@@ -1,1 +1,0 @@
-"""Renderers of a picture: matplotlib for paper, plotly for the browser."""

@@ -1,1 +1,0 @@
-"""Shapes of robots: outline, bent notches, loads that act on them."""

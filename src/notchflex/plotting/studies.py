@@ -1,0 +1,415 @@
+"""The pictures of what many robots or states show: batches, sweeps, tolerances, workspaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull
+
+from notchflex import Batch, InputError
+from notchflex.plotting.curves import entry_label, evenly
+from notchflex.plotting.marks import (
+    BELOW,
+    DASHED,
+    Area,
+    Array,
+    Curve,
+    Mark,
+    Panel,
+    Span,
+    Text,
+    band,
+    bar_panel,
+    box,
+    dots,
+    grid,
+    line,
+)
+from notchflex.plotting.output import Picture
+from notchflex.plotting.path import TIP_LABELS
+from notchflex.plotting.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    MODEL_COLOURS,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    sequence_colours,
+)
+from notchflex.support import QUANTITIES, REGISTERED, described_at, nearest
+
+if TYPE_CHECKING:
+    from notchflex.sweeping import Sweep
+    from notchflex.tolerancing import ToleranceAnalysis
+    from notchflex.workspaces import Workspace
+
+
+MAX_COLUMNS = 12
+"""Entries of a quantity, such as notches, that are drawn; of more, an even selection."""
+
+_LEFT_OUT = ("converged", "reason", "iterations", "tip_position", "stable")
+
+
+def batch_picture(
+    batch: Batch,
+    *,
+    against: ArrayLike | None = None,
+    label: str = "row [number]",
+    title: str = "batch",
+) -> Picture:
+    """Describe what a batch returned.
+
+    A panel for every quantity with one number, or one for each tendon or notch, over the rows or
+    over `against`; and the positions of the tips, if the batch has them. Of a batch of paths the
+    last step of each is drawn. Rows that did not converge are gaps in the curves and red tips.
+
+    Args:
+        batch: What `solve_batch` or `simulate_batch` returned.
+        against: Values for the horizontal axis, (rows,), such as tensions; row numbers if None.
+        label: Label of this axis, with its unit.
+        title: Heading.
+
+    Raises:
+        InputError: The number of values is not that of the rows, or there is nothing to draw.
+
+    Example:
+        >>> import numpy as np
+        >>> import notchflex as nf
+        >>> found = nf.solve_batch(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 2.0, steps=20))
+        >>> picture = batch_picture(found, against=np.linspace(0.0, 2.0, 20), label="tension [N]")
+        >>> picture.cells[-1].panel.x_label
+        'tip position x [mm]'
+    """
+    rows = len(next(iter(batch.values()), ()))
+    x = np.arange(1.0, rows + 1.0) if against is None else np.asarray(against, float)
+    if x.shape != (rows,):
+        raise InputError.WRONG_SHAPE(
+            f"the batch has {rows} rows, and against has the shape {x.shape}; give one value a row."
+        )
+    last: dict[str, Any] = {}  # of paths their last step
+    for name in batch:
+        if name in QUANTITIES:
+            values = np.asarray(batch[name])
+            last[name] = values[:, -1] if values.ndim > 1 + len(QUANTITIES[name].per) else values
+    converged = last.get("converged", np.ones(rows)).astype(bool)
+    panels: list[Panel] = []
+    for name, values in last.items():
+        if name in _LEFT_OUT or values.dtype.kind not in "fi" or values.ndim > 2:
+            continue
+        table = values.reshape(rows, -1) * QUANTITIES[name].scale
+        table = np.where(converged[:, None], table, np.nan)
+        if np.isfinite(table).any():
+            panels.append(_over_rows(name, x, table, label))
+    if "tip_position" in last:
+        tips = last["tip_position"][:, [0, 2]]
+        items: list[Mark] = [dots(tips[converged], BLUE, 2.5, group="tip")]
+        if not converged.all():
+            items.append(dots(tips[~converged], VERMILLION, 2.5, name="not converged"))
+        panels.append(Panel(items, *TIP_LABELS, equal=True))
+    if not panels:
+        raise InputError.NO_DATA(
+            "the batch holds nothing that can be drawn; ask for outputs such as total_angle, "
+            "notch_angle or tip_position."
+        )
+    return Picture(title, grid(panels, min(3, len(panels))))
+
+
+def _over_rows(name: str, x: Array, table: Array, label: str) -> Panel:
+    quantity, order, count = QUANTITIES[name], np.argsort(x, kind="stable"), table.shape[1]
+    shown = evenly(range(count), min(count, MAX_COLUMNS))
+    items: list[Mark] = []
+    for column, colour in zip(shown, sequence_colours(len(shown)), strict=True):
+        name, shade = (f"{quantity.per[0]} {column + 1}", colour) if count > 1 else ("", BLUE)
+        y = table[order, column]
+        items.append(line(x[order], y, shade, width=0.8, marker="o", size=2.0, name=name))
+    return Panel(items, label, quantity.label)
+
+
+MAX_ROWS = 2000
+"""Rows of a sweep that are drawn; of more, an even selection."""
+
+_BINS = 24
+_MIN_PER_BIN = 20
+"""A bin with fewer rows has no quantiles."""
+
+
+def sweep_picture(sweep: Sweep, x: str, y: str) -> Picture:
+    """Describe one column of a sweep over another.
+
+    Rows as points, rejected ones in another colour; where there are many, the median and the band
+    that holds 95 % of them, along x. Rows without a result lie on the axis of x.
+
+    Args:
+        sweep: The sweep.
+        x: A variable or a kept quantity.
+        y: Another one.
+
+    Raises:
+        InputError: There is no such column, or no row.
+    """
+    import polars
+
+    frame = sweep.lazy()
+    columns = [name for name in frame.collect_schema().names() if name != "code"]
+    for name in (x, y):
+        if name == "code":
+            raise InputError.UNSUPPORTED(
+                "`code` is text, and text has no axis; it is shown by the colour of points."
+            )
+        if name not in columns:
+            raise InputError.UNKNOWN_NAME(
+                f'the sweep has no column "{name}"{nearest(name, columns)}; there are '
+                f"{', '.join(columns)}."
+            )
+    if sweep.rows > MAX_ROWS and sweep.plan.output.rows:
+        # Every k-th row would be a regular part of a grid or of a Sobol sequence.
+        scattered = polars.col("row") % 2**31 * 2_654_435_761 % 2**32
+        frame = frame.filter(scattered < 2**32 * MAX_ROWS // sweep.rows)
+    across, upward = (polars.col(name).cast(polars.Float64) for name in (x, y))
+    table = frame.select(polars.col("code").cast(str), across.alias("x"), upward.alias("y"))
+    code, *both = (column.to_numpy() for column in table.collect())
+    both = np.column_stack(both)
+    placed, is_finite = np.isfinite(both[:, 0]), np.isfinite(both).all(axis=1)
+    if not placed.any():
+        raise InputError.NO_DATA(f"no row has a number of {x}.")
+    items: list[Mark] = [
+        dots(both[is_finite & (code == name)], colour, 1.6, name=name)
+        for name, colour in (("accepted", BLUE), ("rejected", ORANGE))
+        if (is_finite & (code == name)).any()
+    ]
+    if is_finite.sum() >= _MIN_PER_BIN * _BINS:
+        items += _quantiles(both[is_finite])
+    lost = placed & ~is_finite
+    if lost.any():
+        floor = both[is_finite, 1].min() if is_finite.any() else 0.0
+        points = np.column_stack([both[lost, 0], np.full(lost.sum(), floor)])
+        items.append(dots(points, VERMILLION, 4.0, name="no result", marker="X"))
+    panel = Panel(items, sweep_label(sweep, x), sweep_label(sweep, y))
+    title = f"{sweep.plan.name}: {sweep.rows} rows"
+    return Picture(title, grid([panel], 1), column_width=5.4, row_height=4.2)
+
+
+def _quantiles(both: Array) -> list[Mark]:
+    """Return the median and the band of 95 % along x: at its values if these are few.
+
+    Otherwise they are those of bins of equally many rows.
+    """
+    both = both[np.argsort(both[:, 0], kind="stable")]
+    values, first = np.unique(both[:, 0], return_index=True)
+    parts = np.array_split(both, _BINS)
+    if len(values) <= _BINS:
+        parts = np.split(both, first[1:])
+    middle = np.array([np.median(part[:, 0]) for part in parts])
+    keep = np.append(True, np.diff(middle) > 0.0)
+    quantiles = np.array([np.quantile(part[:, 1], (0.025, 0.5, 0.975)) for part in parts])
+    middle, (low, half, high) = middle[keep], quantiles[keep].T
+    if len(middle) < 3:
+        return []
+    return [
+        band(middle, low, high, BLUE, 0.15, name="95 % of rows", layer=3),
+        line(middle, half, "black", name="median", layer=4),
+    ]
+
+
+def sweep_label(sweep: Sweep, name: str) -> str:
+    """Return the label of the axis of a column of a sweep, with its unit."""
+    if name in [variable.value for variable in sweep.plan.variable]:
+        unit = described_at(sweep.robot, name).unit
+        return f"{name} [{unit}]" if unit else name
+    kept = [keep.quantity for keep in sweep.plan.keep if f"{name}_".startswith(f"{keep.quantity}_")]
+    if not kept:
+        return name
+    quantity = REGISTERED[max(kept, key=len)]
+    words = name.removeprefix(quantity.name).strip("_").split("_")
+    entry = " ".join(
+        word if axis == "axis" else f"{axis} {word}"
+        for axis, word in zip(quantity.per, words, strict=False)
+    )
+    loads = sweep.plan.load if len(sweep.plan.load) > 1 else ()
+    where = [f"at {load}" for load in loads if f"_at_{load}" in name]
+    step = name.rpartition("_step_")[2] if "_step_" in name else ""
+    where += [f"step {step}"] if step.isdecimal() else []
+    return ", ".join([entry_label(quantity, entry), *where])
+
+
+MAX_LIMITS, MAX_BARS = 4, 12
+"""Limits, and bars of dimensions, that are drawn of a tolerance analysis."""
+
+
+def tolerance_picture(found: ToleranceAnalysis) -> Picture:
+    """Describe what tolerances do to a robot.
+
+    For every limit, of many those that reject most, the histogram of drawn robots with the limits,
+    the value of the drawing and the worst case; bars of the parts of the variance, and of the yield
+    if one dimension were exact.
+
+    Args:
+        found: The analysis.
+    """
+    outside, order = found.below + found.above, found.order[:MAX_BARS]
+    shown = np.sort(np.argsort(-outside, kind="stable")[:MAX_LIMITS])
+    panels = [_histogram(found, int(index)) for index in shown]
+    worst, sources = int(np.argmax(outside)), [found.sources[index] for index in order]
+    parts = np.nan_to_num(found.sobol.total[worst])[order].tolist()
+    exact = (100.0 * found.control.exact[order]).tolist()
+    label = f"part of the variance of {found.criteria[worst].name.replace('_', ' ')} [-]"
+    colours = [SKY] * len(order)
+    panels.append(bar_panel(parts, sources, colours, label, title="total Sobol index"))
+    levels = [(found.accepted_fraction, GREEN), (found.wanted_yield, PURPLE)]
+    marks = [
+        Span("x", 100.0 * level, colour, width=1.4, layer=4)
+        for level, colour in levels
+        if level is not None
+    ]
+    title = "yield if one dimension were exact"
+    panels.append(bar_panel(exact, sources, colours, "yield [%]", marks, title=title))
+    low, high = (100.0 * end for end in found.interval)
+    title = (
+        f"{found.robot.name}: yield {100.0 * found.accepted_fraction:.1f} % "
+        f"({low:.1f} to {high:.1f} %) of {found.draws} robots"
+    )
+    legend: list[Curve | Area] = [
+        Area([], BLUE, name="within the limits"),
+        Area([], ORANGE, name="outside"),
+        Curve([], VERMILLION, name="limit"),
+        Curve([], GREEN, name="drawing; yield as it is"),
+        Curve([], GREY, DASHED, name="worst case"),
+    ]
+    if found.wanted_yield is not None:
+        legend.append(Curve([], PURPLE, name="wanted yield"))
+    return Picture(title, grid(panels, min(3, len(panels))), legend)
+
+
+def _histogram(analysis: ToleranceAnalysis, index: int) -> Panel:
+    limit = analysis.criteria[index]
+    scale, unit = limit.quantity.scale, limit.quantity.unit
+    edges, count = analysis.drawn.histogram(index, 60)
+    edges, tops = edges * scale, 100.0 * count / analysis.draws
+    label = limit.name.replace("_", " ") + (f" [{unit}]" if unit else "")
+    if not len(count):
+        return Panel([Text("no robot has a result")], label, "robots [%]")
+    lower, upper = limit.lower * scale, limit.upper * scale
+    inside = (edges[:-1] >= lower) & (edges[1:] <= upper)
+    items: list[Mark] = []
+    for name, part, colour in (("within", inside, BLUE), ("outside", ~inside, ORANGE)):
+        bins = np.flatnonzero(part & (count > 0))
+        rectangles = [box(edges[bin], 0.0, edges[bin + 1], tops[bin]) for bin in bins]
+        items += [Area(rectangles, colour, group=name)] if rectangles else []
+    nominal = analysis.linear.nominal[index] * scale
+    for level, colour in ((lower, VERMILLION), (upper, VERMILLION), (nominal, GREEN)):
+        items += [Span("x", level, colour, width=1.4, layer=4)] if np.isfinite(level) else []
+    for end in analysis.linear.worst_case[index] * scale:
+        items.append(Span("x", end, GREY, DASHED, layer=3))
+    return Panel(items, label, "robots [%]", y_range=(0.0, None))
+
+
+MAX_POINTS = 4000
+"""Tips that are drawn of one workspace; of more, an even selection."""
+
+_CLASSES = 6
+_LABELS = ("x [mm]", "y [mm]", "z [mm]")
+
+
+def workspace_picture(found: Workspace) -> Picture:
+    """Describe a workspace.
+
+    The convex hull and the tips in space, and below the voxels seen from the side (x or y, the
+    wider, over z), coloured by tension, peak strain, error by hysteresis, dexterity and, where it
+    was computed, stiffness.
+
+    Args:
+        found: The workspace.
+
+    Raises:
+        InputError: No state is left.
+
+    Example:
+        >>> import notchflex as nf
+        >>> picture = workspace_picture(nf.workspace(nf.load_robot("pacheco2021-a"), states=512))
+        >>> picture.cells[1].panel.title
+        'largest tension [N]'
+    """
+    voxels = found.voxels()
+    across = 0 if np.ptp(found.extent[:, 0]) >= np.ptp(found.extent[:, 1]) else 1
+    maps = {
+        "largest tension [N]": voxels.values["tension"],
+        "peak strain [%]": 100.0 * voxels.values["strain"],
+        "largest error by hysteresis [mm]": voxels.values["hysteresis"],
+        "dexterity [% of directions]": 100.0 * voxels.dexterity,
+    }
+    if np.isfinite(found.stiffness).any():
+        maps["softest stiffness of the tip [N/mm]"] = voxels.values["stiffness"]
+    panels = [_cloud(found, across)]
+    for name, values in maps.items():
+        points = np.column_stack([voxels.centre[:, [across, 2]], values])
+        items = list(_classes(points[np.isfinite(values)], name))
+        panels.append(Panel(items, _LABELS[across], _LABELS[2], title=name, equal=True))
+    return Picture(f"Workspace of {found.robot.name}", grid(panels, 3))
+
+
+def workspaces_picture(found: Mapping[str, Workspace]) -> Picture:
+    """Describe several workspaces in the same axes, seen from the front and from the side.
+
+    Args:
+        found: Workspaces by label.
+    """
+    panels: list[Panel] = []
+    flat = all(np.ptp(one.extent[:, 1]) < 1e-9 for one in found.values())
+    for across in (0,) if flat else (0, 1):
+        items: list[Mark] = []
+        for (label, one), colour in zip(found.items(), MODEL_COLOURS, strict=False):
+            name = f"{label}: convex hull {one.hull.size:.3g} {one.hull.unit}"
+            points = one.tip[_thinned(one)][:, [across, 2]]
+            items.append(dots(points, colour, 2.0, name=name))
+        legend = BELOW if across or flat else ""
+        panels.append(Panel(items, _LABELS[across], _LABELS[2], equal=True, legend=legend))
+    *others, last = found
+    title = f"Workspaces of {', '.join(others)} and {last}"
+    return Picture(title, grid(panels, 2), column_width=5.0, row_height=5.0)
+
+
+def _thinned(workspace: Workspace) -> slice:
+    """Return which tips are drawn: an even selection."""
+    return slice(None, None, -(-len(workspace) // MAX_POINTS))
+
+
+def _cloud(workspace: Workspace, across: int) -> Panel:
+    """Return the tips and their convex hull: in space, or in the plane that holds them."""
+    hull, some = workspace.hull, _thinned(workspace)
+    axes = [0, 1, 2] if hull.dimension == 3 else [across, 2]
+    tips, rising = workspace.tip[some][:, axes], workspace.loading[some]
+    items: list[Mark] = [
+        dots(tips[rising], BLUE, 1.5, name="loading"),
+        dots(tips[~rising], ORANGE, 1.5, name="unloading"),
+    ]
+    if hull.dimension == 3:
+        # Some corners alone, one for each cell of a coarse grid: all of them are too many lines.
+        cells = np.round(hull.corners / (0.1 * np.ptp(hull.corners, axis=0)))
+        few = ConvexHull(hull.corners[np.unique(cells, axis=0, return_index=True)[1]])
+        gap = np.full((len(few.simplices), 1, 3), np.nan)
+        edges = np.concatenate([few.points[few.simplices], gap], axis=1).reshape(-1, 3)
+        items.append(Curve(edges, SKY, width=0.5, name="convex hull"))
+    elif hull.dimension == 2:
+        ring = np.concatenate([hull.corners, hull.corners[:1]])[:, axes]
+        items.append(Curve(ring, SKY, width=1.0, name="convex hull"))
+    title = f"convex hull {hull.size:.3g} {hull.unit}"
+    return Panel(items, *(_LABELS[axis] for axis in axes), title=title, equal=True)
+
+
+def _classes(points: Array, name: str) -> Iterator[Mark]:
+    """Yield voxels (across, z, value) in a few classes of values of equal width."""
+    if not len(points):
+        return
+    values = points[:, 2]
+    ends = np.linspace(values.min(), values.max(), _CLASSES + 1)
+    number = np.clip(np.searchsorted(ends, values, side="right") - 1, 0, _CLASSES - 1)
+    for order, colour in enumerate(sequence_colours(_CLASSES)):
+        if len(mine := points[number == order, :2]):
+            label = f"{ends[order]:.3g} to {ends[order + 1]:.3g}"
+            group = f"{name} {order}"
+            yield dots(mine, colour, 2.5, name=label, group=group, layer=2 + order)

@@ -1,0 +1,283 @@
+"""Draws a picture with plotly: one HTML file that needs no network.
+
+matplotlib arranges the panels, limits and legends; plotly draws the marks there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from notchflex.plotting.marks import (
+    Area,
+    Arrow,
+    Curve,
+    Faces,
+    Mark,
+    Panel,
+    Sheet,
+    Span,
+    Text,
+    box,
+)
+from notchflex.plotting.style import for_browser, heading_lines, rgb
+from notchflex.plotting.with_matplotlib import figure_of
+from notchflex.support import need, write_text
+
+Layout = dict[str, Any]
+"""A trace, a layout or a part of it, as plotly takes it."""
+
+INCH = 100.0
+"""Pixels for an inch of paper, if the window is as wide as the picture."""
+POINT = INCH / 72.0
+"""Pixels for a point."""
+
+_SYMBOLS = {
+    "o": "circle", "s": "square", "^": "triangle-up", "D": "diamond", "v": "triangle-down",
+    "P": "cross", "*": "star", "X": "x",
+}  # fmt: skip
+
+
+def interactive_of(picture: Sheet) -> Any:
+    """Return a picture as a figure of plotly.
+
+    Raises:
+        InputError: plotly is not installed.
+    """
+    need("plotly", "plot", "an interactive picture")
+    import plotly.graph_objects as go
+
+    paper = figure_of(picture)
+    paper.draw_without_rendering()  # arranges everything
+    width, height = (INCH * side for side in picture.size)
+    heading = heading_lines(picture.title, picture.size[0])
+    layout: Layout = {
+        "font": {"size": 9.0 * POINT, "family": "DejaVu Sans, Verdana, sans-serif"},
+        "template": "simple_white", "hovermode": "closest", "annotations": [],
+        # The width is that of the window; `meta` holds the one of the arrangement.
+        "autosize": True, "height": height, "meta": {"width": width},
+        "margin": {"t": 0, "b": 0, "l": 0, "r": 0},
+        "title": {
+            "text": "<br>".join(map(for_browser, heading)), "x": 0.5, "font": {"size": 17},
+            "yref": "container", "y": 1.0 - 8.0 / height, "yanchor": "top",
+        },
+    }  # fmt: skip
+    traces: list[Layout] = []
+    for number, (cell, axes) in enumerate(zip(picture.cells, paper.axes, strict=True), 1):
+        panel = cell.panel
+        where = _add_axes(panel, axes, str(number) if number > 1 else "", layout)
+        where |= _add_legend(axes.get_legend(), f"legend{number + 1}", layout)
+        named = {""}
+        for mark in sorted(panel.items, key=lambda mark: mark.layer):
+            for trace in _traces(mark, panel, where, layout):
+                traces.append(trace | {"showlegend": mark.name not in named} | where)
+                named.add(mark.name)
+    for legend in paper.legends:
+        _add_legend(legend, "legend", layout)
+        layout["legend"] |= {"orientation": "h", "x": 0.5, "xanchor": "center"}
+        traces += (
+            _entry(mark) | {"legend": "legend", "showlegend": True} for mark in picture.legend
+        )
+    return go.Figure(traces, layout)
+
+
+def save_html(picture: Sheet, target: str | FilePath) -> None:
+    """Write a picture as one HTML file that works without a network.
+
+    Raises:
+        InputError: plotly is not installed, or the file cannot be written.
+    """
+    config = {"displaylogo": False, "responsive": True, "toImageButtonOptions": {"format": "svg"}}
+    # With a fixed name of the element the same picture gives the same file.
+    options: dict[str, Any] = {"div_id": "notchflex", "default_width": "100%", "config": config}
+    text = interactive_of(picture).to_html(**options)
+    # It shrinks with its window to three quarters of its width; below it is scrolled.
+    narrowest = round(0.75 * INCH * picture.size[0])
+    head = f"<head><title>{escape(picture.title)}</title>"
+    head += f"<style>#notchflex {{min-width: {narrowest}px}}</style>"
+    write_text(target, text.replace("<head>", head, 1))
+
+
+def _add_axes(panel: Panel, axes: Any, number: str, layout: Layout) -> Layout:
+    """Add the axes of a panel where matplotlib has them; return where its traces belong."""
+    box = axes.get_position()
+    domain = {"x": [box.x0, box.x1], "y": [box.y0, box.y1]}
+    if panel.title:
+        layout["annotations"].append(
+            {"text": for_browser(panel.title), "x": box.x0, "xref": "paper", "xanchor": "left",
+             "y": box.y1, "yref": "paper", "yanchor": "bottom", "showarrow": False}
+        )  # fmt: skip
+    scales: dict[str, Any] = {}
+    for name in panel.axes:
+        label, limits = getattr(panel, f"{name}_label"), getattr(axes, f"get_{name}lim")()
+        scales[f"{name}axis"] = {
+            "title": {"text": for_browser(label), "font": {"size": 9.0 * POINT}},
+            "gridcolor": "#e6e6e6", "showgrid": True, "range": list(limits), "nticks": 8,
+            "tickformat": "d" if name in panel.whole else "",
+        }  # fmt: skip
+        if texts := [for_browser(text) for text in panel.ticks.get(name, ())]:
+            scales[f"{name}axis"] |= {"tickvals": [*range(len(texts))], "ticktext": texts}
+            scales[f"{name}axis"] |= {"showgrid": False, "ticks": ""}
+    if panel.z_label:
+        span = {name: float(np.ptp(scales[f"{name}axis"]["range"])) for name in "xyz"}
+        layout[f"scene{number}"] = {
+            "domain": domain, "aspectmode": "manual", **scales,
+            "aspectratio": {name: part / max(span.values()) for name, part in span.items()},
+            "camera": {"eye": {"x": 0.8, "y": -1.7, "z": 0.55}},
+        }  # fmt: skip
+        return {"scene": f"scene{number}"}
+    for name, across in ("xy", "yx"):
+        scale = scales[f"{name}axis"] | {"domain": domain[name], "anchor": across + number}
+        scale["title"]["standoff"] = 6
+        if name in panel.shared and not panel.equal:
+            first = layout["meta"].setdefault(name, name + number)
+            scale |= {"matches": first} if first != name + number else {}
+        if axes.get_aspect() == 1.0 and name == "y":
+            scale["scaleanchor"] = f"x{number}"
+        if axes.get_aspect() == 1.0 and axes.get_adjustable() == "box":
+            scale["constrain"] = "domain"
+        layout[f"{name}axis{number}"] = scale
+    return {"xaxis": f"x{number}", "yaxis": f"y{number}"}
+
+
+def _add_legend(legend: Any, name: str, layout: Layout) -> Layout:
+    """Add a legend where matplotlib has it; return what its traces have for it."""
+    if legend is None:
+        return {"showlegend": False}
+    box = legend.get_window_extent().transformed(legend.figure.transFigure.inverted())
+    layout[name] = {
+        "x": box.x0, "xanchor": "left", "y": box.y1, "yanchor": "top", "indentation": -4,
+        "font": {"size": 7.5 * POINT}, "bgcolor": "rgba(255,255,255,0.7)", "tracegroupgap": 0,
+    }  # fmt: skip
+    return {"legend": name}
+
+
+def _traces(mark: Mark, panel: Panel, where: Layout, layout: Layout) -> Iterator[Layout]:
+    """Yield the traces of a mark; texts are added to `layout`."""
+    match mark:
+        case Curve() | Area():
+            yield _entry(mark, panel)
+        case Faces():
+            yield _mesh(mark)
+        case Arrow():
+            yield from _arrow(mark)
+        case Span():  # over all that the panel shows
+            ends = _axis(layout, where, "y" if mark.axis == "x" else "x")["range"]
+            high = mark.low if mark.high is None else mark.high
+            corners = box(mark.low, ends[0], high, ends[1])
+            corners = corners if mark.axis == "x" else corners[:, ::-1]
+            style: Layout = {"name": mark.name, "group": mark.group}
+            if mark.high is None:
+                yield _line(Curve(corners[1:3], mark.colour, mark.dash, mark.width, **style), panel)
+            else:
+                yield _area(Area([corners], mark.colour, mark.opacity, **style))
+        case Text():
+            anchor = mark.align.replace("center", "middle").split()
+            part = " domain" if mark.inside else ""
+            layout["annotations"].append(
+                {"text": for_browser(mark.text), "x": mark.at[0], "y": mark.at[1],
+                 "xref": where["xaxis"] + part, "yref": where["yaxis"] + part,
+                 "xanchor": anchor[0].replace("middle", "center"), "yanchor": anchor[1],
+                 "font": {"color": css(mark.colour), "size": POINT * mark.size},
+                 "textangle": -90.0 * mark.turned, "showarrow": False}
+            )  # fmt: skip
+        case _:
+            raise NotImplementedError(f"plotly draws no {type(mark).__name__}")
+
+
+def _entry(mark: Curve | Area, panel: Panel | None = None) -> Layout:
+    """Return a curve or an area as a trace; without a panel it is only the entry of a legend."""
+    return _area(mark) if isinstance(mark, Area) else _line(mark, panel or Panel([], "", ""))
+
+
+def _line(mark: Curve, panel: Panel) -> Layout:
+    rows = mark.rows if len(mark.rows) else np.full((1, len(panel.axes)), np.nan)
+    colour, symbol = css(mark.colour), _SYMBOLS.get(mark.marker, "circle")
+    labels = [for_browser(getattr(panel, f"{name}_label")) for name in panel.axes]
+    hover = [f"{label}: %{{{name}:.4g}}" for name, label in zip(panel.axes, labels, strict=True)]
+    trace: Layout = {
+        "type": "scatter3d" if panel.z_label else "scatter",
+        **dict(zip("xyz", rows.T, strict=False)),
+        "mode": "+".join(["lines"] * (mark.dash is not None) + ["markers"] * bool(mark.marker)),
+        "line": {"color": colour, "width": POINT * mark.width},
+        "marker": {"size": POINT * mark.size, "color": colour,
+                   "symbol": f"{symbol}-open" if mark.hollow else symbol},
+        "hovertemplate": "<br>".join([for_browser(mark.name or mark.group), *hover]),
+        **_named(mark),
+    }  # fmt: skip
+    if mark.dash and not panel.z_label:
+        dashes = [f"{POINT * mark.width * length:.1f}px" for length in mark.dash]
+        trace["line"]["dash"] = ",".join(dashes)
+    if mark.error is not None:
+        style: Layout = {"type": "data", "width": 0, "thickness": 0.7 * POINT, "color": colour}
+        trace["error_y"] = style | {"array": np.asarray(mark.error)}
+        trace["text"] = [f" ± {half:.2g}" if np.isfinite(half) else "" for half in mark.error]
+        trace["hovertemplate"] += "%{text}"
+    trace["hovertemplate"] += "<extra></extra>"
+    return trace
+
+
+def _area(mark: Area) -> Layout:
+    """Return polygons as a trace, closed and with a gap behind each."""
+    gap = np.full((1, 2), np.nan)
+    rows = [part for ring in mark.polygons for part in (ring, ring[:1], gap)]
+    x, y = np.concatenate(rows or [gap]).T
+    return {
+        "type": "scatter", "mode": "lines", "fill": "toself", "x": x, "y": y, "hoverinfo": "name",
+        "hoveron": "fills", "fillcolor": css(mark.face or mark.colour, mark.opacity),
+        "line": {"color": css(mark.colour), "width": POINT * mark.width}, **_named(mark),
+    }  # fmt: skip
+
+
+def _mesh(mark: Faces) -> Layout:
+    first = 4 * np.arange(len(mark.corners))
+    triangles = np.repeat(first, 2), *(np.ravel([first + a, first + a + 1], "F") for a in (1, 2))
+    return {
+        "type": "mesh3d", **dict(zip("xyz", mark.corners.reshape(-1, 3).T, strict=True)),
+        **dict(zip("ijk", triangles, strict=True)), "flatshading": True, "hoverinfo": "skip",
+        "color": css(mark.colour), **_named(mark),
+    }  # fmt: skip
+
+
+def _arrow(mark: Arrow) -> Iterator[Layout]:
+    start, end = np.asarray(mark.start, float), np.asarray(mark.end, float)
+    step, colour = end - start, css(mark.colour)
+    line = {"color": colour, "width": POINT * mark.width}
+    style: Layout = {"hoverinfo": "skip", "line": line, **_named(mark)}
+    if len(start) == 3:
+        ends = dict(zip("xyz", np.stack([start, end]).T, strict=True))
+        yield {"type": "scatter3d", "mode": "lines", **ends, **style}
+        yield {
+            "type": "cone", "anchor": "tip", "sizemode": "raw", "showscale": False,
+            "colorscale": [[0, colour], [1, colour]], "hoverinfo": "skip",
+            **dict(zip("xyzuvw", np.concatenate([end, 0.3 * step])[:, None], strict=True)),
+        }  # fmt: skip
+        return
+    # As matplotlib's arc3: a parabola whose control point is offset by `bend` of the length.
+    control = 0.5 * (start + end) + mark.bend * np.array([step[1], -step[0]])
+    part = np.linspace(0.0, 1.0, 21)[:, None]
+    x, y = ((1 - part) ** 2 * start + 2 * part * (1 - part) * control + part**2 * end).T
+    sizes = [0.0] * 20 + [1.2 * mark.head]
+    head = {"symbol": "arrow", "angleref": "previous", "color": colour, "size": sizes}
+    yield {"type": "scatter", "mode": "lines+markers", "x": x, "y": y, "marker": head, **style}
+
+
+def _axis(layout: Layout, where: Layout, name: str) -> Layout:
+    """Return the layout of the axis x or y of a panel, whose name for plotly is like x2."""
+    return layout[f"{name}axis{where[f'{name}axis'][1:]}"]
+
+
+def _named(mark: Mark) -> Layout:
+    """Return the legend entry of a mark, and the group with which it is shown and hidden."""
+    group = for_browser(mark.group or mark.name)
+    return {"name": for_browser(mark.name) or group} | ({"legendgroup": group} if group else {})
+
+
+def css(colour: Any, opacity: float = 1.0) -> str:
+    """Return a colour as HTML takes it."""
+    red, green, blue = (round(255 * part) for part in rgb(colour))
+    return f"rgba({red},{green},{blue},{opacity:g})"
