@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 import notchflex as nf
-from notchflex.export.simulators.joint_model import JointModel, joint_model
-from notchflex.export.simulators.mjcf import mjcf
-from notchflex.export.simulators.mujoco_run import measure_errors, run_mujoco
+from notchflex.export.joints import JointModel, joint_model, turned
+from notchflex.export.mujoco_run import measure_errors, run_mujoco
+from notchflex.export.simulators import mjcf
 
 ROBOTS = {
     "pacheco2021-a": None,
@@ -40,7 +40,7 @@ def inner_error(model: JointModel, text: str) -> float:
     path = nf.simulate(model.robot, [nf.Load(tension=float(level)) for level in levels])
     known = (path.notch_angle - path.notch_angle[0]).sum(axis=1)
     found = run_mujoco(text, 0, levels, len(model.springs))[0].sum(axis=1)
-    return float(np.abs(found - known).max() / np.ptp(model.pulls[0].angle.sum(axis=1)))
+    return float(np.abs(found - known).max() / np.ptp(turned(model.pulls[0]).sum(axis=1)))
 
 
 def with_tip_force(force: float) -> str:
@@ -79,7 +79,7 @@ def main() -> None:
         fitted = time.perf_counter()
         error = measure_errors(model, text)[0]
         run = time.perf_counter()
-        numbers = (error.total_angle, error.notch_angle, error.tip_position, error.loop_area)
+        numbers = list(error.values())[2:]
         print(
             f"{name}, {model.top:.3g},",
             ", ".join(f"{one:.2%}" for one in (*numbers, inner_error(model, text))),

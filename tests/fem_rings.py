@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from notchflex.export.finite_elements.deck import ring_layers
-from notchflex.export.finite_elements.meshes import TubeMesh
+from notchflex.export.deck import ring_layers
+from notchflex.export.mesh import TubeMesh
 
 
 class RingMotion(NamedTuple):

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.export.finite_elements.meshes import mesh_of
 from notchflex.export.formats import DeckOptions
+from notchflex.export.mesh import mesh_of
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from fem_rings import RingMotion, read_rings

@@ -13,9 +13,9 @@ from free_body import free_body
 from matplotlib.axes import Axes
 
 import notchflex as nf
-from notchflex.export.simulators.joint_model import joint_model
-from notchflex.export.simulators.mjcf import mjcf
-from notchflex.export.simulators.mujoco_run import run_mujoco
+from notchflex.export.joints import joint_model
+from notchflex.export.mujoco_run import run_mujoco
+from notchflex.export.simulators import mjcf
 from notchflex.plotting import dimensioned_figure
 from notchflex.plotting.style import (
     BLUE,

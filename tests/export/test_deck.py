@@ -18,9 +18,9 @@ import notchflex as nf
 from fem_rings import RingMotion, read_rings
 from fem_wrists import solid, wrist
 from margins import Margin
-from notchflex.export.finite_elements.deck import ring_layers, tendon_spans
-from notchflex.export.finite_elements.meshes import mesh_of
+from notchflex.export.deck import ring_layers, tendon_spans
 from notchflex.export.formats import DeckOptions
+from notchflex.export.mesh import mesh_of
 from reference_data import named_rows
 from refusals import refused
 

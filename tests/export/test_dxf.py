@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.export.flat.pattern import flat_pattern
 from notchflex.export.formats import PatternOptions, Subject
+from notchflex.export.pattern import flat_pattern
 from notchflex.results.state import robot_digest
 
 LAYERS = ("CUT", "CUT_OFF", "REFERENCE", "TEXT")

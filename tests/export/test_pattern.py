@@ -7,8 +7,8 @@ import pytest
 
 import notchflex as nf
 from notchflex.export.cuts import cuts_of
-from notchflex.export.flat.pattern import flat_pattern
 from notchflex.export.formats import PatternOptions, Subject
+from notchflex.export.pattern import flat_pattern
 from refusals import refused
 
 READY = list(nf.list_robots())
@@ -181,13 +181,13 @@ def test_the_order_is_from_the_tip_to_the_base_and_the_numbers_are_those_of_the_
         cuts = pattern_of(name).cuts
         ends = [one.placed.end for one in cuts]
         assert ends == sorted(ends, reverse=True)
-        numbers = [int(one.name.rstrip("ab")) for one in cuts]
+        numbers = [int(one.placed.name.rstrip("ab")) for one in cuts]
         assert numbers == [one.placed.notch for one in cuts]
-        assert len({one.name for one in cuts}) == len(cuts)
-    assert [one.name for one in pattern_of("york2015").cuts] == ["5", "4", "3", "2", "1"]
+        assert len({one.placed.name for one in cuts}) == len(cuts)
+    assert [one.placed.name for one in pattern_of("york2015").cuts] == ["5", "4", "3", "2", "1"]
     # The last of the links has the slot on its far side too, a pair of triangles has two cuts.
-    assert [one.name for one in pattern_of("gao2017").cuts][:3] == ["27b", "27a", "26"]
-    assert [one.name for one in pattern_of("liu2022").cuts][-3:] == ["2a", "1b", "1a"]
+    assert [one.placed.name for one in pattern_of("gao2017").cuts][:3] == ["27b", "27a", "26"]
+    assert [one.placed.name for one in pattern_of("liu2022").cuts][-3:] == ["2a", "1b", "1a"]
 
 
 def test_outlines_are_counter_clockwise_and_closed_by_no_second_point():

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex.export.drawing import title_lines
 from notchflex.export.export import build
-from notchflex.export.flat.drawing import title_lines
-from notchflex.export.flat.pattern import flat_pattern
 from notchflex.export.formats import PatternOptions, SolidOptions, Subject
+from notchflex.export.pattern import flat_pattern
 from refusals import refused
 
 LAYER = 0.01

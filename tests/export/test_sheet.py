@@ -9,8 +9,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import notchflex as nf
-from notchflex.export.flat.sheet import pattern_sheet
 from notchflex.export.formats import PatternOptions, Subject
+from notchflex.export.sheet import pattern_sheet
 from notchflex.robot.writing import robot_text
 
 ENTRIES = {

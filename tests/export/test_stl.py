@@ -10,7 +10,7 @@ import notchflex as nf
 from export.closed_form import volume_of_windows
 from notchflex.export.cuts import cuts_of
 from notchflex.export.formats import SolidOptions, Subject
-from notchflex.export.solids.straight import DeformationMap, stl_solid
+from notchflex.export.solids import DeformationMap, stl_solid
 from refusals import refused
 
 

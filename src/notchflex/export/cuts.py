@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 from contextlib import contextmanager
-from itertools import accumulate
+from string import ascii_lowercase
 from typing import NamedTuple
 
 import numpy as np
@@ -25,26 +25,23 @@ class PlacedCut(NamedTuple):
 
     Attributes:
         notch: Number of the notch that it belongs to, from 1 at the base.
+        name: That number, with a letter where the notch has several cuts.
         cut: The cut; its corners are measured from the base along the tube [mm].
     """
 
     notch: int
+    name: str
     cut: NotchCut
-
-    @property
-    def name(self) -> str:
-        """What messages call it."""
-        return f"the cut of notch {self.notch}"
 
     @property
     def start(self) -> float:
         """Its proximal end along the tube [mm]."""
-        return min(along for along, _ in self.cut.corners)
+        return min(self.cut.corners)[0]
 
     @property
     def end(self) -> float:
         """Its distal end along the tube [mm]."""
-        return max(along for along, _ in self.cut.corners)
+        return max(self.cut.corners)[0]
 
 
 class RobotCuts(NamedTuple):
@@ -82,24 +79,26 @@ def cuts_of(robot: Robot, shank: float = 0.0, polishing: float = 0.0) -> RobotCu
         >>> len(cuts.cuts), round(cuts.cuts[-1].start, 9), round(cuts.end, 9)
         (5, 8.0, 10.0)
     """
-    diameters = robot.tube.outer_diameter, robot.tube.inner_diameter
+    tube, layouts, warnings = robot.tube, robot.geometry.cuts, ()
     with naming("the tube before polishing"):
-        stock = Tube(diameters[0] + 2.0 * polishing, diameters[1] - 2.0 * polishing)
-    layouts = robot.geometry.cuts
-    cuts = [PlacedCut(number, cut) for number, one in enumerate(layouts, 1) for cut in one.cuts]
-    *_, at = accumulate((one.length for one in layouts), initial=robot.tube.base_length)
-    last, wall = max(one.end for one in cuts), robot.tube.outer_radius - robot.tube.inner_radius
-    warnings: tuple[str, ...] = ()
-    if at <= last:
+        stock = Tube(tube.outer_diameter + 2.0 * polishing, tube.inner_diameter - 2.0 * polishing)
+    cuts = [
+        PlacedCut(number, f"{number}{letter if len(layout.cuts) > 1 else ''}", cut)
+        for number, layout in enumerate(layouts, start=1)
+        for letter, cut in zip(ascii_lowercase, layout.cuts, strict=False)
+    ]
+    end = sum((layout.length for layout in layouts), tube.base_length)
+    last, wall = max(cut.end for cut in cuts), tube.outer_radius - tube.inner_radius
+    if end <= last:
         warnings = (
-            f"the last cut ends at {last:.6g} mm and the robot file at {at:.6g} mm, which leaves "
+            f"the last cut ends at {last:.6g} mm and the robot file at {end:.6g} mm, which leaves "
             f"no ring at the tip; a ring of the thickness of the wall, {wall:.6g} mm, was added "
             "beyond the cut. Give the last notch an `uncut_length` to set it.",
         )
-        at = last + wall
+        end = last + wall
     if polishing:
-        cuts = [_unpolished(one, robot.tube, stock, polishing) for one in cuts]
-    return RobotCuts(stock, tuple(cuts), -shank - polishing, at + polishing, warnings)
+        cuts = [_unpolished(cut, tube, stock, polishing) for cut in cuts]
+    return RobotCuts(stock, tuple(cuts), -shank - polishing, end + polishing, warnings)
 
 
 @contextmanager
@@ -116,15 +115,14 @@ def angle_at(height: float, radius: float) -> float:
     return math.acos(min(1.0, max(-1.0, height / radius)))
 
 
-def _unpolished(one: PlacedCut, tube: Tube, stock: Tube, polishing: float) -> PlacedCut:
+def _unpolished(placed: PlacedCut, tube: Tube, stock: Tube, polishing: float) -> PlacedCut:
     """Return a cut before polishing, which moves its walls into the material.
 
     A radial wall is then no longer radial: in the middle of the wall it lies where the robot has
     it, which keeps the area of the section.
     """
-    cut, top = one.cut, stock.outer_radius
-    inside = polishing, polishing
-    with naming(one.name):
+    cut, top, inside = placed.cut, stock.outer_radius, (polishing, polishing)
+    with naming(f"the cut of notch {placed.notch}"):
         if cut.radial:
             middle = 0.5 * (tube.outer_radius + tube.inner_radius)
             profile = [(x, -middle * angle_at(y, tube.outer_radius)) for x, y in cut.corners]
@@ -132,7 +130,7 @@ def _unpolished(one: PlacedCut, tube: Tube, stock: Tube, polishing: float) -> Pl
         else:
             corners = shrunk(cut.corners, inside, top)
     radii = tuple(max(radius - polishing, 0.0) for radius in cut.radii)
-    return one._replace(cut=cut._replace(corners=tuple(corners), radii=radii))
+    return placed._replace(cut=cut._replace(corners=tuple(corners), radii=radii))
 
 
 class Hole(NamedTuple):
@@ -147,26 +145,16 @@ class Hole(NamedTuple):
     place: Float[np.ndarray, " 3"]
 
 
-def tendon_holes(robot: Robot, tendon: int) -> list[Hole]:
-    """Return the points that a tendon runs through, base to tip.
-
-    Args:
-        robot: The robot.
-        tendon: Which tendon, from 0.
-    """
-    one = robot.tendon[tendon]
-    base, *walls = robot.geometry.walls(one.direction_deg, one.radius)
-    side = np.radians(one.direction_deg)
-    position = one.radius * np.array([np.cos(side), np.sin(side), 0.0])
-
-    def hole(body: int, along: float) -> Hole:
-        return Hole(body, position + np.array([0.0, 0.0, along]))
-
-    last = one.end_body or robot.number_of_notches
-    holes = [hole(0, 0.0)]
-    if base is not None and base[1] > 0.0:
-        holes.append(hole(0, base[1]))
-    for body, wall in enumerate(walls[:last], start=1):
-        if wall is not None:
-            holes += [hole(body, along) for along in (wall if body < last else wall[:1])]
+def tendon_holes(robot: Robot, number: int) -> list[Hole]:
+    """Return the points that a tendon (counted from 0) runs through, base to tip."""
+    tendon = robot.tendon[number]
+    last, side = tendon.end_body or robot.number_of_notches, np.radians(tendon.direction_deg)
+    holes: list[Hole] = []
+    walls = robot.geometry.walls(tendon.direction_deg, tendon.radius)
+    for body, (start, end) in ((body, wall) for body, wall in enumerate(walls[: last + 1]) if wall):
+        # Nothing leads it through a base without length; it ends at the first edge of its body.
+        passes = end > 0.0 if body == 0 else body < last
+        for along in (start, end) if passes else (start,):
+            place = [tendon.radius * np.cos(side), tendon.radius * np.sin(side), along]
+            holes.append(Hole(body, np.array(place)))
     return holes

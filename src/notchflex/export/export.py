@@ -59,8 +59,7 @@ def export_robot(
     name = format_of(target)
     check_output(target, "export_robot")
     FORMATS[name].check_packages("export_robot")
-    document = build(name, _subject(robot), options)
-    return write({target: document})[0]
+    return write({target: build(name, _subject(robot), options)})[0]
 
 
 def build(name: str, subject: Subject, options: object | None = None) -> Document:
@@ -69,22 +68,22 @@ def build(name: str, subject: Subject, options: object | None = None) -> Documen
     Raises:
         InputError: The robot or the options do not allow it.
     """
-    one = FORMATS[name]
-    options = one.options() if options is None else options
-    if not isinstance(options, one.options):
+    kind, path, step = FORMATS[name], subject.path, subject.step
+    options = kind.options() if options is None else options
+    if not isinstance(options, kind.options):
         raise InputError.WRONG_TYPE(
-            f"a {one.text} takes {one.options.__name__}; got {type(options).__name__}."
+            f"a {kind.text} takes {kind.options.__name__}; got {type(options).__name__}."
         )
-    if subject.path is not None and not one.bends:
+    if path is not None and not kind.bends:
         raise InputError.CONFLICT(
-            f"a {one.text} shows the robot as it is cut, without loads; give the robot instead "
+            f"a {kind.text} shows the robot as it is cut, without loads; give the robot instead "
             "of a result."
         )
-    if subject.path is not None and not subject.path.converged[subject.step]:
+    if path is not None and not path.converged[step]:
         raise InputError.NOT_CONVERGED(
-            f"the state that is exported did not converge: {subject.path.reason[subject.step]}."
+            f"the state that is exported did not converge: {path.reason[step]}."
         )
-    return one.build(subject, options)
+    return kind.build(subject, options)
 
 
 def write(documents: Mapping[str, Document]) -> list[Exported]:
@@ -103,9 +102,9 @@ def _subject(robot: object) -> Subject:
     from notchflex import Equilibrium, EquilibriumPath  # they import JAX
 
     if isinstance(robot, EquilibriumPath):
-        return Subject(robot.robot, robot, len(robot) - 1)
+        robot = robot[-1]
     if isinstance(robot, Equilibrium):
-        return Subject(robot.path.robot, robot.path, robot.step)
+        return Subject(robot.robot, robot.path, robot.step)
     raise InputError.WRONG_TYPE(
         f"export_robot takes a Robot, an Equilibrium or an EquilibriumPath; got "
         f"{type(robot).__name__}."

@@ -35,7 +35,7 @@ def _length(text: str, most: float = 10.0) -> Any:
 _Width = Annotated[Float, _length("width of the beam")]
 _Kerf = Annotated[
     tuple[_Width, _Width],
-    BeforeValidator(lambda one: one if isinstance(one, tuple | list) else (one, one)),
+    BeforeValidator(lambda kerf: kerf if isinstance(kerf, tuple | list) else (kerf, kerf)),
     Field(validate_default=True),
 ]
 _Polishing = Annotated[Float, _length("what polishing removes from every surface")]
@@ -124,6 +124,7 @@ class SolidOptions:
 
 
 Mesh = Literal["coarse", "medium", "fine"]
+# Of each the elements that the first five options of a deck count.
 _MESHES = {"coarse": (1, 3, 4, 3, 4), "medium": (1, 5, 6, 6, 8), "fine": (2, 8, 8, 10, 12)}
 
 
@@ -165,8 +166,7 @@ class DeckOptions:
         """
         if mesh not in _MESHES:
             raise InputError.UNKNOWN_NAME(f"there is no mesh {mesh!r}; give {', '.join(_MESHES)}")
-        names = ("wall", "spine", "opening", "notch", "uncut")
-        return cls(**dict(zip(names, _MESHES[mesh], strict=True)), **options)
+        return cls(*_MESHES[mesh], **options)
 
 
 @dataclass(frozen=True)
@@ -219,10 +219,9 @@ class Format:
     Args:
         text: What it is, for messages and for the help of its option.
         suffixes: Suffixes of its files; no two formats share one.
-        builder: `module:function` that makes the document of a subject with options.
+        builder: `module:function` in this folder that makes the document of a subject with options.
         options: Class of its options; it can be made without arguments.
         needs: Packages that it needs, each with the extra that installs it.
-        bends: Whether it shows the robot under load; others are of the robot as it is cut.
     """
 
     text: str
@@ -230,11 +229,15 @@ class Format:
     builder: str
     options: type
     needs: tuple[tuple[str, str], ...] = ()
-    bends: bool = False
+
+    @property
+    def bends(self) -> bool:
+        """Whether it shows the robot under load; others are of the robot as it is cut."""
+        return self.options is not PatternOptions
 
     def build(self, subject: Subject, options: Any) -> Document:
         """Make the document; nothing is written."""
-        return resolve_name(self.builder)(subject, options)
+        return resolve_name(f"notchflex.export.{self.builder}")(subject, options)
 
     def check_packages(self, option: str) -> None:
         """Raise if a package that it needs is not installed."""
@@ -242,72 +245,46 @@ class Format:
             need(module, extra, option)
 
 
-_EZDXF = (("ezdxf", "export"),)
+_EZDXF, _MATPLOTLIB = ("ezdxf", "export"), ("matplotlib", "plot")
+_MANIFOLD, _TRIMESH = ("manifold3d", "export"), ("trimesh", "export")
+_BUILD123D = ("build123d", "cad")
 
 FORMATS: dict[str, Format] = {
     "dxf": Format(
-        "flat pattern for the laser",
-        (".dxf",),
-        "notchflex.export.flat.drawing:dxf_pattern",
-        PatternOptions,
-        _EZDXF,
+        "flat pattern for the laser", (".dxf",), "drawing:dxf_pattern", PatternOptions, (_EZDXF,)
     ),
-    "svg": Format(
-        "flat pattern at full size",
-        (".svg",),
-        "notchflex.export.flat.drawing:svg_pattern",
-        PatternOptions,
-    ),
+    "svg": Format("flat pattern at full size", (".svg",), "drawing:svg_pattern", PatternOptions),
     "pdf": Format(
         "sheet with the pattern, a table of the cuts and a dimensioned drawing",
         (".pdf",),
-        "notchflex.export.flat.sheet:pattern_sheet",
+        "sheet:pattern_sheet",
         PatternOptions,
-        (("matplotlib", "plot"),),
+        (_MATPLOTLIB,),
     ),
     "stl": Format(
         "solid as triangles",
         (".stl",),
-        "notchflex.export.solids.straight:stl_solid",
+        "solids:stl_solid",
         SolidOptions,
-        (("manifold3d", "export"), ("matplotlib", "plot")),
-        bends=True,
+        (_MANIFOLD, _TRIMESH, _MATPLOTLIB),
     ),
     "step": Format(
         "solid for CAD",
         (".step", ".stp"),
-        "notchflex.export.solids.step:step_solid",
+        "step:step_solid",
         SolidOptions,
-        (("build123d", "cad"), ("matplotlib", "plot")),
-        bends=True,
+        (_BUILD123D, _MATPLOTLIB),
     ),
-    "mjcf": Format(
-        "MuJoCo model",
-        (".xml", ".mjcf"),
-        "notchflex.export.simulators.document:mjcf_document",
-        SimulatorOptions,
-        bends=True,
-    ),
-    "urdf": Format(
-        "URDF model",
-        (".urdf",),
-        "notchflex.export.simulators.document:urdf_document",
-        SimulatorOptions,
-        bends=True,
-    ),
+    "mjcf": Format("MuJoCo model", (".xml", ".mjcf"), "simulators:mjcf_document", SimulatorOptions),
+    "urdf": Format("URDF model", (".urdf",), "simulators:urdf_document", SimulatorOptions),
     "transmission": Format(
         "table of levers and joint moments, for a URDF model,",
         (".csv",),
-        "notchflex.export.simulators.document:transmission_document",
+        "simulators:transmission_document",
         SimulatorOptions,
-        bends=True,
     ),
     "inp": Format(
-        "deck of finite elements for CalculiX",
-        (".inp",),
-        "notchflex.export.finite_elements.deck:deck_document",
-        DeckOptions,
-        bends=True,
+        "deck of finite elements for CalculiX", (".inp",), "deck:deck_document", DeckOptions
     ),
 }
 """Name of a format, which is also that of its option, to what writes it."""
@@ -320,12 +297,13 @@ def format_of(file: str) -> str:
         InputError: No format has this suffix.
     """
     suffix = Path(file).suffix.lower()
-    for name, one in FORMATS.items():
-        if suffix in one.suffixes:
-            return name
-    suffixes = ", ".join(suffix for one in FORMATS.values() for suffix in one.suffixes)
+    names = {suffix: name for name, kind in FORMATS.items() for suffix in kind.suffixes}
+    if suffix in names:
+        return names[suffix]
     got = f"the suffix {suffix}" if suffix else "no suffix"
-    raise InputError.FILE_FORMAT(f"{file}: got {got}; the file must end in one of {suffixes}.")
+    raise InputError.FILE_FORMAT(
+        f"{file}: got {got}; the file must end in one of {', '.join(names)}."
+    )
 
 
 def check_suffix(name: str, file: str, option: str) -> None:

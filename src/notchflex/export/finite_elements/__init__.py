@@ -1,1 +1,0 @@
-"""Decks of finite elements of notched tubes, for CalculiX."""

@@ -1,1 +1,0 @@
-"""Flat patterns: the outer surface of the tube unrolled, with the cuts on it."""

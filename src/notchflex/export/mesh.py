@@ -1,0 +1,336 @@
+"""The structured mesh that a robot gets: half of the tube where it bends in its plane, else all.
+
+z runs along the tube. Half a tube is cut by the plane in which it bends: its notches open toward
++x, and the half with y >= 0 is meshed. In a whole tube x points to direction 0, and lines run
+evenly round it but for what the notches ask for: along both edges of the spine of a notch, and at
+every tendon. Between two notches the lines go over from their places at one to those at the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex import ArcNotch, InputError, Robot
+from notchflex.export.formats import DeckOptions
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int_]
+
+# Corners and middle nodes of an element in steps of half an element, as CalculiX counts them: first
+# along the angle, then along the radius (which makes a right-handed frame with z).
+_NODES = np.array(
+    [
+        *[(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)],
+        *[(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)],
+        *[(0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)],
+    ]
+)[:, [1, 0, 2]]
+# Elements round the tube for those that half a tube has in its plane.
+_ROUND = 1.4
+# The narrowest and widest element round the tube, in parts of an even one.
+_NARROW, _WIDE = 0.25, 3.0
+# Directions that differ by less are the same, deg.
+_SAME = 1e-6
+
+
+class GridOpening(NamedTuple):
+    """Opening of a notch on the grid.
+
+    Attributes:
+        first: Index of the angle at its first edge.
+        cells: Number of elements round its opening, to its last edge; in half a tube to the middle.
+        low: Index along z of its first face.
+        high: Index along z of its last face.
+    """
+
+    first: int
+    cells: int
+    low: int
+    high: int
+
+
+@dataclass(frozen=True)
+class TubeMesh:
+    """A mesh of m elements of a tube, or of the half of it with y >= 0. Units mm.
+
+    Attributes:
+        nodes: Number of every node on the grid of half elements, -1 where there is none; (radii,
+            angles, heights).
+        heights: Height of every layer of the grid, mm.
+        place: Places of the nodes, in the order of their numbers, from 1; (nodes, 3).
+        elements: Nodes of every element, (m, 20).
+        cell: Which cell of the grid every element is, (radius, angle, z); (m, 3).
+        openings: Where the notches are open.
+        is_half: Whether y = 0 is a plane of symmetry.
+        x_deg: Direction of the x axis on the robot, deg.
+    """
+
+    nodes: Numbers
+    heights: Array
+    place: Array
+    elements: Numbers
+    cell: Numbers
+    openings: Sequence[GridOpening]
+    is_half: bool
+    x_deg: float
+
+    @property
+    def share(self) -> float:
+        """The part of the tube that is meshed."""
+        return 0.5 if self.is_half else 1.0
+
+    @property
+    def faces(self) -> Numbers:
+        """Indices along z of the grid at the first and last face of every notch, (n, 2)."""
+        return np.array([opening[2:] for opening in self.openings])
+
+    def layer(self, index: int) -> Numbers:
+        """Return the nodes of one layer across the tube, by its index along z."""
+        numbers = self.nodes[:, :, index]
+        return np.unique(numbers[numbers > 0])
+
+    def in_plane(self) -> Numbers:
+        """Return the nodes in the plane of symmetry of half a tube."""
+        numbers = self.nodes[:, [0, -1], :]
+        return numbers[numbers > 0]
+
+    def faces_of(self, opening: GridOpening) -> tuple[Numbers, Numbers]:
+        """Return the elements below and above a notch whose faces may meet, by their numbers.
+
+        They lie behind the outer half of its faces.
+        """
+        first, cells, low, high = opening
+        along = (self.cell[:, 1] - first // 2) % (self.nodes.shape[1] // 2)
+        both_sides = np.abs(2 * along + 1 - cells) <= 0.5 * cells
+        outer = np.where(self.is_half, 2 * along >= cells, both_sides) & (along < cells)
+        below, above = (
+            1 + np.flatnonzero(outer & (self.cell[:, 2] == layer))
+            for layer in (low // 2 - 1, high // 2)
+        )
+        return below, above
+
+
+def _numbered(
+    radius: Array,
+    angle: Array,
+    heights: Array,
+    openings: Sequence[GridOpening],
+    *,
+    is_half: bool,
+    x_deg: float,
+) -> TubeMesh:
+    """Drop the cells of the notches and number the nodes that are left.
+
+    Args:
+        radius: Radii of the grid, mm, (a,).
+        angle: Angles of the grid from x on, rad, (a, b, c); a whole tube closes from the last to
+            the first.
+        heights: Heights of the layers, mm, (c,).
+        openings: Where the notches are open.
+        is_half: Whether half a tube is meshed.
+        x_deg: Direction of the x axis on the robot.
+    """
+    across = radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+    position = np.moveaxis(across, 0, -1) + heights[:, None] * [0.0, 0.0, 1.0]
+    shape = position.shape[:3]
+    cells = np.argwhere(np.ones([size // 2 for size in shape]))
+    for first, count, low, high in openings:
+        inside = (2 * cells[:, 2] >= low) & (2 * cells[:, 2] < high)
+        cut = inside & ((cells[:, 1] - first // 2) % (shape[1] // 2) < count)
+        cells = cells[~cut]
+    # Half a tube counts its angles from the spine, the other way round.
+    grid = 2 * cells[:, None] + (_NODES if is_half else [0, 2, 0] + _NODES * [1, -1, 1])
+    grid[..., 1] %= shape[1]
+    flat = np.ravel_multi_index(tuple(np.moveaxis(grid, -1, 0)), shape)
+    used = np.unique(flat)
+    numbers = np.full(shape, -1)
+    numbers.ravel()[used] = np.arange(1, len(used) + 1)
+    places = position.reshape(-1, 3)[used]
+    return TubeMesh(
+        numbers, heights, places, numbers.ravel()[flat], cells, openings, is_half, x_deg
+    )
+
+
+def check_shape(robot: Robot) -> list[ArcNotch]:
+    """Return the notches of a robot that the mesh can be made of.
+
+    Raises:
+        InputError: A notch is not an arc, or has a precurvature, or its cut leaves a solid strip.
+    """
+    notches: list[ArcNotch] = []
+    for number, notch in enumerate(robot.notches, start=1):
+        if problem := _problem(robot, notch):
+            raise InputError.UNSUPPORTED(f"notch {number} of {robot.name} {problem}")
+        assert isinstance(notch, ArcNotch)
+        notches.append(notch)
+    return notches
+
+
+def _problem(robot: Robot, notch: object) -> str:
+    """Return what is wrong with a notch for a mesh."""
+    outer, inner = robot.tube.outer_radius, robot.tube.inner_radius
+    if not isinstance(notch, ArcNotch):
+        return (
+            f"is of kind {getattr(notch, 'kind', '')!r}: a deck of finite elements is made of "
+            'notches of kind "arc" only; export the solid with --step and mesh it by gmsh, with '
+            "second-order tetrahedra"
+        )
+    if notch.precurvature_deg != 0.0:
+        return "has a precurvature, and the mesh is straight: set notch.precurvature_deg=0"
+    if notch.stiffness_factor != 1.0:
+        return (
+            "has a stiffness_factor, and a solid has the stiffness of its shape: set "
+            "notch.stiffness_factor=1"
+        )
+    if notch.cut == "off-axis" and notch.depth - outer >= inner:
+        return (
+            "leaves a solid strip, without bore: the mesh needs a depth of less than "
+            f"{outer + inner:g} mm"
+        )
+    return ""
+
+
+def _edge_angle(notch: ArcNotch, robot: Robot, radius: Array) -> Array:
+    """Return half the angle of the wall that a notch leaves, at some radii, rad."""
+    outer = robot.tube.outer_radius
+    cut_at = radius if notch.cut == "off-axis" else np.full(len(radius), outer)
+    return np.arccos((notch.section_depth(robot.tube) - outer) / cut_at)
+
+
+def _layers(
+    robot: Robot, notches: Sequence[ArcNotch], options: DeckOptions
+) -> tuple[Array, Numbers]:
+    """Return the heights of all layers, and the layers of both faces of every notch, (n, 2)."""
+    even = np.linspace(0.0, 1.0, options.uncut + 1)
+    uncut = _with_middles(even - 0.09 * np.sin(2.0 * np.pi * even))  # closer at both ends
+    heights, faces = np.zeros(1), list[tuple[int, int]]()
+
+    def add(length: float, places: Array) -> Array:
+        return np.append(heights, heights[-1] + length * places[1:] if length > 0.0 else ())
+
+    heights = add(robot.tube.base_length, uncut)
+    for notch in notches:
+        low = len(heights) - 1
+        heights = add(notch.height, np.linspace(0.0, 1.0, 2 * options.notch + 1))
+        faces.append((low, len(heights) - 1))
+        heights = add(notch.uncut_length, uncut)
+    return heights, np.array(faces)
+
+
+def _with_middles(corners: Array) -> Array:
+    """Return places of corners with those of middle nodes half way between."""
+    return np.interp(np.arange(2 * len(corners) - 1) / 2.0, np.arange(len(corners)), corners)
+
+
+def _over(heights: Array, faces: Numbers, values: Array) -> Array:
+    """Return values (n, ...) of the notches at all heights, (..., c): straight between notches."""
+    ends = np.repeat(values.reshape(len(values), -1), 2, axis=0)
+    rows = [np.interp(heights, heights[faces.ravel()], row) for row in ends.T]
+    return np.reshape(rows, (*values.shape[1:], len(heights)))
+
+
+def mesh_of(robot: Robot, options: DeckOptions, tendons: Sequence[int] = (0,)) -> TubeMesh:
+    """Mesh a robot.
+
+    Args:
+        robot: The robot.
+        options: The mesh.
+        tendons: The tendons that are pulled, from 0.
+
+    Raises:
+        InputError: The robot has another shape than a mesh can have.
+    """
+    notches = check_shape(robot)
+    sides = [robot.tendon[number].direction_deg for number in tendons]
+    first = notches[0].direction_deg
+    turns = [side - first for side in (*sides, *(notch.direction_deg for notch in notches))]
+    is_half = all(abs((turn + 180.0) % 360.0 - 180.0) < _SAME for turn in turns)
+    radius = np.linspace(robot.tube.inner_radius, robot.tube.outer_radius, 2 * options.wall + 1)
+    heights, faces = _layers(robot, notches, options)
+    edges = np.stack([_edge_angle(notch, robot, radius) for notch in notches])  # (n, radii)
+    if is_half:
+        # Between two notches the lines go over from the edge of one to that of the next.
+        edge = _over(heights, faces, edges)[:, None]
+        spine, beyond = (
+            _with_middles(np.linspace(0.0, 1.0, count + 1) ** 1.4)[:, None]  # closer at the edge
+            for count in (options.spine, options.opening)
+        )
+        angle = [(1.0 - spine[::-1]) * edge, edge + beyond[1:] * (np.pi - edge)]
+        openings = [
+            GridOpening(2 * options.spine, options.opening, *face) for face in faces.tolist()
+        ]
+        angle = np.pi - np.concatenate(angle, axis=1)
+        return _numbered(radius, angle, heights, openings, is_half=True, x_deg=first)
+    around = 4 * int(np.ceil(_ROUND * (options.spine + options.opening) / 2.0))
+    openings, shifts = list[GridOpening](), list[Array]()
+    for number, (notch, face, edge) in enumerate(
+        zip(notches, faces.tolist(), edges, strict=True), 1
+    ):
+        name = f"notch {number} of {robot.name}"
+        if notch.uncut_length <= 0.0 and number < len(notches):
+            raise InputError.UNSUPPORTED(
+                f"{name} has no uncut_length behind it, in which the lines "
+                "of the mesh could go over to the next notch: give it one above 0 mm"
+            )
+        low, high = _spine_lines(notch, float(edge[-1]), around, options)
+        knots = _knots(notch, edge, (low, high), np.radians(sides).tolist(), around)
+        shifts.append(_shifts(knots, around, name))
+        openings.append(GridOpening(2 * high, around - (high - low), *face))
+    angle = _over(heights, faces, np.stack(shifts))
+    angle += (np.arange(2 * around) * np.pi / around)[:, None]
+    return _numbered(radius, angle, heights, openings, is_half=False, x_deg=0.0)
+
+
+def _spine_lines(
+    notch: ArcNotch, edge: float, around: int, options: DeckOptions
+) -> tuple[int, int]:
+    """Return the lines at the edges of the spine of a notch, by their number."""
+    middle = round(around * (notch.direction_deg + 180.0) / 360.0)
+    even = around * edge / (2.0 * np.pi)
+    # Somewhat finer than even where the spine is narrow.
+    half = round(0.5 * (even + max(even, options.spine)))
+    half = min(max(half, 2), around // 2 - 2)
+    return middle - half, middle + half
+
+
+def _knots(
+    notch: ArcNotch, edge: Array, lines: tuple[int, int], sides: Sequence[float], around: int
+) -> dict[int, Array]:
+    """Return by how much lines lie beside their even places at a notch, rad."""
+    spine, per = np.radians(notch.direction_deg) + np.pi, 2.0 * np.pi / around
+    first, last = lines
+    knots = {first % around: spine - edge - first * per, last % around: spine + edge - last * per}
+    for side in sides:
+        away = (side - spine + np.pi) % (2.0 * np.pi) - np.pi  # from the middle of the spine
+        number = round((spine + away) / per)
+        if abs(away) < edge[0]:
+            number = min(max(number, first + 1), last - 1)
+        else:
+            number = min(last + 1 + (number - last - 1) % around, first + around - 1)
+            away %= 2.0 * np.pi
+        knots[number % around] = np.full(len(edge), spine + away - number * per)
+    return {line: (by + np.pi) % (2.0 * np.pi) - np.pi for line, by in knots.items()}
+
+
+def _shifts(knots: dict[int, Array], around: int, name: str) -> Array:
+    """Return by how much all lines lie beside their even places, between those that must.
+
+    Raises:
+        InputError: Two lines come too near to each other.
+    """
+    lines = sorted(knots)
+    half = np.arange(2 * around) / 2.0
+    rows = np.stack([knots[line] for line in lines], axis=1)
+    shift = np.stack([np.interp(half, lines, row, period=around) for row in rows])
+    width = 1.0 + np.diff(shift, axis=1, append=shift[:, :1]) * around / np.pi
+    if width.min() < _NARROW or width.max() > _WIDE:
+        raise InputError.UNSUPPORTED(
+            f"{name}: a tendon lies so near to an edge of the notch that the mesh has no line for "
+            "each of them; take a finer mesh, or place the tendon elsewhere"
+        )
+    return shift
