@@ -1,1 +1,22 @@
-"""Long computations in pieces, one file each, by threads or dask; resumed after an interruption."""
+"""Long computations in pieces, one file each, by threads or dask; resumed after a stop."""
+
+from notchflex.pieces.folder import (
+    ACCEPTED,
+    CODES,
+    FAILED,
+    INVALID,
+    REJECTED,
+    Manifest,
+    Task,
+    check_target,
+    damaged,
+    encoded,
+    heads,
+    piece_file,
+)
+from notchflex.pieces.run import PieceFolder, Progress
+from notchflex.pieces.statistics import Scale, Sketch, sobol_points
+
+__all__ = ["ACCEPTED", "CODES", "FAILED", "INVALID", "REJECTED"]
+__all__ += ["Manifest", "PieceFolder", "Progress", "Scale", "Sketch", "Task"]
+__all__ += ["check_target", "damaged", "encoded", "heads", "piece_file", "sobol_points"]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BELOW, BESIDE, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, sequence_colours
-from notchflex.workspaces.cloud import hull_of, sphere_directions
+from notchflex.workspaces import hull_of, sphere_directions
 
 if TYPE_CHECKING:
     from notchflex.workspaces import Workspace
