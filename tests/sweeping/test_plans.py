@@ -14,7 +14,7 @@ from scipy.stats import qmc
 import notchflex as nf
 from mutations import mutated
 from notchflex.cli import run
-from notchflex.pieces import PieceFolder, Scale, Sketch
+from notchflex.pieces import PieceFolder, Sketch, add_to, scale_of, summed_up
 from notchflex.sweeping.sweep import numbers_between
 
 TEMPLATE = Path(nf.__file__).parent / "sweeping" / "template.toml"
@@ -62,25 +62,33 @@ def test_points_are_the_grid_times_those_of_scipy():
 def test_merging_in_any_order_and_far_values():
     rng = np.random.default_rng(0)
     values = np.concatenate([rng.normal(3.0, 0.1, 3000), [1e9, -1e300, np.nan, 3.0]])
-    scale = Scale.of(values[:500])
-    parts = np.split(values, [10, 500, 1800])
-    starts = [0, 10, 500, 1800]
-    made = [Sketch.of(one, a, scale, 4) for one, a in zip(parts, starts, strict=True)]
-    whole = Sketch.of(values, 0, scale, 4)
+    scales = {"a": scale_of(values[:500])}
+    starts = [0, 10, 500, 1800, len(values)]
+
+    def head(start: int, stop: int) -> dict[str, Any]:
+        codes = np.zeros(stop - start, int)
+        return summed_up({"a": values[start:stop]}, codes, start, scales, 4)
+
+    made = [json.loads(json.dumps(head(*ends))) for ends in itertools.pairwise(starts)]
+    whole: dict[str, Sketch] = {}
+    add_to(whole, head(0, len(values)), 4)
     for order in ([0, 1, 2, 3], [3, 1, 0, 2]):
-        found = Sketch()
+        found: dict[str, Sketch] = {}
         for number in order:
-            document = made[number].document()
-            found = found.merged(Sketch.read(document, (scale.middle, scale.half)), 4)
-        assert found.smallest == whole.smallest
-        assert found.largest == whole.largest
-        assert (found.counts == whole.counts).all()
+            add_to(found, made[number], 4)
+        assert found["a"].smallest == whole["a"].smallest
+        assert found["a"].largest == whole["a"].largest
+        assert found["a"].counts.sum() == whole["a"].counts.sum()
+        parts = np.linspace(0.0, 1.0, 101)
+        assert [found["a"].quantile(part) for part in parts] == [
+            whole["a"].quantile(part) for part in parts
+        ]
     good = values[np.isfinite(values)]
     for part in (0.01, 0.5, 0.99):
         exact = np.quantile(good, part, method="inverted_cdf")
-        assert abs(whole.quantile(part) - exact) < 2.0 * scale.half / 1024
-    assert np.isclose(whole.quantile(1.0), 1e9)
-    assert Sketch.of(np.full(5, np.nan), 0, scale, 4).count == 0
+        assert abs(whole["a"].quantile(part) - exact) < 2.0 * scales["a"][1] / 1024
+    assert np.isclose(whole["a"].quantile(1.0), 1e9)
+    assert Sketch.of(np.full(5, np.nan), 0, scales["a"], 4).count == 0
 
 
 BAD = {

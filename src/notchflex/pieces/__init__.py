@@ -15,8 +15,16 @@ from notchflex.pieces.folder import (
     piece_file,
 )
 from notchflex.pieces.run import PieceFolder, Progress
-from notchflex.pieces.statistics import Scale, Sketch, sobol_points
+from notchflex.pieces.statistics import (
+    Scale,
+    Sketch,
+    add_to,
+    scale_of,
+    sobol_points,
+    summed_up,
+)
 
 __all__ = ["ACCEPTED", "CODES", "FAILED", "INVALID", "REJECTED"]
 __all__ += ["Manifest", "PieceFolder", "Progress", "Scale", "Sketch", "Task"]
-__all__ += ["check_target", "damaged", "encoded", "heads", "piece_file", "sobol_points"]
+__all__ += ["add_to", "check_target", "damaged", "encoded", "heads", "piece_file"]
+__all__ += ["scale_of", "sobol_points", "summed_up"]

@@ -90,17 +90,12 @@ class Manifest:
         text = read_text(file, "manifest")
         try:
             document = json.loads(text)
-            there = document["kind"], document["format"]
-            pieces = -(-document["rows"] // document["piece"])
-            if document["pieces"] != pieces or not dict(document["versions"]):
+            needed = kind, FORMAT, -(-document["rows"] // document["piece"])
+            there = tuple(document[key] for key in ("kind", "format", "pieces"))
+            if there != needed or not dict(document["versions"]):
                 raise ValueError
         except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError):
             raise damaged(file) from None
-        if there != (kind, FORMAT):
-            raise InputError.FILE_FORMAT(
-                f"{file} is of kind {there[0]} and format {there[1]}; needed are {kind} and "
-                f"{FORMAT}."
-            )
         return cls(document)
 
     @cached_property

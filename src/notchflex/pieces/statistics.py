@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,45 +17,25 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.stats import qmc
 
+from notchflex.pieces.folder import CODES
+
 _HALF = 1024
 """Bins on either side of the middle of the sample."""
 
 _MAX_BIN = 64 * _HALF
 
 
-@dataclass(frozen=True)
-class Scale:
-    """Range of the values of a sample: a finite middle, and half the range, above 0."""
+Scale = tuple[float, float]
+"""Range of the values of a sample: a finite middle, and half the range, above 0."""
 
-    middle: float = 0.0
-    half: float = 1.0
 
-    @classmethod
-    def of(cls, values: Float[np.ndarray, " k"]) -> Scale:
-        """Find the scale of a sample; NaN is left out."""
-        finite = values[np.isfinite(values)]
-        if not len(finite):
-            return cls()
-        low, high = 0.5 * float(finite.min()), 0.5 * float(finite.max())
-        return cls(low + high, max(high - low, 1e-9 * abs(low + high), 1e-12))
-
-    def bins(self, values: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
-        """Return the bin of every value."""
-        position = (values - self.middle) / self.half
-        bins = np.floor(position * _HALF)
-        beyond = np.abs(position) > 1.0
-        if beyond.any():
-            far = position[beyond]
-            bins[beyond] = np.floor(np.copysign(_HALF * (1.0 + np.log(np.abs(far))), far))
-        return np.clip(bins, -_MAX_BIN, _MAX_BIN).astype(np.int64)
-
-    def edge(self, number: Any) -> Float[np.ndarray, " k"]:
-        """Return values whose bins are given; between whole numbers those in between."""
-        position = np.asarray(number, float) / _HALF
-        size = np.abs(position)
-        with np.errstate(over="ignore"):
-            far = np.copysign(np.exp(size - 1.0), position)
-        return self.middle + self.half * np.where(size > 1.0, far, position)
+def scale_of(values: Float[np.ndarray, " k"]) -> Scale:
+    """Find the scale of a sample; NaN is left out."""
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return 0.0, 1.0
+    low, high = 0.5 * float(finite.min()), 0.5 * float(finite.max())
+    return low + high, max(high - low, 1e-9 * abs(low + high), 1e-12)
 
 
 @dataclass
@@ -63,7 +43,6 @@ class Sketch:
     """Statistics of a column that are merged from pieces.
 
     Attributes:
-        scale: Range of a sample.
         count: Number of values.
         total: Their sum, less the middle of the scale.
         squares: Sum of squares of the same.
@@ -71,9 +50,9 @@ class Sketch:
         largest: Largest values with their rows, the largest first.
         first: Bin of the first count.
         counts: Values in every bin from there on.
+        scale: Range of a sample.
     """
 
-    scale: Scale = Scale()
     count: int = 0
     total: float = 0.0
     squares: float = 0.0
@@ -81,6 +60,7 @@ class Sketch:
     largest: list[list[Any]] = field(default_factory=list[list[Any]])
     first: int = 0
     counts: Int[np.ndarray, " bins"] = field(default_factory=lambda: np.zeros(0, np.int64))
+    scale: Scale = (0.0, 1.0)
 
     @classmethod
     def of(cls, values: Float[np.ndarray, " k"], start: int, scale: Scale, keep: int) -> Sketch:
@@ -90,27 +70,17 @@ class Sketch:
         if not is_finite.all():
             values, rows = values[is_finite], rows[is_finite]
         if not len(values):
-            return cls(scale)
-        bins = scale.bins(values)
+            return cls(scale=scale)
+        middle, half = scale
+        moved = values - middle
+        bins = _bins(moved / half)
         first = int(bins.min())
-        moved = values - scale.middle
         with np.errstate(over="ignore"):
             total, squares = float(moved.sum()), float(np.square(moved).sum())
         smallest = _least(values, rows, keep)
         largest = [[-value, row] for value, row in _least(-values, rows, keep)]
         counts = np.bincount(bins - first)
-        return cls(scale, len(values), total, squares, smallest, largest, first, counts)
-
-    @classmethod
-    def read(cls, document: dict[str, Any], scale: Sequence[float]) -> Sketch:
-        """Make a description of its plain values."""
-        counts = np.array(document["counts"], np.int64)
-        return replace(cls(**document), scale=Scale(*scale), counts=counts)
-
-    def document(self) -> dict[str, Any]:
-        """Return plain values, which `read` takes beside the scale."""
-        values = vars(self) | {"counts": self.counts.tolist()}
-        return {name: value for name, value in values.items() if name != "scale"}
+        return cls(len(values), total, squares, smallest, largest, first, counts, scale)
 
     def merged(self, more: Sketch, keep: int) -> Sketch:
         """Return the description of both columns; the scale is that of `more`."""
@@ -120,7 +90,6 @@ class Sketch:
         for part in (self, more):
             counts[part.first - first :][: len(part.counts)] += part.counts
         return Sketch(
-            more.scale,
             self.count + more.count,
             self.total + more.total,
             self.squares + more.squares,
@@ -128,6 +97,7 @@ class Sketch:
             sorted(self.largest + more.largest, key=lambda pair: (-pair[0], pair[1]))[:keep],
             first,
             counts,
+            more.scale,
         )
 
     @property
@@ -141,7 +111,7 @@ class Sketch:
         if not self.count:
             return math.nan, math.nan
         mean = self.total / self.count
-        return mean + self.scale.middle, math.sqrt(max(self.squares / self.count - mean**2, 0.0))
+        return mean + self.scale[0], math.sqrt(max(self.squares / self.count - mean**2, 0.0))
 
     def quantile(self, part: float) -> float:
         """Return the value that a part of all values lies below, within its bin; NaN of none."""
@@ -151,16 +121,34 @@ class Sketch:
         below = np.concatenate([[0], np.cumsum(self.counts)])
         number = max(int(np.searchsorted(below, target)) - 1, 0)
         inside = (target - below[number]) / max(int(self.counts[number]), 1)
-        return float(np.clip(self.scale.edge(self.first + number + inside), *self.ends))
+        return float(np.clip(self._values(number + inside), *self.ends))
 
     def histogram(self, bins: int) -> tuple[list[float], list[int]]:
         """Return edges and counts of equal bins; a fine bin counts where its middle lies."""
         if not self.count or not bins:
             return [], []
         edges = np.linspace(*self.ends, bins + 1)
-        middles = self.scale.edge(self.first + 0.5 + np.arange(len(self.counts)))
+        middles = self._values(0.5 + np.arange(len(self.counts)))
         numbers = np.clip(np.searchsorted(edges, middles, side="right") - 1, 0, bins - 1)
         return edges.tolist(), np.bincount(numbers, self.counts, bins).astype(int).tolist()
+
+    def _values(self, number: Any) -> Any:
+        """Return values by numbers of bins from the first; between whole numbers those between."""
+        (middle, half), position = self.scale, (self.first + number) / _HALF
+        size = np.abs(position)
+        with np.errstate(over="ignore"):
+            far = np.copysign(np.exp(size - 1.0), position)
+        return middle + half * np.where(size > 1.0, far, position)
+
+
+def _bins(position: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
+    """Return the bins of values less the middle, in halves of the range."""
+    bins = np.floor(position * _HALF)
+    beyond = np.abs(position) > 1.0
+    if beyond.any():
+        far = position[beyond]
+        bins[beyond] = np.floor(np.copysign(_HALF * (1.0 + np.log(np.abs(far))), far))
+    return np.clip(bins, -_MAX_BIN, _MAX_BIN).astype(np.int64)
 
 
 def _least(
@@ -171,10 +159,48 @@ def _least(
         near = values <= np.partition(values, keep - 1)[keep - 1]
         values, rows = values[near], rows[near]
     order = np.argsort(values, kind="stable")[:keep]
-    return [
-        [value, row]
-        for value, row in zip(values[order].tolist(), rows[order].tolist(), strict=True)
-    ]
+    return list(map(list, zip(values[order].tolist(), rows[order].tolist(), strict=True)))
+
+
+def summed_up(
+    columns: Mapping[str, Float[np.ndarray, " k"]],
+    codes: Int[np.ndarray, " k"],
+    start: int,
+    scales: Mapping[str, Scale],
+    keep: int,
+) -> dict[str, Any]:
+    """Return what the head of a piece says of its rows, in plain values.
+
+    Args:
+        columns: Numbers of its rows by name.
+        codes: What became of them, indices of `CODES`.
+        start: The first row.
+        scales: Scales of the statistics.
+        keep: So many rows with the smallest and the largest values are told.
+    """
+    sketches = {
+        name: Sketch.of(values, start, scales[name], keep) for name, values in columns.items()
+    }
+    return {
+        "codes": np.bincount(codes, minlength=len(CODES)).tolist(),
+        "scales": scales,
+        "columns": {
+            name: {
+                key: value.tolist() if key == "counts" else value
+                for key, value in vars(sketch).items()
+                if key != "scale"
+            }
+            for name, sketch in sketches.items()
+        },
+    }
+
+
+def add_to(sketches: dict[str, Sketch], head: Mapping[str, Any], keep: int) -> None:
+    """Merge the columns of a head, made by `summed_up`, with those of the pieces before."""
+    for name, document in head["columns"].items():
+        counts = np.array(document["counts"], np.int64)
+        more = replace(Sketch(**document), counts=counts, scale=head["scales"][name])
+        sketches[name] = sketches.get(name, Sketch()).merged(more, keep)
 
 
 _BITS_30 = 2**30

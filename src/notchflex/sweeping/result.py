@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex import InputError, Robot
-from notchflex.pieces import CODES, Manifest, Sketch, damaged, heads, piece_file
+from notchflex.pieces import CODES, Manifest, Sketch, add_to, damaged, heads, piece_file
 from notchflex.support import Displayed, Summary, from_table, nearest, need, short, write_json
 from notchflex.sweeping.plan import SweepPlan, plan_from_table
 
@@ -259,8 +259,6 @@ def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
         pieces.append(head["piece"])
         codes += head["codes"]
         failures += head["failures"][: plan.output.failures - len(failures)]
-        for name, document in head["columns"].items():
-            more = Sketch.read(document, head["scales"][name])
-            sketches[name] = sketches[name].merged(more, keep)
+        add_to(sketches, head, keep)
     counts: dict[str, int] = dict(zip(CODES, codes.tolist(), strict=True))
     return Sweep(Path(directory), manifest, plan, robot, tuple(pieces), counts, failures, sketches)

@@ -28,11 +28,12 @@ from notchflex.pieces import (
     PieceFolder,
     Progress,
     Scale,
-    Sketch,
     Task,
     check_target,
     encoded,
+    scale_of,
     sobol_points,
+    summed_up,
 )
 from notchflex.support import (
     REGISTERED,
@@ -54,7 +55,7 @@ from notchflex.sweeping.plan import (
     read_plan,
 )
 from notchflex.sweeping.result import KIND, Sweep, read_sweep, write_summary
-from notchflex.tolerancing import Outcomes, Study, piece_rows
+from notchflex.tolerancing import Study, piece_rows
 from notchflex.tolerancing.spec import (
     AXES,
     FIRST,
@@ -267,15 +268,19 @@ class SweepTask(Task):
         )
 
     @cached_property
-    def scales(self) -> list[Scale]:
+    def scales(self) -> dict[str, Scale]:
         """Scales of the statistics of every column."""
-        return [Scale.of(column) for column in self._solved(_sample(self.plan)).values.T]
+        columns, _ = self._solved(_sample(self.plan))
+        return {name: scale_of(values) for name, values in columns.items()}
 
-    def _solved(self, numbers: Mapping[str, Float[np.ndarray, " k"]]) -> Outcomes:
-        """Solve robots: values in the units of files, NaN where there is no result."""
+    def _solved(
+        self, numbers: Mapping[str, Float[np.ndarray, " k"]]
+    ) -> tuple[dict[str, Float[np.ndarray, " k"]], Int[np.ndarray, " k"]]:
+        """Solve robots; return columns in the units of files, NaN where there is no result."""
         values, codes = self.study.solved(numbers, len(next(iter(numbers.values()))))
         scales = np.array([criterion.quantity.scale for criterion in self.study.criteria])
-        return Outcomes(values * scales, codes)
+        columns = np.ascontiguousarray((values * scales).T)
+        return dict(zip(self.columns, columns, strict=True)), codes
 
     def piece(self, number: int) -> tuple[DataFrame, dict[str, Any]]:
         """Solve the robots of one piece."""
@@ -283,30 +288,17 @@ class SweepTask(Task):
 
         start, stop = self.manifest.between(number)
         numbers = numbers_between(self.plan, start, stop)
-        outcomes, output = self._solved(numbers), self.plan.output
-        columns = dict(zip(self.columns, np.ascontiguousarray(outcomes.values.T), strict=True))
-        failed = np.flatnonzero(outcomes.codes >= FAILED)
-        keep = max(output.extremes, 1)
-        sketches = {
-            name: Sketch.of(values, start, scale, keep).document()
-            for (name, values), scale in zip(columns.items(), self.scales, strict=True)
-        }
-        head = {
-            "codes": np.bincount(outcomes.codes, minlength=len(CODES)).tolist(),
-            "failures": (failed[: output.failures] + start).tolist(),
-            "scales": {
-                name: [scale.middle, scale.half]
-                for name, scale in zip(columns, self.scales, strict=True)
-            },
-            "columns": sketches,
-        }
-        code = polars.Series("code", CODES, polars.Enum(CODES)).gather(outcomes.codes)
+        columns, codes = self._solved(numbers)
+        output, failed = self.plan.output, np.flatnonzero(codes >= FAILED)
+        head = summed_up(columns, codes, start, self.scales, max(output.extremes, 1))
+        head["failures"] = (failed[: output.failures] + start).tolist()
+        code = polars.Series("code", CODES, polars.Enum(CODES)).gather(codes)
         named = {**numbers, "code": code, **columns}
         frame = polars.DataFrame(named, nan_to_null=len(failed) > 0)
         if not output.rows:
             rows = set(head["failures"])
-            for sketch in sketches.values():
-                rows |= {row for _, row in sketch["smallest"] + sketch["largest"]}
+            for column in head["columns"].values():
+                rows |= {row for _, row in column["smallest"] + column["largest"]}
             chosen = np.array(sorted(rows), np.int64)
             frame = frame[chosen - start].insert_column(0, polars.Series("row", chosen))
         return frame, head

@@ -28,7 +28,8 @@ from notchflex.support import (
 from notchflex.tolerancing.spec import Criterion, ToleranceSpec, read_tolerance_spec
 from notchflex.tolerancing.study import (
     REPLICATES,
-    Drawn,
+    DrawnPieces,
+    DrawnRobots,
     Study,
     ToleranceTask,
     draw,
@@ -269,7 +270,7 @@ class ToleranceAnalysis(Displayed):
     assumed: tuple[str, ...]
     sources: tuple[str, ...]
     linear: LinearEffects
-    drawn: Drawn
+    drawn: DrawnRobots | DrawnPieces
     sobol: SobolIndices
     control: Control
     wanted_yield: float | None

@@ -11,7 +11,7 @@ from notchflex import InputError
 from notchflex.pieces import CODES
 from notchflex.support import document_head
 from notchflex.tolerancing.analysis import WORST_SD, ToleranceAnalysis
-from notchflex.tolerancing.study import DrawnPieces, DrawnRobots, limited_columns
+from notchflex.tolerancing.study import DrawnPieces, limited_columns
 
 PERCENTILES = (2.5, 50.0, 97.5)
 
@@ -112,10 +112,9 @@ def tolerance_columns(analysis: ToleranceAnalysis) -> dict[str, Sequence[Any]]:
         InputError: They were drawn in pieces.
     """
     drawn = analysis.drawn
-    if not isinstance(drawn, DrawnRobots):
-        where = drawn.directory if isinstance(drawn, DrawnPieces) else "pieces"
+    if isinstance(drawn, DrawnPieces):
         raise InputError.UNSUPPORTED(
-            f"the drawn robots are rows of the files in {where}; read those."
+            f"the drawn robots are rows of the files in {drawn.directory}; read those."
         )
     columns = {**drawn.numbers, **limited_columns(analysis.criteria, drawn.outcomes.values)}
     return {

@@ -39,8 +39,11 @@ from notchflex.pieces import (
     Scale,
     Sketch,
     Task,
+    add_to,
     heads,
+    scale_of,
     sobol_points,
+    summed_up,
 )
 from notchflex.support import Tolerance, to_table
 from notchflex.tolerancing.spec import Criterion, ToleranceSpec, criteria_of
@@ -308,7 +311,7 @@ def yield_interval(accepted: Int[np.ndarray, " replicates"], each: int) -> tuple
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class DrawnCounts:
     """Counts of drawn robots, k numbers with limits.
 
     Attributes:
@@ -323,17 +326,9 @@ class Drawn:
     below: Counts
     above: Counts
 
-    def percentile(self, part: float) -> Float[np.ndarray, " k"]:
-        """Return the value of each number that a part of the robots stays below."""
-        raise NotImplementedError
-
-    def histogram(self, index: int, bins: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return edges and counts of the values of a number; both empty without a result."""
-        raise NotImplementedError
-
 
 @dataclass(frozen=True, eq=False)
-class DrawnRobots(Drawn):
+class DrawnRobots(DrawnCounts):
     """The robots that were drawn within the tolerances.
 
     Attributes:
@@ -373,7 +368,7 @@ def draw(
 
 
 @dataclass(frozen=True, eq=False)
-class DrawnPieces(Drawn):
+class DrawnPieces(DrawnCounts):
     """Summary of robots that were drawn in pieces.
 
     Attributes:
@@ -435,13 +430,16 @@ class ToleranceTask(Task):
         )
 
     @cached_property
-    def scales(self) -> list[Scale]:
+    def scales(self) -> dict[str, Scale]:
         """Scales of the statistics of every number."""
         sources, each = len(self.study.sources), points_of_each(self.draws)
         first = min(4 * _SAMPLE // REPLICATES, each)
         levels = np.concatenate(replicates(sources, each, self.seed, first))
         values = self.study.at_levels(levels[:: -(-len(levels) // _SAMPLE)]).values
-        return [Scale.of(column) for column in values.T]
+        return {
+            criterion.name: scale_of(column)
+            for criterion, column in zip(self.study.criteria, values.T, strict=True)
+        }
 
     def piece(self, number: int) -> tuple[DataFrame, dict[str, Any]]:
         """Draw and solve the robots of one piece."""
@@ -453,19 +451,14 @@ class ToleranceTask(Task):
         last = first + stop - start
         levels = sobol_points(len(study.sources), self.seed, first, last, each, which)
         outcomes = study.at_levels(levels)
-        codes, below, above = study.counts(outcomes)
+        _, below, above = study.counts(outcomes)
         solved = np.isfinite(outcomes.values).all(axis=1)
-        columns = np.where(solved, outcomes.values.T, np.nan)
+        columns = dict(zip(self.scales, np.where(solved, outcomes.values.T, np.nan), strict=True))
         head = {
-            "codes": codes.tolist(),
             "replicate": which,
             "below": below.tolist(),
             "above": above.tolist(),
-            "scales": [[scale.middle, scale.half] for scale in self.scales],
-            "columns": [
-                Sketch.of(values, start, scale, _EXTREMES).document()
-                for values, scale in zip(columns, self.scales, strict=True)
-            ],
+            **summed_up(columns, outcomes.codes, start, self.scales, _EXTREMES),
         }
         code = polars.Series("code", CODES, polars.Enum(CODES)).gather(outcomes.codes)
         named = {"code": code, **limited_columns(study.criteria, outcomes.values)}
@@ -496,14 +489,11 @@ def draw_in_pieces(
     size = len(task.study.criteria)
     codes, accepted = np.zeros(len(CODES), int), np.zeros(REPLICATES, int)
     below, above = np.zeros(size, int), np.zeros(size, int)
-    sketches = [Sketch()] * size
+    sketches: dict[str, Sketch] = {}
     for head in heads(folder.directory, task.manifest, range(task.manifest.pieces)):
         codes += head["codes"]
         accepted[head["replicate"]] += head["codes"][ACCEPTED]
         below += head["below"]
         above += head["above"]
-        more = map(Sketch.read, head["columns"], head["scales"])
-        sketches = [
-            sketch.merged(one, _EXTREMES) for sketch, one in zip(sketches, more, strict=True)
-        ]
-    return DrawnPieces(codes, accepted, below, above, folder.directory, sketches)
+        add_to(sketches, head, _EXTREMES)
+    return DrawnPieces(codes, accepted, below, above, folder.directory, list(sketches.values()))
