@@ -168,6 +168,7 @@ def summed_up(
     start: int,
     scales: Mapping[str, Scale],
     keep: int,
+    **more: Any,
 ) -> dict[str, Any]:
     """Return what the head of a piece says of its rows, in plain values.
 
@@ -177,12 +178,14 @@ def summed_up(
         start: The first row.
         scales: Scales of the statistics.
         keep: So many rows with the smallest and the largest values are told.
+        more: Further entries.
     """
     sketches = {
         name: Sketch.of(values, start, scales[name], keep) for name, values in columns.items()
     }
     return {
         "codes": np.bincount(codes, minlength=len(CODES)).tolist(),
+        **more,
         "scales": scales,
         "columns": {
             name: {

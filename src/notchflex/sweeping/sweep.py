@@ -289,14 +289,15 @@ class SweepTask(Task):
         start, stop = self.manifest.between(number)
         numbers = numbers_between(self.plan, start, stop)
         columns, codes = self._solved(numbers)
-        output, failed = self.plan.output, np.flatnonzero(codes >= FAILED)
-        head = summed_up(columns, codes, start, self.scales, max(output.extremes, 1))
-        head["failures"] = (failed[: output.failures] + start).tolist()
+        output, without = self.plan.output, np.flatnonzero(codes >= FAILED)
+        failures = (without[: output.failures] + start).tolist()
+        keep = max(output.extremes, 1)
+        head = summed_up(columns, codes, start, self.scales, keep, failures=failures)
         code = polars.Series("code", CODES, polars.Enum(CODES)).gather(codes)
         named = {**numbers, "code": code, **columns}
-        frame = polars.DataFrame(named, nan_to_null=len(failed) > 0)
+        frame = polars.DataFrame(named, nan_to_null=len(without) > 0)
         if not output.rows:
-            rows = set(head["failures"])
+            rows = set(failures)
             for column in head["columns"].values():
                 rows |= {row for _, row in column["smallest"] + column["largest"]}
             chosen = np.array(sorted(rows), np.int64)

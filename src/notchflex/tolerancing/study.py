@@ -454,12 +454,8 @@ class ToleranceTask(Task):
         _, below, above = study.counts(outcomes)
         solved = np.isfinite(outcomes.values).all(axis=1)
         columns = dict(zip(self.scales, np.where(solved, outcomes.values.T, np.nan), strict=True))
-        head = {
-            "replicate": which,
-            "below": below.tolist(),
-            "above": above.tolist(),
-            **summed_up(columns, outcomes.codes, start, self.scales, _EXTREMES),
-        }
+        counts = {"replicate": which, "below": below.tolist(), "above": above.tolist()}
+        head = summed_up(columns, outcomes.codes, start, self.scales, _EXTREMES, **counts)
         code = polars.Series("code", CODES, polars.Enum(CODES)).gather(outcomes.codes)
         named = {"code": code, **limited_columns(study.criteria, outcomes.values)}
         return polars.DataFrame(named, nan_to_null=True), head
