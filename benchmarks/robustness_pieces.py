@@ -7,10 +7,10 @@ so times and numbers in reasons are left out of the files.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import groupby
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import polars
@@ -19,8 +19,7 @@ from judge import plain
 from robustness import Outcome, follow
 from shapes import DRAWN, SHAPES
 
-from notchflex.pieces.folder import Manifest, Piece, Recipe, finished_head, piece_file
-from notchflex.pieces.run import PieceFolder
+from notchflex.pieces import Manifest, PieceFolder, Task, piece_file
 from notchflex.solver.programs.store import code_digest
 
 KIND = "robustness"
@@ -49,26 +48,26 @@ class Chosen(NamedTuple):
         ]
 
 
-class DrawsTask:
+@dataclass(frozen=True)
+class DrawsTask(Task):
     """Draws that are followed and judged, in pieces.
 
     Args:
         chosen: Which.
     """
 
-    def __init__(self, chosen: Chosen) -> None:
-        self.chosen, self.shapes = chosen, DRAWN if chosen.drawn else SHAPES
-        self.manifest = Manifest.made(
-            KIND, len(chosen.numbers), EACH, code=code_digest(), **chosen._asdict()
-        )
+    chosen: Chosen
+
+    @cached_property
+    def manifest(self) -> Manifest:
+        """Which robots, and the code that solves them."""
+        chosen = self.chosen
+        return Manifest.of(KIND, len(chosen.numbers), EACH, code=code_digest(), **chosen._asdict())
 
     @property
-    def recipe(self) -> Recipe:
-        """How another process makes the same task."""
-        return Recipe(draws_task, json.dumps(self.chosen))
-
-    def prepare(self) -> None:
-        """Draws need nothing in common."""
+    def shapes(self) -> list[Any]:
+        """Shapes of the robots."""
+        return DRAWN if self.chosen.drawn else SHAPES
 
     def _draws(self, number: int) -> Iterator[list[Draw]]:
         """Yield the draws of a piece, those of one shape together."""
@@ -76,7 +75,7 @@ class DrawsTask:
         for place, alike in groupby(self.chosen.numbers[start:stop], lambda one: one[0]):
             yield [draw(one, self.chosen.seed, self.shapes[place]) for _, one in alike]
 
-    def piece(self, number: int) -> Piece:
+    def piece(self, number: int) -> tuple[polars.DataFrame, dict[str, Any]]:
         """Follow and judge the draws of one piece."""
         rows: list[dict[str, Any]] = []
         codes = [0, 0, 0, 0]
@@ -90,7 +89,7 @@ class DrawsTask:
             "draw": polars.Int64,
             "step": polars.Int64,
         }
-        return Piece(polars.DataFrame(rows, schema=schema), {"codes": codes})
+        return polars.DataFrame(rows, schema=schema), {"codes": codes}
 
 
 def _row(shape: str, state: Outcome) -> dict[str, Any]:
@@ -105,11 +104,6 @@ def _row(shape: str, state: Outcome) -> dict[str, Any]:
     }
 
 
-def draws_task(content: str) -> DrawsTask:
-    """Make the task of another process again."""
-    return DrawsTask(Chosen(*json.loads(content)))
-
-
 def followed(chosen: Chosen, folder: PieceFolder) -> dict[str, list[Outcome]]:
     """Follow draws in pieces; what came of their states, by shape.
 
@@ -122,8 +116,7 @@ def followed(chosen: Chosen, folder: PieceFolder) -> dict[str, list[Outcome]]:
     print()
     outcomes: dict[str, list[Outcome]] = {}
     for piece in range(task.manifest.pieces):
-        finished_head(folder.directory, task.manifest, piece)
-        for one in polars.read_parquet(piece_file(Path(folder.directory), piece)).to_dicts():
+        for one in polars.read_parquet(piece_file(folder.directory, piece)).to_dicts():
             state = Outcome(one["draw"], one["step"], reason=one["reason"])
             state.silent, state.wrong = (
                 [text for text in one[name].split("\n") if text] for name in ("silent", "wrong")

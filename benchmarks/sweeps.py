@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 import notchflex as nf
-from notchflex.sweeping.rows import Points
+from notchflex.sweeping.sweep import numbers_between
 
 OUTPUTS = ("total_angle", "tip_position", "converged")
 CHUNK = 1_000_000
@@ -59,10 +59,9 @@ def spent() -> float:
 def bare(rows: int, cores: int, clock: Any) -> float:
     """Return the time of the batch alone, s."""
     chosen, robot = plan(rows), nf.load_robot("pacheco2021-a")
-    points = Points(chosen)
     taken = 0.0
     for start in range(-CHUNK, rows, CHUNK):  # the first is not counted: it prepares
-        numbers = points.rows(max(start, 0), min(max(start, 0) + CHUNK, rows))
+        numbers = numbers_between(chosen, max(start, 0), min(max(start, 0) + CHUNK, rows))
         begun = clock()
         nf.batch(robot, numbers, nf.Load(tension=1.0), outputs=OUTPUTS, cores=cores)
         taken += (clock() - begun) if start >= 0 else 0.0

@@ -11,10 +11,9 @@ import time
 import numpy as np
 
 import notchflex as nf
-from notchflex.tolerancing.linear import linear_effects
+from notchflex.tolerancing import Study, replicates, yield_interval
+from notchflex.tolerancing.analysis import linear_effects
 from notchflex.tolerancing.spec import criteria_of
-from notchflex.tolerancing.study import Study
-from notchflex.tolerancing.yields import replicates, yield_interval
 
 WRIST = nf.load_robot("pacheco2021-a")
 LOADS = {"pulled": nf.pull(0.45, 0.9, steps=2)}
@@ -64,7 +63,7 @@ def against_draws() -> None:
 def time_of_draws() -> Study:
     """Time a hundred thousand draws, the first with compiling."""
     study = study_of(SHOP, nf.AcceptanceLimit("total_angle", lower=0.735, upper=0.9))
-    levels = np.concatenate(list(replicates(len(study.sources), 4096, 0)))
+    levels = np.concatenate(replicates(len(study.sources), 4096, 0))
     for what in ("first", "again"):
         wall, cpu = time.perf_counter(), time.process_time()
         study.at_levels(levels)
@@ -80,7 +79,7 @@ def coverage(study: Study) -> None:
     parts = [study.at_levels(many.random((250_000, count))).accepted.mean() for _ in range(8)]
     truth = float(np.mean(parts))
     # All repetitions in one batch: a call of its own for each costs more than its solves.
-    levels = [np.concatenate(list(replicates(count, EACH, 1000 + k))) for k in range(REPETITIONS)]
+    levels = [np.concatenate(replicates(count, EACH, 1000 + k)) for k in range(REPETITIONS)]
     accepted = study.at_levels(np.concatenate(levels)).accepted.reshape(REPETITIONS, -1, EACH)
     ends = np.array([yield_interval(one.sum(axis=1), EACH) for one in accepted])
     held = int(np.sum((ends[:, 0] <= truth) & (truth <= ends[:, 1])))

@@ -13,7 +13,7 @@ import pytest
 import notchflex as nf
 from notchflex.cli import run
 from notchflex.fit import calibrate, calibration_document, simulate_measurements
-from notchflex.pieces.run import PieceFolder
+from notchflex.pieces import PieceFolder
 from swept import digests
 
 pytest.importorskip("polars")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,8 @@ from scipy.stats import qmc
 import notchflex as nf
 from mutations import mutated
 from notchflex.cli import run
-from notchflex.pieces.sketch import Scale, Sketch
-from notchflex.sweeping.rows import Points
+from notchflex.pieces import PieceFolder, Sketch, add_to, scale_of, summed_up
+from notchflex.sweeping.sweep import numbers_between
 
 TEMPLATE = Path(nf.__file__).parent / "sweeping" / "template.toml"
 TEXT = TEMPLATE.read_text(encoding="utf-8")
@@ -42,18 +41,17 @@ def plan(**changes: Any) -> nf.SweepPlan:
 def test_rows_are_the_same_in_any_pieces(method):
     chosen = plan(sampling={"points": 50, "seed": 7, "method": method})
     assert chosen.rows == 300
-    every = Points(chosen).rows(0, 300)
-    one = Points(chosen)
+    every = numbers_between(chosen, 0, 300)
     cuts = [0, 7, 8, 49, 101, 160, 299, 300]
-    parts = [one.rows(a, b) for a, b in itertools.pairwise(cuts)]
-    back = [Points(chosen).rows(a, b) for a, b in itertools.pairwise(cuts)]
+    parts = [numbers_between(chosen, a, b) for a, b in itertools.pairwise(cuts)]
+    back = [numbers_between(chosen, a, b) for a, b in [*itertools.pairwise(cuts)][::-1]][::-1]
     for name, values in every.items():
         assert (np.concatenate([part[name] for part in parts]) == values).all()
         assert (np.concatenate([part[name] for part in back]) == values).all()
 
 
 def test_points_are_the_grid_times_those_of_scipy():
-    rows = Points(plan()).rows(0, 300)
+    rows = numbers_between(plan(), 0, 300)
     sobol = qmc.Sobol(2, scramble=True, rng=np.random.default_rng(7)).random(64)[:50]
     assert np.allclose(rows["notch.depth"][:50], 1.36 + 0.06 * sobol[:, 0], rtol=0, atol=1e-15)
     assert np.allclose(rows["tube.base_length"][250:], 1.0 + sobol[:, 1], rtol=0, atol=1e-15)
@@ -64,24 +62,33 @@ def test_points_are_the_grid_times_those_of_scipy():
 def test_merging_in_any_order_and_far_values():
     rng = np.random.default_rng(0)
     values = np.concatenate([rng.normal(3.0, 0.1, 3000), [1e9, -1e300, np.nan, 3.0]])
-    scale = Scale.of(values[:500])
-    parts = np.split(values, [10, 500, 1800])
-    starts = [0, 10, 500, 1800]
-    made = [Sketch.of(one, a, scale, 4) for one, a in zip(parts, starts, strict=True)]
-    whole = Sketch.of(values, 0, scale, 4)
+    scales = {"a": scale_of(values[:500])}
+    starts = [0, 10, 500, 1800, len(values)]
+
+    def head(start: int, stop: int) -> dict[str, Any]:
+        codes = np.zeros(stop - start, int)
+        return summed_up({"a": values[start:stop]}, codes, start, scales, 4)
+
+    made = [json.loads(json.dumps(head(*ends))) for ends in itertools.pairwise(starts)]
+    whole: dict[str, Sketch] = {}
+    add_to(whole, head(0, len(values)), 4)
     for order in ([0, 1, 2, 3], [3, 1, 0, 2]):
-        found = Sketch()
+        found: dict[str, Sketch] = {}
         for number in order:
-            found = found.merged(Sketch.read(made[number].document()), 4)
-        assert found.smallest == whole.smallest
-        assert found.largest == whole.largest
-        assert (found.counts == whole.counts).all()
+            add_to(found, made[number], 4)
+        assert found["a"].smallest == whole["a"].smallest
+        assert found["a"].largest == whole["a"].largest
+        assert found["a"].counts.sum() == whole["a"].counts.sum()
+        parts = np.linspace(0.0, 1.0, 101)
+        assert [found["a"].quantile(part) for part in parts] == [
+            whole["a"].quantile(part) for part in parts
+        ]
     good = values[np.isfinite(values)]
     for part in (0.01, 0.5, 0.99):
         exact = np.quantile(good, part, method="inverted_cdf")
-        assert abs(whole.quantile(part, scale) - exact) < 2.0 * scale.half / 1024
-    assert np.isclose(whole.quantile(1.0, scale), 1e9)
-    assert Sketch.of(np.full(5, np.nan), 0, scale, 4).count == 0
+        assert abs(whole["a"].quantile(part) - exact) < 2.0 * scales["a"][1] / 1024
+    assert np.isclose(whole["a"].quantile(1.0), 1e9)
+    assert Sketch.of(np.full(5, np.nan), 0, scales["a"], 4).count == 0
 
 
 BAD = {
@@ -147,7 +154,7 @@ def test_300_mutated_files(seeds, tmp_path, monkeypatch, capsys):
     def stop(*_: Any) -> None:
         raise ReachedError
 
-    monkeypatch.setattr(sys.modules["notchflex.sweeping.sweep"], "open_folder", stop)
+    monkeypatch.setattr(PieceFolder, "run", stop)
     refused = 0
     for seed in seeds:
         Path("plan.toml").write_text(mutated(TEXT, seed), encoding="utf-8")

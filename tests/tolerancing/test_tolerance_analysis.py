@@ -7,12 +7,10 @@ import pytest
 
 import notchflex as nf
 from notchflex.analysis.draws import deviation, moments
-from notchflex.pieces.folder import CODES
+from notchflex.pieces import CODES
 from notchflex.robot.problems import Tolerance
-from notchflex.tolerancing.analysis import tolerances_for
 from notchflex.tolerancing.spec import criteria_of
-from notchflex.tolerancing.study import Study
-from notchflex.tolerancing.yields import replicates, yield_interval
+from notchflex.tolerancing.study import Study, replicates, tolerances_for, yield_interval
 from refusals import refused
 
 WRIST = nf.load_robot("pacheco2021-a")
@@ -140,7 +138,7 @@ def test_the_interval_holds_the_yield_as_often_as_it_says():
     """A rule whose yield is known in closed form: a quarter of a disc in the square."""
     truth, held = np.pi / 4.0, 0
     for seed in range(400):
-        sets = np.stack(list(replicates(2, 32, seed)))
+        sets = np.stack(replicates(2, 32, seed))
         accepted = ((sets**2).sum(axis=-1) <= 1.0).sum(axis=-1)
         low, high = yield_interval(accepted, 32)
         held += low <= truth <= high

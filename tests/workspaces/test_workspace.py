@@ -1,15 +1,17 @@
 """Workspaces: their states are those of simulations, their volumes those of known shapes."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex.pieces import sobol_points
 from notchflex.workspaces import workspace
 from notchflex.workspaces.cloud import DIRECTIONS, alpha_size, hull_of, inside, overlaps, voxel_map
+from notchflex.workspaces.explore import rays
 from notchflex.workspaces.limits import in_python, limits_of
-from notchflex.workspaces.rays import rays
 from refusals import refused
 
 RNG = np.random.default_rng(0)
@@ -93,7 +95,8 @@ def test_stiffness_is_that_of_a_small_force(wrist):
 def test_rays_pull_neighbours_up_and_down_again():
     robot = nf.load_robot("two-axis-wrist")
     largest = np.array([1.0, 2.0, 1.0, 2.0])
-    tension = rays(robot, largest, 64, 5, 0.1, 0)
+    points = partial(sobol_points, seed=0, start=0, stop=64, total=64)
+    tension = rays(robot, largest, 5, 0.1, points)
     assert tension.shape == (64, 10, 4)
     assert np.array_equal(tension, tension[:, ::-1])
     assert (np.diff(tension[:, :5], axis=1) >= 0.0).all()

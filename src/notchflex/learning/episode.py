@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from notchflex import InputError, Robot, Stepper, load_robot, tip_from_angles
 from notchflex.support import check_integer, check_number, need, short_repr
-from notchflex.workspaces.rays import largest_tensions
+from notchflex.workspaces import largest_tensions
 
 # So many steps from a slack tendon to the largest tension, where no rate is given.
 _STEPS_TO_LARGEST = 20

@@ -1,1 +1,30 @@
-"""Long computations in pieces, one file each, by threads or dask; resumed after an interruption."""
+"""Long computations in pieces, one file each, by threads or dask; resumed after a stop."""
+
+from notchflex.pieces.folder import (
+    ACCEPTED,
+    CODES,
+    FAILED,
+    INVALID,
+    REJECTED,
+    Manifest,
+    Task,
+    check_target,
+    damaged,
+    encoded,
+    heads,
+    piece_file,
+)
+from notchflex.pieces.run import PieceFolder, Progress
+from notchflex.pieces.statistics import (
+    Scale,
+    Sketch,
+    add_to,
+    scale_of,
+    sobol_points,
+    summed_up,
+)
+
+__all__ = ["ACCEPTED", "CODES", "FAILED", "INVALID", "REJECTED"]
+__all__ += ["Manifest", "PieceFolder", "Progress", "Scale", "Sketch", "Task"]
+__all__ += ["add_to", "check_target", "damaged", "encoded", "heads", "piece_file"]
+__all__ += ["scale_of", "sobol_points", "summed_up"]

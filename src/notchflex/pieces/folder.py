@@ -1,4 +1,4 @@
-"""A folder of pieces: its manifest, its lock, its pieces, each worked out to one Parquet file."""
+"""A folder of pieces: its manifest, and one Parquet file for each piece."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import io
 import json
 import os
 import sys
-from collections.abc import Callable, Generator, Iterable, Mapping
+import zlib
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic_core import to_jsonable_python
 
 from notchflex import InputError, __version__
-from notchflex.pieces import checksum
-from notchflex.pieces.checksum import is_whole
 from notchflex.solver.programs.compiled import backend
 from notchflex.support import check_folder, read_text, replacing, unwritable, write_text
 
@@ -28,7 +28,15 @@ if TYPE_CHECKING:
     from polars import DataFrame
 
 
+CODES = ("accepted", "rejected", "NOT_CONVERGED", "INVALID_ROBOT")
+"""Outcome of a row; the last two have no result and count as rejected."""
+
+ACCEPTED, REJECTED, FAILED, INVALID = range(len(CODES))
+
 FORMAT = 1
+_PIECES, _LOCK = "pieces", ".lock"
+_HEAD, _CHECKSUM = "notchflex-sweep", "notchflex-crc32"
+"""Metadata of the file of a piece."""
 
 
 def versions() -> dict[str, str]:
@@ -43,25 +51,18 @@ def versions() -> dict[str, str]:
 
 @dataclass(frozen=True, eq=False)
 class Manifest:
-    """Manifest of a folder of pieces.
+    """All that the bytes of pieces depend on.
 
     Attributes:
-        document: As it is in its file, of plain values: `kind` (as in "sweep.json"), `versions`,
-            `rows`, `piece` (rows of a piece), `pieces`, and what is computed.
+        document: Plain values: `kind` (as in "sweep.json"), `versions`, `rows`, `piece` (rows of a
+            piece), `pieces`, and what is computed.
     """
 
     document: Mapping[str, Any]
 
     @classmethod
-    def made(cls, kind: str, rows: int, piece: int, **content: Any) -> Self:
-        """Make a manifest.
-
-        Args:
-            kind: What is computed, such as "sweep".
-            rows: Rows of all pieces.
-            piece: Rows of a piece.
-            content: All else that the bytes depend on, of plain values.
-        """
+    def of(cls, kind: str, rows: int, piece: int, **content: Any) -> Manifest:
+        """Return the manifest of so many rows, and of so many in a piece."""
         document = {
             "program": "notchflex",
             "kind": kind,
@@ -72,40 +73,29 @@ class Manifest:
             "piece": piece,
             "pieces": -(-rows // piece),
         }
-        return cls(json.loads(json.dumps(document)))
+        return cls(to_jsonable_python(document, inf_nan_mode="strings", fallback=_plain))
 
     @classmethod
-    def read(cls, text: str, where: str, expected: str) -> Self:
-        """Read the text of a manifest.
-
-        Args:
-            text: The text.
-            where: What messages call it.
-            expected: The kind that it must be of.
+    def read(cls, folder: str | os.PathLike[str], kind: str) -> Manifest:
+        """Read the manifest of a folder.
 
         Raises:
-            InputError: It is not a manifest of this kind, or one of another format.
+            InputError: There is none of this kind and format.
         """
-        damaged = InputError.FILE_DAMAGED(
-            f"{where} is not a manifest of a {expected}, or was changed; remove its "
-            "folder, or take another one."
-        )
+        file = Path(folder) / f"{kind}.json"
+        if not file.exists():
+            raise InputError.FILE_NOT_FOUND(
+                f"{folder} is not a folder of a {kind}: there is no {file}."
+            )
+        text = read_text(file, "manifest")
         try:
             document = json.loads(text)
-            kind, form = document["kind"], document["format"]
-        except (ValueError, TypeError, KeyError, RecursionError):
-            raise damaged from None
-        if kind != expected or form != FORMAT:
-            raise InputError.FILE_FORMAT(
-                f"{where} is of kind {kind} and format {form}; needed are {expected} and {FORMAT}."
-            )
-        numbers = [document.get(key) for key in ("rows", "piece", "pieces")]
-        if not isinstance(document.get("versions"), dict) or not all(
-            isinstance(one, int) and one > 0 for one in numbers
-        ):
-            raise damaged
-        if -(-numbers[0] // numbers[1]) != numbers[2]:
-            raise damaged
+            needed = kind, FORMAT, -(-document["rows"] // document["piece"])
+            there = tuple(document[key] for key in ("kind", "format", "pieces"))
+            if there != needed or not dict(document["versions"]):
+                raise ValueError
+        except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError):
+            raise damaged(file) from None
         return cls(document)
 
     @cached_property
@@ -138,236 +128,41 @@ class Manifest:
         size = self.document["piece"]
         return piece * size, min((piece + 1) * size, self.rows)
 
-    def check_versions(self, where: str) -> None:
-        """Raise if this process would compute other bytes.
 
-        Raises:
-            InputError: The folder was begun with another version of a library.
-        """
-        begun = self.document["versions"]
-        for name, current in versions().items():
-            if begun.get(name) != current:
-                raise InputError.CONFLICT(
-                    f"{where} was begun with {name} {begun.get(name)}, and here is {name} "
-                    f"{current}, which may give other digits; go on with the former, or take "
-                    "another folder."
-                )
-
-    def check_same(self, other: Manifest, where: str) -> None:
-        """Raise if other pieces were begun in a folder.
-
-        Args:
-            other: The manifest in the folder.
-            where: The folder.
-
-        Raises:
-            InputError: Anything differs; the message names the first difference.
-        """
-        other.check_versions(where)
-        for key in dict.fromkeys([*self.document, *other.document]):
-            difference = _difference(key, self.document.get(key), other.document.get(key))
-            if difference:
-                raise InputError.CONFLICT(
-                    f"{where} holds another {self.kind}: {difference}; take another folder, or "
-                    "remove it."
-                )
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else repr(value)
 
 
-def _difference(path: str, mine: Any, theirs: Any) -> str:
-    """Return the first difference in words, "" if there is none."""
-    if mine == theirs:
-        return ""
-    if isinstance(mine, dict) and isinstance(theirs, dict):
-        keys = dict.fromkeys([*mine, *theirs])
-        differences = (_difference(f"{path}.{key}", mine.get(key), theirs.get(key)) for key in keys)
-        return next(one for one in differences if one)
-    if isinstance(mine, list) and isinstance(theirs, list) and len(mine) == len(theirs):
-        pairs = zip(mine, theirs, strict=True)
-        differences = (_difference(f"{path}[{n}]", *pair) for n, pair in enumerate(pairs, start=1))
-        return next(one for one in differences if one)
-    return f"`{path}` is {_shown(theirs)} there and {_shown(mine)} here"
+def damaged(file: Path) -> InputError:
+    """Return the error of a manifest that cannot be used."""
+    return InputError.FILE_DAMAGED(
+        f"{file} is not a manifest of a {file.stem}, or was changed; remove its folder, or take "
+        "another one."
+    )
 
 
-def _shown(value: Any) -> str:
-    text = "not given" if value is None else json.dumps(value, ensure_ascii=False)
-    return text if len(text) < 60 else f"{text[:57]}..."
+class Task:
+    """A computation that is cut into pieces, each of which depends on the task and its number.
 
-
-def plain(value: Any) -> Any:
-    """Return a value as JSON holds it: fields of objects by name, None for NaN.
-
-    Args:
-        value: Numbers, text, arrays, data classes, and mappings and sequences of them.
-    """
-    if value is None or isinstance(value, str | bool | int):
-        return value
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, float):
-        return value if np.isfinite(value) else None if np.isnan(value) else str(value)
-    if isinstance(value, Mapping):
-        return {str(key): plain(one) for key, one in value.items()}
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        names = [one.name for one in dataclasses.fields(value)]
-        return {"type": type(value).__name__} | {n: plain(getattr(value, n)) for n in names}
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain(one) for one in value]
-    return repr(value)
-
-
-CODES = ("accepted", "rejected", "NOT_CONVERGED", "INVALID_ROBOT")
-"""Outcome of a robot; the last two meet no limit and count as rejected."""
-
-ACCEPTED, REJECTED, FAILED, INVALID = range(len(CODES))
-
-
-KEY = "notchflex-sweep"
-
-
-class Piece(NamedTuple):
-    """Computed content of a piece.
-
-    Attributes:
-        frame: Its rows.
-        head: What is summed up of them, of plain values; `codes` counts rows by `CODES`.
+    It is a data class; its pickle holds its fields, and nothing that was derived from them.
     """
 
-    frame: DataFrame
-    head: dict[str, Any]
-
-
-class Done(NamedTuple):
-    """Outcome of a piece.
-
-    Attributes:
-        piece: Its number, from 0.
-        rows: Its rows.
-        unsolved: Rows without a result.
-        size: Bytes of its file.
-    """
-
-    piece: int
-    rows: int
-    unsolved: int
-    size: int
-
-
-class Recipe(NamedTuple):
-    """Recipe by which another process makes a task.
-
-    Attributes:
-        make: A function of a module.
-        content: What it takes: text, or pickled objects.
-    """
-
-    make: Callable[[Any], PieceTask]
-    content: str | bytes
-
-
-class PieceTask(Protocol):
-    """Work that is cut into pieces, each of which depends on the task and its number alone."""
-
-    @property
+    @cached_property
     def manifest(self) -> Manifest:
         """All that the bytes of pieces depend on."""
-        ...
+        raise NotImplementedError
 
-    @property
-    def recipe(self) -> Recipe:
-        """Recipe by which another process makes the same task."""
-        ...
+    def piece(self, number: int) -> tuple[DataFrame, dict[str, Any]]:
+        """Return the rows of a piece, and what is summed up of them in plain values.
 
-    def prepare(self) -> None:
-        """Do once what all pieces need."""
-        ...
+        `codes` of the latter counts rows by `CODES`. Several threads may compute pieces at once.
+        """
+        raise NotImplementedError
 
-    def piece(self, number: int) -> Piece:
-        """Work out one piece; several threads may do so at once."""
-        ...
-
-
-@lru_cache(maxsize=2)
-def task_of(recipe: Recipe, text: str) -> PieceTask:
-    """Return the task of a recipe, prepared; one for a process.
-
-    Args:
-        recipe: The recipe.
-        text: Text of the manifest.
-
-    Raises:
-        InputError: This process would compute other bytes.
-    """
-    Manifest(json.loads(text)).check_versions("the folder")
-    task = recipe.make(recipe.content)
-    task.prepare()
-    return task
-
-
-def piece_file(folder: str | os.PathLike[str], piece: int) -> Path:
-    """Return the file of a piece."""
-    return Path(folder) / "pieces" / f"piece-{piece:09d}.parquet"
-
-
-def encoded(task: PieceTask, piece: int) -> tuple[memoryview, dict[str, Any]]:
-    """Return the bytes of a piece, and its head."""
-    frame, content = task.piece(piece)
-    head = {"sweep": task.manifest.digest, "piece": piece, **content}
-    buffer = io.BytesIO()
-    metadata = {KEY: json.dumps(head), checksum.KEY: checksum.BLANK}
-    frame.write_parquet(buffer, compression="lz4", statistics=True, metadata=metadata)
-    data = buffer.getbuffer()
-    checksum.seal(data)
-    return data, head
-
-
-def make_piece(task: PieceTask, folder: str | os.PathLike[str], piece: int) -> Done:
-    """Work out a piece and write its file, beside and then renamed.
-
-    Raises:
-        InputError: The file cannot be written.
-    """
-    data, head = encoded(task, piece)
-    with replacing(piece_file(folder, piece)) as temporary:
-        # polars writes into memory: what the disk refuses is an error of this call alone.
-        temporary.write_bytes(data)
-    return done_of(task.manifest, head, len(data))
-
-
-def done_of(manifest: Manifest, head: dict[str, Any], size: int) -> Done:
-    """Return what became of a piece, by its head and the bytes of its file."""
-    start, stop = manifest.between(head["piece"])
-    return Done(head["piece"], stop - start, sum(head["codes"][FAILED:]), size)
-
-
-PIECES, LOCK = "pieces", ".lock"
-
-_OF_MANIFEST = 2**40
-"""The byte of the lock that locks the manifest, behind those of all pieces."""
-
-
-class _Held:
-    """Ranges of pieces that this process works on: the system's locks do not tell its threads."""
-
-    ranges: list[tuple[Path, int, int]] = []  # noqa: RUF012 - one for the process
-
-
-def manifest_file(folder: str | os.PathLike[str], kind: str) -> Path:
-    """Return the file of the manifest, such as "sweep.json"."""
-    return Path(folder) / f"{kind}.json"
-
-
-def manifest_in(folder: str | os.PathLike[str], kind: str) -> Manifest:
-    """Read the manifest of a folder.
-
-    Raises:
-        InputError: There is none, or it cannot be read.
-    """
-    file, what = manifest_file(folder, kind), f"{folder} is not a folder of a {kind}"
-    if not Path(folder).is_dir():
-        raise InputError.FILE_NOT_FOUND(f"{what}: there is no such folder.")
-    if not file.exists():
-        raise InputError.FILE_NOT_FOUND(f"{what}: it has no {file.name}.")
-    return Manifest.read(read_text(file, "manifest"), str(file), kind)
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields by name."""
+        names = [field.name for field in dataclasses.fields(self)]  # pyright: ignore
+        return {name: getattr(self, name) for name in names}
 
 
 def check_target(
@@ -384,143 +179,165 @@ def check_target(
     Raises:
         InputError: It cannot be written, or it holds other files.
     """
-    file = manifest_file(folder, kind)
-    check_folder(os.fspath(folder), (file.name, LOCK), option, inputs=inputs)
-    path = Path(folder)
-    if path.is_dir() and not file.exists():
-        others = sorted(one.name for one in path.iterdir() if one.name not in (PIECES, LOCK))
-        if others:
+    manifest, path = f"{kind}.json", Path(folder)
+    check_folder(os.fspath(folder), (manifest, _LOCK), option, inputs=inputs)
+    if path.is_dir() and not (path / manifest).exists():
+        strange = sorted({file.name for file in path.iterdir()} - {_PIECES, _LOCK})
+        if strange:
             raise InputError.FILE_UNWRITABLE(
-                f"{option} {folder} holds other files, such as {others[0]}; give an empty "
+                f"{option} {folder} holds other files, such as {strange[0]}; give an empty "
                 "folder, or one that is not there."
             )
 
 
-def prepare_folder(folder: str | os.PathLike[str], manifest: Manifest) -> None:
-    """Make the folder of pieces, or check that it is that of these.
+def open_folder(folder: str | os.PathLike[str], manifest: Manifest) -> None:
+    """Make the folder of pieces, or check that it belongs to a manifest.
 
     Raises:
-        InputError: It holds others, or cannot be made.
+        InputError: It belongs to another one, or cannot be made.
     """
-    path, kind = Path(folder), manifest.kind
-    file = manifest_file(folder, kind)
-    if file.exists():
-        manifest.check_same(manifest_in(path, kind), str(folder))
+    file = Path(folder) / f"{manifest.kind}.json"
     with unwritable(f"{folder} cannot be made"):
-        (path / PIECES).mkdir(parents=True, exist_ok=True)
-        lock = open(path / LOCK, "ab")  # noqa: SIM115 - held below
-    with lock:  # of two clients that begin at once the second finds the manifest of the first
-        _lock(lock, _OF_MANIFEST, 1, wait=True)
-        if file.exists():
-            manifest.check_same(manifest_in(path, kind), str(folder))
-        else:
-            write_text(file, manifest.text)
+        (file.parent / _PIECES).mkdir(parents=True, exist_ok=True)
+    if not file.exists():
+        write_text(file, manifest.text)
+    stored = Manifest.read(folder, manifest.kind)
+    if stored.digest != manifest.digest:
+        difference = _difference("", manifest.document, stored.document)
+        raise InputError.CONFLICT(
+            f"{folder} holds another {manifest.kind}: {difference}; give what it was begun "
+            "with, or take another folder."
+        )
+
+
+def _difference(path: str, here: Any, there: Any) -> str:
+    """Return the first difference of two documents in words."""
+    for key in {**here, **there} if isinstance(here, dict) and isinstance(there, dict) else ():
+        if here.get(key) != there.get(key):
+            return _difference(f"{path}.{key}" if path else key, here.get(key), there.get(key))
+    words = ["not given" if one is None else json.dumps(one)[:60] for one in (there, here)]
+    return f"`{path}` is {words[0]} there and {words[1]} here"
 
 
 @contextlib.contextmanager
-def locked(folder: str | os.PathLike[str], first: int, last: int) -> Generator[None]:
-    """Hold the pieces from `first` to `last` (not included) of a folder for this process.
-
-    The system gives the lock back when the process ends, however it ends.
+def locked(folder: str | os.PathLike[str], pieces: range) -> Generator[None]:
+    """Keep other processes from some pieces; the system ends it with this process.
 
     Raises:
-        InputError: Another process holds some of them.
+        InputError: Another process works on some of them.
     """
-    path = Path(os.path.realpath(folder))
-    taken = InputError.CONFLICT(
-        f"{folder} is being written by another process; wait for its end, or take another folder."
-    )
-    if any(p == path and first < b and a < last for p, a, b in _Held.ranges):
-        raise taken
     with unwritable(f"{folder} cannot be locked"):
-        file = open(path / LOCK, "ab")  # noqa: SIM115 - held below
-    mine = (path, first, last)
-    try:
-        try:
-            _lock(file, first, last - first)
-        except OSError:
-            raise taken from None
-        _Held.ranges.append(mine)
-        try:
-            yield
-        finally:
-            _Held.ranges.remove(mine)
-    finally:
-        file.close()
+        file = open(Path(folder) / _LOCK, "ab")  # noqa: SIM115 - closed below
+    with file:
+        if sys.platform != "win32":  # there both do the same work, with the same files
+            import fcntl
+
+            try:
+                how = fcntl.LOCK_EX | fcntl.LOCK_NB
+                fcntl.lockf(file, how, len(pieces), pieces.start)
+            except OSError:
+                raise InputError.CONFLICT(
+                    f"{folder} is being written by another process; wait for its end, or take "
+                    "another folder."
+                ) from None
+        yield
 
 
-def _lock(file: Any, first: int, count: int, *, wait: bool = False) -> None:
-    """Lock so many bytes of a file, one for each piece, until it is closed."""
-    if sys.platform == "win32":
-        import msvcrt
-
-        file.seek(first)
-        msvcrt.locking(file.fileno(), msvcrt.LK_LOCK if wait else msvcrt.LK_NBLCK, count)
-        return
-    import fcntl
-
-    how = fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB
-    fcntl.lockf(file.fileno(), how, count, first)
+def piece_file(folder: str | os.PathLike[str], piece: int) -> Path:
+    """Return the file of a piece."""
+    return Path(folder) / _PIECES / f"piece-{piece:09d}.parquet"
 
 
-def head_of(file: Path, manifest: Manifest, piece: int) -> dict[str, Any] | None:
-    """Return the head of a piece, None where its file is missing, damaged or of another sweep."""
-    head = _any_head(file)
-    if head is None or (head["sweep"], head["piece"]) != (manifest.digest, piece):
-        return None
-    return head
+def encoded(task: Task, piece: int) -> tuple[bytes, dict[str, Any]]:
+    """Return the bytes of the file of a piece, and its head."""
+    frame, content = task.piece(piece)
+    head = {"sweep": task.manifest.digest, "piece": piece, **content}
+    buffer = io.BytesIO()
+    metadata = {_HEAD: json.dumps(head), _CHECKSUM: "0" * 8}
+    frame.write_parquet(buffer, compression="lz4", statistics=True, metadata=metadata)
+    data = buffer.getbuffer()
+    place, _, checksum = _checksum(data)
+    data[place] = checksum
+    return bytes(data), head
 
 
-def _any_head(file: Path) -> dict[str, Any] | None:
-    """Return the head of a piece of any sweep, None where its file is missing or damaged."""
-    import polars
-    from polars.exceptions import PolarsError
+def _checksum(data: memoryview) -> tuple[slice, bytes, bytes]:
+    """Return the place of the checksum in a file, what is there, and what must be there.
 
-    if not file.exists():
-        return None
-    try:
-        return json.loads(polars.read_parquet_metadata(file)[KEY])
-    except (OSError, PolarsError, KeyError, ValueError):
-        return None
+    It is a text of eight characters in the footer, written in Thrift's encoding of texts.
+    """
+    key = _CHECKSUM.encode() + b"\x18\x08"
+    footer = len(data) - 8 - int.from_bytes(data[-8:-4], "little")
+    start = footer + bytes(data[footer:]).find(key) + len(key)
+    place = slice(start, start + 8)
+    there = bytes(data[place])
+    data[place] = b"0" * len(there)
+    return place, there, b"%08x" % zlib.crc32(data)
 
 
-def check_own(folder: str | os.PathLike[str], manifest: Manifest) -> None:
-    """Raise if finished pieces belong to another manifest: that in the folder was changed.
+def write_piece(task: Task, folder: str | os.PathLike[str], piece: int) -> tuple[int, int]:
+    """Work out a piece and write its file; return its number and its rows without a result.
 
     Raises:
-        InputError: There is such a piece.
+        InputError: The file cannot be written.
     """
-    for file in sorted((Path(folder) / PIECES).glob("piece-*.parquet")):
-        head = _any_head(file)
-        if head is not None and head["sweep"] != manifest.digest:
+    data, head = encoded(task, piece)
+    with replacing(piece_file(folder, piece)) as temporary:
+        temporary.write_bytes(data)
+    return piece, unsolved(head)
+
+
+def unsolved(head: dict[str, Any]) -> int:
+    """Return how many rows of a piece have no result."""
+    return sum(head["codes"][FAILED:])
+
+
+def stored_piece(
+    folder: str | os.PathLike[str], manifest: Manifest, piece: int
+) -> dict[str, Any] | None:
+    """Return the head of a piece, None where its file is missing or damaged."""
+    head = _head(folder, manifest, piece)
+    if head is None:
+        return None
+    data = memoryview(bytearray(piece_file(folder, piece).read_bytes()))
+    _, there, needed = _checksum(data)
+    return head if there == needed else None
+
+
+def heads(
+    folder: str | os.PathLike[str], manifest: Manifest, needed: range | None = None
+) -> Iterator[dict[str, Any]]:
+    """Yield the heads of pieces in their order: of those that are there, or of all that are needed.
+
+    Raises:
+        InputError: A piece was written for another manifest, or a needed one is not there.
+    """
+    pieces = range(manifest.pieces) if needed is None else needed
+    for piece in pieces:
+        head = _head(folder, manifest, piece)
+        if head is not None:
+            yield head
+        elif needed is not None:
             raise InputError.FILE_DAMAGED(
-                f"{folder} cannot be read: its {manifest.kind}.json was changed after "
-                f"{file.name} was written; put the former file back, or take another folder."
+                f"{folder} lost its piece {piece} while it was read; call again."
             )
 
 
-def finished_head(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> dict[str, Any]:
-    """Return the head of a piece that was finished.
+def _head(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> dict[str, Any] | None:
+    """Return the head of a piece, None where its file is missing or damaged."""
+    import polars
+    from polars.exceptions import PolarsError
 
-    Raises:
-        InputError: Its file is gone, or damaged.
-    """
-    head = head_of(piece_file(folder, piece), manifest, piece)
-    if head is None:
-        raise InputError.FILE_DAMAGED(
-            f"{folder} lost its piece {piece} while it was read; call again."
-        )
-    return head
-
-
-def done_piece(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> Done | None:
-    """Return what became of a piece that is there already, None if it is not or is damaged."""
     file = piece_file(folder, piece)
-    head = head_of(file, manifest, piece)
-    if head is None:
+    if not file.exists():
         return None
     try:
-        data = bytearray(file.read_bytes())
-    except OSError:
+        head = json.loads(polars.read_parquet_metadata(file)[_HEAD])
+    except (OSError, PolarsError, KeyError, ValueError):
         return None
-    return done_of(manifest, head, len(data)) if is_whole(memoryview(data)) else None
+    if head["sweep"] != manifest.digest:
+        raise InputError.FILE_DAMAGED(
+            f"{folder} cannot be read: its {manifest.kind}.json was changed after {file.name} "
+            "was written; put the former file back, or take another folder."
+        )
+    return head if head["piece"] == piece else None

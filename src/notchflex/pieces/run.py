@@ -1,167 +1,58 @@
-"""Runs the pieces of a task, or those of them that are not there yet."""
+"""Runs the pieces of a task that are not in its folder: by threads, processes or dask."""
 
 from __future__ import annotations
 
 import contextlib
+import logging
+import multiprocessing
 import os
-from collections.abc import Callable, Generator, Iterable, Iterator
+import pickle
+import re
+import threading
+import time
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Self
+from functools import lru_cache, partial
+from itertools import islice
+from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
 from notchflex import ErrorCode, InputError
 from notchflex.pieces.folder import (
-    Done,
-    Manifest,
-    PieceTask,
+    Task,
     check_target,
-    done_piece,
     locked,
-    prepare_folder,
+    open_folder,
+    stored_piece,
+    unsolved,
+    versions,
+    write_piece,
 )
-from notchflex.pieces.running import (
-    check_address,
-    in_processes,
-    in_threads,
-    on_cluster,
-    scheduler_at,
-)
-from notchflex.support import check_integer, need, short_repr
+from notchflex.support import check_integer, need, on_cores, short_repr
+
+T = TypeVar("T")
 
 Progress = Callable[[int, int, int, int], None]
 """Called with rows done, rows in all, rows without a result, and rows done by earlier calls."""
 
+_Work = Callable[[int], tuple[int, int]]
+"""Works out a piece; returns its number, and its rows without a result."""
 
-def check_workers(workers: int | None, scheduler: str | None) -> None:
-    """Raise unless pieces can be worked on as asked for.
+_AHEAD = 2
+"""Pieces that wait for each worker, so that none is idle."""
 
-    Args:
-        workers: Number of processes of this machine; threads of this process if None.
-        scheduler: Address of a scheduler of dask.
+_TRIES = 20
+"""Lost processes after which the work is given up."""
 
-    Raises:
-        InputError: Both are given, one of them is none, or an extra is missing.
-    """
-    need("polars", "data", "pieces")
-    if workers is not None and scheduler is not None:
-        raise InputError.CONFLICT("workers and a scheduler exclude each other; give one of them.")
-    if workers is not None and not 1 <= check_integer(workers, "workers") <= 1024:
-        raise InputError.OUT_OF_RANGE(f"workers must be 1 to 1024; got {workers}")
-    if scheduler is not None:
-        need("distributed", "cluster", "scheduler")
-        check_address(scheduler)
+_CONNECT, _WAIT, _CLOSE = 20.0, 60.0, 10.0
+"""Seconds to wait for a scheduler, for its first worker, and for the end of a connection."""
 
-
-def open_folder(
-    task: PieceTask,
-    folder: str | os.PathLike[str],
-    option: str,
-    inputs: Iterable[str | Path] = (),
-) -> None:
-    """Make the folder of a task, or check that it is that of this one.
-
-    Args:
-        task: The task.
-        folder: The folder.
-        option: What messages call the folder.
-        inputs: Files that are read.
-
-    Raises:
-        InputError: It holds something else, or cannot be written.
-    """
-    check_target(folder, task.manifest.kind, option, inputs)
-    prepare_folder(folder, task.manifest)
-
-
-def run_pieces(
-    task: PieceTask,
-    folder: str | os.PathLike[str],
-    *,
-    pieces: range | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    cores: int | None = None,
-    progress: Progress | None = None,
-) -> None:
-    """Work on those of the pieces that are not there.
-
-    Args:
-        task: The task.
-        folder: Its folder, opened.
-        pieces: The pieces; all where not given.
-        workers: Number of processes of this machine; threads of this process if None.
-        scheduler: Address of a scheduler of dask, whose workers see the same folder.
-        cores: Number of threads; one per core where not given.
-        progress: Called with rows done, rows in all, rows without a result, and rows done by
-            earlier calls.
-
-    Raises:
-        InputError: The folder is being written by another process, or takes no more files.
-    """
-    manifest = task.manifest
-    pieces = range(manifest.pieces) if pieces is None else pieces
-    if not pieces:
-        return
-    # Products of matrices by several threads may have other last digits.
-    with threadpool_limits(1), locked(folder, pieces.start, pieces.stop):
-        stored = [done_piece(folder, manifest, piece) for piece in pieces]
-        finished = [one for one in stored if one is not None]
-        left = [piece for piece, one in zip(pieces, stored, strict=True) if one is None]
-        absolute = os.path.abspath(folder)
-        try:
-            with _running(task, absolute, left, workers, scheduler, cores) as running:
-                _watch(running, finished, manifest, pieces, progress)
-        except InputError as problem:
-            if problem.code is not ErrorCode.FILE_UNWRITABLE:
-                raise
-            message = f"{problem} All finished pieces are kept: make room, and call again."
-            raise InputError.FILE_UNWRITABLE(message) from None
-
-
-@contextlib.contextmanager
-def _running(
-    task: PieceTask,
-    folder: str,
-    pieces: list[int],
-    workers: int | None,
-    scheduler: str | None,
-    cores: int | None,
-) -> Generator[Iterator[Done]]:
-    """Work on pieces; yields what becomes of them, as they are finished."""
-    if not pieces:
-        yield iter(())
-    elif workers is None and scheduler is None:
-        task.prepare()  # in the calling thread: all threads need the same preparations
-        with contextlib.closing(in_threads(task, folder, pieces, cores)) as running:
-            yield running
-    elif workers is not None:
-        with contextlib.closing(in_processes(workers, task, folder, pieces)) as running:
-            yield running
-    else:
-        with (
-            scheduler_at(scheduler or "") as client,
-            contextlib.closing(on_cluster(client, task, folder, pieces)) as running,
-        ):
-            yield running
-
-
-def _watch(
-    running: Iterable[Done],
-    finished: list[Done],
-    manifest: Manifest,
-    pieces: range,
-    progress: Progress | None,
-) -> None:
-    """Count what is done."""
-    before = done = sum(one.rows for one in finished)
-    unsolved = sum(one.unsolved for one in finished)
-    total = manifest.between(pieces.stop - 1)[1] - manifest.between(pieces.start)[0]
-    for one in running:
-        done, unsolved = done + one.rows, unsolved + one.unsolved
-        if progress is not None:
-            progress(done, total, unsolved, before)
+_BEAT, _ANSWER, _ALONE = 1.0, 20.0, 30.0
+"""Seconds to wait for a piece before the scheduler is asked for its workers, for the answer, and
+for new workers where all are lost."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +63,7 @@ class PieceFolder:
 
     Args:
         directory: The folder; it is made if it is missing.
-        workers: Number of processes of this machine; this process alone if None.
+        workers: Number of processes of this machine; threads of this process if None.
         scheduler: Address of a scheduler of dask, whose workers see the same folder.
 
     Raises:
@@ -189,16 +80,27 @@ class PieceFolder:
             raise InputError.WRONG_TYPE(
                 f"folder must be the path of a folder; got {short_repr(self.directory)}"
             )
-        check_workers(self.workers, self.scheduler)
+        need("polars", "data", "pieces")
+        if self.workers is not None and self.scheduler is not None:
+            raise InputError.CONFLICT("workers and a scheduler exclude each other; give one.")
+        if self.workers is not None and not 1 <= check_integer(self.workers, "workers") <= 1024:
+            raise InputError.OUT_OF_RANGE(f"workers must be 1 to 1024; got {self.workers}")
+        if self.scheduler is not None:
+            need("distributed", "cluster", "scheduler")
+            if not re.fullmatch(r"(\w+://)?[^\s/]+:\d{1,5}", self.scheduler):
+                raise InputError.BAD_SYNTAX(
+                    f"{self.scheduler!r} is not an address of a scheduler; write it like "
+                    "tcp://10.0.0.1:8786."
+                )
 
     @classmethod
-    def of(cls, folder: PieceFolder | str | os.PathLike[str]) -> Self:
+    def of(cls, folder: PieceFolder | str | os.PathLike[str]) -> PieceFolder:
         """Return a folder, given as one or as its path."""
-        return folder if isinstance(folder, cls) else cls(folder)  # pyright: ignore
+        return folder if isinstance(folder, PieceFolder) else cls(folder)
 
     def run(
         self,
-        task: PieceTask,
+        task: Task,
         *,
         pieces: range | None = None,
         cores: int | None = None,
@@ -207,18 +109,227 @@ class PieceFolder:
         """Work on those pieces of a task that are not there.
 
         Args:
-            task: The task.
+            task: The task; it is pickled for other processes.
             pieces: The pieces; all where not given.
             cores: Number of threads; one per core where not given.
-            progress: As for `run_pieces`.
+            progress: See `Progress`.
+
+        Raises:
+            InputError: The folder belongs to another task, is being written by another process, or
+                takes no more files.
         """
-        open_folder(task, self.directory, "--folder")
-        run_pieces(
-            task,
-            self.directory,
-            pieces=pieces,
-            workers=self.workers,
-            scheduler=self.scheduler,
-            cores=cores,
-            progress=progress,
+        manifest, folder = task.manifest, os.path.abspath(self.directory)
+        check_target(self.directory, manifest.kind, "--folder")
+        open_folder(self.directory, manifest)
+        pieces = range(manifest.pieces) if pieces is None else pieces
+        rows = {
+            piece: stop - start for piece in pieces for start, stop in [manifest.between(piece)]
+        }
+        # Products of matrices by several threads may have other last digits.
+        with threadpool_limits(1), locked(self.directory, pieces):
+            stored = {piece: stored_piece(folder, manifest, piece) for piece in pieces}
+            lost = sum(unsolved(head) for head in stored.values() if head)
+            before = done = sum(rows[piece] for piece, head in stored.items() if head)
+            left = [piece for piece, head in stored.items() if head is None]
+            try:
+                with contextlib.closing(self._finished(task, folder, left, cores)) as finished:
+                    for piece, without in finished:
+                        done, lost = done + rows[piece], lost + without
+                        if progress is not None:
+                            progress(done, sum(rows.values()), lost, before)
+            except InputError as problem:
+                if problem.code is not ErrorCode.FILE_UNWRITABLE:
+                    raise
+                message = f"{problem} All finished pieces are kept: make room, and call again."
+                raise InputError.FILE_UNWRITABLE(message) from None
+
+    def _finished(
+        self, task: Task, folder: str, pieces: list[int], cores: int | None
+    ) -> Generator[tuple[int, int]]:
+        """Work on pieces; yield number and rows without a result of each."""
+        if not pieces:
+            return
+        if self.workers is None and self.scheduler is None:
+            yield from on_cores(partial(write_piece, task, folder), pieces, cores)
+            return
+        work = partial(_work, pickle.dumps(task), versions(), folder)
+        if self.workers is not None:
+            yield from _in_processes(self.workers, work, pieces)
+        else:
+            with _connected(self.scheduler or "") as client:
+                yield from _on_cluster(client, work, pieces)
+
+
+def _work(task: bytes, needed: dict[str, str], folder: str, piece: int) -> tuple[int, int]:
+    """Work on one piece, in another process."""
+    here = versions()
+    for name, there in needed.items():
+        if here[name] != there:
+            raise InputError.CONFLICT(
+                f"a worker has {name} {here[name]}, and the folder was begun with {there}, which "
+                "may give other digits; give all workers the same versions."
+            )
+    if not os.path.isdir(folder):
+        raise InputError.FILE_NOT_FOUND(
+            f"a worker sees no folder {folder}; give a folder that all workers share."
         )
+    with threadpool_limits(1):
+        return write_piece(_task(task), folder, piece)
+
+
+@lru_cache(maxsize=2)
+def _task(pickled: bytes) -> Task:
+    """Return a task; one for a process, since what it derives takes time."""
+    return pickle.loads(pickled)
+
+
+def _submitted(
+    executor: Executor,
+    work: _Work,
+    pieces: Iterable[int],
+    ahead: int,
+    check: Callable[[], None] = lambda: None,
+) -> Generator[tuple[int, int]]:
+    """Work on pieces by an executor, so many at once; `check` may raise while none is finished."""
+    waiting = iter(pieces)
+    running = {executor.submit(work, piece) for piece in islice(waiting, ahead)}
+    while running:
+        finished, running = wait(running, timeout=_BEAT, return_when=FIRST_COMPLETED)
+        if not finished:
+            check()
+        for future in finished:
+            result = future.result()
+            running |= {executor.submit(work, piece) for piece in islice(waiting, 1)}
+            yield result
+
+
+def _in_processes(workers: int, work: _Work, pieces: list[int]) -> Generator[tuple[int, int]]:
+    """Work on pieces in processes of this machine, which speak through pipes.
+
+    A port would be open to all users of the machine, and who reaches a worker runs any code in it.
+    """
+    left = dict.fromkeys(pieces)
+    for _ in range(_TRIES):
+        spawn = multiprocessing.get_context("spawn")
+        pool = ProcessPoolExecutor(workers, mp_context=spawn, initializer=_end_with_parent)
+        try:
+            for result in _submitted(pool, work, list(left), _AHEAD * workers):
+                del left[result[0]]
+                yield result
+            return
+        except BrokenProcessPool:  # pieces that were lost with a process are worked on again
+            continue
+        finally:
+            pool.shutdown(cancel_futures=True)
+    raise InputError.PROCESS_FAILED(
+        f"the work was given up: a process was lost {_TRIES} times. All finished pieces are kept."
+    )
+
+
+def _end_with_parent() -> None:
+    """End this process when that which started it ends, however it ends."""
+
+    def watch() -> None:
+        parent = multiprocessing.parent_process()
+        if parent is not None:
+            parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextlib.contextmanager
+def _connected(address: str) -> Generator[Any]:
+    """Connect to a scheduler of dask.
+
+    Raises:
+        InputError: Nothing answers there, or it has no workers.
+    """
+    import distributed
+    from distributed.utils import silence_logging_cmgr
+
+    def connect() -> Any:
+        client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
+        client.wait_for_workers(1, timeout=_WAIT)
+        return client
+
+    with silence_logging_cmgr(logging.CRITICAL + 1):  # an error of ours reports the loss
+        try:
+            client = _within(_CONNECT + _WAIT + _CLOSE, connect)
+        except (OSError, ValueError, TypeError) as problem:
+            raise InputError.NO_CONNECTION(
+                f"no scheduler with workers answers at {address}: {_in_words(problem)}. Start one "
+                f"with `dask scheduler`, and workers with `dask worker {address}`."
+            ) from None
+        try:
+            yield client
+        finally:
+            with contextlib.suppress(Exception):
+                _within(_CLOSE, partial(client.close, timeout=_CLOSE / 2))
+
+
+def _on_cluster(client: Any, work: _Work, pieces: Iterable[int]) -> Generator[tuple[int, int]]:
+    """Work on pieces with the workers of a client of dask.
+
+    dask may wait for ever: for a piece that is submitted while the scheduler dies, or for workers.
+    """
+    from distributed import KilledWorker
+
+    stream = client.scheduler_comm
+    manned = time.monotonic()
+
+    def is_lost() -> bool:
+        return client.status != "running" or client.scheduler_comm is not stream or stream.closed()
+
+    def check() -> None:
+        nonlocal manned
+        if is_lost():
+            raise OSError("the connection was closed")
+        if _within(_ANSWER, client.nthreads):
+            manned = time.monotonic()
+        elif time.monotonic() - manned > _ALONE:
+            raise OSError(f"no worker for {_ALONE:.0f} s")
+
+    # A piece is not a pure function: its file may be gone while its result is remembered.
+    executor = client.get_executor(pure=False)
+    try:
+        threads = sum(_within(_ANSWER, client.nthreads).values())
+        yield from _submitted(executor, work, pieces, _AHEAD * max(threads, 1), check)
+    except KilledWorker as problem:
+        raise InputError.PROCESS_FAILED(
+            f"the work was given up: {_in_words(problem)}. All finished pieces are kept."
+        ) from None
+    except Exception as problem:
+        # dask raises errors of many types if its connection is lost in the middle of a call.
+        if isinstance(problem, InputError) or not (isinstance(problem, OSError) or is_lost()):
+            raise
+        raise InputError.NO_CONNECTION(
+            f"the scheduler or its workers are gone ({_in_words(problem)}); all finished pieces "
+            "are kept: start them again, and call again."
+        ) from None
+    finally:
+        if not is_lost():
+            with contextlib.suppress(Exception):
+                executor.shutdown(wait=False)
+
+
+def _in_words(problem: object) -> str:
+    return " ".join(str(problem).split())[:200] or "no answer"
+
+
+def _within(seconds: float, call: Callable[[], T]) -> T:
+    """Return the result of a call; a call of dask whose scheduler dies may wait for ever.
+
+    Raises:
+        TimeoutError: It takes longer.
+    """
+    future: Future[T] = Future()
+
+    def work() -> None:
+        try:
+            future.set_result(call())
+        except Exception as problem:
+            future.set_exception(problem)
+
+    threading.Thread(target=work, daemon=True).start()
+    return future.result(seconds)

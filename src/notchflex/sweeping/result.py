@@ -2,76 +2,26 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Int
 
 from notchflex import InputError, Robot
-from notchflex.pieces.folder import CODES, Manifest, check_own, head_of, manifest_in, piece_file
-from notchflex.pieces.sketch import Scale, Sketch
-from notchflex.support import (
-    Displayed,
-    Summary,
-    from_table,
-    nearest,
-    need,
-    short,
-    to_table,
-    write_json,
-)
-from notchflex.sweeping.plan import SweepPlan, plan_from_table, plan_table
-from notchflex.sweeping.rows import SweepModel, axis_values
-from notchflex.tolerancing.study import piece_rows
+from notchflex.pieces import CODES, Manifest, Sketch, add_to, damaged, heads, piece_file
+from notchflex.support import Displayed, Summary, from_table, nearest, need, short, write_json
+from notchflex.sweeping.plan import SweepPlan, plan_from_table
 
 if TYPE_CHECKING:
     from polars import DataFrame, LazyFrame
     from xarray import Dataset
 
-
 KIND = "sweep"
-
-
-class SweepManifest(Manifest):
-    """Manifest of a sweep."""
-
-    @classmethod
-    def of(cls, plan: SweepPlan, robot: Robot, model: SweepModel) -> SweepManifest:
-        """Make the manifest of a plan.
-
-        Args:
-            plan: The plan.
-            robot: The robot that it names.
-            model: The model of both.
-        """
-        table = plan_table(plan)
-        return cls.made(
-            KIND,
-            plan.rows,
-            plan.piece or piece_rows(plan.rows, model),
-            plan={key: value for key, value in table.items() if key != "robot"},
-            robot=to_table(robot),
-            columns=list(model.columns),
-        )
-
-    @property
-    def plan(self) -> SweepPlan:
-        """The plan; its robot is only a name."""
-        return plan_from_table({**self.document["plan"], "robot": self.document["robot"]["name"]})
-
-    @property
-    def robot(self) -> Robot:
-        """The robot that is varied."""
-        return from_table(self.document["robot"])
-
-
-SUMMARY = "summary.json"
 _MAX_XARRAY = 100_000_000
+"""Rows of a data set at most, which is in memory."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,35 +31,27 @@ class Sweep(Displayed):
     Attributes:
         directory: The folder.
         manifest: What the sweep is.
+        plan: The plan; its robot is only a name.
+        robot: The robot that is varied.
         pieces: Numbers of the pieces that are there.
         counts: How many rows have each code.
         failures: Numbers of the first rows without a result, as many as the plan asks for.
         sketches: Statistics of every kept quantity.
-        scales: Scales of the statistics.
     """
 
     directory: Path
-    manifest: SweepManifest
+    manifest: Manifest
+    plan: SweepPlan
+    robot: Robot
     pieces: tuple[int, ...]
     counts: dict[str, int]
     failures: list[int]
     sketches: dict[str, Sketch]
-    scales: dict[str, Scale]
-
-    @property
-    def plan(self) -> SweepPlan:
-        """The plan."""
-        return self.manifest.plan
-
-    @property
-    def robot(self) -> Robot:
-        """The robot that is varied."""
-        return self.manifest.robot
 
     @property
     def rows(self) -> int:
         """Rows that are there."""
-        return sum(b - a for a, b in map(self.manifest.between, self.pieces))
+        return sum(self.counts.values())
 
     @property
     def finished(self) -> bool:
@@ -119,7 +61,7 @@ class Sweep(Displayed):
     @property
     def columns(self) -> list[str]:
         """Names of the kept quantities, with their units."""
-        return self.manifest.document["columns"]
+        return list(self.sketches)
 
     def lazy(self) -> LazyFrame:
         """Return the rows as a lazy frame of polars, in their order.
@@ -135,15 +77,9 @@ class Sweep(Displayed):
 
         if not self.pieces:
             raise InputError.NO_DATA(f"{self.directory} has no finished piece yet.")
-        files = [piece_file(self.directory, piece) for piece in self.pieces]
-        if not self.plan.output.rows:
-            return polars.scan_parquet(files)
-        if self.finished and self.manifest.rows < 2**32:  # an index of polars has 32 bits
-            row = polars.col("row").cast(polars.Int64)
-            return polars.scan_parquet(files).with_row_index("row").with_columns(row)
-        return polars.concat([self._numbered(piece) for piece in self.pieces])
+        return polars.concat([self._piece(piece) for piece in self.pieces])
 
-    def _numbered(self, piece: int) -> LazyFrame:
+    def _piece(self, piece: int) -> LazyFrame:
         """Return the rows of a piece with their numbers."""
         import polars
 
@@ -163,24 +99,29 @@ class Sweep(Displayed):
         need("xarray", "data", "to_xarray")
         import xarray
 
-        if not self.finished or not self.plan.output.rows or self.manifest.rows > _MAX_XARRAY:
+        if not self.finished or not self.plan.output.rows or self.rows > _MAX_XARRAY:
             raise InputError.UNSUPPORTED(
                 "to_xarray needs all rows of a finished sweep, at most 1e8; use lazy()."
             )
         plan, frame = self.plan, self.lazy().collect()
-        axes = {one.value: axis_values(one) for one in plan.grid}
-        sizes = [len(one) for one in axes.values()]
-        dimensions = list(axes)
-        if plan.sampled:
-            dimensions.append("point")
-            sizes.append(cast("Any", plan.sampling).points)
-        values: dict[str, Any] = {
-            name: (dimensions, frame[name].to_numpy().reshape(sizes)) for name in self.columns
-        }
-        values["code"] = (dimensions, frame["code"].cast(str).to_numpy().reshape(sizes).astype(str))
+        sampling = plan.sampling
+        sizes = [len(one.values or ()) or one.count or 1 for one in plan.grid]
+        dimensions = [one.value for one in plan.grid]
+        if sampling is not None:
+            dimensions, sizes = [*dimensions, "point"], [*sizes, sampling.points]
+
+        def column(name: str) -> np.ndarray:
+            return frame[name].to_numpy().reshape(sizes)
+
+        code = frame["code"].cast(str).to_numpy().reshape(sizes).astype(str)
+        values: dict[str, Any] = {name: (dimensions, column(name)) for name in self.columns}
+        values["code"] = (dimensions, code)
         for one in plan.sampled:
-            column = frame[one.value].to_numpy().reshape(sizes)
-            values[one.value] = (["point"], column[(0,) * len(axes)])
+            values[one.value] = (["point"], column(one.value)[(0,) * len(plan.grid)])
+        axes = {
+            one.value: np.moveaxis(column(one.value), number, 0).reshape(sizes[number], -1)[:, 0]
+            for number, one in enumerate(plan.grid)
+        }
         attributes = {"sweep": plan.name, "robot": self.robot.name}
         return xarray.Dataset(values, coords=axes, attrs=attributes)
 
@@ -194,13 +135,10 @@ class Sweep(Displayed):
         Raises:
             InputError: There is no such quantity.
         """
-        import polars
-
-        sketch = self.sketches[self._column(column)]
+        sketch = self._sketch(column)
         pairs = (sketch.largest if largest else sketch.smallest)[: self.plan.output.extremes]
-        return self._rows([row for _, row in pairs]).sort(
-            polars.col(column), descending=largest, maintain_order=True
-        )
+        rows = self._rows([row for _, row in pairs])
+        return rows.sort(column, descending=largest, maintain_order=True)
 
     def first_failures(self) -> DataFrame:
         """Return the first rows without a result."""
@@ -213,9 +151,8 @@ class Sweep(Displayed):
             column: Name of the quantity, as in `columns`.
             parts: Numbers between 0 and 1; those of the plan if None.
         """
-        sketch = self.sketches[self._column(column)]
         levels = self.plan.output.quantiles if parts is None else parts
-        return [sketch.quantile(part, self.scales[column]) for part in levels]
+        return [self._sketch(column).quantile(part) for part in levels]
 
     def histogram(self, column: str, bins: int | None = None) -> tuple[list[float], list[int]]:
         """Return edges and counts of a histogram of a kept quantity.
@@ -224,51 +161,40 @@ class Sweep(Displayed):
             column: Name of the quantity, as in `columns`.
             bins: Number of bins; that of the plan if None.
         """
-        sketch = self.sketches[self._column(column)]
-        return sketch.histogram(
-            self.plan.output.bins if bins is None else bins, self.scales[column]
-        )
+        return self._sketch(column).histogram(self.plan.output.bins if bins is None else bins)
 
-    def _column(self, name: str) -> str:
-        if name not in self.columns:
+    def _sketch(self, name: str) -> Sketch:
+        if name not in self.sketches:
             raise InputError.UNKNOWN_NAME(
                 f'no quantity "{name}" is kept{nearest(name, self.columns)}; there are '
                 f"{', '.join(self.columns)}."
             )
-        return name
+        return self.sketches[name]
 
     def _rows(self, rows: Sequence[int]) -> DataFrame:
         """Read rows by their numbers, from the pieces that hold them."""
         import polars
 
-        selected: Int[np.ndarray, " k"] = np.array(sorted(rows), np.int64)
-        frames: list[DataFrame] = []
         size = self.manifest.document["piece"]
-        for piece in np.unique(selected // size).tolist():
-            inside = polars.col("row").is_in(selected[selected // size == piece].tolist())
-            frames.append(self._numbered(piece).filter(inside).collect())
-        return polars.concat(frames) if frames else self.lazy().head(0).collect()
+        pieces = sorted({row // size for row in rows}) or self.pieces[:1]
+        frame = polars.concat([self._piece(piece) for piece in pieces])
+        return frame.filter(polars.col("row").is_in(list(rows))).collect()
 
     def document(self) -> dict[str, Any]:
         """Return what is summed up of all rows, as plain values."""
         columns: dict[str, Any] = {}
-        for name, one in self.sketches.items():
+        for name, sketch in self.sketches.items():
+            mean, sd = sketch.moments
+            smallest, largest = sketch.ends
             edges, counts = self.histogram(name)
-            mean = one.total / one.count if one.count else math.nan
-            variance = max(one.squares / one.count - mean**2, 0.0) if one.count else math.nan
-            scale = self.scales.get(name, Scale(0.0, 1.0))
+            levels = [f"{part:g}" for part in self.plan.output.quantiles]
             columns[name] = {
-                "count": one.count,
-                "mean": mean + scale.middle,
-                "sd": math.sqrt(variance) if one.count else math.nan,
-                "smallest": one.smallest[0][0] if one.count else math.nan,
-                "largest": one.largest[0][0] if one.count else math.nan,
-                "quantiles": {
-                    f"{part:g}": value
-                    for part, value in zip(
-                        self.plan.output.quantiles, self.quantiles(name), strict=True
-                    )
-                },
+                "count": sketch.count,
+                "mean": mean,
+                "sd": sd,
+                "smallest": smallest,
+                "largest": largest,
+                "quantiles": dict(zip(levels, self.quantiles(name), strict=True)),
                 "histogram": {"edges": edges, "counts": counts},
             }
         return {
@@ -288,9 +214,9 @@ class Sweep(Displayed):
         done = "" if self.finished else f" of {self.manifest.rows}"
         title = f"Sweep {self.plan.name}: {self.rows}{done} rows"
         rows = [(code, str(count)) for code, count in self.counts.items() if count]
-        for name, one in self.sketches.items():
-            if one.count:
-                rows.append((name, f"{short(one.smallest[0][0])} to {short(one.largest[0][0])}"))
+        for name, sketch in self.sketches.items():
+            if sketch.count:
+                rows.append((name, " to ".join(map(short, sketch.ends))))
         return Summary(title, rows, ".lazy() is a frame of polars, .to_xarray() a data set")
 
 
@@ -300,25 +226,7 @@ def write_summary(sweep: Sweep) -> None:
     Raises:
         InputError: It cannot be written.
     """
-    write_json(str(sweep.directory / SUMMARY), sweep.document())
-
-
-def check_content(manifest: SweepManifest, directory: str | os.PathLike[str]) -> None:
-    """Raise unless plan, robot and columns can be read from a manifest.
-
-    Raises:
-        InputError: Its file was changed.
-    """
-    try:
-        _ = manifest.plan, manifest.robot
-        columns = manifest.document["columns"]
-        if not isinstance(columns, list) or not all(isinstance(one, str) for one in columns):
-            raise TypeError
-    except (InputError, LookupError, TypeError, AttributeError):
-        raise InputError.FILE_DAMAGED(
-            f"{directory} cannot be read: its sweep.json was changed; give the plan again with "
-            "another folder."
-        ) from None
+    write_json(str(sweep.directory / "summary.json"), sweep.document())
 
 
 def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
@@ -335,26 +243,22 @@ def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
             installed.
     """
     need("polars", "data", "read_sweep")
-    manifest = SweepManifest(manifest_in(directory, KIND).document)
-    check_content(manifest, directory)
-    output = manifest.plan.output
+    manifest = Manifest.read(directory, KIND)
+    content = manifest.document
+    try:
+        robot = from_table(content["robot"])
+        plan = plan_from_table({**content["plan"], "robot": robot.name})
+        sketches = {str(name): Sketch() for name in content["columns"]}
+    except (InputError, LookupError, TypeError, AttributeError):
+        raise damaged(Path(directory, "sweep.json")) from None
     pieces: list[int] = []
     codes = np.zeros(len(CODES), int)
     failures: list[int] = []
-    sketches = {name: Sketch() for name in manifest.document["columns"]}
-    scales: dict[str, Scale] = {}
-    for piece in range(manifest.pieces):
-        file = piece_file(directory, piece)
-        head = head_of(file, manifest, piece)
-        if head is None:
-            continue
-        pieces.append(piece)
-        codes += np.array(head["codes"])
-        failures += head["failures"][: output.failures - len(failures)]
-        scales = {name: Scale(*pair) for name, pair in head["scales"].items()}
-        for name, document in head["columns"].items():
-            sketches[name] = sketches[name].merged(Sketch.read(document), output.extremes)
-    if not pieces:
-        check_own(directory, manifest)
+    keep = max(plan.output.extremes, 1)
+    for head in heads(directory, manifest):
+        pieces.append(head["piece"])
+        codes += head["codes"]
+        failures += head["failures"][: plan.output.failures - len(failures)]
+        add_to(sketches, head, keep)
     counts: dict[str, int] = dict(zip(CODES, codes.tolist(), strict=True))
-    return Sweep(Path(directory), manifest, tuple(pieces), counts, failures, sketches, scales)
+    return Sweep(Path(directory), manifest, plan, robot, tuple(pieces), counts, failures, sketches)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +14,8 @@ from scipy.optimize import brentq
 from scipy.stats import qmc, sobol_indices
 
 from notchflex import EquilibriumPath, InputError, Robot, Settings
-from notchflex.analysis.draws import tolerances_of
-from notchflex.pieces.folder import ACCEPTED, CODES, FAILED, INVALID
-from notchflex.pieces.run import PieceFolder
+from notchflex.analysis.draws import deviation, moments
+from notchflex.pieces import CODES, FAILED, INVALID, PieceFolder
 from notchflex.support import (
     Displayed,
     Summary,
@@ -27,22 +25,100 @@ from notchflex.support import (
     short,
     short_repr,
 )
-from notchflex.tolerancing.linear import LinearEffects, linear_effects
 from notchflex.tolerancing.spec import Criterion, ToleranceSpec, read_tolerance_spec
 from notchflex.tolerancing.study import (
+    REPLICATES,
     DrawnPieces,
     DrawnRobots,
-    Outcomes,
     Study,
+    ToleranceTask,
+    draw,
     draw_in_pieces,
     study_of,
+    tolerances_for,
+    yield_interval,
 )
-from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicates, yield_interval
+
+WORST_SD = 3.0
+"""Number of standard deviations in the worst case of an untruncated normal distribution."""
+
+
+class LinearEffects(NamedTuple):
+    """Effect of small tolerances on the numbers that have limits, for each source.
+
+    Attributes:
+        nominal: The numbers of the drawing, (k,).
+        shift: Change of each number by the mean of each source, (k, d).
+        spread: Change by one standard deviation of each source, with its sign, (k, d).
+        low: Change by the worse end of each source toward smaller values, (k, d), not positive.
+        high: The same toward larger values, not negative.
+    """
+
+    nominal: Float[np.ndarray, " k"]
+    shift: Float[np.ndarray, "k d"]
+    spread: Float[np.ndarray, "k d"]
+    low: Float[np.ndarray, "k d"]
+    high: Float[np.ndarray, "k d"]
+
+    @property
+    def worst_case(self) -> Float[np.ndarray, "k 2"]:
+        """Smallest and largest value: all sources at their worse ends at once."""
+        ends = [self.nominal + end.sum(axis=1) for end in (self.low, self.high)]
+        return np.stack(ends, axis=-1)
+
+    @property
+    def mean(self) -> Float[np.ndarray, " k"]:
+        """Mean of the robots."""
+        return self.nominal + self.shift.sum(axis=1)
+
+    @property
+    def sd(self) -> Float[np.ndarray, " k"]:
+        """Standard deviation of the robots: the root of the sum of squares."""
+        return np.sqrt((self.spread**2).sum(axis=1))
+
+    @property
+    def share(self) -> Float[np.ndarray, "k d"]:
+        """Part of each source in the variance of each number; 0 where nothing varies."""
+        total = (self.spread**2).sum(axis=1, keepdims=True)
+        return np.divide(self.spread**2, total, out=np.zeros_like(self.spread), where=total > 0.0)
+
+
+def linear_effects(study: Study) -> LinearEffects:
+    """Differentiate the numbers that have limits by all that deviates.
+
+    Derivatives are those of the solved path, through the memory of the contacts; where a notch is
+    about to close or a contact to slip they are of one side.
+    """
+    names = [name for source in study.sources for name in source.nominal]
+    slopes, nominal = np.empty((len(study.criteria), len(names))), np.empty(len(study.criteria))
+    for load, path in study.loads.items():
+        places, outputs = study.of_load(load)
+        solved = study.paths[load][: len(path)]
+        jacobian = solved.jacobian(names, outputs)
+        for place in places:
+            criterion = study.criteria[place]
+            quantity = criterion.quantity.name
+            slopes[place] = criterion.of(np.moveaxis(jacobian[quantity], -1, 0))
+            nominal[place] = criterion.of(np.asarray(solved.quantity(quantity))[None])[0]
+    # Mean, standard deviation and both ends of each name, which moves with its source alone.
+    deviations = np.zeros((4, len(names), len(study.sources)))
+    for column, source in enumerate(study.sources):
+        for name, value in source.nominal.items():
+            mean, sd = moments(source.tolerance, value)
+            ends = np.array([deviation(source.tolerance, value, level) for level in (0.0, 1.0)])
+            ends = np.where(np.isfinite(ends), ends, [-WORST_SD * sd, WORST_SD * sd])
+            deviations[:, names.index(name), column] = mean, sd, *ends
+    shift, spread, *ends = slopes @ deviations
+    low, high = np.minimum(*ends), np.maximum(*ends)
+    return LinearEffects(nominal, shift, spread, np.minimum(low, 0.0), np.maximum(high, 0.0))
+
 
 _POINTS = 2048
+"""Points of a yield with one tolerance changed, and of each set of Sobol's indices, at most."""
+_LEAST_POINTS = 16
 _WIDEST = 2.0
 """Largest factor on a tolerance that is tried."""
-_EXACT = 0.02
+_ACCURACY = 0.02
 """Relative accuracy of the factor on a tolerance."""
 
 
@@ -66,7 +142,7 @@ class Control(NamedTuple):
 def control(
     study: Study,
     draws: int,
-    target: float | None,
+    wanted: float | None,
     seed: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> Control:
@@ -75,52 +151,42 @@ def control(
     Args:
         study: What deviates, and the numbers that have limits.
         draws: About how many robots the yield is found of.
-        target: The wanted yield, between 0 and 1; None to look for no tolerance.
+        wanted: The wanted yield, between 0 and 1; None to look for no tolerance.
         seed: Of the points.
         progress: Called with the sources done and all of them.
     """
     points = min(2 ** int(np.log2(draws)), _POINTS)
     sampler = qmc.Sobol(len(study.sources), scramble=True, rng=np.random.default_rng(seed))
-    levels = sampler.random(points)
+    numbers = study.drawn(sampler.random(points))
     exact, factors = [], []
-    for index in range(len(study.sources)):
-        yields: dict[float, float] = {}
+    for index, source in enumerate(study.sources):
 
-        def yield_at(
-            factor: float, index: int = index, computed: dict[float, float] = yields
-        ) -> float:
-            if factor not in computed:
-                drawn = study.drawn(levels)
-                source = study.sources[index]
-                for name, value in source.nominal.items():
-                    drawn[name] = value + factor * (drawn[name] - value)
-                computed[factor] = float(study.solved(drawn, points).accepted.mean())
-            return computed[factor]
+        @lru_cache
+        def yield_at(factor: float, nominal: dict[str, float] = source.nominal) -> float:
+            changed = {
+                name: value + factor * (numbers[name] - value) for name, value in nominal.items()
+            }
+            return float(study.solved(numbers | changed, points).accepted.mean())
 
         exact.append(yield_at(0.0))
-        if target is not None:
-            factors.append(_factor(yield_at, target))
+        factors.append(np.nan if wanted is None else _factor(yield_at, wanted))
         if progress is not None:
             progress(index + 1, len(study.sources))
-    return Control(np.array(exact), None if target is None else np.array(factors), points)
+    return Control(np.array(exact), None if wanted is None else np.array(factors), points)
 
 
-def _factor(yield_at: Callable[[float], float], target: float) -> float:
-    """Find the factor on a tolerance at which the yield falls to its target."""
-    if yield_at(0.0) < target:
+def _factor(yield_at: Callable[[float], float], wanted: float) -> float:
+    """Find the factor on a tolerance at which the yield falls to what is wanted."""
+    if yield_at(0.0) < wanted:
         return 0.0
     low, high = 0.0, 1.0
-    while yield_at(high) >= target:
+    while yield_at(high) >= wanted:
         if high >= _WIDEST:
             return np.inf
         low, high = high, 2.0 * high
     # The yield is a staircase: a root of the difference lies on a step.
-    root: Any = brentq(lambda factor: yield_at(factor) - target, low, high, xtol=_EXACT * high)
+    root: Any = brentq(lambda factor: yield_at(factor) - wanted, low, high, xtol=_ACCURACY * high)
     return float(root)
-
-
-_MAX_POINTS, _MIN_POINTS = 2048, 16
-"""Points of each of the two sets; all indices need d + 2 times as many robots."""
 
 
 class SobolIndices(NamedTuple):
@@ -151,39 +217,31 @@ def sobol(
         progress: Called with the robots done and all of them.
     """
     sources = len(study.sources)
-    points = 2 ** int(math.log2(max(draws / (sources + 2), _MIN_POINTS)))
-    points = min(points, _MAX_POINTS)
+    points = min(2 ** int(np.log2(max(draws / (sources + 2), _LEAST_POINTS))), _POINTS)
     sampler = qmc.Sobol(2 * sources, scramble=True, rng=np.random.default_rng(seed))
-    both = sampler.random(points)
-    first, second = both[:, :sources], both[:, sources:]
-    mixed = np.repeat(first[None], sources, axis=0)
-    for index in range(sources):
-        mixed[index, :, index] = second[:, index]
+    first, second = np.split(sampler.random(points), 2, axis=1)
+    mixed = np.where(np.eye(sources, dtype=bool)[:, None], second, first)
     levels = np.concatenate([first, second, *mixed])
     outcomes = study.at_levels(levels, progress)
-    values = np.column_stack([outcomes.values, outcomes.accepted.astype(float)])
-    sets = values.reshape(sources + 2, points, -1)
-    is_finite = np.isfinite(sets).all(axis=(0, 2))
+    values = np.column_stack([outcomes.values, outcomes.accepted])
     failed = int(np.isnan(values).any(axis=1).sum())
-    size = sets.shape[2]
+    sets = np.moveaxis(values.reshape(sources + 2, points, -1), 1, 2)
+    is_finite = np.isfinite(sets).all(axis=(0, 1))
     if not is_finite.any():
-        nothing = np.full((size, sources), np.nan)
+        nothing = np.full((sets.shape[1], sources), np.nan)
         return SobolIndices(nothing, nothing, len(levels), failed)
     # A set of robots with one that failed is replaced by the good set before it.
     last = np.maximum.accumulate(np.where(is_finite, np.arange(points), -1))
-    sets = sets[:, np.where(last >= 0, last, np.argmax(is_finite))]
-    sets = sets - sets[:2].mean(axis=(0, 1))  # smaller errors than about a distant mean
-    ordered = np.moveaxis(sets, 1, 2)
-    varies = np.ptp(ordered[:2], axis=(0, 2)) > 0.0
+    sets = sets[..., np.where(last >= 0, last, np.argmax(is_finite))]
+    sets = sets - sets[:2].mean(axis=(0, 2))[:, None]  # smaller errors than about a distant mean
+    varies = np.ptp(sets[:2], axis=(0, 2)) > 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        indices = sobol_indices(
-            func={"f_A": ordered[0], "f_B": ordered[1], "f_AB": ordered[2:]}, n=points
-        )
-    first_order, total = (
-        np.where(varies[:, None], one.reshape(size, sources), np.nan)
-        for one in (indices.first_order, indices.total_order)
-    )
-    return SobolIndices(first_order, total, len(levels), failed)
+        indices = sobol_indices(func={"f_A": sets[0], "f_B": sets[1], "f_AB": sets[2:]}, n=points)
+    orders = [
+        np.where(varies[:, None], order.reshape(-1, sources), np.nan)
+        for order in (indices.first_order, indices.total_order)
+    ]
+    return SobolIndices(orders[0], orders[1], len(levels), failed)
 
 
 @dataclass(frozen=True, repr=False)
@@ -226,7 +284,7 @@ class ToleranceAnalysis(Displayed):
     @property
     def accepted_fraction(self) -> float:
         """The yield: the part of drawn robots that meet all limits, failed ones counted."""
-        return int(self.drawn.codes[ACCEPTED]) / self.draws
+        return self.counts["accepted"] / self.draws
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -241,12 +299,12 @@ class ToleranceAnalysis(Displayed):
     @property
     def below(self) -> Float[np.ndarray, " k"]:
         """Part of the drawn robots below the lower limit of each number."""
-        return self.drawn.beyond(self.criteria)[0] / self.draws
+        return self.drawn.below / self.draws
 
     @property
     def above(self) -> Float[np.ndarray, " k"]:
         """Part of the drawn robots above the upper limit of each number."""
-        return self.drawn.beyond(self.criteria)[1] / self.draws
+        return self.drawn.above / self.draws
 
     def percentile(self, part: float) -> Float[np.ndarray, " k"]:
         """Return the value of each number that a part of the drawn robots stays below.
@@ -268,49 +326,38 @@ class ToleranceAnalysis(Displayed):
 
     def warnings(self) -> list[str]:
         """Return a sentence for each thing that makes the result less than it seems."""
+        failed, invalid = self.drawn.codes[FAILED], self.drawn.codes[INVALID]
         warnings: list[str] = []
-        counts = self.counts
-        if counts[CODES[FAILED]]:
+        if failed:
             warnings.append(
-                f"{counts[CODES[FAILED]]} of {self.draws} drawn robots did not converge; they "
-                "count as rejected, and mean and percentiles leave them out."
+                f"{failed} of {self.draws} drawn robots did not converge; they count as rejected, "
+                "and mean and percentiles leave them out."
             )
-        if counts[CODES[INVALID]]:
+        if invalid:
             warnings.append(
-                f"{counts[CODES[INVALID]]} of {self.draws} draws make no valid robot, because the "
-                "tolerances reach beyond what the tube allows; they count as rejected."
+                f"{invalid} of {self.draws} draws make no valid robot, because the tolerances "
+                "reach beyond what the tube allows; they count as rejected."
             )
         return warnings
 
     def _summary(self) -> Summary:
-        low, high = self.interval
-        rows = [("yield", f"{_percent(self.accepted_fraction)} ({_percent(low)} to "
-                          f"{_percent(high)})")]  # fmt: skip
-        for index, one in enumerate(self.criteria):
-            quantity = one.quantity
-            worst = self.linear.worst_case[index] * quantity.scale
-            spread = self.linear.sd[index] * quantity.scale
-            rows.append(
-                (
-                    one.name,
-                    f"{short(self.linear.nominal[index] * quantity.scale)} {quantity.unit}, "
-                    f"standard deviation {short(spread)}, worst case {short(worst[0])} to "
-                    f"{short(worst[1])}",
-                )
-            )
-        rows.append(("control first", ", ".join(self.sources[one] for one in self.order[:2])))
+        part, low, high = (f"{100.0 * x:.4g} %" for x in (self.accepted_fraction, *self.interval))
+        rows = [("yield", f"{part} ({low} to {high})")]
+        for index, criterion in enumerate(self.criteria):
+            linear, quantity = self.linear, criterion.quantity
+            values = (linear.nominal[index], linear.sd[index], *linear.worst_case[index])
+            drawing, sd, least, most = (short(value * quantity.scale) for value in values)
+            words = f"{drawing} {quantity.unit}, standard deviation {sd}, worst case {least} to "
+            rows.append((criterion.name, f"{words}{most}"))
+        rows.append(("control first", ", ".join(self.sources[place] for place in self.order[:2])))
         title = f"Tolerances of {self.robot.name}, {self.draws} draws"
         return Summary(title, rows, ".linear, .drawn, .sobol, .control; nf.plot(it) draws them")
 
 
-def _percent(part: float) -> str:
-    return f"{100.0 * part:.4g} %"
-
-
-DRAWS = 100_000
-MIN_DRAWS = 2 * REPLICATES
-MAX_DRAWS, MAX_IN_PIECES = 10_000_000, 10_000_000_000
+_MIN_DRAWS = 2 * REPLICATES
+_MAX_DRAWS, _MAX_IN_PIECES = 10_000_000, 10_000_000_000
 """Draws in memory at most, and in pieces."""
+
 
 Stage = Callable[[str, int, int], None]
 """Called with what is computed, how much of it is done, and how much there is."""
@@ -320,7 +367,7 @@ def tolerance_analysis(
     robot: Robot,
     spec: ToleranceSpec | str | os.PathLike[str],
     *,
-    draws: int = DRAWS,
+    draws: int = 100_000,
     seed: int = 0,
     settings: Settings | None = None,
     refinement: int = 0,
@@ -359,72 +406,43 @@ def tolerance_analysis(
         200
     """
     check_is_robot(robot)
-    if check_integer(draws, "draws") < MIN_DRAWS:
-        raise InputError.OUT_OF_RANGE(f"draws must be {MIN_DRAWS} or more; got {draws}")
-    folder = None if folder is None else PieceFolder.of(folder)
-    if draws > (MAX_DRAWS if folder is None else MAX_IN_PIECES):
-        more = "; give a folder, which draws in pieces" if folder is None else ""
-        most = MAX_DRAWS if folder is None else MAX_IN_PIECES
-        raise InputError.OUT_OF_RANGE(f"draws must be at most {most:,}{more}; got {draws}")
-    asked = _spec(spec, robot)
-    chosen, assumed = tolerances_for(robot, asked)
-    study = study_of(robot, asked, chosen, settings, refinement, cores)
+    most = _MAX_DRAWS if folder is None else _MAX_IN_PIECES
+    if not _MIN_DRAWS <= check_integer(draws, "draws") <= most:
+        more = ", or more in pieces (give a folder)" if folder is None else ""
+        raise InputError.OUT_OF_RANGE(
+            f"draws must be from {_MIN_DRAWS} to {most:,}{more}; got {draws}"
+        )
+    if isinstance(spec, str | os.PathLike):
+        spec = read_tolerance_spec(spec, robot)
+    elif not isinstance(spec, ToleranceSpec):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError.WRONG_TYPE(
+            f"a notchflex.ToleranceSpec is needed, or the path of a file; got {short_repr(spec)}"
+        )
+    study = study_of(robot, spec, settings, refinement, cores)
     if not study.sources:
         raise InputError.NO_DATA("nothing deviates: all tolerances are 0; give one that is not.")
     effects = linear_effects(study)
-    report = {
-        name: None if progress is None else partial(progress, name)
-        for name in ("drawing", "sensitivity", "tolerances")
-    }
+
+    def report(stage: str, done: int, total: int, *_: int) -> None:
+        if progress is not None:
+            progress(stage, done, total)
+
     if folder is None:
-        drawn = _draw(study, draws, seed, report["drawing"])
+        drawn = draw(study, draws, seed, partial(report, "drawing"))
     else:
-        told = report["drawing"]
-        of_pieces = None if told is None else lambda done, count, *_: told(done, count)
-        drawn = draw_in_pieces(study, asked, draws, seed, folder, of_pieces)
+        task = ToleranceTask(robot, spec, draws, seed, settings, refinement)
+        drawn = draw_in_pieces(task, PieceFolder.of(folder), cores, partial(report, "drawing"))
     return ToleranceAnalysis(
         robot=robot,
         paths=study.paths,
         criteria=tuple(study.criteria),
-        tolerances=chosen,
-        assumed=assumed,
-        sources=tuple(one.name for one in study.sources),
+        tolerances=study.tolerances,
+        assumed=tolerances_for(robot, spec)[1],
+        sources=tuple(source.name for source in study.sources),
         linear=effects,
         drawn=drawn,
-        sobol=sobol(study, draws, seed, report["sensitivity"]),
-        control=control(study, draws, asked.wanted_yield, seed, report["tolerances"]),
-        wanted_yield=asked.wanted_yield,
+        sobol=sobol(study, draws, seed, partial(report, "sensitivity")),
+        control=control(study, draws, spec.wanted_yield, seed, partial(report, "tolerances")),
+        wanted_yield=spec.wanted_yield,
         seed=seed,
     )
-
-
-def _spec(spec: ToleranceSpec | str | os.PathLike[str], robot: Robot) -> ToleranceSpec:
-    if isinstance(spec, ToleranceSpec):
-        return spec
-    if not isinstance(spec, str | os.PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InputError.WRONG_TYPE(
-            f"a notchflex.ToleranceSpec is needed, or the path of a file; got {short_repr(spec)}"
-        )
-    return read_tolerance_spec(spec, robot)
-
-
-def tolerances_for(
-    robot: Robot, asked: ToleranceSpec
-) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]:
-    """Return the tolerances, and the names of those that are assumed.
-
-    Args:
-        robot: The robot of the drawing.
-        asked: What is asked of it.
-    """
-    if asked.tolerances is None:
-        return tolerances_of(robot)
-    return robot.replace(tolerance=asked.tolerances).tolerance, ()
-
-
-def _draw(
-    study: Study, draws: int, seed: int, progress: Callable[[int, int], None] | None
-) -> DrawnRobots:
-    levels = np.concatenate(list(replicates(len(study.sources), points_of_each(draws), seed)))
-    outcomes: Outcomes = study.at_levels(levels, progress)
-    return DrawnRobots(study.drawn(levels), outcomes)

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from notchflex import InputError
-from notchflex.pieces.folder import CODES
+from notchflex.pieces import CODES
 from notchflex.support import document_head
-from notchflex.tolerancing.analysis import ToleranceAnalysis
-from notchflex.tolerancing.linear import WORST_SD
-from notchflex.tolerancing.study import DrawnPieces
+from notchflex.tolerancing.analysis import WORST_SD, ToleranceAnalysis
+from notchflex.tolerancing.study import DrawnPieces, limited_columns
 
 PERCENTILES = (2.5, 50.0, 97.5)
 
@@ -27,7 +26,6 @@ def tolerance_document(analysis: ToleranceAnalysis) -> dict[str, Any]:
         `yield` (with `interval`), `limits`, one for each number that has limits, and `sources`, one
         for each deviation. Angles in deg, lengths in mm, forces in N.
     """
-    low, high = analysis.interval
     return {
         **document_head(analysis.robot),
         "draws": analysis.draws,
@@ -36,7 +34,7 @@ def tolerance_document(analysis: ToleranceAnalysis) -> dict[str, Any]:
         "assumed": list(analysis.assumed),
         "yield": {
             "accepted": analysis.accepted_fraction,
-            "interval": [low, high],
+            "interval": list(analysis.interval),
             "wanted": analysis.wanted_yield,
             "counts": analysis.counts,
         },
@@ -50,30 +48,31 @@ def tolerance_document(analysis: ToleranceAnalysis) -> dict[str, Any]:
 
 
 def _limits(analysis: ToleranceAnalysis) -> list[dict[str, Any]]:
-    parts = [analysis.percentile(part / 100.0) for part in PERCENTILES]
-    below, above, linear = analysis.below, analysis.above, analysis.linear
+    linear = analysis.linear
+    values = {
+        "drawing": linear.nominal,
+        "worst_case": linear.worst_case,
+        "rss_mean": linear.mean,
+        "rss_sd": linear.sd,
+    }
+    parts = {f"{level:g}": analysis.percentile(level / 100.0) for level in PERCENTILES}
     documents: list[dict[str, Any]] = []
-    for index, one in enumerate(analysis.criteria):
-        scale = one.quantity.scale
+    for index, criterion in enumerate(analysis.criteria):
+        scale = criterion.quantity.scale
+        # A limit that was turned to rad and back has a rounding error.
+        ends = {end: float(f"{getattr(criterion, end) * scale:.12g}") for end in ("lower", "upper")}
         documents.append(
             {
-                "name": one.name,
-                "quantity": one.quantity.name,
-                "unit": one.quantity.unit,
-                "load": one.load,
-                "step": one.step + 1,
-                "lower": _number(one.lower * scale),
-                "upper": _number(one.upper * scale),
-                "drawing": linear.nominal[index] * scale,
-                "worst_case": linear.worst_case[index] * scale,
-                "rss_mean": linear.mean[index] * scale,
-                "rss_sd": linear.sd[index] * scale,
-                "percentiles": {
-                    f"{level:g}": part[index] * scale
-                    for level, part in zip(PERCENTILES, parts, strict=True)
-                },
-                "below": below[index],
-                "above": above[index],
+                "name": criterion.name,
+                "quantity": criterion.quantity.name,
+                "unit": criterion.quantity.unit,
+                "load": criterion.load,
+                "step": criterion.step + 1,
+                **{end: value if np.isfinite(value) else None for end, value in ends.items()},
+                **{name: column[index] * scale for name, column in values.items()},
+                "percentiles": {level: part[index] * scale for level, part in parts.items()},
+                "below": analysis.below[index],
+                "above": analysis.above[index],
             }
         )
     return documents
@@ -81,23 +80,21 @@ def _limits(analysis: ToleranceAnalysis) -> list[dict[str, Any]]:
 
 def _sources(analysis: ToleranceAnalysis) -> list[dict[str, Any]]:
     """Return what is found of every deviation; lists are in the order of `limits`."""
-    factor = analysis.control.factor
-    documents: list[dict[str, Any]] = []
-    for index, name in enumerate(analysis.sources):
-        scales = np.array([one.quantity.scale for one in analysis.criteria])
-        documents.append(
-            {
-                "name": name,
-                "one_sd": analysis.linear.spread[:, index] * scales,
-                "variance_share": analysis.linear.share[:, index],
-                "sobol_first": analysis.sobol.first[:-1, index],
-                "sobol_total": analysis.sobol.total[:-1, index],
-                "sobol_total_of_acceptance": analysis.sobol.total[-1, index],
-                "yield_if_exact": analysis.control.exact[index],
-                "allowed_factor": None if factor is None else factor[index],
-            }
-        )
-    return documents
+    sobol, control = analysis.sobol, analysis.control
+    scales = np.array([criterion.quantity.scale for criterion in analysis.criteria])
+    return [
+        {
+            "name": name,
+            "one_sd": analysis.linear.spread[:, index] * scales,
+            "variance_share": analysis.linear.share[:, index],
+            "sobol_first": sobol.first[:-1, index],
+            "sobol_total": sobol.total[:-1, index],
+            "sobol_total_of_acceptance": sobol.total[-1, index],
+            "yield_if_exact": control.exact[index],
+            "allowed_factor": None if control.factor is None else control.factor[index],
+        }
+        for index, name in enumerate(analysis.sources)
+    ]
 
 
 def tolerance_columns(analysis: ToleranceAnalysis) -> dict[str, Sequence[Any]]:
@@ -114,20 +111,14 @@ def tolerance_columns(analysis: ToleranceAnalysis) -> dict[str, Sequence[Any]]:
     Raises:
         InputError: They were drawn in pieces.
     """
-    if isinstance(analysis.drawn, DrawnPieces):
+    drawn = analysis.drawn
+    if isinstance(drawn, DrawnPieces):
         raise InputError.UNSUPPORTED(
-            f"the drawn robots are rows of the files in {analysis.drawn.directory}; read those."
+            f"the drawn robots are rows of the files in {drawn.directory}; read those."
         )
-    outcomes = analysis.drawn.outcomes
-    columns: dict[str, Sequence[Any]] = {"robot": range(1, analysis.draws + 1)}
-    columns |= {name: values.tolist() for name, values in analysis.drawn.numbers.items()}
-    for one, values in zip(analysis.criteria, outcomes.values.T, strict=True):
-        unit = f" [{one.quantity.unit}]" if one.quantity.unit else ""
-        columns[f"{one.name}{unit}"] = (values * one.quantity.scale).tolist()
-    columns["outcome"] = [CODES[code] for code in outcomes.codes]
-    return columns
-
-
-def _number(value: float) -> float | None:
-    """Return a limit as it was given: turned to rad and back it has a rounding error."""
-    return float(f"{value:.12g}") if np.isfinite(value) else None
+    columns = {**drawn.numbers, **limited_columns(analysis.criteria, drawn.outcomes.values)}
+    return {
+        "robot": range(1, analysis.draws + 1),
+        **{name: values.tolist() for name, values in columns.items()},
+        "outcome": [CODES[code] for code in drawn.outcomes.codes],
+    }

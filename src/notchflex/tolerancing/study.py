@@ -1,22 +1,20 @@
-"""Robots within tolerances, solved under all loads: at levels, drawn, in memory or in pieces.
+"""Robots within tolerances, drawn and solved under all loads: in memory or in pieces.
 
-A piece is a part of one replicate of scrambled Sobol points.
+They are drawn as independent replicates of scrambled Sobol points; a piece is a part of one.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
-import pickle
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.stats import t as student_t
 
 from notchflex import (
     EquilibriumPath,
@@ -28,29 +26,36 @@ from notchflex import (
     batch,
     simulate,
 )
-from notchflex.analysis.draws import ToleranceSource, sources_of, values_at
-from notchflex.pieces.folder import (
+from notchflex.analysis.draws import ToleranceSource, sources_of, tolerances_of, values_at
+from notchflex.pieces import (
     ACCEPTED,
     CODES,
     FAILED,
     INVALID,
     REJECTED,
     Manifest,
-    Piece,
-    Recipe,
-    finished_head,
-    plain,
+    PieceFolder,
+    Progress,
+    Scale,
+    Sketch,
+    Task,
+    add_to,
+    heads,
+    scale_of,
+    sobol_points,
+    summed_up,
 )
-from notchflex.pieces.run import PieceFolder, Progress
-from notchflex.pieces.sketch import Scale, Sketch
-from notchflex.pieces.sobol import SobolPart
 from notchflex.support import Tolerance, to_table
 from notchflex.tolerancing.spec import Criterion, ToleranceSpec, criteria_of
-from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicate
+
+if TYPE_CHECKING:
+    from polars import DataFrame
 
 TAIL = 1e-6
 """What a normal distribution has beyond its end is drawn at the end: 1e-6 on either side, 4.8
 standard deviations."""
+
+Counts = Int[np.ndarray, " k"]
 
 
 class Outcomes(NamedTuple):
@@ -99,16 +104,27 @@ class Study:
 
     @cached_property
     def sources(self) -> list[ToleranceSource]:
-        """Independent sources of deviations."""
-        return [one for one in sources_of(self.exact, self.tolerances) if np.ptp(_ends(one)) > 0.0]
+        """Independent sources of deviations, those that deviate by nothing left out."""
+
+        def deviates(source: ToleranceSource) -> bool:
+            low, high = (next(iter(source.values(level).values())) for level in (0.25, 0.75))
+            return low < high
+
+        return [source for source in sources_of(self.exact, self.tolerances) if deviates(source)]
 
     @cached_property
     def loads(self) -> dict[str, LoadPath]:
         """The loads that any limit is about, each up to the last step that has one."""
         last: dict[str, int] = {}
-        for one in self.criteria:
-            last[one.load] = max(last.get(one.load, 0), one.step + 1)
+        for criterion in self.criteria:
+            last[criterion.load] = max(last.get(criterion.load, 0), criterion.step + 1)
         return {name: self.paths[name].load[:steps] for name, steps in last.items()}
+
+    def of_load(self, load: str) -> tuple[list[int], tuple[str, ...]]:
+        """Return the places of the criteria of a load, and their quantities."""
+        places = [place for place, one in enumerate(self.criteria) if one.load == load]
+        names = [self.criteria[place].quantity.name for place in places]
+        return places, tuple(dict.fromkeys(names))
 
     def drawn(self, levels: Float[np.ndarray, "robots d"]) -> dict[str, Float[np.ndarray, " r"]]:
         """Return the numbers of robots by name, at levels of the sources; see `TAIL`."""
@@ -124,72 +140,84 @@ class Study:
 
     def solved(
         self,
-        drawn: Mapping[str, Float[np.ndarray, " r"]],
+        numbers: Mapping[str, Float[np.ndarray, " r"]],
         count: int,
         progress: Callable[[int, int], None] | None = None,
     ) -> Outcomes:
         """Solve robots with other numbers under all loads.
 
         Args:
-            drawn: The numbers by name, one per robot.
+            numbers: The numbers by name, one per robot.
             count: How many robots.
             progress: Called with the robots done and all of them.
         """
         values = np.full((count, len(self.criteria)), np.nan)
         codes = np.full(count, ACCEPTED)
-        for number, (name, load) in enumerate(self.loads.items()):
-            own = [index for index, one in enumerate(self.criteria) if one.load == name]
-            outputs = tuple(dict.fromkeys(self.criteria[index].quantity.name for index in own))
-            part = _part_of(progress, number, len(self.loads))
+        for turn, (name, load) in enumerate(self.loads.items()):
+            places, outputs = self.of_load(name)
+
+            def report(done: int, total: int, turn: int = turn) -> None:
+                if progress is not None:
+                    progress(turn * total + done, len(self.loads) * total)
+
             try:
                 quantities = batch(
-                    self.exact, drawn, load, outputs=outputs, settings=self.settings,
-                    refinement=self.refinement, cores=self.cores, progress=part,
+                    self.exact, numbers, load, outputs=outputs, settings=self.settings,
+                    refinement=self.refinement, cores=self.cores, progress=report,
                 )  # fmt: skip
             except InputError as error:
                 if error.code is not ErrorCode.INVALID_ROBOT:
                     raise
                 return Outcomes(values, np.full(count, INVALID))
             converged = quantities["converged"]
-            for index in own:
-                criterion = self.criteria[index]
+            for place in places:
+                criterion = self.criteria[place]
                 result = criterion.of(quantities[criterion.quantity.name])
-                values[:, index] = np.where(converged[:, criterion.step], result, np.nan)
+                values[:, place] = np.where(converged[:, criterion.step], result, np.nan)
             codes[~converged.all(axis=1)] = FAILED
             codes[~quantities.valid] = INVALID
-        codes[(codes == ACCEPTED) & ~self.within(values).all(axis=1)] = REJECTED
+        lower, upper = self.limits
+        within = ((values >= lower) & (values <= upper)).all(axis=1)
+        codes[(codes == ACCEPTED) & ~within] = REJECTED
         return Outcomes(values, codes)
 
-    def within(self, values: Float[np.ndarray, "robots k"]) -> Bool[np.ndarray, "robots k"]:
-        """Return which numbers lie within their limits; NaN does not."""
-        lower, upper = (
-            np.array([getattr(one, end) for one in self.criteria]) for end in ("lower", "upper")
-        )
-        return (values >= lower) & (values <= upper)
+    @property
+    def limits(self) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+        """Lower and upper limits."""
+        lower, upper = np.array([[one.lower, one.upper] for one in self.criteria]).T
+        return lower, upper
+
+    def counts(self, outcomes: Outcomes) -> tuple[Counts, Counts, Counts]:
+        """Return how many robots have each code, and are below and above each limit."""
+        lower, upper = self.limits
+        codes = np.bincount(outcomes.codes, minlength=len(CODES))
+        values = outcomes.values
+        return codes, (values < lower).sum(axis=0), (values > upper).sum(axis=0)
+
+
+def tolerances_for(
+    robot: Robot, spec: ToleranceSpec
+) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]:
+    """Return the tolerances, and the names of those that are assumed."""
+    if spec.tolerances is None:
+        return tolerances_of(robot)
+    return robot.replace(tolerance=spec.tolerances).tolerance, ()
 
 
 def study_of(
     robot: Robot,
     spec: ToleranceSpec,
-    tolerances: tuple[Tolerance, ...],
     settings: Settings | None,
     refinement: int,
     cores: int | None = None,
 ) -> Study:
-    """Make the study of a robot; the other arguments are those of `Study`.
-
-    Args:
-        robot: The robot of the drawing.
-        spec: Loads and limits.
-        tolerances: What deviates.
-        settings: Tolerance and limits of the solver.
-        refinement: More strain modes.
-        cores: How many cores to use.
+    """Make the study of a robot.
 
     Raises:
         InputError: The robot of the drawing does not converge under a load.
     """
     paths: dict[str, EquilibriumPath] = {}
+    tolerances, _ = tolerances_for(robot, spec)
     for name, load in spec.loads.items():
         paths[name] = simulate(robot, load, settings=settings, refinement=refinement)
         if not paths[name].converged.all():
@@ -202,24 +230,6 @@ def study_of(
     return Study(robot, tolerances, paths, criteria, settings, refinement, cores)
 
 
-def _ends(source: ToleranceSource) -> list[float]:
-    """Return values of a source that differ where its tolerance is not zero."""
-    first = next(iter(source.nominal))
-    return [source.values(level)[first] for level in (0.25, 0.75)]
-
-
-def _part_of(
-    progress: Callable[[int, int], None] | None, number: int, parts: int
-) -> Callable[[int, int], None] | None:
-    """Return the progress of one of several batches as part of all."""
-    if progress is None:
-        return None
-    return lambda done, count: progress(number * count + done, parts * count)
-
-
-SAMPLE = 4096
-"""Rows from all over a study, from which the scales of its statistics come."""
-
 _PIECES = 16
 """Approximate number of pieces of a study, unless they would be too small or too large."""
 _MIN_ROWS, _MAX_ROWS = 2**12, 2**18
@@ -227,52 +237,98 @@ _MAX_BYTES = 2**27
 """What the solver returns of one piece at most, so that a worker needs less than 1 GiB."""
 
 
-@dataclass(frozen=True, eq=False)
-class PieceStudy(Study):
-    """A study that is solved in pieces.
-
-    Attributes:
-        sample: Numbers of some rows from all over the study, by name.
-    """
-
-    sample: Mapping[str, Float[np.ndarray, " k"]] = dataclasses.field(
-        default_factory=dict[str, np.ndarray]
-    )
-
-    @property
-    def row_bytes(self) -> int:
-        """Bytes that the solver returns of one row."""
-        sizes: dict[tuple[str, str], int] = {}
-        for one in self.criteria:
-            values = self.paths[one.load].quantity(one.quantity.name)[0]
-            sizes[one.load, one.quantity.name] = len(self.loads[one.load]) * max(values.size, 1)
-        return 8 * sum(sizes.values())
-
-    def at(self, numbers: Mapping[str, Float[np.ndarray, " k"]]) -> Outcomes:
-        """Solve robots: numbers in the units of files, NaN where there is no result."""
-        count = len(next(iter(numbers.values())))
-        outcomes = self.solved(numbers, count)
-        scale = np.array([one.quantity.scale for one in self.criteria])
-        return Outcomes(outcomes.values * scale, outcomes.codes)
-
-
-def piece_rows(rows: int, study: PieceStudy) -> int:
-    """Return the rows of a piece, a power of two.
-
-    Args:
-        rows: Rows of the study.
-        study: The study.
-    """
+def piece_rows(rows: int, study: Study) -> int:
+    """Return the rows of a piece, a power of two, for so many rows of a study."""
+    numbers = 0  # that the solver returns of a row
+    for name, load in study.loads.items():
+        for quantity in study.of_load(name)[1]:
+            numbers += len(load) * max(study.paths[name].quantity(quantity)[0].size, 1)
     size = 2 ** math.ceil(math.log2(max(rows / _PIECES, 1)))
-    most = 2 ** int(math.log2(max(_MAX_BYTES / study.row_bytes, 16)))
+    most = 2 ** int(math.log2(max(_MAX_BYTES / (8 * numbers), 16)))
     return min(max(size, _MIN_ROWS), _MAX_ROWS, most)
 
 
-Histogram = tuple[Float[np.ndarray, " edges"], Int[np.ndarray, " bins"]]
+REPLICATES = 25
+"""Independent sets of points: the quantile of t is 5 % above that of infinitely many."""
+
+_CONFIDENCE = 0.95
+
+
+def points_of_each(draws: int) -> int:
+    """Return how many points each replicate has: the power of two nearest to its share.
+
+    Example:
+        >>> REPLICATES * points_of_each(100_000)
+        102400
+    """
+    return 2 ** max(round(math.log2(draws / REPLICATES)), 1)
+
+
+def replicates(
+    sources: int, each: int, seed: int, first: int | None = None
+) -> list[Float[np.ndarray, "first d"]]:
+    """Return independent sets of levels, scrambled Sobol points between 0 and 1.
+
+    Args:
+        sources: How many numbers are drawn.
+        each: Points of a set, a power of two.
+        seed: The same seed makes the same points.
+        first: Only so many points of each set.
+    """
+    return [
+        sobol_points(sources, seed, 0, first or each, each, number) for number in range(REPLICATES)
+    ]
+
+
+def yield_interval(accepted: Int[np.ndarray, " replicates"], each: int) -> tuple[float, float]:
+    r"""Return the 95 % interval of the yield.
+
+    Scrambled Sobol points fill the tolerances more evenly than independent draws, so that a
+    binomial interval of all points would be too wide. The scatter of the yields $\hat p_r$ of
+    independent replicates gives the variance of the mean. That is worth
+    $n_e = \hat p(1 - \hat p)/\operatorname{var}(\bar p)$ independent draws, which Wilson's interval
+    takes with the quantile of Student's t for the number of replicates.
+
+    Args:
+        accepted: How many robots of each replicate are accepted.
+        each: Robots of a replicate.
+
+    Example:
+        >>> low, high = yield_interval(np.full(25, 40), 40)
+        >>> round(low, 4), high
+        (0.9958, 1.0)
+    """
+    parts = np.asarray(accepted) / each
+    part, variance = float(parts.mean()), float(parts.var(ddof=1)) / len(parts)
+    draws = part * (1.0 - part) / variance if variance > 0.0 else float(len(parts) * each)
+    square = float(student_t.ppf(0.5 + 0.5 * _CONFIDENCE, len(parts) - 1)) ** 2 / draws
+    middle = (part + 0.5 * square) / (1.0 + square)
+    half = math.sqrt(square * part * (1.0 - part) + 0.25 * square**2) / (1.0 + square)
+    return (
+        max(middle - half, 0.0) if part > 0.0 else 0.0,
+        min(middle + half, 1.0) if part < 1.0 else 1.0,
+    )
 
 
 @dataclass(frozen=True, eq=False)
-class DrawnRobots:
+class DrawnCounts:
+    """Counts of drawn robots, k numbers with limits.
+
+    Attributes:
+        codes: How many robots have each of `CODES`.
+        accepted: How many robots of each replicate are accepted.
+        below: How many robots are below the lower limit of each number, (k,).
+        above: The same above the upper limit.
+    """
+
+    codes: Counts
+    accepted: Int[np.ndarray, " replicates"]
+    below: Counts
+    above: Counts
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnRobots(DrawnCounts):
     """The robots that were drawn within the tolerances.
 
     Attributes:
@@ -283,20 +339,6 @@ class DrawnRobots:
     numbers: Mapping[str, Float[np.ndarray, " draws"]]
     outcomes: Outcomes
 
-    @property
-    def codes(self) -> Int[np.ndarray, " codes"]:
-        """Number of robots by each of `CODES`."""
-        return np.bincount(self.outcomes.codes, minlength=len(CODES))
-
-    @property
-    def accepted(self) -> Int[np.ndarray, " replicates"]:
-        """Number of accepted robots in each replicate."""
-        return self.outcomes.accepted.reshape(REPLICATES, -1).sum(axis=1)
-
-    def beyond(self, criteria: Sequence[Criterion]) -> tuple[np.ndarray, np.ndarray]:
-        """Return how many robots are below and above the limits of each number, (k,) each."""
-        return beyond(self.outcomes.values, criteria)
-
     def percentile(self, part: float) -> Float[np.ndarray, " k"]:
         """Return the value of each number that a part of the robots stays below."""
         values = self.outcomes.values
@@ -304,7 +346,7 @@ class DrawnRobots:
         size = values.shape[1]
         return np.quantile(values, part, axis=0) if len(values) else np.full(size, np.nan)
 
-    def histogram(self, index: int, bins: int) -> Histogram:
+    def histogram(self, index: int, bins: int) -> tuple[np.ndarray, np.ndarray]:
         """Return edges and counts of the values of a number; both empty without a result."""
         values = self.outcomes.values[:, index]
         values = values[np.isfinite(values)]
@@ -314,208 +356,140 @@ class DrawnRobots:
         return edges, counts
 
 
+def draw(
+    study: Study, draws: int, seed: int, progress: Callable[[int, int], None] | None
+) -> DrawnRobots:
+    """Draw robots in memory; arguments as for `tolerance_analysis`."""
+    levels = np.concatenate(replicates(len(study.sources), points_of_each(draws), seed))
+    outcomes = study.at_levels(levels, progress)
+    codes, below, above = study.counts(outcomes)
+    accepted = outcomes.accepted.reshape(REPLICATES, -1).sum(axis=1)
+    return DrawnRobots(codes, accepted, below, above, study.drawn(levels), outcomes)
+
+
 @dataclass(frozen=True, eq=False)
-class DrawnPieces:
+class DrawnPieces(DrawnCounts):
     """Summary of robots that were drawn in pieces.
 
     Attributes:
         directory: The folder of the pieces.
-        codes: How many robots have each of `CODES`.
-        accepted: How many robots of each replicate are accepted.
-        below: How many robots are below the lower limit of each number, (k,).
-        above: The same above the upper limit.
         sketches: Statistics of each number.
-        scales: Scales of the statistics.
     """
 
     directory: str | os.PathLike[str]
-    codes: Int[np.ndarray, " codes"]
-    accepted: Int[np.ndarray, " replicates"]
-    below: Int[np.ndarray, " k"]
-    above: Int[np.ndarray, " k"]
     sketches: Sequence[Sketch]
-    scales: Sequence[Scale]
-
-    def beyond(self, criteria: Sequence[Criterion]) -> tuple[np.ndarray, np.ndarray]:
-        """Return how many robots are below and above the limits of each number, (k,) each."""
-        del criteria
-        return self.below, self.above
 
     def percentile(self, part: float) -> Float[np.ndarray, " k"]:
-        """Return the value of each number that a part of the robots stays below.
+        """Return percentiles, exact to 1/1000 of half the range of most values."""
+        return np.array([sketch.quantile(part) for sketch in self.sketches])
 
-        It is exact to 1/1000 of half the range of most values.
-        """
-        both = zip(self.sketches, self.scales, strict=True)
-        return np.array([sketch.quantile(part, scale) for sketch, scale in both])
-
-    def histogram(self, index: int, bins: int) -> Histogram:
+    def histogram(self, index: int, bins: int) -> tuple[np.ndarray, np.ndarray]:
         """Return edges and counts of the values of a number; both empty without a result."""
-        edges, counts = self.sketches[index].histogram(bins, self.scales[index])
+        edges, counts = self.sketches[index].histogram(bins)
         return np.array(edges), np.array(counts, int)
 
 
-def beyond(
-    values: Float[np.ndarray, "robots k"], criteria: Sequence[Criterion]
-) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-    """Return how many robots are below and above the limits of each number."""
-    lower, upper = (np.array([getattr(one, end) for one in criteria]) for end in ("lower", "upper"))
-    return (values < lower).sum(axis=0), (values > upper).sum(axis=0)
-
-
-KIND = "tolerance"
-_SCALED = 1024
-"""Robots of the sample that find the scales of statistics."""
+_SAMPLE = 1024
+"""Robots of the sample that finds the scales of statistics, or fewer."""
 _EXTREMES = 10
 """Smallest and largest values that are kept of each number."""
 
 
-class ToleranceTask:
-    """Robots at levels of their tolerances, in pieces.
+@dataclass(frozen=True, eq=False)
+class ToleranceTask(Task):
+    """Drawn robots in pieces; arguments as for `tolerance_analysis`."""
 
-    Args:
-        study: What deviates, and the numbers that have limits.
-        spec: What it was made from.
-        draws: About how many robots are drawn.
-        seed: Of the draws.
-    """
+    robot: Robot
+    spec: ToleranceSpec
+    draws: int
+    seed: int
+    settings: Settings | None
+    refinement: int
 
-    def __init__(self, study: Study, spec: ToleranceSpec, draws: int, seed: int) -> None:
-        self._content = (study.robot, spec, study.tolerances, study.settings, study.refinement)
-        self._draws, self.seed, self.each = draws, seed, points_of_each(draws)
-        self._own = threading.local()
-        sources = len(study.sources)
-        levels = np.concatenate(
-            [
-                replicate(sources, self.each, seed, number).between(0, SAMPLE // REPLICATES)
-                for number in range(REPLICATES)
-            ]
-            if self.each >= SAMPLE // REPLICATES
-            else [np.random.default_rng(seed).random((SAMPLE, sources))]
-        )
-        self.study = PieceStudy(
-            study.robot, study.tolerances, study.paths, study.criteria, study.settings,
-            study.refinement, 1, sample=study.drawn(levels),
-        )  # fmt: skip
-        self.manifest = self._manifest()
+    @cached_property
+    def study(self) -> Study:
+        """The robot and what it must meet, solved by one thread a piece."""
+        return study_of(self.robot, self.spec, self.settings, self.refinement, 1)
 
-    def _manifest(self) -> Manifest:
-        """Return all that the bytes of pieces depend on."""
-        rows = REPLICATES * self.each
-        study = self.study
-        return Manifest.made(
-            KIND,
+    @cached_property
+    def manifest(self) -> Manifest:
+        """All that the bytes of pieces depend on."""
+        study, each = self.study, points_of_each(self.draws)
+        rows = REPLICATES * each
+        return Manifest.of(
+            "tolerance",
             rows,
-            min(piece_rows(rows, study), self.each),
+            min(piece_rows(rows, study), each),
             robot=to_table(study.exact),
-            tolerances=plain(study.tolerances),
-            loads=plain(study.loads),
-            limits=[
-                [one.name, one.load, one.step, plain(one.lower), plain(one.upper)]
-                for one in study.criteria
-            ],
-            settings=plain(study.settings),
+            tolerances=study.tolerances,
+            loads=study.loads,
+            limits=[[one.name, one.load, one.step, one.lower, one.upper] for one in study.criteria],
+            settings=study.settings,
             refinement=study.refinement,
             seed=self.seed,
         )
 
-    @property
-    def recipe(self) -> Recipe:
-        """Recipe by which another process makes the same task."""
-        return Recipe(tolerance_task, pickle.dumps((self._content, self._draws, self.seed)))
-
-    def prepare(self) -> None:
-        """Find scales, which all threads need."""
-        assert self.scales
-
     @cached_property
-    def scales(self) -> list[Scale]:
+    def scales(self) -> dict[str, Scale]:
         """Scales of the statistics of every number."""
-        sample = {name: one[:: SAMPLE // _SCALED] for name, one in self.study.sample.items()}
-        outcomes = self.study.solved(sample, len(next(iter(sample.values()))))
-        return [Scale.of(column) for column in outcomes.values.T]
+        sources, each = len(self.study.sources), points_of_each(self.draws)
+        first = min(4 * _SAMPLE // REPLICATES, each)
+        levels = np.concatenate(replicates(sources, each, self.seed, first))
+        values = self.study.at_levels(levels[:: -(-len(levels) // _SAMPLE)]).values
+        return {
+            criterion.name: scale_of(column)
+            for criterion, column in zip(self.study.criteria, values.T, strict=True)
+        }
 
-    def _sequence(self, number: int) -> SobolPart:
-        """Return a replicate, for the calling thread."""
-        if getattr(self._own, "number", None) != number:
-            self._own.number = number
-            self._own.part = replicate(len(self.study.sources), self.each, self.seed, number)
-        return self._own.part
-
-    def piece(self, number: int) -> Piece:
+    def piece(self, number: int) -> tuple[DataFrame, dict[str, Any]]:
         """Draw and solve the robots of one piece."""
         import polars
 
+        study, each = self.study, points_of_each(self.draws)
         start, stop = self.manifest.between(number)
-        which, first = divmod(start, self.each)
-        levels = self._sequence(which).between(first, first + stop - start)
-        outcomes = self.study.at_levels(levels)
-        below, above = beyond(outcomes.values, self.study.criteria)
-        solved = np.asarray(np.isfinite(outcomes.values).all(axis=1))
-        complete = np.where(solved[:, None], outcomes.values, np.nan)
-        columns = zip(np.ascontiguousarray(complete.T), self.scales, strict=True)
-        head = {
-            "codes": np.bincount(outcomes.codes, minlength=len(CODES)).tolist(),
-            "replicate": which,
-            "below": below.tolist(),
-            "above": above.tolist(),
-            "scales": [[one.middle, one.half] for one in self.scales],
-            "columns": [
-                Sketch.of(values, start, scale, _EXTREMES).document() for values, scale in columns
-            ],
-        }
+        which, first = divmod(start, each)
+        last = first + stop - start
+        levels = sobol_points(len(study.sources), self.seed, first, last, each, which)
+        outcomes = study.at_levels(levels)
+        _, below, above = study.counts(outcomes)
+        solved = np.isfinite(outcomes.values).all(axis=1)
+        columns = dict(zip(self.scales, np.where(solved, outcomes.values.T, np.nan), strict=True))
+        counts = {"replicate": which, "below": below.tolist(), "above": above.tolist()}
+        head = summed_up(columns, outcomes.codes, start, self.scales, _EXTREMES, **counts)
         code = polars.Series("code", CODES, polars.Enum(CODES)).gather(outcomes.codes)
-        frame: dict[str, Any] = {"code": code}
-        for one, values in zip(self.study.criteria, outcomes.values.T, strict=True):
-            unit = f" [{one.quantity.unit}]" if one.quantity.unit else ""
-            frame[f"{one.name}{unit}"] = np.ascontiguousarray(values) * one.quantity.scale
-        return Piece(polars.DataFrame(frame, nan_to_null=True), head)
+        named = {"code": code, **limited_columns(study.criteria, outcomes.values)}
+        return polars.DataFrame(named, nan_to_null=True), head
 
 
-def tolerance_task(content: bytes) -> ToleranceTask:
-    """Make the task of another process again, from objects that it pickled."""
-    (robot, spec, tolerances, settings, refinement), draws, seed = pickle.loads(content)
-    study = study_of(robot, spec, tolerances, settings, refinement)
-    return ToleranceTask(study, spec, draws, seed)
+def limited_columns(
+    criteria: Sequence[Criterion], values: Float[np.ndarray, "robots k"]
+) -> dict[str, Float[np.ndarray, " robots"]]:
+    """Return the numbers that have limits by name and unit, in the units of files."""
+    columns: dict[str, np.ndarray] = {}
+    for criterion, column in zip(criteria, values.T, strict=True):
+        unit = f" [{criterion.quantity.unit}]" if criterion.quantity.unit else ""
+        columns[f"{criterion.name}{unit}"] = np.ascontiguousarray(column) * criterion.quantity.scale
+    return columns
 
 
 def draw_in_pieces(
-    study: Study,
-    spec: ToleranceSpec,
-    draws: int,
-    seed: int,
-    folder: PieceFolder,
-    progress: Progress | None = None,
+    task: ToleranceTask, folder: PieceFolder, cores: int | None, progress: Progress | None
 ) -> DrawnPieces:
     """Draw robots in pieces, and sum up what became of them.
-
-    Args:
-        study: What deviates, and the numbers that have limits.
-        spec: What it was made from.
-        draws: About how many robots are drawn.
-        seed: Of the draws.
-        folder: Where pieces are kept.
-        progress: Called with robots done, robots in all, those without a result, and those done by
-            earlier calls.
 
     Raises:
         InputError: The folder holds something else, or cannot be written.
     """
-    task = ToleranceTask(study, spec, draws, seed)
-    folder.run(task, cores=study.cores, progress=progress)
-    size, manifest = len(study.criteria), task.manifest
+    assert task.scales  # all threads need them
+    folder.run(task, cores=cores, progress=progress)
+    size = len(task.study.criteria)
     codes, accepted = np.zeros(len(CODES), int), np.zeros(REPLICATES, int)
     below, above = np.zeros(size, int), np.zeros(size, int)
-    sketches, scales = [Sketch() for _ in range(size)], [Scale(0.0, 1.0)] * size
-    for piece in range(manifest.pieces):
-        head = finished_head(folder.directory, manifest, piece)
-        codes += np.array(head["codes"])
+    sketches: dict[str, Sketch] = {}
+    for head in heads(folder.directory, task.manifest, range(task.manifest.pieces)):
+        codes += head["codes"]
         accepted[head["replicate"]] += head["codes"][ACCEPTED]
-        below += np.array(head["below"], int)
-        above += np.array(head["above"], int)
-        scales = [Scale(*pair) for pair in head["scales"]]
-        sketches = [
-            one.merged(Sketch.read(document), _EXTREMES)
-            for one, document in zip(sketches, head["columns"], strict=True)
-        ]
-    return DrawnPieces(folder.directory, codes, accepted, below, above, sketches, scales)
+        below += head["below"]
+        above += head["above"]
+        add_to(sketches, head, _EXTREMES)
+    return DrawnPieces(codes, accepted, below, above, folder.directory, list(sketches.values()))

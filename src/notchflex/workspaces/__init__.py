@@ -1,6 +1,18 @@
 """Where the tip of a robot can go: clouds of states, volumes and maps."""
 
-from notchflex.workspaces.cloud import Workspace
-from notchflex.workspaces.explore import workspace
+from notchflex.workspaces.cloud import (
+    Overlap,
+    Workspace,
+    hull_of,
+    overlap_documents,
+    overlaps,
+    save_netcdf,
+    sphere_directions,
+    workspace_document,
+)
+from notchflex.workspaces.explore import largest_tensions, workspace
+from notchflex.workspaces.limits import in_python
 
-__all__ = ["Workspace", "workspace"]
+__all__ = ["Overlap", "Workspace", "hull_of", "in_python", "largest_tensions"]
+__all__ += ["overlap_documents", "overlaps", "save_netcdf", "sphere_directions"]
+__all__ += ["workspace", "workspace_document"]

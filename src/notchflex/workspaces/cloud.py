@@ -46,6 +46,7 @@ class Hull:
         faces: Triples of corners, counted from 0; none unless it has a volume, (f, 3).
         origin: A point of the cloud's middle, mm, (3,).
         axes: Unit vectors of the space that the cloud fills, (dimension, 3).
+        equations: Outward normals of its sides in that space and their offsets, (s, dimension + 1).
     """
 
     dimension: int
@@ -54,6 +55,7 @@ class Hull:
     faces: Int[np.ndarray, "f 3"]
     origin: Float[np.ndarray, " 3"]
     axes: Float[np.ndarray, "dimension 3"]
+    equations: Float[np.ndarray, "s n"]
 
     @property
     def unit(self) -> str:
@@ -64,22 +66,19 @@ class Hull:
 def hull_of(points: Float[np.ndarray, "n 3"]) -> Hull:
     """Return the convex hull of points, mm."""
     origin, axes = _frame(points)
-    dimension = len(axes)
     flat = (points - origin) @ axes.T
-    no_faces = np.zeros((0, 3), int)
-    if dimension == 0:
-        return Hull(0, 0.0, points[:1], no_faces, origin, axes)
-    if dimension == 1:
-        ends = [int(flat.argmin()), int(flat.argmax())]
-        return Hull(1, float(np.ptp(flat)), points[ends], no_faces, origin, axes)
-    hull = ConvexHull(flat)
-    corners = points[hull.vertices]
-    faces = no_faces
-    if dimension == 3:
-        index = np.zeros(len(points), int)
-        index[hull.vertices] = np.arange(len(hull.vertices))
-        faces = index[hull.simplices]
-    return Hull(dimension, float(hull.volume), corners, faces, origin, axes)
+    dimension, faces, equations = len(axes), np.zeros((0, 3), int), np.zeros((0, 0))
+    if dimension < 2:  # a line, or a single point
+        places = np.array([flat.argmin(), flat.argmax()] if dimension else [0])
+        size = float(np.ptp(flat)) if dimension else 0.0
+    else:
+        hull = ConvexHull(flat)
+        places, size, equations = hull.vertices, float(hull.volume), hull.equations
+        if dimension == 3:
+            number = np.zeros(len(points), int)
+            number[places] = np.arange(len(places))
+            faces = number[hull.simplices]
+    return Hull(dimension, size, points[places], faces, origin, axes, equations)
 
 
 def alpha_size(points: Float[np.ndarray, "n 3"], radius: float) -> float:
@@ -126,8 +125,7 @@ def inside(
     flat = (points - hull.origin) @ hull.axes.T
     off = points - hull.origin - flat @ hull.axes
     within = np.abs(off).max(axis=1) <= near
-    equations = ConvexHull((hull.corners - hull.origin) @ hull.axes.T).equations
-    for row in equations:  # few, while the points are many
+    for row in hull.equations:  # few, while the points are many
         within &= flat @ row[:-1] + row[-1] <= near
     return within
 
@@ -193,17 +191,18 @@ def voxel_map(
     occupied, of_state, states = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
     of_state = of_state.reshape(-1)
     reached = np.unique(of_state * DIRECTIONS + nearest_directions(directions))
-    dexterity = np.bincount(reached // DIRECTIONS, minlength=len(occupied)) / DIRECTIONS
+    dexterity = np.bincount(reached // DIRECTIONS) / DIRECTIONS
     maps: dict[str, np.ndarray] = {}
-    for name, one in values.items():
-        is_finite = np.isfinite(one)
+    for name, column in values.items():
+        is_finite = np.isfinite(column)
+        of_finite, finite = of_state[is_finite], column[is_finite]
         if name == "hysteresis":
-            most = np.full(len(occupied), -np.inf)
-            np.maximum.at(most, of_state[is_finite], one[is_finite])
-            maps[name] = np.where(np.isfinite(most), most, np.nan)
+            maps[name] = np.full(len(occupied), np.nan)
+            np.fmax.at(maps[name], of_finite, finite)
         else:
-            count = np.bincount(of_state[is_finite], minlength=len(occupied))
-            total = np.bincount(of_state[is_finite], one[is_finite], minlength=len(occupied))
+            count, total = (
+                np.bincount(of_finite, weights, len(occupied)) for weights in (None, finite)
+            )
             maps[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
     return VoxelMap(size, (occupied + 0.5) * size, states, dexterity, maps, of_state)
 
@@ -440,24 +439,23 @@ def overlaps(found: Mapping[str, Workspace]) -> list[Overlap]:
 
 
 def _overlap(first: str, second: str, a: Workspace, b: Workspace) -> Overlap:
-    size = max(float(np.ptp(one.extent, axis=0).max()) for one in (a, b)) / 32.0
-    cells = []
-    for one in (a, b):
-        map_ = voxel_map(one.tip, one.direction, {}, size)
-        cells.append({tuple(row) for row in np.floor(map_.centre / size).astype(int).tolist()})
+    size = max(float(np.ptp(one.extent, axis=0).max()) for one in (a, b)) / _VOXELS
+    in_a, in_b = (
+        set(map(tuple, np.unique(np.floor(one.tip / size), axis=0).tolist())) for one in (a, b)
+    )
     return Overlap(
         first,
         second,
         size,
-        both=len(cells[0] & cells[1]),
-        first_alone=len(cells[0] - cells[1]),
-        second_alone=len(cells[1] - cells[0]),
+        both=len(in_a & in_b),
+        first_alone=len(in_a - in_b),
+        second_alone=len(in_b - in_a),
         first_in_second=float(inside(b.hull, a.tip).mean()),
         second_in_first=float(inside(a.hull, b.tip).mean()),
     )
 
 
-_PARTS = (0.05, 0.5, 0.95)
+_PARTS = (0.05, 0.5, 0.95, 1.0)
 
 
 def workspace_document(explored: Workspace) -> dict[str, Any]:
@@ -498,12 +496,10 @@ def workspace_document(explored: Workspace) -> dict[str, Any]:
 def _spread(values: np.ndarray) -> dict[str, float | None]:
     finite = values[np.isfinite(values)]
     if not len(finite):
-        return {"p5": None, "p50": None, "p95": None, "largest": None}
-    parts = np.quantile(finite, _PARTS)
-    named: dict[str, float | None] = {
-        f"p{100 * part:g}": float(one) for part, one in zip(_PARTS, parts, strict=True)
-    }
-    return named | {"largest": float(finite.max())}
+        return dict.fromkeys(("p5", "p50", "p95", "largest"))
+    return dict(
+        zip(("p5", "p50", "p95", "largest"), np.quantile(finite, _PARTS).tolist(), strict=True)
+    )
 
 
 def overlap_documents(overlaps: Sequence[Overlap]) -> list[dict[str, Any]]:

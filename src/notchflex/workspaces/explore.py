@@ -1,26 +1,40 @@
-"""Explores a workspace: rays of tension in batches, piece by piece, thinned by voxels.
+"""Explores a workspace: rays of tension in batches, piece by piece.
 
-Of the states whose tips lie in the same voxel, point the same way (one of the directions of the
-dexterity) and are both loaded or both unloaded, that with the largest hysteresis is kept. Corners
-of the convex hull of each piece are kept too, so that the hull is that of all states.
+A ray is a ratio of tensions that rises from 0 to a peak and falls again, so that every tension
+is there while loading and while unloading. Of the tendons that end at one body two neighbours are
+pulled at a time: what more would add is pressed together, not moved.
 """
 
 from __future__ import annotations
 
 import os
-import pickle
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from notchflex import InputError, Robot, tip_response
-from notchflex.pieces.folder import Manifest, Piece, Recipe, finished_head, piece_file, plain
-from notchflex.pieces.run import PieceFolder
+from notchflex import (
+    InputError,
+    LoadPath,
+    Robot,
+    Settings,
+    closing,
+    simulate_batch,
+    tip_response,
+)
+from notchflex.loads.load import NO_VECTOR
+from notchflex.pieces import (
+    Manifest,
+    PieceFolder,
+    Task,
+    heads,
+    piece_file,
+    sobol_points,
+)
 from notchflex.support import (
     ExternalLoad,
     check_integer,
@@ -30,201 +44,297 @@ from notchflex.support import (
     to_table,
 )
 from notchflex.workspaces.cloud import Workspace, hull_of, nearest_directions
-from notchflex.workspaces.limits import limits_of
-from notchflex.workspaces.rays import (
-    LEVELS,
-    Explorer,
-    RayPiece,
-    joined,
-    largest_tensions,
-    ray_sequence,
-    rays,
-    rays_at,
-    under,
-)
+from notchflex.workspaces.limits import Limit, all_hold, limits_of
 
-KIND = "workspace"
-_FINE = 64
-"""Voxels along the longest side, twice as many as maps have."""
-_SAMPLE = 256
-"""Rays that find how large the workspace is."""
+if TYPE_CHECKING:
+    from polars import DataFrame
+
+_LEVELS = 16
+"""Levels of tension on each way of a ray."""
+_STATES = 2 * _LEVELS
+"""States of a ray."""
+_FIRST_LEVELS = 12
+"""Levels of the first pull, that finds how far limits allow each ray to be pulled."""
+_HALVINGS = 5
+"""How often the step between the last level within the limits and the next is halved."""
+_SETTINGS = Settings(tolerance=1e-9)
+"""Far below what a picture or a volume shows, and a third quicker than the usual tolerance."""
 _PIECE = 4096
 """Rays of a piece: its states and their quantities are in memory at a time."""
+_SAMPLE = 256
+"""Rays that find how large the workspace is."""
+_FINE = 64
+"""Voxels along the longest side where states are thinned, twice as many as maps have."""
+
+_Columns = dict[str, Any]
+"""States as columns: arrays by the names of the attributes of `Workspace`."""
+_SHAPES = ("tension", "tip", "direction")
+"""Columns that hold several numbers of a state, which have columns of their own in files."""
 
 
-class WorkspaceTask:
-    """Rays of a workspace, in pieces.
+def largest_tensions(robot: Robot, tension: ArrayLike | None) -> Float[np.ndarray, " t"]:
+    """Return the largest tension of every tendon, N; by default that which closes all notches.
+
+    Raises:
+        InputError: Not one number or one per tendon, not above 0, or none is given and no tension
+            closes the notches.
+    """
+    tendons = robot.number_of_tendons
+    if tension is None:
+        closed = np.asarray(closing(robot).tension)
+        closed = closed[np.isfinite(closed)]
+        if not len(closed):
+            raise InputError.MISSING_VALUE(
+                f"no tension closes a notch of {robot.name}, so that nothing says how far to "
+                "pull; give the largest tension"
+            )
+        return np.full(tendons, closed.max())
+    try:
+        values = np.array(tension, float)
+    except (TypeError, ValueError):
+        raise InputError.WRONG_TYPE(
+            f"tension must be a number of N, or one per tendon; got {short_repr(tension)}"
+        ) from None
+    if values.shape not in ((), (tendons,)):
+        raise InputError.WRONG_SHAPE(
+            f"tension must be one number or {tendons}, one per tendon; got {short_repr(tension)}"
+        )
+    if not np.isfinite(values).all():
+        raise InputError.NOT_FINITE(f"tension must be finite, N; got {short_repr(tension)}")
+    if (values < 0.0).any() or not (values > 0.0).any():
+        raise InputError.OUT_OF_RANGE(
+            f"a tendon only pulls: give a largest tension above 0 N; got {short_repr(tension)}"
+        )
+    return np.broadcast_to(values, tendons).copy()
+
+
+def rays(
+    robot: Robot,
+    largest: Float[np.ndarray, " t"],
+    levels: int,
+    pretension: float,
+    points: Callable[[int], Float[np.ndarray, "r d"]],
+) -> Float[np.ndarray, "r s t"]:
+    """Return tensions along rays: a number of levels up to a peak, and the same levels down.
+
+    Half of the rays reach the largest tensions, the others a part of them: unloading begins at many
+    peaks. Directions, peaks and levels are points of a sequence of low discrepancy.
 
     Args:
-        explorer: The robot, its limits and its load.
+        robot: The robot.
         largest: Largest tension of every tendon, N.
-        number: Number of rays.
+        levels: Levels of tension on each way.
         pretension: Tension that every tendon has at least, N.
-        seed: Of the sequence that draws the rays.
+        points: Returns points of the sequence, of so many numbers each between 0 and 1.
+    """
+    groups = _groups(robot, largest)
+    drawn = points(2 * len(groups) + 2)
+    # Rays side by side take as many iterations as the hardest of them: similar ones together.
+    drawn = drawn[np.argsort(drawn[:, 0], kind="stable")]
+    directions = np.zeros((len(drawn), robot.number_of_tendons))
+    for number, group in enumerate(groups):
+        around, share = drawn[:, 2 * number], drawn[:, 2 * number + 1]
+        part = _around(group, around, robot.number_of_tendons)
+        directions += part * share[:, None] if len(groups) > 1 else part
+    directions /= directions.max(axis=1, keepdims=True)
+    peak = np.where(np.arange(len(drawn)) % 2 == 0, 1.0, np.sqrt(drawn[:, -2]))
+    steps = (np.arange(levels) + drawn[:, -1:]) / levels
+    steps[:, -1] = 1.0
+    up = peak[:, None] * steps
+    ways = np.concatenate([up, up[:, ::-1]], axis=1)
+    return np.maximum(ways[:, :, None] * directions[:, None] * largest, pretension)
+
+
+def _groups(robot: Robot, largest: Float[np.ndarray, " t"]) -> list[list[int]]:
+    """Return the tendons that are pulled, by the body where they end, in order around the tube."""
+    groups: dict[int, list[int]] = {}
+    for number, tendon in enumerate(robot.tendon):
+        end = robot.number_of_notches if tendon.end_body is None else tendon.end_body
+        if largest[number] > 0.0:
+            groups.setdefault(end, []).append(number)
+    turn = [tendon.direction_deg % 360.0 for tendon in robot.tendon]
+    return [sorted(group, key=turn.__getitem__) for group in groups.values()]
+
+
+def _around(
+    group: Sequence[int], place: Float[np.ndarray, " r"], tendons: int
+) -> Float[np.ndarray, "r t"]:
+    """Return tensions, the larger of two 1, of neighbours at places from 0 to 1 around the tube."""
+    pulled, row = np.zeros((len(place), tendons)), np.arange(len(place))
+    pairs = 1 if len(group) == 2 else len(group)
+    pair = np.minimum((place * pairs).astype(int), pairs - 1)
+    angle = 0.5 * np.pi * (place * pairs - pair)
+    order = np.array(group)
+    pulled[row, order[pair]] = np.cos(angle)
+    if len(group) > 1:
+        pulled[row, order[(pair + 1) % len(group)]] = np.sin(angle)
+    return pulled / pulled.max(axis=1, keepdims=True)
+
+
+def _under(load: ExternalLoad, tension: Float[np.ndarray, "s t"]) -> LoadPath:
+    """Return a path of valid tensions under a load that acts all the time."""
+    turn = np.array(getattr(load, "base_rotation", NO_VECTOR))
+    external = (load.external,) * len(tension)
+    return LoadPath.of_valid(tension, np.full(tension.shape, np.nan), turn, external)
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceTask(Task):
+    """States of a robot along rays of tension, in pieces; arguments as for `workspace`.
+
+    Attributes:
+        number: Number of rays.
     """
 
-    def __init__(
-        self,
-        explorer: Explorer,
-        largest: Float[np.ndarray, " t"],
-        number: int,
-        pretension: float,
-        seed: int,
-    ) -> None:
-        self.explorer, self.largest = explorer, largest
-        self._rest = number, pretension, seed
-        self.manifest = Manifest.made(
-            KIND,
-            2 * LEVELS * number,
-            2 * LEVELS * min(_PIECE, number),
-            robot=to_table(explorer.robot.replace(tolerance=None)),
-            limits=[one.text for one in explorer.limits],
-            bounds=plain([[one.name, one.low, one.high] for one in explorer.limits]),
-            load=plain(explorer.load),
-            largest=plain(largest),
-            pretension=pretension,
-            seed=seed,
-        )
-
-    @property
-    def recipe(self) -> Recipe:
-        """Recipe by which another process makes the same task."""
-        one = self.explorer
-        content = (one.robot, one.limits, one.load, self.largest, *self._rest)
-        return Recipe(workspace_task, pickle.dumps(content))
-
-    def prepare(self) -> None:
-        """Find the size of a voxel, which all pieces need."""
-        assert self.size
+    robot: Robot
+    limits: tuple[Limit, ...]
+    load: ExternalLoad
+    largest: Float[np.ndarray, " t"]
+    number: int
+    pretension: float
+    seed: int
+    cores: int | None
 
     @cached_property
-    def size(self) -> float:
+    def manifest(self) -> Manifest:
+        """All that the bytes of pieces depend on."""
+        return Manifest.of(
+            "workspace",
+            _STATES * self.number,
+            _STATES * min(_PIECE, self.number),
+            robot=to_table(self.robot.replace(tolerance=None)),
+            limits=[[limit.name, limit.low, limit.high] for limit in self.limits],
+            load=self.load,
+            largest=self.largest,
+            pretension=self.pretension,
+            seed=self.seed,
+        )
+
+    @cached_property
+    def voxel(self) -> float:
         """Edge of a voxel, mm, from a few rays."""
-        robot, largest = self.explorer.robot, self.largest
-        explored = self._solved(rays(robot, largest, _SAMPLE, LEVELS, *self._rest[1:]))
-        side = float(np.ptp(explored.tip, axis=0).max()) if len(explored) else 1.0
+        tips = self.states(0, _SAMPLE, _SAMPLE)[0]["tip"]
+        side = float(np.ptp(tips, axis=0).max()) if len(tips) else 1.0
         return max(side, 1e-6) / _FINE
 
-    def _solved(self, tension: Float[np.ndarray, "r s t"]) -> Workspace:
-        return joined(self.explorer, self.largest, [self.explorer.piece(tension)])
+    def states(
+        self, start: int, stop: int, total: int | None = None
+    ) -> tuple[_Columns, Int[np.ndarray, " 3"]]:
+        """Solve the rays from `start` to `stop` (not included) of a sequence.
 
-    def piece(self, number: int) -> Piece:
+        Returns:
+            The states that are kept; how many are kept, break a limit or follow one that does, and
+            did not converge.
+        """
+
+        def points(dimension: int) -> Float[np.ndarray, "r d"]:
+            return sobol_points(dimension, self.seed, start, stop, total or self.number)
+
+        tension = rays(self.robot, self.largest, _LEVELS, self.pretension, points)
+        if self.limits:
+            tension = tension * self._allowed(tension)[:, None, None]
+        names = ["tip_position", "tip_rotation", "peak_strain", "total_angle"]
+        outputs, within = self._solved(tension, names)
+        # What follows a state beyond a limit has a history that the limit forbids.
+        keeps = np.logical_and.accumulate(within, axis=1)
+        converged, tip = np.asarray(outputs["converged"], bool), outputs["tip_position"]
+        # The same tensions stand at mirrored places of the way up and down.
+        apart = np.linalg.norm(tip - tip[:, ::-1], axis=2)
+        columns = {
+            "tension": tension,
+            "tip": tip,
+            "direction": outputs["tip_rotation"][..., 2],
+            "loading": np.broadcast_to(np.arange(_STATES) < _LEVELS, keeps.shape),
+            "strain": np.abs(outputs["peak_strain"]).max(axis=2),
+            "angle": outputs["total_angle"],
+            "hysteresis": np.where(keeps[:, ::-1], apart, np.nan),
+        }
+        counts = [keeps.sum(), (converged & ~keeps).sum(), (~converged).sum()]
+        return {name: values[keeps] for name, values in columns.items()}, np.array(counts)
+
+    def _allowed(self, tension: Float[np.ndarray, "r s t"]) -> Float[np.ndarray, " r"]:
+        """Return the part of each ray that the limits allow, by a pull in few levels."""
+        part = np.linspace(0.0, 1.0, _FIRST_LEVELS + 1)
+        peak = tension[:, tension.shape[1] // 2]
+        within = self._solved(part[1:, None] * peak[:, None])[1]
+        last = np.logical_and.accumulate(within, axis=1).sum(axis=1)
+        low, high = part[last], part[np.minimum(last + 1, _FIRST_LEVELS)]
+        for _ in range(_HALVINGS):  # rays as a batch
+            middle = 0.5 * (low + high)
+            steps = np.stack([low, middle], axis=1)[:, :, None] * peak[:, None]
+            fits = self._solved(steps)[1][:, 1]
+            low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+        return low
+
+    def _solved(
+        self, tension: Float[np.ndarray, "r s t"], names: Iterable[str] = ()
+    ) -> tuple[Mapping[str, np.ndarray], np.ndarray]:
+        """Return quantities of states, and which of them converge and keep all limits."""
+        outputs = simulate_batch(
+            self.robot,
+            [_under(self.load, ray) for ray in tension],
+            outputs=[*names, "converged", *(limit.name for limit in self.limits)],
+            settings=_SETTINGS,
+            cores=self.cores,
+        )
+        return outputs, all_hold(self.limits, outputs)
+
+    def piece(self, number: int) -> tuple[DataFrame, dict[str, Any]]:
         """Solve the rays of one piece, and thin their states."""
         import polars
 
-        count, pretension, seed = self._rest
-        start, stop = (one // (2 * LEVELS) for one in self.manifest.between(number))
-        robot, largest = self.explorer.robot, self.largest
-        drawn = ray_sequence(robot, largest, count, seed).between(start, stop)
-        explored = self._solved(rays_at(robot, largest, drawn, LEVELS, pretension))
-        columns = _columns(explored)
-        corner = _corners(explored.tip)
-        kept = np.union1d(thinned(columns, self.size), np.flatnonzero(corner))
-        columns["corner"] = corner
-        frame = polars.DataFrame(
-            {name: np.ascontiguousarray(one[kept]) for name, one in columns.items()}
-        )
-        head = {"codes": [len(explored), explored.beyond, explored.failed, 0]}
-        return Piece(frame, head)
+        start, stop = (row // _STATES for row in self.manifest.between(number))
+        columns, counts = self.states(start, stop)
+        tips, weights = columns["tip"], [1.0, np.pi, np.e]  # equal points have equal sums
+        corners = hull_of(tips).corners if len(tips) else tips
+        columns["corner"] = np.isin((tips * weights).sum(axis=1), (corners * weights).sum(axis=1))
+        columns = _thinned(columns, self.voxel)
+        for name in _SHAPES:
+            vectors = columns.pop(name)
+            for place, values in enumerate(vectors.T, start=1):
+                columns[f"{name}_{place}"] = np.ascontiguousarray(values)
+        return polars.DataFrame(columns), {"codes": [*counts.tolist(), 0]}
 
 
-def workspace_task(content: bytes) -> WorkspaceTask:
-    """Make the task of another process again, from objects that it pickled."""
-    robot, limits, load, *rest = pickle.loads(content)
-    return WorkspaceTask(Explorer(robot, limits, load, 1), *rest)
+def _thinned(columns: _Columns, size: float) -> _Columns:
+    """Thin states by voxels of a size, mm.
 
-
-def _columns(explored: Workspace) -> dict[str, np.ndarray]:
-    """Return the states as columns, in mm, N and rad."""
-    vectors = {"tension": explored.tension, "tip": explored.tip, "direction": explored.direction}
-    columns = {
-        f"{name}_{number + 1}": values[:, number]
-        for name, values in vectors.items()
-        for number in range(values.shape[1])
-    }
-    names = ("loading", "strain", "angle", "hysteresis")
-    return columns | {name: getattr(explored, name) for name in names}
-
-
-def _vectors(columns: dict[str, np.ndarray], name: str, size: int) -> Float[np.ndarray, "n k"]:
-    return np.stack([columns[f"{name}_{number + 1}"] for number in range(size)], axis=1)
-
-
-def thinned(columns: dict[str, np.ndarray], size: float) -> Int[np.ndarray, " k"]:
-    """Return the states that are kept: of each voxel, direction and way the largest hysteresis.
-
-    Args:
-        columns: The states.
-        size: Edge of a voxel, mm.
+    Of the states whose tips lie in the same voxel, point the same way (one of the directions of the
+    dexterity) and are both loaded or both unloaded, that with the largest hysteresis is kept.
+    Corners of the convex hull of each piece are kept too, so that the hull is that of all states.
     """
-    cells = np.floor(_vectors(columns, "tip", 3) / size).astype(np.int64)
-    direction = nearest_directions(_vectors(columns, "direction", 3))
-    key = np.column_stack([cells, direction, columns["loading"].astype(np.int64)])
+    cells = np.floor(columns["tip"] / size).astype(np.int64)
+    direction = nearest_directions(columns["direction"])
+    key = np.column_stack([cells, direction, columns["loading"]])
     order = np.argsort(-np.nan_to_num(columns["hysteresis"], nan=-1.0), kind="stable")
-    return np.sort(order[np.unique(key[order], axis=0, return_index=True)[1]])
+    kept = order[np.unique(key[order], axis=0, return_index=True)[1]]
+    kept = np.union1d(kept, np.flatnonzero(columns["corner"]))
+    return {name: values[kept] for name, values in columns.items()}
 
 
-def _corners(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
-    """Return which points are corners of their convex hull."""
-    if not len(points):
-        return np.zeros(0, bool)
-    weights = np.array([1.0, np.pi, np.e])
-    corners = hull_of(points).corners
-    return np.isin((points * weights).sum(axis=1), (corners * weights).sum(axis=1))
-
-
-def explore_in_pieces(
-    explorer: Explorer,
-    largest: Float[np.ndarray, " t"],
-    number: int,
-    pretension: float,
-    seed: int,
-    folder: PieceFolder,
-    progress: Callable[[int, int], None] | None = None,
-) -> Workspace:
-    """Solve rays in pieces, and join the states that are kept.
-
-    Args:
-        explorer: The robot, its limits and its load.
-        largest: Largest tension of every tendon, N.
-        number: Number of rays.
-        pretension: Tension that every tendon has at least, N.
-        seed: Of the sequence that draws the rays.
-        folder: Where pieces are kept.
-        progress: Called with the rays done and the rays of the whole.
-
-    Raises:
-        InputError: The folder holds something else, or cannot be written.
-    """
+def _explored_in_pieces(
+    task: WorkspaceTask, folder: PieceFolder, cores: int | None, progress: Progress
+) -> tuple[_Columns, Int[np.ndarray, " 3"]]:
+    """Solve rays in pieces, and join the states that are kept; returns as `states` of the task."""
     import polars
 
-    alone = Explorer(explorer.robot, explorer.limits, explorer.load, 1)
-    task = WorkspaceTask(alone, largest, number, pretension, seed)
-    each = 2 * LEVELS
-
-    def report(done: int, total: int, *_: int) -> None:
-        if progress is not None:
-            progress(done // each, total // each)
-
-    folder.run(task, cores=explorer.cores, progress=report)
-    codes = np.zeros(4, int)
-    every: dict[str, np.ndarray] = {}
-    for piece in range(task.manifest.pieces):
-        codes += np.array(finished_head(folder.directory, task.manifest, piece)["codes"])
-        frame = polars.read_parquet(piece_file(folder.directory, piece))
-        mine: dict[str, Any] = {name: frame[name].to_numpy() for name in frame.columns}
-        every = {n: np.concatenate([every[n], one]) for n, one in mine.items()} if every else mine
-        kept = np.union1d(thinned(every, task.size), np.flatnonzero(every["corner"]))
-        every = {name: one[kept] for name, one in every.items()}
-    return Workspace(
-        explorer.robot, explorer.limits, explorer.load, largest,
-        int(codes.sum()), int(codes[2]), int(codes[1]),
-        _vectors(every, "tension", len(largest)),
-        _vectors(every, "tip", 3),
-        _vectors(every, "direction", 3),
-        every["loading"], every["strain"], every["angle"], every["hysteresis"],
-        np.full(len(every["strain"]), np.nan),
-    )  # fmt: skip
+    assert task.voxel  # all threads need it
+    folder.run(task, cores=cores, progress=lambda done, total, *_: progress(done, total))
+    counts, joined = np.zeros(3, int), {}
+    for head in heads(folder.directory, task.manifest, range(task.manifest.pieces)):
+        counts += head["codes"][:3]
+        frame = polars.read_parquet(piece_file(folder.directory, head["piece"]))
+        columns: _Columns = {
+            name: frame.select(f"^{name}_\\d+$").to_numpy()
+            if name in _SHAPES
+            else frame[name].to_numpy()
+            for name in (*_SHAPES, "loading", "strain", "angle", "hysteresis", "corner")
+        }
+        if joined:
+            columns = {name: np.concatenate([joined[name], columns[name]]) for name in columns}
+        joined = _thinned(columns, task.voxel)
+    del joined["corner"]
+    return joined, counts
 
 
 def with_stiffness(explored: Workspace, count: int) -> Workspace:
@@ -245,11 +355,12 @@ def with_stiffness(explored: Workspace, count: int) -> Workspace:
         3
     """
     rising = np.flatnonzero(explored.loading)
+    if not count or not len(rising):
+        return explored
     first = np.unique(explored.voxels().of_state[rising], return_index=True)[1]
     even = np.unique(np.linspace(0, len(first) - 1, min(count, len(first))).round().astype(int))
     states = rising[first[even]]
-    tension = explored.tension[states]
-    load = under(explored.load, tension)
+    load = _under(explored.load, explored.tension[states])
     response = tip_response(explored.robot, load, each_from_rest=True)
     by_force = response.compliance[:, 3:, 3:]
     is_known = np.isfinite(by_force).all(axis=(1, 2)) & response.path.converged
@@ -260,7 +371,7 @@ def with_stiffness(explored: Workspace, count: int) -> Workspace:
 
 Progress = Callable[[int, int], None]
 
-MAX_STATES, MAX_IN_PIECES = 20_000_000, 20_000_000_000
+_MAX_STATES, _MAX_IN_PIECES = 20_000_000, 20_000_000_000
 """States in memory at most, and in pieces."""
 
 _MAX_STIFFNESS = 5000
@@ -315,44 +426,16 @@ def workspace(
     """
     checked = limits_of(limits)
     largest = largest_tensions(check_is_robot(robot), tension)
-    folder = None if folder is None else PieceFolder.of(folder)
-    most = MAX_STATES if folder is None else MAX_IN_PIECES
-    _check_numbers(states, pretension, stiffness, seed, float(largest.max()), most)
-    if load is not None and not isinstance(load, ExternalLoad):  # pyright: ignore
-        raise InputError.WRONG_TYPE(
-            f"load must be a notchflex.Load with external loads; got {short_repr(load)}"
-        )
-    explorer = Explorer(robot, checked, load or ExternalLoad(), cores)
-    number = -(-states // (2 * LEVELS))
-    if folder is not None:
-        explored = explore_in_pieces(explorer, largest, number, pretension, seed, folder, progress)
-        return (
-            with_stiffness(explored, stiffness)
-            if stiffness and explored.loading.any()
-            else explored
-        )
-    every = rays(robot, largest, number, LEVELS, pretension, seed)
-    pieces: list[RayPiece] = []
-    for start in range(0, number, _PIECE):
-        pieces.append(explorer.piece(every[start : start + _PIECE]))
-        if progress is not None:
-            progress(min(start + _PIECE, number), number)
-    explored = joined(explorer, largest, pieces)
-    return with_stiffness(explored, stiffness) if stiffness and explored.loading.any() else explored
-
-
-def _check_numbers(
-    states: int, pretension: float, stiffness: int, seed: int, largest: float, most: int
-) -> None:
-    if not 2 * LEVELS <= check_integer(states, "states") <= most:
-        more = ", or more in pieces (give a folder)" if most == MAX_STATES else ""
+    most = _MAX_STATES if folder is None else _MAX_IN_PIECES
+    if not _STATES <= check_integer(states, "states") <= most:
+        more = ", or more in pieces (give a folder)" if folder is None else ""
         raise InputError.OUT_OF_RANGE(
-            f"states must be from {2 * LEVELS} to {most:,}{more}; got {states}"
+            f"states must be from {_STATES} to {most:,}{more}; got {states}"
         )
-    if not 0.0 <= check_number(pretension, "pretension") < largest:
+    if not 0.0 <= check_number(pretension, "pretension") < largest.max():
         raise InputError.OUT_OF_RANGE(
-            f"pretension must be 0 N or more and below the largest tension, {largest:g} N; "
-            f"got {pretension:g}"
+            "pretension must be 0 N or more and below the largest tension, "
+            f"{largest.max():g} N; got {pretension:g}"
         )
     if not 0 <= check_integer(stiffness, "stiffness") <= _MAX_STIFFNESS:
         raise InputError.OUT_OF_RANGE(
@@ -360,3 +443,43 @@ def _check_numbers(
         )
     if check_integer(seed, "seed") < 0:
         raise InputError.OUT_OF_RANGE(f"seed must be 0 or more; got {seed}")
+    load = ExternalLoad() if load is None else load
+    if not isinstance(load, ExternalLoad):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError.WRONG_TYPE(
+            f"load must be a notchflex.Load with external loads; got {short_repr(load)}"
+        )
+    number = -(-states // _STATES)
+
+    def report(done: int, total: int) -> None:
+        if progress is not None:
+            progress(done // _STATES, total // _STATES)
+
+    task = WorkspaceTask(robot, checked, load, largest, number, pretension, seed, cores)
+    if folder is None:
+        columns, counts = _explored(task, report)
+    else:
+        task = replace(task, cores=1)
+        columns, counts = _explored_in_pieces(task, PieceFolder.of(folder), cores, report)
+    explored = Workspace(
+        robot,
+        checked,
+        load,
+        largest,
+        tried=int(counts.sum()),
+        failed=int(counts[2]),
+        beyond=int(counts[1]),
+        **columns,
+        stiffness=np.full(len(columns["tip"]), np.nan),
+    )
+    return with_stiffness(explored, stiffness)
+
+
+def _explored(task: WorkspaceTask, progress: Progress) -> tuple[_Columns, Int[np.ndarray, " 3"]]:
+    """Solve rays piece by piece, and join their states; returns as `states` of the task."""
+    pieces: list[tuple[_Columns, Int[np.ndarray, " 3"]]] = []
+    for start in range(0, task.number, _PIECE):
+        stop = min(start + _PIECE, task.number)
+        pieces.append(task.states(start, stop))
+        progress(_STATES * stop, _STATES * task.number)
+    columns = {name: np.concatenate([piece[name] for piece, _ in pieces]) for name in pieces[0][0]}
+    return columns, np.sum([counts for _, counts in pieces], axis=0)

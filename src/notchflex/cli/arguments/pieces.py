@@ -14,7 +14,7 @@ from notchflex.cli.arguments.conversion import converted
 from notchflex.support import parse_whole
 
 if TYPE_CHECKING:
-    from notchflex.pieces.run import PieceFolder
+    from notchflex.pieces import PieceFolder
 
 PIECES = Group("In pieces", sort_key=7)
 
@@ -71,8 +71,7 @@ class InPieces:
             raise InputError.CONFLICT(
                 "--workers and --scheduler exclude each other; give one of them."
             )
-        from notchflex.pieces.folder import check_target
-        from notchflex.pieces.run import PieceFolder
+        from notchflex.pieces import PieceFolder, check_target
 
         check_target(self.folder, kind, "--folder", [os.fspath(one) for one in inputs])
         return PieceFolder(self.folder, self.workers, self.scheduler)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from notchflex.cli import terminal
 
 if TYPE_CHECKING:
-    from notchflex.sweeping import Sweep
-    from notchflex.sweeping.sweep import Estimate
+    from notchflex.sweeping import Estimate, Sweep
 
 
 def duration(seconds: float) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from notchflex.cli import terminal
 
 if TYPE_CHECKING:
-    from notchflex.workspaces.cloud import Overlap
+    from notchflex.workspaces import Overlap
 
 _SPREADS = {
     "total_angle_deg": "total angle [deg]",

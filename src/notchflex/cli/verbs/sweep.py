@@ -17,8 +17,7 @@ from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.support import check_picture, parse_whole
 
 if TYPE_CHECKING:
-    from notchflex.sweeping import Sweep
-    from notchflex.sweeping.sweep import Estimate
+    from notchflex.sweeping import Estimate, Sweep
 
 _PART = "two whole numbers, such as 7/100 for the seventh of a hundred parts"
 
@@ -117,7 +116,7 @@ def sweep(
     if dry_run:
         with terminal.working("solving some rows"):
             terminal.use_compile_cache()
-            from notchflex.sweeping.sweep import estimate
+            from notchflex.sweeping import estimate
 
             expected = estimate(plan, workers=workers)
         outputs.write_json(expected._asdict)

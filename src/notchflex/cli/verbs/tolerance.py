@@ -96,7 +96,7 @@ def tolerance(
 
 
 def _write(found: ToleranceAnalysis, outputs: Outputs) -> None:
-    from notchflex.tolerancing.documents import tolerance_columns, tolerance_document
+    from notchflex.tolerancing import tolerance_columns, tolerance_document
 
     outputs.write_json(lambda: tolerance_document(found))
     outputs.write_csv(lambda: tolerance_columns(found))

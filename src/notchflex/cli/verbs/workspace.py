@@ -127,7 +127,7 @@ def workspace(
         terminal.use_compile_cache()
         from notchflex import pull
         from notchflex import workspaces as exploring
-        from notchflex.workspaces.limits import in_python
+        from notchflex.workspaces import in_python
 
         load = external.on(pull(0.0, 0.0, steps=1))[0]
         limits = in_python(dict(limit))
@@ -148,7 +148,7 @@ def workspace(
 
 
 def _write(found: Mapping[str, Workspace], outputs: Outputs) -> None:
-    from notchflex.workspaces.cloud import (
+    from notchflex.workspaces import (
         overlap_documents,
         overlaps,
         save_netcdf,

@@ -42,8 +42,13 @@ from notchflex.designing.search.problem import (
 from notchflex.designing.search.search import Searches, SearchResult, solved
 from notchflex.designing.specification import DesignConstraint, DesignSpec, RobustOptions
 from notchflex.support import Tolerance
-from notchflex.tolerancing.study import TAIL
-from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicates, yield_interval
+from notchflex.tolerancing import (
+    REPLICATES,
+    TAIL,
+    points_of_each,
+    replicates,
+    yield_interval,
+)
 
 # Derivatives of a standard deviation are differences of exact derivatives, over this part of the
 # range of each variable.
@@ -221,7 +226,7 @@ def levels_of(
 ) -> Float[np.ndarray, "draws d"]:
     """Return levels of everything that deviates, as for a tolerance analysis."""
     sources = sources_of(problem.solver.variables.robot, tolerances)
-    return np.concatenate(list(replicates(len(sources), points_of_each(draws), seed)))
+    return np.concatenate(replicates(len(sources), points_of_each(draws), seed))
 
 
 def met_by(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,14 +24,16 @@ from notchflex.fit.measurements.measurements import Measurements
 from notchflex.fit.model.constants import Constant, unknowns
 from notchflex.fit.model.drawing import deviations_of
 from notchflex.fit.model.samples import Samples
-from notchflex.pieces.folder import Manifest, Piece, Recipe, finished_head, plain
-from notchflex.pieces.run import PieceFolder
+from notchflex.pieces import Manifest, PieceFolder, Task, heads
 from notchflex.support import to_table
+
+if TYPE_CHECKING:
+    from polars import DataFrame
 
 KIND = "calibration"
 
 
-class SearchTask:
+class SearchTask(Task):
     """Searches from starting points, each of which is a piece.
 
     Args:
@@ -47,29 +48,25 @@ class SearchTask:
         samples = problem.samples
         self._robots = {one.label: one.robot for one in samples.every}
         self._settings = samples.every[0].settings
-        self.manifest = Manifest.made(
+        self.manifest = Manifest.of(
             KIND,
             len(self.points),
             1,
             robots={label: to_table(robot) for label, robot in self._robots.items()},
-            measurements=[[one.label, plain(one.measured)] for one in samples.every],
-            constants=plain(samples.unknowns),
-            objective=plain(problem.objective),
-            settings=plain(self._settings),
+            measurements=[[one.label, one.measured] for one in samples.every],
+            constants=samples.unknowns,
+            objective=[type(problem.objective).__name__, problem.objective],
+            settings=self._settings,
             starts=starts,
             seed=seed,
         )
 
-    @property
-    def recipe(self) -> Recipe:
-        """How another process makes the same task."""
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Tell how another process makes the same task."""
         samples = self.problem.samples
         data = {label: tuple(samples.of_robot(label)) for label in self._robots}
         content = (self._robots, data, samples.unknowns, self._settings)
-        return Recipe(
-            search_task,
-            pickle.dumps((content, self.problem.objective, self.starts, self.seed)),
-        )
+        return _search_task, (content, self.problem.objective, self.starts, self.seed)
 
     def prepare(self) -> None:
         """Estimate the noise, as the first search does at the first point with a solution."""
@@ -78,10 +75,11 @@ class SearchTask:
                 break
             self.problem(point)
 
-    def piece(self, number: int) -> Piece:
+    def piece(self, number: int) -> tuple[DataFrame, dict[str, Any]]:
         """Search from one starting point."""
         import polars
 
+        self.prepare()
         search = search_from(self.problem, self.points[number], number, self.starts, self.seed)
         names = [one.name for one in self.problem.unknowns]
         cost = np.nan if search.cost is None else search.cost.value
@@ -93,7 +91,7 @@ class SearchTask:
             **{name: getattr(search, name) for name in ("converged", "reason")},
             **{name: int(getattr(search, name)) for name in ("iterations", "calls")},
         }
-        return Piece(polars.DataFrame(frame), head)
+        return polars.DataFrame(frame), head
 
     def minimum(self, head: dict[str, Any]) -> Minimum:
         """Return what a search found, from the head of its piece."""
@@ -103,11 +101,11 @@ class SearchTask:
         return Minimum(values, cost, *rest)
 
 
-def search_task(content: bytes) -> SearchTask:
-    """Make the task of another process again, from objects that it pickled."""
-    (robots, data, constants, settings), objective, starts, seed = pickle.loads(content)
-    samples = Samples.of(robots, data, constants, settings)
-    return SearchTask(FitProblem(samples, objective), starts, seed)
+def _search_task(
+    content: tuple[Any, ...], objective: FitObjective, starts: int, seed: int
+) -> SearchTask:
+    """Make the task of another process again."""
+    return SearchTask(FitProblem(Samples.of(*content), objective), starts, seed)
 
 
 def search_in_pieces(
@@ -137,9 +135,8 @@ def search_in_pieces(
                 progress("searching", min(before + rows, starts), starts)
 
         folder.run(task, pieces=range(done, last), cores=1, progress=report)
-        for piece in range(done, last):
-            head = finished_head(folder.directory, task.manifest, piece)
-            if head["codes"][0] or not piece:
+        for head in heads(folder.directory, task.manifest, range(done, last)):
+            if head["codes"][0] or not head["piece"]:
                 minima.append(task.minimum(head))
         done = last
     if all(one.cost is None for one in minima):

@@ -19,7 +19,7 @@ def schema(
     if design and sweep:
         raise InputError.CONFLICT("--design and --sweep exclude each other; give one of them.")
     if sweep:
-        from notchflex.sweeping.plan import plan_schema
+        from notchflex.sweeping import plan_schema
 
         document = plan_schema()
     elif design:
