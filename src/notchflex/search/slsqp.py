@@ -155,10 +155,7 @@ class _Search:
         rest = float(np.linalg.norm(here.gradient + multipliers @ slopes))
         steepest = max(float(np.linalg.norm(here.gradient)), _FLAT * self.steepest)
         settled = program.worst(here) <= TOLERANCE and rest <= _REST * steepest
-            print("   rest", rest / steepest, program.worst(here), here.value)
         return Minimum(self.variables, here, multipliers, active, settled)
-
-
 
 
 def minimise(program: Program, start: Vector, iterations: int) -> Minimum | None:
