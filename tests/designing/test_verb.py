@@ -47,7 +47,7 @@ goal = "maximise"
 CHILD = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in background
-import notchflex.designing.search.search as searches
+import notchflex.designing.search as searches
 searched, begun = searches.search_from, []
 def told(*given):
     begun.append(given)

@@ -10,7 +10,7 @@ from notchflex.designing.result import (
     write_design,
     write_front,
 )
-from notchflex.designing.search.robust import YieldOf
+from notchflex.designing.robust import YieldOf
 from notchflex.designing.specification import (
     DesignConstraint,
     DesignObjective,

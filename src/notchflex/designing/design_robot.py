@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Mapping, Sequence
-from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -14,23 +13,28 @@ import numpy as np
 
 from notchflex import InputError, Robot, load_robot
 from notchflex.analysis.draws import tolerances_of
-from notchflex.designing.explanation import chosen_form, curves_missed, explain, yield_sentences
+from notchflex.designing.explanation import (
+    chosen_form,
+    curves_missed,
+    explain,
+    missed_rows,
+    yield_sentences,
+)
 from notchflex.designing.model.point import Solver
 from notchflex.designing.model.quantities import COMPLIANCE, CURVE, OF_STATES
 from notchflex.designing.model.variables import StatePaths, check_states, state_paths, variables_of
 from notchflex.designing.model.wishes import Wish, wishes_of
+from notchflex.designing.problem import DesignProblem, Progress
 from notchflex.designing.result import (
     Design,
     VariableResult,
     WishResult,
     asked_in_words,
-    total_counts,
 )
-from notchflex.designing.search.problem import TOLERANCE, DesignEvaluation, DesignProblem, Progress
-from notchflex.designing.search.robust import YieldOf, check_limits, robust_search
-from notchflex.designing.search.search import Searches, SearchResult, search
+from notchflex.designing.robust import YieldOf, check_limits, robust_search
+from notchflex.designing.search import Searches, on_grid, search
 from notchflex.designing.specification import (
-    DesignConstraint,
+    DesignObjective,
     DesignSpec,
     RobustOptions,
     read_design,
@@ -170,52 +174,6 @@ def _paths(spec: DesignSpec, wishes: tuple[Wish, ...], robot: Robot) -> StatePat
     return state_paths(spec.state, robot.number_of_tendons, list(dict.fromkeys(used)), probes)
 
 
-# Lengths that are tried on both sides of where the search ended; of more, the nearest is taken.
-_MOST = 6
-
-
-def on_grid(searches: Searches, grid: float) -> Searches:
-    """Return the searches with the best robot on a grid.
-
-    Of the neighbours of the best robot it is the one that meets the constraints, or comes nearest,
-    with the smallest sum.
-
-    Args:
-        searches: The searches.
-        grid: Step of all lengths that are variables, mm; 0 for none.
-
-    Raises:
-        InputError: No robot on the grid lies within the limits and can be solved.
-    """
-    if not grid:
-        return searches
-    best = searches.optimum
-    problem, solver = copy(best.problem), best.problem.solver
-    variables = replace(solver.variables, grid=grid)
-    problem.solver, problem.failures = replace(solver, variables=variables), {}
-    vars(problem).pop("_kept", None)
-    exact = problem.x(best.found.z)
-    steps = np.where(variables.lengths, exact / grid, 0.0)
-    sides = [sorted({np.floor(one), np.ceil(one)}) for one in steps]
-    if sum(map(len, sides)) > len(sides) + _MOST:
-        sides = [[np.round(one)] for one in steps]
-    results: list[SearchResult] = []
-    for places in itertools.product(*sides):
-        x = np.where(variables.lengths, np.array(places) * grid, exact)
-        z = (x - variables.lower) / variables.span
-        one = problem.evaluate(z) if np.abs(z - 0.5).max(initial=0.0) <= 0.5 + 1e-9 else None
-        if one is not None:
-            found = best.found._replace(z=z, evaluation=one)
-            results.append(replace(best, problem=problem, found=found))
-    if not results:
-        reasons = "; ".join(problem.failures) or "all lie beyond the limits of the variables"
-        raise InputError.UNSUPPORTED(
-            f"no robot on a grid of {grid:g} mm beside the best one can be made: {reasons}; give a "
-            "smaller grid."
-        )
-    return replace(searches, rounded=min(results, key=lambda one: one.merit))
-
-
 def design(
     spec: DesignSpec | Mapping[str, Any] | str | os.PathLike[str],
     *,
@@ -251,7 +209,7 @@ def design(
         >>> f"{made.robot.notches[0].height:.3f} mm"
         '0.627 mm'
     """
-    asked, first = given(spec, robot)
+    asked, first = specification_of(spec, robot)
     if not 0.0 <= check_number(grid, "grid") < np.inf:
         raise InputError.OUT_OF_RANGE(f"grid must be 0 mm or more and finite; got {grid:g} mm.")
     if robust and not asked.is_robust:
@@ -296,7 +254,7 @@ def with_yields(design: Design, yields: tuple[YieldOf, ...]) -> Design:
     )
 
 
-def given(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
+def specification_of(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
     """Return a specification given in any form, and the robot to begin with.
 
     Raises:
@@ -319,29 +277,34 @@ def made_of(
 ) -> Design:
     """Make the result of the best of some searches."""
     best = searches.best
-    problem, optimum = best.problem, best.found
-    one = optimum.evaluation
-    assert one is not None
-    initial = problem.evaluate(problem.start)
-    missed = missed_by_wish(problem, one)
+    problem, one, variables = best.problem, best.evaluation, best.problem.solver.variables
+    initial = problem.initial
+    missed = {id(problem.rows[number].wish) for number in missed_rows(best)}
     wishes = tuple(
-        _achieved(wish, one.point, initial and initial.point, missed.get(id(wish)))
+        WishResult(
+            title=wish.title,
+            unit=wish.unit,
+            asked=asked_in_words(wish),
+            achieved=tuple(wish.measure(one.point).values.tolist()),
+            before=() if initial is None else tuple(wish.measure(initial.point).values.tolist()),
+            met=None if isinstance(wish.asked, DesignObjective) else id(wish) not in missed,
+            parts=wish.labels,
+        )
         for wish in problem.wishes
     )
-    variables = problem.solver.variables
-    met = problem.worst(one) <= TOLERANCE
     reason = ""
     if searches.interrupted:
         reason = "interrupted; this is the best robot so far"
-    elif not met:
-        grid = problem.solver.variables.grid
-        where = f" on a grid of {grid:g} mm" if grid else ""
+    elif missed:
+        where = f" on a grid of {variables.grid:g} mm" if variables.grid else ""
         reason = f"not all constraints can be met{where}; this is the robot that comes nearest"
     elif far := curves_missed(best):
         reason = far[0].rstrip(".")
-    elif not optimum.stationary:
+    elif not best.is_stationary:
         reason = "the search ended before it settled; try more starts or iterations"
-    solves, gradients = total_counts([*problems, *(one.problem for one in searches.outcomes)])
+    every = [*problems, *(one.problem for one in searches.outcomes)]
+    counts = {id(one.solver.counts): one.solver.counts for one in every}.values()
+    values = zip(variables.columns, one.point.x.tolist(), variables.start.tolist(), strict=True)
     return Design(
         spec=spec,
         before=first,
@@ -350,42 +313,15 @@ def made_of(
         reason=reason,
         wishes=wishes,
         variables=tuple(
-            VariableResult(c.name, c.unit, value, was, c.lower, c.upper)
-            for c, value, was in zip(
-                variables.columns, one.point.x.tolist(), variables.start.tolist(), strict=True
-            )
+            VariableResult(column.name, column.unit, value, before, column.lower, column.upper)
+            for column, value, before in values
         ),
         explanation=(
             *chosen_form(spec, one.point.robot, len(problems)),
             *explain(searches.optimum),
         ),
-        solves=solves,
-        gradients=gradients,
+        solves=sum(one["solves"] for one in counts),
+        gradients=sum(one["gradients"] for one in counts),
         starts=len(searches.outcomes),
         outcome=best,
-    )
-
-
-def missed_by_wish(problem: DesignProblem, one: DesignEvaluation) -> dict[int, float]:
-    """Return the most by which each constraint is missed, in the sizes of its numbers."""
-    violations: dict[int, float] = {}
-    for row, violation in zip(problem.rows, np.abs(problem.violation(one)).tolist(), strict=True):
-        violations[id(row.wish)] = max(violations.get(id(row.wish), 0.0), violation)
-    return violations
-
-
-def _achieved(wish: Wish, point: Any, before: Any, violation: float | None) -> WishResult:
-    """Compare what is achieved with what was asked."""
-    met = None
-    if isinstance(wish.asked, DesignConstraint):
-        met = violation is not None and violation <= TOLERANCE
-    was = () if before is None else tuple(wish.measure(before.plain).values.tolist())
-    return WishResult(
-        title=wish.title,
-        unit=wish.unit,
-        asked=asked_in_words(wish),
-        achieved=tuple(wish.measure(point.plain).values.tolist()),
-        before=was,
-        met=met,
-        parts=wish.labels,
     )

@@ -3,37 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from notchflex import Robot
-from notchflex.designing.model.wishes import Wish
-from notchflex.designing.search.optimality import ActiveLimit, multipliers
-from notchflex.designing.search.problem import TOLERANCE, DesignProblem, Row
-from notchflex.designing.search.robust import YieldOf
-from notchflex.designing.search.search import SearchResult
+from notchflex.designing.problem import DesignProblem, Row
+from notchflex.designing.robust import YieldOf
+from notchflex.designing.search import SearchResult
 from notchflex.designing.specification import DesignObjective, DesignSpec
+from notchflex.search.slsqp import TOLERANCE
 from notchflex.support import numbers_at, round_number, short
 
 # The most sentences about limits, the dearest first.
 _MAX_SENTENCES = 12
 # Change of a limit, relative to its size, for which its cost is stated.
 _PART = 0.05
-_NOTHING = 1e-9
+# An effect below this part of the sum is none; a variable is at a limit within this part of its range.
+_NO_EFFECT, _AT_LIMIT = 1e-9, 1e-6
 
 
 def curves_missed(outcome: SearchResult) -> tuple[str, ...]:
     """Return a sentence for every curve with points that the axis does not reach."""
-    one = outcome.found.evaluation
-    assert one is not None
     sentences: list[str] = []
     for curve in {id(w.curve): w.curve for w in outcome.problem.wishes if w.curve}.values():
-        far = one.point.plain.curve(curve).values
-        numbers = np.flatnonzero(far > curve.within) + 1
-        if len(numbers):
-            shown = ", ".join(map(str, numbers[:10].tolist())) + (
-                " ..." if len(numbers) > 10 else ""
-            )
+        far = outcome.evaluation.point.curve(curve).values
+        numbers = (np.flatnonzero(far > curve.within) + 1).tolist()
+        if numbers:
+            shown = ", ".join(map(str, numbers[:10])) + (" ..." if len(numbers) > 10 else "")
             sentences.append(
                 f"curve.{curve.name} is not reached at {len(numbers)} of {len(far)} points "
                 f"({shown}), up to {short(float(far.max()))} mm away; asked {curve.within:g} mm."
@@ -58,126 +55,124 @@ def yield_sentences(yields: Sequence[YieldOf]) -> tuple[str, ...]:
 
 
 def _yield_sentence(one: YieldOf) -> str:
-    low, high = (_percent(end) for end in one.interval)
-    target = "" if one.wanted is None else f", wanted {_percent(one.wanted)} %"
+    achieved, low, high, plain = (
+        f"{100.0 * part:.4g}" for part in (one.achieved, *one.interval, one.plain)
+    )
+    target = "" if one.wanted is None else f", wanted {100.0 * one.wanted:.4g} %"
     meets = "meet" if one.title == "all limits" else "meet the limit of"
     return (
-        f"{_percent(one.achieved)} % of the robots made within the tolerances {meets} {one.title} "
-        f"({low} to {high} %{target}); without regard to tolerances {_percent(one.plain)} %."
+        f"{achieved} % of the robots made within the tolerances {meets} {one.title} "
+        f"({low} to {high} %{target}); without regard to tolerances {plain} %."
     )
-
-
-def _percent(part: float) -> str:
-    return f"{100.0 * part:.4g}"
 
 
 def explain(outcome: SearchResult) -> tuple[str, ...]:
     """Return sentences about the best robot of a design."""
-    return (*curves_missed(outcome), *_about_limits(outcome))
+    missed = missed_rows(outcome)
+    limits = (*_missed(outcome, missed), _at_limits(outcome)) if missed else _held(outcome)
+    return (*curves_missed(outcome), *limits)
 
 
-def _about_limits(outcome: SearchResult) -> tuple[str, ...]:
-    one = outcome.found.evaluation
-    assert one is not None
-    problem = outcome.problem
-    if problem.worst(one) > TOLERANCE:
-        return (*_missed(outcome), *_at_limits(outcome))
-    active = multipliers(problem, outcome.found.z, one)
-    costs = sorted(active.held, key=lambda held: -abs(_effect(problem, held)[1]))
-    sentences = [_sentence(problem, held) for held in costs]
+class _ActiveLimit(NamedTuple):
+    """A limit that the design is at."""
+
+    title: str
+    unit: str
+    limit: float
+    side: str  # "least", "greatest" or "wanted"
+    step: float  # a round change of the limit
+    effect: float  # change of the sum by that step more
+
+
+def _active_limits(outcome: SearchResult) -> list[_ActiveLimit]:
+    """Return the limits that are reached, that with the greatest effect first."""
+    problem, minimum = outcome.problem, outcome.minimum
+    assert minimum is not None
+    rows, columns = problem.rows, problem.solver.variables.columns
+    first = len(minimum.multipliers) - len(minimum.variables)  # of the variables
+    titled = [
+        (k, row.title, row.wish.unit, row, row.size or problem.sizes[k])
+        for k, row in enumerate(rows)
+    ]
+    titled += [(first + k, c.name, c.unit, c, c.span) for k, c in enumerate(columns)]
+    limits: list[_ActiveLimit] = []
+    for k, title, unit, one, size in titled:
+        if not minimum.active[k]:
+            continue
+        number = (
+            outcome.evaluation.rows.values[k]
+            if k < first
+            else outcome.evaluation.point.x[k - first]
+        )
+        is_low = one.upper - number > number - one.lower
+        side = "wanted" if one.lower == one.upper else "least" if is_low else "greatest"
+        step = round_number(_PART * size)
+        cost = -minimum.multipliers[k] / (size if k >= first else 1.0)
+        limits.append(
+            _ActiveLimit(title, unit, one.lower if is_low else one.upper, side, step, cost * step)
+        )
+    return sorted(limits, key=lambda one: -abs(one.effect))
+
+
+def _held(outcome: SearchResult) -> tuple[str, ...]:
+    """Which limits hold the design, and what each costs."""
+    sentences = [_sentence(outcome, limit) for limit in _active_limits(outcome)]
     kept = [one for one in sentences if one]
-    left = len(kept) - _MAX_SENTENCES
     if not kept:
-        kept = ["No limit is active: the design meets the specification inside all limits."]
+        return ("No limit is active: the design meets the specification inside all limits.",)
+    left = len(kept) - _MAX_SENTENCES
     more = [f"{left} more limits are reached."] if left > 0 else []
     return (*kept[:_MAX_SENTENCES], *more)
 
 
-def _effect(problem: DesignProblem, held: ActiveLimit) -> tuple[float, float]:
-    """A round change of a limit, and what it changes of the sum."""
-    if held.is_variable:
-        size = problem.solver.variables.span[held.row]
-    else:
-        row = problem.rows[held.row]
-        limits = [abs(one) for one in (row.lower, row.upper) if np.isfinite(one)]
-        size = max(limits, default=0.0) or float(problem.sizes[held.row])
-    step = round_number(_PART * size)
-    return step, held.cost * step
+def _sentence(outcome: SearchResult, active: _ActiveLimit) -> str:
+    what = _objective_name(outcome.problem)
+    limit = f"{active.title} stands at its {active.side} value, "
+    limit += f"{short(active.limit)} {active.unit}".strip()
+    if what is None or abs(active.effect) <= _NO_EFFECT * abs(outcome.evaluation.total):
+        return "" if active.side == "wanted" else f"{limit}."
+    name, unit, verb = what
+    # A wanted value is moved to where the sum falls, a limit to where it leaves more room.
+    is_more = active.effect < 0.0 if active.side == "wanted" else active.side == "greatest"
+    step = f"{short(active.step)} {active.unit}".strip() + (" more" if is_more else " less")
+    amount = f"{short(abs(active.effect))} {unit}".strip()
+    return f"{limit}; {step} would {verb} {amount} of {name}."
 
 
-def _sentence(problem: DesignProblem, held: ActiveLimit) -> str:
-    step, effect = _effect(problem, held)
-    what = _objective_name(problem)
-    limit, unit, change = _place(problem, held, step)
-    if what is None or abs(effect) <= _NOTHING * problem.total_size:
-        return f"{limit}." if held.side else ""
-    name, of_unit, sign = what
-    gain = effect if held.side else -abs(effect)
-    if held.side == 0:
-        way = "more" if effect < 0.0 else "less"
-        change = f"{short(step)} {unit}".strip() + f" {way}"
-    elif held.side < 0:
-        gain = -effect
-    amount = f"{short(abs(gain))} {of_unit}".strip()
-    return f"{limit}; {change} would {'save' if sign > 0 else 'gain'} {amount} of {name}."
-
-
-def _place(problem: DesignProblem, held: ActiveLimit, step: float) -> tuple[str, str, str]:
-    if held.is_variable:
-        column = problem.solver.variables.columns[held.row]
-        limit = column.upper if held.side > 0 else column.lower
-        title, unit = column.name, column.unit
-    else:
-        row = problem.rows[held.row]
-        limit = row.upper if held.side >= 0 else row.lower
-        title, unit = row.title, row.wish.unit
-    at = {1: "greatest", -1: "least", 0: "wanted"}[held.side]
-    shown = f"{short(limit)} {unit}".strip()
-    change = f"{short(step)} {unit}".strip() + (" more" if held.side > 0 else " less")
-    return f"{title} stands at its {at} value, {shown}", unit, change
-
-
-def _objective_name(problem: DesignProblem) -> tuple[str, str, float] | None:
-    """Name, unit and direction of the only objective; None without one."""
-    objectives = problem.objectives
-    if len(objectives) == 0:
+def _objective_name(problem: DesignProblem) -> tuple[str, str, str] | None:
+    """Name and unit of the objective, and what less of a limit does to it; None without one."""
+    if not problem.objectives:
         return None
-    if len(objectives) > 1:
-        return "the weighted sum of the objectives", "", 1.0
-    wish = objectives[0]
+    if len(problem.objectives) > 1:
+        return "the weighted sum of the objectives", "", "save"
+    (wish,) = problem.objectives
     asked = wish.asked
     assert isinstance(asked, DesignObjective)
     if asked.target is not None:
-        return f"the squared distance of {wish.title} from {asked.target:g}", "", 1.0
+        return f"the squared distance of {wish.title} from {asked.target:g}", "", "save"
     if wish.take == "rms":
-        return f"the square of {wish.title}", f"{wish.unit}²" if wish.unit else "", 1.0
-    return wish.title, wish.unit, 1.0 if asked.goal == "minimise" else -1.0
+        return f"the square of {wish.title}", f"{wish.unit}²" if wish.unit else "", "save"
+    return wish.title, wish.unit, "save" if asked.goal == "minimise" else "gain"
 
 
-def _missed(outcome: SearchResult) -> tuple[str, ...]:
-    """Conflicting constraints, and the violation of each at the nearest robot."""
-    one, problem = outcome.found.evaluation, outcome.problem
-    assert one is not None
-    violation = np.abs(problem.violation(one))
-    worst: dict[int, tuple[float, int]] = {}
-    wishes: dict[int, Wish] = {}
-    for number, row in enumerate(problem.rows):
+def missed_rows(outcome: SearchResult) -> list[int]:
+    """Return the number of the row by which each missed constraint is missed most, worst first."""
+    rows, worst = outcome.problem.rows, dict[int, int]()
+    violation = np.abs(outcome.problem.violation(outcome.evaluation))
+    for number in np.argsort(-violation).tolist():
         if violation[number] > TOLERANCE:
-            before = worst.get(id(row.wish), (0.0, number))
-            worst[id(row.wish)] = max(before, (float(violation[number]), number))
-            wishes[id(row.wish)] = row.wish
-    sentences: list[str] = []
-    for _, number in sorted(worst.values(), reverse=True):
-        row = problem.rows[number]
-        sentences.append(_miss(row, float(one.rows.values[number])))
-    start = (
-        "One constraint cannot be met"
-        if len(sentences) == 1
-        else "These constraints contradict each other"
-    )
+            worst.setdefault(id(rows[number].wish), number)
+    return list(worst.values())
+
+
+def _missed(outcome: SearchResult, missed: Sequence[int]) -> tuple[str, ...]:
+    """Conflicting constraints, and the violation of each at the nearest robot."""
+    several = "These constraints contradict each other"
+    start = several if len(missed) > 1 else "One constraint cannot be met"
+    numbers = outcome.evaluation.rows.values.tolist()
     return (
         f"{start} within the limits of the variables; the robot that comes nearest:",
-        *sentences,
+        *(_miss(outcome.problem.rows[number], numbers[number]) for number in missed),
     )
 
 
@@ -185,22 +180,20 @@ def _miss(row: Row, value: float) -> str:
     unit = f" {row.wish.unit}" if row.wish.unit else ""
     limit = row.upper if value > row.upper else row.lower
     way = "above" if value > limit else "below"
-    word = "the value" if row.is_equality else "its limit"
+    word = "the value" if row.lower == row.upper else "its limit"
     off = f"{short(abs(value - limit))}{unit} {way} {word} {short(limit)}{unit}"
     return f"{row.title} is {short(value)}{unit}, {off}."
 
 
-def _at_limits(outcome: SearchResult) -> tuple[str, ...]:
+def _at_limits(outcome: SearchResult) -> str:
     """Which variables stand at their limits, where wider ones could help."""
+    columns = outcome.problem.solver.variables.columns
     names: list[str] = []
-    for z, column in zip(
-        outcome.found.z.tolist(), outcome.problem.solver.variables.columns, strict=False
-    ):
-        if z < 1e-6 or z > 1.0 - 1e-6:
-            limit = column.upper if z > 0.5 else column.lower
-            which = "greatest" if z > 0.5 else "least"
+    for z, column in zip(outcome.evaluation.z.tolist(), columns, strict=True):
+        if abs(z - 0.5) > 0.5 - _AT_LIMIT:
+            which, limit = ("greatest", column.upper) if z > 0.5 else ("least", column.lower)
             names.append(f"{column.name} ({which}, {limit:g} {column.unit})".replace(" )", ")"))
     if not names:
-        return ("No variable stands at its limit: other variables are needed, or weaker wishes.",)
+        return "No variable stands at its limit: other variables are needed, or weaker wishes."
     shown = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
-    return (f"Wider limits could help where a variable stands at its own: {shown}.",)
+    return f"Wider limits could help where a variable stands at its own: {shown}."

@@ -16,24 +16,24 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex import InputError, Robot
-from notchflex.designing.design_robot import given, made_of, problems_of
-from notchflex.designing.model.wishes import Wish
-from notchflex.designing.result import Design
-from notchflex.designing.search.local import search_from
-from notchflex.designing.search.problem import (
-    TOLERANCE,
+from notchflex.designing.design_robot import made_of, problems_of, specification_of
+from notchflex.designing.problem import (
     DesignEvaluation,
     DesignProblem,
     Progress,
-    Vector,
     objective_reading,
 )
-from notchflex.designing.search.search import Searches, SearchResult, draw, evaluate_all, smooth
+from notchflex.designing.result import Design
+from notchflex.designing.search import Searches, SearchResult, drawn_robots
 from notchflex.designing.specification import DesignSpec
+from notchflex.search.slsqp import TOLERANCE, minimise
 from notchflex.support import Displayed, Summary, need, short
 
 _MAX_OBJECTIVES = 3
+# Objectives and violations of a robot that cannot be solved.
 _UNSOLVED = 1e6
+# Largest violation of a robot of the genetic search that is polished.
+_NEARLY = 1e-3
 # A point is kept beside another if it differs by this part of the range of an objective.
 _APART = 1e-3
 
@@ -107,7 +107,7 @@ def design_front(
         InputError: Not two or three objectives, pymoo is not installed, or as for `design`.
     """
     need("pymoo", "design", "a front between objectives")
-    asked, first = given(spec, robot)
+    asked, first = specification_of(spec, robot)
     if not 2 <= len(asked.objective) <= _MAX_OBJECTIVES or asked.curve:
         raise InputError.UNSUPPORTED(
             f"a front needs 2 or {_MAX_OBJECTIVES} objectives, and curves as one of them; got "
@@ -121,149 +121,101 @@ def design_front(
     if points < 2 or generations < 1:
         raise InputError.OUT_OF_RANGE("a front needs 2 points and 1 generation or more")
     problems = problems_of(asked, first)
-    found: list[tuple[DesignProblem, Vector, DesignEvaluation]] = []
+    report: Progress = progress or (lambda stage, done, total: None)
+    spread: list[SearchResult] = []
+    polished: list[SearchResult] = []
     reason = ""
     try:
         for number, problem in enumerate(problems):
-            if progress is not None:
-                progress("spreading over the front", number, len(problems))
-            found += _spread(problem, points, generations, asked.search.seed)
-        chosen = _chosen(found, points)
-        polished: list[tuple[DesignProblem, Vector, DesignEvaluation]] = []
+            report("spreading over the front", number, len(problems))
+            spread += _spread(problem, number, points, generations, asked.search.seed)
+        chosen = _chosen(spread, points)
         for number, one in enumerate(chosen):
-            if progress is not None:
-                progress("polishing", number, len(chosen))
-            polished.append(_polished(*one, asked.search.iterations))
-        found = polished
+            report("polishing", number, len(chosen))
+            polished += _polished(one, asked.search.iterations)
     except KeyboardInterrupt:
         reason = "interrupted; these are the robots so far"
-        found = [one for one in found if one[2].has_slopes] or found[:1]
-    best = _chosen([one for one in found if one[2].has_slopes], points)
+    best = _chosen(polished, points)
     if not best:
         raise InputError.UNSUPPORTED("no robot meets all constraints; try `notchflex design` first")
-    designs = tuple(_design(asked, first, problems, one) for one in best)
-    return DesignFront(asked, designs, reason)
+    designs = (made_of(asked, first, problems, Searches([one])) for one in best)
+    return DesignFront(asked, tuple(replace(one, explanation=()) for one in designs), reason)
 
 
 def sums(problem: DesignProblem, one: DesignEvaluation) -> Float[np.ndarray, " m"]:
     """Return what each objective adds to the sum that is minimised."""
-    wishes = problem.objectives
-    return np.array([float(objective_reading(w, one.point.plain).values.sum()) for w in wishes])
+    return np.array([objective_reading(w, one.point).values[0] for w in problem.objectives])
 
 
 def _spread(
-    problem: DesignProblem, points: int, generations: int, seed: int
-) -> list[tuple[DesignProblem, Vector, DesignEvaluation]]:
-    """Return the front of a genetic search of one form of robots."""
+    problem: DesignProblem, number: int, points: int, generations: int, seed: int
+) -> list[SearchResult]:
+    """Return the last generation of a genetic search of one form of robots."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem as PymooProblem
     from pymoo.optimize import minimize
 
     size = 4 * points
-    count = len(problem.objectives)
-    evaluations = [
-        one for _, one in evaluate_all(problem, smooth(problem, size, seed)) if one is not None
-    ]
-    if evaluations:
-        problem.set_sizes(evaluations)
+    start = drawn_robots(problem, size, seed)
+    problem.set_sizes([one for one in problem.evaluate_all(start) if one is not None])
     evaluated: dict[bytes, DesignEvaluation] = {}
 
     class Batched(PymooProblem):  # pyright: ignore[reportUntypedBaseClass]
         """One batch a generation."""
 
         def __init__(self) -> None:
-            rows = len(problem.rows)
-            super().__init__(n_var=problem.count, n_obj=count, n_ieq_constr=rows, xl=0.0, xu=1.0)
+            objectives, rows = len(problem.objectives), len(problem.rows)
+            super().__init__(
+                n_var=problem.count, n_obj=objectives, n_ieq_constr=rows, xl=0.0, xu=1.0
+            )
 
         def _evaluate(self, x: np.ndarray, out: dict[str, Any], *_: Any, **__: Any) -> None:
-            objectives = np.full((len(x), count), _UNSOLVED)
-            violation = np.full((len(x), len(problem.rows)), _UNSOLVED)
-            for row, (z, one) in enumerate(evaluate_all(problem, x)):
+            out["F"] = np.full((len(x), len(problem.objectives)), _UNSOLVED)
+            out["G"] = np.full((len(x), len(problem.rows)), _UNSOLVED)
+            for row, one in enumerate(problem.evaluate_all(x)):
                 if one is not None:
-                    evaluated[np.asarray(z).tobytes()] = one
-                    objectives[row] = sums(problem, one)
-                    violation[row] = np.abs(problem.violation(one)) - 1e-3
-            out["F"], out["G"] = objectives, violation
+                    evaluated[x[row].tobytes()] = one
+                    out["F"][row] = sums(problem, one)
+                    out["G"][row] = np.abs(problem.violation(one)) - _NEARLY
 
-    half = size // 2
-    start: Any = np.concatenate(
-        [smooth(problem, half, seed), draw(size - half, problem.count, seed)]
-    )
     algorithm: Any = NSGA2(pop_size=size, sampling=start)
     result: Any = minimize(Batched(), algorithm, ("n_gen", generations), seed=seed, verbose=False)
-    population = result.pop.get("X")
-    every = [(problem, z, evaluated[z.tobytes()]) for z in population if z.tobytes() in evaluated]
-    return sorted(every, key=lambda one: problem.worst(one[2]))
+    last = [evaluated.get(z.tobytes()) for z in result.pop.get("X")]
+    return [SearchResult(problem, number, one) for one in last if one is not None]
 
 
-def _polished(
-    problem: DesignProblem, z: Vector, one: DesignEvaluation, iterations: int
-) -> tuple[DesignProblem, Vector, DesignEvaluation]:
-    """Make the first objective least, the others no worse."""
-    wishes = problem.objectives
-    values = sums(problem, one)
-    limited = [
-        (wish, float(value) + 1e-9 * max(1.0, abs(float(value))))
-        for wish, value in zip(wishes[1:], values[1:], strict=True)
-    ]
-    first = replace_problem(problem, wishes[0], limited)
-    optimum = search_from(first, z, iterations)
-    if optimum.evaluation is None or first.worst(optimum.evaluation) > TOLERANCE:
-        return problem, z, one
-    whole = problem.evaluate(optimum.z)
-    full = None if whole is None else problem.with_slopes(whole, optimum.z)
-    return (problem, z, one) if full is None else (problem, optimum.z, full)
+def _polished(one: SearchResult, iterations: int) -> list[SearchResult]:
+    """Make the first objective least, the others no worse; none where no constraints are met."""
+    problem, wishes = one.problem, one.problem.objectives
+    most = sums(problem, one.evaluation)
+    most += 1e-9 * np.maximum(np.abs(most), 1.0)
+    caps = tuple(zip(wishes[1:], most[1:].tolist(), strict=True))
+    capped = replace(problem, wishes=(wishes[0], *problem.constraints), caps=caps)
+    capped.sizes[: len(problem.sizes)] = problem.sizes
+    found = minimise(*capped.program(one.evaluation), iterations)
+    if found is None or capped.worst(found.reached.source) > TOLERANCE:
+        return []
+    end: DesignEvaluation = found.reached.source
+    settled = found._replace(is_stationary=True)
+    return [replace(one, evaluation=problem.read(end.point, end.z), minimum=settled)]
 
 
-def replace_problem(
-    problem: DesignProblem, kept: Wish, limited: list[tuple[Wish, float]]
-) -> DesignProblem:
-    """Return a problem of one objective, with limits on the others."""
-    replaced = DesignProblem(problem.solver, (kept, *problem.constraints), tuple(limited))
-    sizes = [problem.sizes, np.array([max(abs(most), 1e-12) for _, most in limited])]
-    vars(replaced)["sizes"] = np.concatenate(sizes)
-    vars(replaced)["total_size"] = problem.total_size
-    return replaced
-
-
-def _chosen(
-    candidates: list[tuple[DesignProblem, Vector, DesignEvaluation]], points: int
-) -> list[tuple[DesignProblem, Vector, DesignEvaluation]]:
+def _chosen(candidates: list[SearchResult], points: int) -> list[SearchResult]:
     """Choose points that none of the others beats, spread evenly, by the first objective."""
-    feasible = [one for one in candidates if one[0].worst(one[2]) <= max(TOLERANCE, 2e-3)]
+    feasible = [one for one in candidates if one.merit[0] <= 2.0 * _NEARLY]
     if not feasible:
         return []
-    values = np.array([sums(problem, one) for problem, _, one in feasible])
+    values = np.array([sums(one.problem, one.evaluation) for one in feasible])
     span = np.ptp(values, axis=0)
     scaled = (values - values.min(axis=0)) / np.where(span > 0.0, span, 1.0)
-    best = [
-        k
-        for k, one in enumerate(scaled)
-        if not ((scaled <= one + 1e-12).all(axis=1) & (scaled < one - 1e-9).any(axis=1)).any()
-    ]
     kept: list[int] = []
-    for k in sorted(best, key=lambda number: tuple(scaled[number])):
-        if all(np.abs(scaled[k] - scaled[other]).max() > _APART for other in kept):
+    for k in np.lexsort(scaled.T[::-1]).tolist():
+        better = (scaled <= scaled[k] + 1e-12).all(axis=1) & (scaled < scaled[k] - 1e-9).any(axis=1)
+        if not better.any() and all(np.abs(scaled[k] - scaled[j]).max() > _APART for j in kept):
             kept.append(k)
     if len(kept) > points:  # evenly along the front
         steps = np.linalg.norm(np.diff(scaled[kept], axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(steps)])
         targets = np.linspace(0.0, along[-1], points)
-        kept = [kept[int(np.argmin(np.abs(along - one)))] for one in targets]
-        kept = list(dict.fromkeys(kept))
-    return [feasible[k] for k in kept]
-
-
-def _design(
-    spec: DesignSpec,
-    first: Robot,
-    problems: list[DesignProblem],
-    one: tuple[DesignProblem, Vector, DesignEvaluation],
-) -> Design:
-    problem, z, evaluation = one
-    from notchflex.designing.search.local import LocalOptimum
-
-    optimum = LocalOptimum(z, evaluation, True, 0)
-    outcome = SearchResult(problem, problems.index(problem), z, optimum)
-    design = made_of(spec, first, problems, Searches([outcome]))
-    return replace(design, explanation=())
+        kept = [kept[int(np.argmin(np.abs(along - target)))] for target in targets]
+    return [feasible[k] for k in dict.fromkeys(kept)]

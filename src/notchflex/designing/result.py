@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 from notchflex import ConvergenceError, EquilibriumPath, Robot
 from notchflex.designing.explanation import yield_sentences
 from notchflex.designing.model.wishes import Wish
-from notchflex.designing.search.problem import DesignProblem
-from notchflex.designing.search.robust import YieldOf
-from notchflex.designing.search.search import SearchResult
+from notchflex.designing.robust import YieldOf
+from notchflex.designing.search import SearchResult
 from notchflex.designing.specification import DesignConstraint, DesignObjective, DesignSpec
 from notchflex.support import (
     Displayed,
@@ -124,8 +123,7 @@ class Design(Displayed):
     @cached_property
     def path(self) -> EquilibriumPath | None:
         """The states of the designed robot, one after the other; None if nothing asks for one."""
-        problem = self.outcome.problem
-        return problem.solver.path(problem.x(self.outcome.found.z))
+        return self.outcome.problem.solver.path(self.outcome.evaluation.point.x)
 
     @cached_property
     def path_before(self) -> EquilibriumPath | None:
@@ -203,12 +201,6 @@ def asked_in_words(wish: Wish) -> str:
     if asked.lower is not None:
         return f"at least {asked.lower:g}{unit}{of}"
     return f"at most {asked.upper:g}{unit}{of}"
-
-
-def total_counts(problems: Sequence[DesignProblem]) -> tuple[int, int]:
-    """Return how many robots were solved and differentiated."""
-    counts = {id(one.solver.counts): one.solver.counts for one in problems}.values()
-    return sum(one["solves"] for one in counts), sum(one["gradients"] for one in counts)
 
 
 def design_document(made: Design) -> dict[str, Any]:

@@ -1,24 +1,24 @@
-"""One robot of a design, solved under its states: readings with exact derivatives."""
+"""One robot of a design, solved under its states: readings with exact slopes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
+from itertools import compress
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from notchflex import Closing, EquilibriumPath, InputError, LoadPath, Robot, closing
+from notchflex import EquilibriumPath, InputError, LoadPath, Robot, batch, closing
 from notchflex.analysis.forward_model import ForwardModel, slope
-from notchflex.analysis.slopes import change_along
 from notchflex.designing.model.quantities import (
     OF_ROBOTS,
+    OF_STATES,
     Bodies,
     Reading,
     distances,
-    edge_unit,
     offsets,
     target_points,
 )
@@ -38,110 +38,81 @@ from notchflex.support import (
     changes,
     derivatives,
     load_change,
+    number_at,
     numbers_at,
 )
 
-CLOSINGS = "closing tensions"
-"""Under what a `Point` keeps closing tensions (N) that are known without it, for values only."""
+_BODIES = ("body_position", "body_rotation")
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A vector of variables, its robot, and what was solved of it.
+    """A robot, and what was solved of it.
+
+    Slopes are by the ranges of the variables, then by the standard deviations of what deviates.
 
     Attributes:
-        variables: The variables.
-        x: The vector.
+        x: The vector of variables.
         robot: Its robot.
         paths: The layout of the states.
         arrays: Quantities of every step of all states, in the units of Python.
-        slopes_of: Gives the derivatives of quantities of all steps, variables as leading axis;
-            None for values only.
-        kept: What was worked out already.
+        slopes: Their slopes, what varies as leading axis; empty for values only.
+        names: Single numbers of the robot that vary.
+        along: By how much each of them does; no rows for values only.
+        closing_tensions: Closing tensions, N, where they are known without the robot.
     """
 
-    variables: Variables
     x: Float[np.ndarray, " v"]
     robot: Robot
     paths: StatePaths
     arrays: Mapping[str, np.ndarray]
-    slopes_of: Callable[[str], np.ndarray] | None = None
-    kept: dict[Any, Any] = field(default_factory=dict[Any, Any])
-
-    @property
-    def plain(self) -> Point:
-        """The same for values only."""
-        return replace(self, slopes_of=None)
+    slopes: Mapping[str, np.ndarray] = field(default_factory=dict[str, np.ndarray])
+    names: tuple[str, ...] = ()
+    along: Float[np.ndarray, "v names"] = field(default_factory=lambda: np.zeros((0, 0)))
+    closing_tensions: Float[np.ndarray, " n"] | None = None
 
     def of_state(self, name: str, state: str) -> Reading:
         """Return a quantity of a state, flat, in the unit of the edges."""
-        return self._at(name, self.paths.step[state]).scaled(edge_unit(name)[1])
+        return self._at(name, self.paths.step[state]).scaled(OF_STATES[name].scale)
 
     def _at(self, name: str, step: int) -> Reading:
-        values = np.ravel(self.arrays[name][step])
-        if self.slopes_of is None:
-            return Reading(values, None)
-        slopes = self.slopes_of(name)[:, step]
-        return Reading(values, slopes.reshape(len(slopes), -1).T)
+        return Reading.of(
+            self.arrays[name][step], self.slopes[name][:, step] if self.slopes else ()
+        )
 
     def closings(self) -> Reading:
         """Return closing tensions, N; NaN for a notch that does not close."""
-        if CLOSINGS in self.kept:
-            return Reading(self.kept[CLOSINGS], None)
-        table: Closing = self.once("closing", lambda: closing(self.robot))
-        if self.slopes_of is None or not np.isfinite(table.tension).all():
-            return Reading(table.tension, None)
+        return self._closings
 
-        def slopes() -> np.ndarray:
-            return table.along(self.directions)[0]
-
-        return Reading(table.tension, self.once("closing slopes", slopes))
-
-    def once(self, key: Any, compute: Callable[[], Any]) -> Any:
-        """Return what was worked out before under a key, or work it out."""
-        if key not in self.kept:
-            self.kept[key] = compute()
-        return self.kept[key]
+    @cached_property
+    def _closings(self) -> Reading:
+        if self.closing_tensions is not None:
+            return Reading.of(self.closing_tensions)
+        table = closing(self.robot)
+        if not len(self.along):
+            return Reading.of(table.tension)
+        return Reading.of(table.tension, self.along @ table.jacobian(self.names)["tension"].T)
 
     def of_robot(self, name: str) -> Reading:
         """Return a quantity of the robot alone."""
         return self._of_robot(OF_ROBOTS[name].formula)
 
+    def _of_robot(self, formula: Callable[[Robot], np.ndarray]) -> Reading:
+        numbers = np.array([number_at(self.robot, name) for name in self.names])
+
+        def moved(part: float, row: np.ndarray) -> np.ndarray:
+            values = dict(zip(self.names, (numbers + part * row).tolist(), strict=True))
+            changed = {name: values[name] for name in compress(self.names, row)}
+            return formula(self.robot.with_values(changed) if changed else self.robot)
+
+        slopes = [slope(partial(moved, row=row), 0.0, order=2) for row in self.along]
+        return Reading.of(formula(self.robot), slopes)
+
     def value(self, path: str) -> Reading:
         """Return the values of the robot file."""
         numbers = numbers_at(self.robot, path)
-        values = np.array(list(numbers.values()))
-        if self.slopes_of is None:
-            return Reading(values, None)
-        slopes = np.stack([self.variables.parts_of(one) for one in numbers])
-        by = [[self._deviates(one, path) for one in self.deviations] for path in numbers]
-        return Reading(values, np.hstack([slopes, np.reshape(by, (len(values), -1))]))
-
-    def _deviates(self, deviation: Deviation, path: str) -> float:
-        sds = (sd for name, sd in deviation.sd.items() if path in numbers_at(self.robot, name))
-        return next(sds, 0.0)
-
-    def _of_robot(self, formula: Callable[[Robot], np.ndarray]) -> Reading:
-        values = formula(self.robot)
-        if self.slopes_of is None:
-            return Reading(values, None)
-        slopes = [
-            np.zeros(len(values))
-            if column.load is not None
-            else slope(lambda t, n=number: formula(self.moved(n, t)), 0.0, order=2) / column.span
-            for number, column in enumerate(self.variables.columns)
-        ]
-        slopes += [
-            slope(lambda t, one=one: formula(one.moved(self.robot, t)), 0.0, order=2)
-            for one in self.deviations
-        ]
-        return Reading(values, np.stack(slopes, axis=1))
-
-    @property
-    def deviations(self) -> Sequence[Deviation]:
-        """Deviations of robots within the tolerances."""
-        tolerances = self.variables.tolerances
-        return self.once("deviations", lambda: deviations_of(self.robot, tolerances))
+        by = [self.along @ np.array([one == name for one in self.names], float) for name in numbers]
+        return Reading(np.column_stack([[*numbers.values()], by]))
 
     def compliance(self, state: str, direction: Direction) -> Reading:
         """Return tip compliance along a direction, mm/N: a force to either side, and its travel."""
@@ -149,8 +120,7 @@ class Point:
             self._at("tip_position", self.paths.step[Probe(state, direction, side)])
             for side in (1, -1)
         )
-        row = np.array([direction]) / (2.0 * PROBE)
-        return plus.minus(minus).map(row)
+        return plus.minus(minus).map(np.array([direction]) / (2.0 * PROBE))
 
     def curve(self, curve: TargetCurve) -> Reading:
         """Return the distances of the points of a curve, mm."""
@@ -158,51 +128,11 @@ class Point:
 
     def offsets(self, curve: TargetCurve) -> Reading:
         """Return the vectors from the points of a curve to the axis, mm."""
-        step, points = self.paths.step[curve.state], target_points(curve)
-        poses = [self.arrays[name][step] for name in ("body_position", "body_rotation")]
-        if self.slopes_of is None:
-            return offsets(self.robot, Bodies(*poses), points, None)
-        lengths = self._of_robot(lambda one: one.geometry.body_length).slopes
-        assert lengths is not None
-        changes = [self.slopes_of(name)[:, step] for name in ("body_position", "body_rotation")]
-        return offsets(self.robot, Bodies(*poses, *changes), points, lengths.T)
-
-    def moved(self, number: int, part: float) -> Robot:
-        """Return the robot with a variable moved by a part of its span."""
-        x = self.x.copy()
-        x[number] += part * self.variables.columns[number].span
-        return self.once(("robot", number, part), lambda: self.variables.robot_at(x))
-
-    def directions(self, path: EquilibriumPath) -> list[Change]:
-        """Return directions of all variables, then of one standard deviation of every deviation.
-
-        Args:
-            path: States of the robot, whose loads are taken not to depend on the variables.
-        """
-        every = [self._change(path, number) for number in range(len(self.x))]
-        for one in self.deviations:
-            if one.law is not None:
-                every += changes(path, [one.law], np.array([[one.sd[one.law]]]))
-            else:
-                every.append(change_along(path, partial(one.moved, self.robot), 0.0, order=2))
-        return every
-
-    def _change(self, path: EquilibriumPath, number: int) -> Change:
-        """Return the direction of a variable of the robot; nothing for a load."""
-        column = self.variables.columns[number]
-        if column.load is not None:
-            return Change(None, None)
-        if column.law is not None:
-            return changes(path, [column.law])[0]
-        loaded = any(not one.is_nothing for one in path.load.external)
-        key = ("change", number, id(path.prepared.chain_layout))
-        if not loaded and key in self.kept:  # the arrays of the robot, without its weight
-            return Change(None, self.kept[key])
-        by = change_along(path, lambda part: self.moved(number, part), 0.0, order=2)
-        assert by.chain is not None
-        self.kept[key] = by.chain / column.span
-        loads = None if by.loads is None else by.loads / column.span
-        return Change(loads, self.kept[key])
+        step = self.paths.step[curve.state]
+        bodies = Bodies(*(self.arrays[name][step] for name in _BODIES))
+        slopes = Bodies(*(self.slopes[name][:, step] for name in _BODIES)) if self.slopes else None
+        lengths = self._of_robot(lambda robot: robot.geometry.body_length).slopes.T
+        return offsets(self.robot, bodies, target_points(curve), slopes, lengths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,18 +151,22 @@ class Solver:
     outputs: tuple[str, ...]
     counts: dict[str, int] = field(default_factory=lambda: {"solves": 0, "gradients": 0})
 
-    @cached_property
-    def _models(self) -> dict[str, ForwardModel]:
-        return {}
+    def path(self, x: Float[np.ndarray, " v"]) -> EquilibriumPath | None:
+        """Return the states of the robot of a vector; None if there are none."""
+        if not self.paths.pieces:
+            return None
+        robot, load = self.variables.robot_at(x), self._loads(x)
+        return ForwardModel(robot, load, from_rest=self.paths.from_rest).solve(robot, load)
 
-    def _model(self, robot: Robot, load: LoadPath) -> ForwardModel:
-        if "one" not in self._models:
-            from_rest = self.paths.from_rest
-            self._models["one"] = ForwardModel(robot, load, from_rest=from_rest)
-        return self._models["one"]
+    def _loads(self, x: Float[np.ndarray, " v"]) -> LoadPath:
+        return self.paths.path(self.variables.loads_at(x))
+
+    def deviations(self, robot: Robot) -> Sequence[Deviation]:
+        """Return what deviates of a robot within the tolerances."""
+        return deviations_of(robot, self.variables.tolerances)
 
     def point(self, x: Float[np.ndarray, " v"]) -> Point:
-        """Solve the robot of a vector.
+        """Solve the robot of a vector, and differentiate it.
 
         Raises:
             InputError: No robot can have these values, or a state does not converge.
@@ -240,61 +174,92 @@ class Solver:
         x = self.variables.on_grid(x)
         robot = self.variables.robot_at(x)
         self.counts["solves"] += 1
-        if not self.paths.pieces:
-            return self._without_states(robot, x)
-        load = self.path_at(x)
-        path = self._model(robot, load).solve(robot, load)
+        names, along = self._varied(robot)
+        path = self.path(x)
+        if path is None:
+            return Point(x, robot, self.paths, {}, {}, names, along)
         if not path.converged.all():
-            step = int(np.argmin(path.converged))
-            raise InputError.NOT_CONVERGED(path.failures[step][1])
+            raise InputError.NOT_CONVERGED(path.failures[int(np.argmin(path.converged))][1])
+        self.counts["gradients"] += 1
         arrays = {name: np.asarray(path.quantity(name)) for name in self.outputs}
-        slopes: dict[str, np.ndarray] = {}
+        slopes = derivatives(path, self._changes(path, x, names, along), self.outputs)
+        for name, by in slopes.items():
+            if (
+                REGISTERED[name].kind is float
+                and not np.isfinite(by[:, np.isfinite(arrays[name])]).all()
+            ):
+                raise InputError.NOT_CONVERGED(
+                    f"a step was so hard that the derivatives of {name} are not known; "
+                    "give the state more `steps`"
+                )
+        return Point(x, robot, self.paths, arrays, slopes, names, along)
 
-        def slopes_of(name: str) -> np.ndarray:
-            if not slopes:
-                self.counts["gradients"] += 1
-                slopes.update(self._slopes(point, path))
-            return slopes[name]
+    def _varied(self, robot: Robot) -> tuple[tuple[str, ...], Float[np.ndarray, "v names"]]:
+        """Return the single numbers that vary, and by how much with everything that varies."""
+        variables, deviations = self.variables, self.deviations(robot)
+        paths = [path for column in variables.columns for path in column.weights]
+        paths += [path for one in deviations for path in one.sd]
+        names = tuple(dict.fromkeys(name for path in paths for name in numbers_at(robot, path)))
+        along = [variables.parts_of(name) * variables.span for name in names]
+        by_variable = np.reshape(along, (len(names), len(variables.columns))).T
+        by_deviation = [[one.sd.get(name, 0.0) for name in names] for one in deviations]
+        return names, np.concatenate([by_variable, np.reshape(by_deviation, (-1, len(names)))])
 
-        point = Point(self.variables, x, robot, self.paths, arrays, slopes_of)
-        return point
-
-    def path_at(self, x: Float[np.ndarray, " v"]) -> LoadPath:
-        """Return the loads of a vector."""
-        return self.paths.path(self.variables.loads_at(x))
-
-    def path(self, x: Float[np.ndarray, " v"]) -> EquilibriumPath | None:
-        """Return the states of the robot of a vector; None if there are none."""
-        if not self.paths.pieces:
-            return None
-        robot = self.variables.robot_at(x)
-        load = self.path_at(x)
-        return self._model(robot, load).solve(robot, load)
-
-    def _without_states(self, robot: Robot, x: np.ndarray) -> Point:
-        def slopes_of(name: str) -> np.ndarray:
-            raise KeyError(name)
-
-        return Point(self.variables, x, robot, self.paths, {}, slopes_of)
-
-    def _slopes(self, point: Point, path: EquilibriumPath) -> dict[str, np.ndarray]:
-        directions = point.directions(path)
-        numbers = self.variables.loads_at(point.x)
+    def _changes(
+        self, path: EquilibriumPath, x: np.ndarray, names: Sequence[str], along: np.ndarray
+    ) -> list[Change]:
+        directions = changes(path, names, along)
         for number, column in enumerate(self.variables.columns):
-            if column.load is not None:
-                more = self.paths.path(numbers | {column.load: numbers[column.load] + 1.0})
-                directions[number] = Change(load_change(path, more), None)
-        slopes = derivatives(path, directions, self.outputs)
-        wrong = [name for name, one in slopes.items() if not _known(name, one, path)]
-        if wrong:
-            raise InputError.NOT_CONVERGED(
-                f"a step was so hard that the derivatives of {wrong[0]} are not known; "
-                "give the state more `steps`"
+            if column.load is not None:  # loads are linear in it
+                more = x + np.eye(len(x))[number] * column.span
+                directions[number] = Change(load_change(path, self._loads(more)), None)
+        return directions
+
+    def points(self, vectors: Sequence[np.ndarray]) -> list[Point | InputError]:
+        """Solve the robots of several vectors at once, for values only."""
+        points: list[Any] = []
+        for x in vectors:
+            try:
+                points.append(Point(x, self.variables.robot_at(x), self.paths, {}))
+            except InputError as error:
+                points.append(error)
+        valid = [number for number, one in enumerate(points) if isinstance(one, Point)]
+        self.counts["solves"] += len(valid)
+        robots = [points[number].robot for number in valid]
+        arrays, converged = self.rows(robots, [vectors[number] for number in valid], {})
+        for row, number in enumerate(valid):
+            by_name = {name: values[row] for name, values in arrays.items()}
+            points[number] = (
+                Point(vectors[number], robots[row], self.paths, by_name)
+                if converged[row]
+                else InputError.NOT_CONVERGED("a state does not converge")
             )
-        return slopes
+        return points
 
+    def rows(
+        self,
+        robots: Robot | Sequence[Robot],
+        vectors: Sequence[np.ndarray],
+        numbers: Mapping[str, np.ndarray],
+    ) -> tuple[dict[str, np.ndarray], Bool[np.ndarray, " robots"]]:
+        """Solve robots by batches.
 
-def _known(name: str, slopes: np.ndarray, path: EquilibriumPath) -> bool:
-    """Whether derivatives are known wherever the quantity itself is a number."""
-    is_finite = np.isfinite(np.asarray(path.quantity(name)))
-    return REGISTERED[name].kind is not float or bool(np.isfinite(slopes[:, is_finite]).all())
+        Args:
+            robots: The robots.
+            vectors: The vector of each, or one for all, of which the loads are.
+            numbers: Numbers of each by name, where they are not those of `robots`.
+
+        Returns:
+            Quantities of every step of all robots, and whether all their steps converged.
+        """
+        if robots == [] or not self.paths.pieces:
+            return {}, np.ones(len(next(iter(numbers.values()), vectors)), bool)
+        same = all(column.load is None for column in self.variables.columns)
+        loads = [self._loads(x) for x in (vectors[:1] if same else vectors)]
+        ends = np.cumsum(self.paths.lengths)
+        pieces = [
+            batch(robots, numbers, [path[start:end] for path in loads], outputs=self.outputs)
+            for start, end in zip(ends - self.paths.lengths, ends, strict=True)
+        ]
+        arrays = {name: np.concatenate([one[name] for one in pieces], axis=1) for name in pieces[0]}
+        return arrays, np.asarray(arrays["converged"].all(axis=1))

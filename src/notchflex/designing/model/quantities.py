@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 from notchflex import Robot
-from notchflex._jax import constant
-from notchflex.analysis.kinematics import (
-    AxisPlaces,
-    axis_places,
-    axis_point_changes,
-    points_on_axis,
-)
+from notchflex.analysis.kinematics import axis_places, axis_point_changes, points_on_axis
 from notchflex.designing.specification import TargetCurve
 from notchflex.support import DEGREES, QUANTITIES
 
@@ -99,90 +93,80 @@ def quantity_names() -> list[str]:
     return [*OF_STATES, CLOSING, COMPLIANCE, *OF_ROBOTS]
 
 
-def edge_unit(name: str) -> tuple[str, float]:
-    """Return the unit of a quantity of states at the edges, and the factor to it."""
-    one: Any = OF_STATES[name]
-    return one.unit, one.scale
-
-
-class Reading(NamedTuple):
-    """Numbers of a robot, and how they change with the variables of a design.
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Numbers of a robot, and how they change with what varies.
 
     Attributes:
-        values: The numbers, (k,).
-        slopes: Their derivatives by every variable, (k, variables); None where not asked.
+        table: A row for every number: the number, then its slopes, none where only values are read.
     """
 
-    values: Float[np.ndarray, " k"]
-    slopes: Float[np.ndarray, "k v"] | None
+    table: Float[np.ndarray, "k 1+v"]
+
+    @classmethod
+    def of(cls, values: np.ndarray, slopes: Iterable[np.ndarray] = ()) -> Reading:
+        """Return a quantity of any shape with its slopes, those by one variable after the other."""
+        table = np.stack([values, *slopes])
+        return cls(table.reshape(len(table), -1).T)
+
+    @property
+    def values(self) -> Float[np.ndarray, " k"]:
+        """The numbers."""
+        return self.table[:, 0]
+
+    @property
+    def slopes(self) -> Float[np.ndarray, "k v"]:
+        """Their slopes."""
+        return self.table[:, 1:]
 
     def map(self, matrix: Float[np.ndarray, "m k"]) -> Reading:
         """Return linear combinations."""
-        return Reading(matrix @ self.values, None if self.slopes is None else matrix @ self.slopes)
+        return Reading(matrix @ self.table)
 
     def pick(self, rows: np.ndarray) -> Reading:
         """Return some of the numbers."""
-        return Reading(self.values[rows], None if self.slopes is None else self.slopes[rows])
+        return Reading(self.table[rows])
 
     def scaled(self, factor: float) -> Reading:
         """Return the numbers in another unit."""
-        return Reading(factor * self.values, None if self.slopes is None else factor * self.slopes)
+        return Reading(factor * self.table)
 
     def minus(self, other: Reading) -> Reading:
         """Return the difference."""
-        slopes = None
-        if self.slopes is not None and other.slopes is not None:
-            slopes = self.slopes - other.slopes
-        return Reading(self.values - other.values, slopes)
-
-
-def differences(count: int) -> Float[np.ndarray, "m k"]:
-    """Return the matrix that takes each number from the next.
-
-    Example:
-        >>> differences(3) @ np.array([1.0, 3.0, 7.0])
-        array([2., 4.])
-    """
-    return np.eye(count)[1:] - np.eye(count)[:-1]
-
-
-def pairs(count: int) -> Float[np.ndarray, "m k"]:
-    """Return the matrix that takes each number from every other one.
-
-    Example:
-        >>> pairs(2) @ np.array([1.0, 3.0])
-        array([-2.,  2.])
-    """
-    eye = np.eye(count)
-    rows = [eye[i] - eye[j] for i in range(count) for j in range(count) if i != j]
-    return np.array(rows).reshape(-1, count)
+        return Reading(self.table - other.table)
 
 
 def taken(reading: Reading, take: str) -> Reading:
     """Make several numbers one; `each` leaves them, `steps` takes each from the next."""
-    count = len(reading.values)
     if take == "each":
         return reading
-    if take == "steps":
-        return reading.map(differences(count))
-    if take in ("sum", "mean"):
-        return reading.map(np.full((1, count), 1.0 if take == "sum" else 1.0 / count))
-    if take == "rms":
-        size = float(np.sqrt(np.mean(reading.values**2)))
-        by = reading.values / (count * size) if size > 0.0 else np.zeros(count)
-        slopes = None if reading.slopes is None else by[None] @ reading.slopes
-        return Reading(np.array([size]), slopes)
-    high, low = int(np.argmax(reading.values)), int(np.argmin(reading.values))
-    if take == "range":
-        row = np.zeros((1, count))
-        row[0, high] += 1.0
-        row[0, low] -= 1.0
-        return reading.map(row)
-    return reading.pick(np.array([high if take == "largest" else low]))
+    return reading.map(np.atleast_2d(_weights(reading.values, take)))
 
 
-# Points of the axis among which the nearest is searched, and how often the search narrows.
-_STATIONS, _ROUNDS = 241, 4
+def _weights(values: Float[np.ndarray, " k"], take: str) -> np.ndarray:
+    count = len(values)
+    unit = np.eye(count)
+    match take:
+        case "steps":
+            return unit[1:] - unit[:-1]
+        case "pairs":  # each less every other one
+            first, second = np.nonzero(1.0 - unit)
+            return unit[first] - unit[second]
+        case "sum":
+            return np.ones(count)
+        case "mean":
+            return np.full(count, 1.0 / count)
+        case "rms":
+            size = np.sqrt(np.mean(values**2))
+            return values / (count * size if size > 0.0 else 1.0)
+        case "range":
+            return unit[np.argmax(values)] - unit[np.argmin(values)]
+        case _:
+            return unit[np.argmax(values) if take == "largest" else np.argmin(values)]
+
+
+# Stations of the axis between which the nearest point is searched.
+_STATIONS = 481
 # Points of a curve that is given by its curvature, and steps of its integration between two.
 _POINTS, _FINE = 20, 50
 # How far to both sides of a point the direction of the axis is taken, mm.
@@ -206,26 +190,18 @@ def target_points(curve: TargetCurve) -> Float[np.ndarray, "m 3"]:
 
 
 class Bodies(NamedTuple):
-    """Poses of the bodies, and their changes with every variable.
+    """Poses of the bodies, or their slopes with what varies as leading axis."""
 
-    Attributes:
-        position: Origins, mm, (bodies, 3).
-        rotation: Rotations, (bodies, 3, 3).
-        positions: Their changes, (variables, bodies, 3); None where not asked.
-        rotations: Changes of the rotations, (variables, bodies, 3, 3).
-    """
-
-    position: np.ndarray
-    rotation: np.ndarray
-    positions: np.ndarray | None = None
-    rotations: np.ndarray | None = None
+    position: Float[np.ndarray, "*v bodies 3"]  # mm
+    rotation: Float[np.ndarray, "*v bodies 3 3"]
 
 
 def offsets(
     robot: Robot,
     bodies: Bodies,
     points: Float[np.ndarray, "m 3"],
-    lengths: Float[np.ndarray, "variables bodies"] | None,
+    slopes: Bodies | None,
+    lengths: Float[np.ndarray, "v bodies"],
 ) -> Reading:
     """Return the vector from each point to the nearest of the axis, from the last one to the tip.
 
@@ -233,59 +209,41 @@ def offsets(
         robot: The robot.
         bodies: Where it is.
         points: The points.
-        lengths: Changes of the lengths of the bodies with every variable; None for values only.
+        slopes: Slopes of where it is; None for values only.
+        lengths: Slopes of the lengths of its bodies.
 
     Returns:
         The vectors one after the other, mm; their slopes across the axis, as the nearest point
         slides along.
     """
-    stations = _nearest(robot, bodies, points)
-    places = axis_places(robot, stations)
-    off = _axis(places, bodies.position, bodies.rotation) - points
-    if lengths is None or bodies.positions is None or bodies.rotations is None:
-        return Reading(off.ravel(), None)
-    near = np.clip(stations + np.array([[-_ASIDE], [_ASIDE]]), 0.0, stations[-1])
-    ends = [_axis(axis_places(robot, at), bodies.position, bodies.rotation) for at in near]
-    along = ends[1] - ends[0]
+
+    def axis(stations: np.ndarray) -> np.ndarray:
+        return np.asarray(points_on_axis(axis_places(robot, stations), *bodies))
+
+    stations = np.linspace(0.0, robot.geometry.length, _STATIONS)
+    line = axis(stations)
+    # The nearest point of each straight piece between two stations, and of these the nearest.
+    piece = np.diff(line, axis=0)
+    part = np.sum((points[:, None] - line[:-1]) * piece, axis=-1) / np.sum(piece**2, axis=-1)
+    part = np.clip(part, 0.0, 1.0)
+    far = np.linalg.norm(line[:-1] + part[..., None] * piece - points[:, None], axis=-1)
+    place = far.argmin(axis=1), np.arange(len(points))
+    nearest = stations[place[0]] + part[place[1], place[0]] * stations[1]
+    nearest[-1] = stations[-1]
+    off = axis(nearest) - points
+    if slopes is None:
+        return Reading.of(off)
+    before, after = (np.clip(nearest + side, 0.0, stations[-1]) for side in (-_ASIDE, _ASIDE))
+    along = axis(after) - axis(before)
     along /= np.linalg.norm(along, axis=1)[:, None]
     along[-1] = 0.0  # the tip does not slide
-    changes = bodies.positions, bodies.rotations
-    moved = axis_point_changes(places, bodies[:2], changes, lengths)
-    across = moved - np.sum(moved * along, axis=-1)[..., None] * along
-    return Reading(off.ravel(), across.reshape(-1, off.size).T)
+    moved = axis_point_changes(axis_places(robot, nearest), bodies, slopes, lengths)
+    return Reading.of(off, moved - np.sum(moved * along, axis=-1)[..., None] * along)
 
 
 def distances(off: Reading) -> Reading:
     """Return the lengths of the vectors of `offsets`, mm."""
     vectors = off.values.reshape(-1, 3)
     size = np.linalg.norm(vectors, axis=1)
-    if off.slopes is None:
-        return Reading(size, None)
     toward = vectors / np.where(size > 0.0, size, 1.0)[:, None]
-    slopes = off.slopes.reshape(len(size), 3, -1)
-    return Reading(size, np.einsum("ma,mav->mv", toward, slopes))
-
-
-def _nearest(
-    robot: Robot, bodies: Bodies, points: Float[np.ndarray, "m 3"]
-) -> Float[np.ndarray, " m"]:
-    """Return how far from the base, along the straight robot, the nearest points lie."""
-    total = robot.geometry.length
-    low, high = np.zeros(len(points)), np.full(len(points), total)
-    for number in range(_ROUNDS):
-        count = _STATIONS if number == 0 else 21
-        part = np.linspace(0.0, 1.0, count)
-        at = low[:, None] + part * (high - low)[:, None]
-        every = at[0] if number == 0 else at.ravel()
-        axis = _axis(axis_places(robot, every), bodies.position, bodies.rotation)
-        axis = np.broadcast_to(axis.reshape(-1, count, 3), (len(points), count, 3))
-        best = np.argmin(np.sum((axis - points[:, None]) ** 2, axis=-1), axis=1)
-        rows = np.arange(len(points))
-        low, high = at[rows, np.maximum(best - 1, 0)], at[rows, np.minimum(best + 1, count - 1)]
-    nearest = 0.5 * (low + high)
-    nearest[-1] = total
-    return nearest
-
-
-def _axis(places: AxisPlaces, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    return np.asarray(points_on_axis(places, constant(position), constant(rotation)))
+    return Reading(np.einsum("ma,mav->mv", toward, off.table.reshape(len(size), 3, -1)))

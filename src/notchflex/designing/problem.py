@@ -1,0 +1,384 @@
+"""The design as a problem of optimisation: scaled variables, sums to minimise, rows of limits.
+
+Variables run from 0 to 1 between their limits. The largest of several numbers is not smooth: where
+it is minimised, an epigraph variable above all of them replaces it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex import InputError
+from notchflex.designing.model.point import Point, Solver
+from notchflex.designing.model.quantities import Reading, taken
+from notchflex.designing.model.wishes import Source, Wish
+from notchflex.designing.specification import DesignConstraint, DesignObjective
+from notchflex.search.slsqp import Linearisation, Program, Vector
+
+# A curve is followed well enough at this part of the distance at which its points are reached.
+_ENOUGH = 0.1
+
+Progress = Callable[[str, int, int], None]
+"""Called with the stage, how much of it is done, and how much there is."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One constraint on one number: which one, "" for the only one, and its limits."""
+
+    wish: Wish
+    label: str
+    lower: float
+    upper: float
+
+    @property
+    def title(self) -> str:
+        """Name in messages."""
+        return f"{self.wish.title}, {self.label}" if self.label else self.wish.title
+
+    @property
+    def size(self) -> float:
+        """The greater of its limits; 0 where none has a size."""
+        return max((abs(one) for one in (self.lower, self.upper) if np.isfinite(one)), default=0.0)
+
+
+def limits(asked: DesignConstraint) -> tuple[float, float]:
+    """Return least and greatest value of a constraint, for steps from notch to notch if ordered."""
+    if asked.order is not None:
+        return (-np.inf, -asked.margin) if asked.order == "tip-first" else (asked.margin, np.inf)
+    if asked.equal is not None:
+        return asked.equal, asked.equal
+    low, high = asked.lower, asked.upper
+    return -np.inf if low is None else low, np.inf if high is None else high
+
+
+def _searched(wish: Wish) -> tuple[str, float, float]:
+    """Return how the search takes a constraint, smooth where that asks for the same."""
+    assert isinstance(wish.asked, DesignConstraint)
+    low, high = limits(wish.asked)
+    if (wish.take == "largest" and low == -np.inf) or (wish.take == "smallest" and high == np.inf):
+        return "each", low, high
+    if wish.take == "range" and low <= 0.0:
+        return ("pairs", -np.inf, high) if high > 0.0 else ("steps", 0.0, high)
+    return wish.take, low, high
+
+
+def rows_of(wish: Wish) -> list[Row]:
+    """Return the rows of a constraint as the search takes it, in the order of `row_reading`."""
+    take, low, high = _searched(wish)
+    parts, labels = wish.parts, [""]
+    if take == "each" and len(parts) > 1:
+        labels = list(parts)
+    elif take == "pairs":
+        labels = [f"{a} less {b}" for a, b in itertools.permutations(parts, 2)]
+    elif take == "steps":
+        labels = [f"{a} to {b.split()[-1]}" for a, b in itertools.pairwise(parts)]
+    return [Row(wish, label, low, high) for label in labels]
+
+
+def row_reading(wish: Wish, source: Source) -> Reading:
+    """Return the numbers of the rows of a constraint."""
+    return taken(wish.every(source), _searched(wish)[0])
+
+
+def violations(
+    rows: Sequence[Row], values: Float[np.ndarray, "*robots m"], sizes: Float[np.ndarray, " m"]
+) -> Float[np.ndarray, "*robots m"]:
+    """Return by how much numbers are beyond their limits, signed, in their sizes."""
+    low, high = (np.array([getattr(one, side) for one in rows]) for side in ("lower", "upper"))
+    return (values - np.clip(values, low, high)) / sizes
+
+
+def objective_reading(wish: Wish, source: Source) -> Reading:
+    """Return what an objective adds to the sum that is minimised, in the units of the user."""
+    asked = wish.asked
+    assert isinstance(asked, DesignObjective)
+    if is_square(wish):
+        off = squared(wish, source)
+        return Reading(off.values[None] @ np.column_stack([off.values, 2.0 * off.slopes]))
+    # Several numbers that each count are added up.
+    reading = taken(wish.every(source), "sum" if wish.take == "each" else wish.take)
+    return reading.scaled(asked.weight if asked.goal == "minimise" else -asked.weight)
+
+
+def is_square(wish: Wish) -> bool:
+    """Return whether an objective is to come near to something."""
+    asked = wish.asked
+    assert isinstance(asked, DesignObjective)
+    return asked.target is not None or (wish.take == "rms" and asked.goal == "minimise")
+
+
+def squared(wish: Wish, source: Source) -> Reading:
+    """Return the numbers whose squares an objective adds up: distances from a target or curve."""
+    asked = wish.asked
+    assert isinstance(asked, DesignObjective)
+    if asked.target is None:  # the mean square, which is smooth where it is 0
+        reading = wish.every(source) if wish.curve is None else source.offsets(wish.curve)
+        return reading.scaled(float(np.sqrt(asked.weight / len(wish.rows))))
+    reading = taken(wish.every(source), wish.take)
+    off = np.column_stack([reading.values - asked.target, reading.slopes])
+    return Reading(off).scaled(float(np.sqrt(asked.weight)))
+
+
+@dataclass(frozen=True)
+class EpigraphBound:
+    """A variable of the search that is above (sign 1) or below (-1) all numbers of an objective."""
+
+    wish: Wish
+    sign: float
+
+    @property
+    def factor(self) -> float:
+        """Its factor in the sum that is minimised."""
+        assert isinstance(self.wish.asked, DesignObjective)
+        return self.sign * self.wish.asked.weight
+
+
+def epigraphs(wish: Wish) -> Iterator[EpigraphBound]:
+    """Yield the bounds for the largest or smallest of several numbers in an objective."""
+    asked = wish.asked
+    assert isinstance(asked, DesignObjective)
+    if asked.target is not None or len(wish.rows) < 2:
+        return
+    if (asked.goal == "minimise") and wish.take in ("largest", "range"):
+        yield EpigraphBound(wish, 1.0)
+    if (wish.take, asked.goal) in (("smallest", "maximise"), ("range", "minimise")):
+        yield EpigraphBound(wish, -1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class DesignEvaluation:
+    """A design at one vector of scaled variables.
+
+    Attributes:
+        z: The vector.
+        point: The robot solved.
+        objective: The sum that is minimised, without terms replaced by epigraph bounds.
+        rows: The numbers of all constraints.
+        bounded: The numbers that each bound is above or below.
+        total: The whole sum, the largest of several numbers taken as it is.
+    """
+
+    z: Vector
+    point: Point
+    objective: Reading
+    rows: Reading
+    bounded: tuple[Reading, ...]
+    total: float
+
+
+@dataclass(eq=False)
+class DesignProblem:
+    """A design of robots of one form.
+
+    Attributes:
+        solver: Solves them.
+        wishes: Objectives and constraints.
+        caps: Further objectives, and the most that each may add; for points of a front.
+        failures: Why points could not be solved, and how often.
+        sizes: In which violations of rows are measured.
+    """
+
+    solver: Solver
+    wishes: tuple[Wish, ...]
+    caps: tuple[tuple[Wish, float], ...] = ()
+    failures: Counter[str] = field(default_factory=Counter[str])
+
+    def __post_init__(self) -> None:
+        """Take the sizes of the limits."""
+        self.sizes = np.array([row.size or 1.0 for row in self.rows])
+
+    @property
+    def count(self) -> int:
+        """Number of variables, without bounds."""
+        return len(self.solver.variables.columns)
+
+    @cached_property
+    def objectives(self) -> tuple[Wish, ...]:
+        """The objectives."""
+        return tuple(one for one in self.wishes if isinstance(one.asked, DesignObjective))
+
+    @cached_property
+    def constraints(self) -> tuple[Wish, ...]:
+        """The constraints."""
+        return tuple(one for one in self.wishes if isinstance(one.asked, DesignConstraint))
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """Every constraint on one number."""
+        caps = [Row(wish, "", -np.inf, most) for wish, most in self.caps]
+        return (*(row for wish in self.constraints for row in rows_of(wish)), *caps)
+
+    @cached_property
+    def bounds(self) -> tuple[EpigraphBound, ...]:
+        """The further variables."""
+        return tuple(bound for wish in self.objectives for bound in epigraphs(wish))
+
+    @cached_property
+    def start(self) -> Vector:
+        """The robot as it is, scaled."""
+        variables = self.solver.variables
+        return (variables.start - variables.lower) / variables.span
+
+    @cached_property
+    def initial(self) -> DesignEvaluation | None:
+        """The robot as it is, solved."""
+        return self.evaluate(self.start)
+
+    def x(self, z: Vector) -> Vector:
+        """Return the vector of variables of a scaled one."""
+        variables = self.solver.variables
+        return variables.lower + z * variables.span
+
+    def evaluate(self, z: Vector) -> DesignEvaluation | None:
+        """Return the design at a scaled vector; None where there is no robot or no equilibrium."""
+        try:
+            return self.read(self.solver.point(self.x(z)), z)
+        except InputError as error:
+            self.failures[str(error)] += 1
+            return None
+
+    def evaluate_all(self, vectors: Float[np.ndarray, "k v"]) -> list[DesignEvaluation | None]:
+        """Evaluate many vectors at once, without slopes."""
+        evaluations: list[DesignEvaluation | None] = []
+        points = self.solver.points([self.x(z) for z in vectors])
+        for z, point in zip(vectors, points, strict=True):
+            try:
+                if isinstance(point, InputError):
+                    raise point
+                evaluations.append(self.read(point, z))
+            except InputError as error:
+                self.failures[str(error)] += 1
+                evaluations.append(None)
+        return evaluations
+
+    def read(self, point: Point, z: Vector) -> DesignEvaluation:
+        """Return objectives and constraints of a solved robot.
+
+        Raises:
+            InputError: One of them is not a number.
+        """
+        terms, total = self._terms(point, z)
+        width = 1 + (self.count if len(point.along) else 0)  # without slopes by what deviates
+
+        def joined(readings: Iterable[Reading]) -> Reading:
+            tables = (one.table[:, :width] for one in readings)
+            return Reading(np.concatenate([np.zeros((0, width)), *tables]))
+
+        terms, total = self._terms(point, z)
+        rows = joined(self._row_readings(point))
+        bounded = tuple(joined([bound.wish.every(point)]) for bound in self.bounds)
+        one = DesignEvaluation(
+            z, point, joined(terms).map(np.ones((1, len(terms)))), rows, bounded, total
+        )
+        if not all(np.isfinite(r.table).all() for r in (one.objective, one.rows, *one.bounded)):
+            raise InputError.NOT_FINITE(
+                "a quantity that is asked is not a number, as where a notch never closes"
+            )
+        return one
+
+    def _terms(self, point: Point, z: Vector) -> tuple[list[Reading], float]:
+        """Return the smooth terms of the objective, and the whole sum."""
+        if not self.objectives:  # the smallest change of the robot
+            off = z - self.start
+            return [Reading(np.concatenate([[off @ off], 2.0 * off])[None])], float(off @ off)
+        terms = [(wish, objective_reading(wish, point)) for wish in self.objectives]
+        bounded = [id(bound.wish) for bound in self.bounds]
+        total = sum(float(term.values[0]) for _, term in terms)
+        return [term for wish, term in terms if id(wish) not in bounded], total
+
+    def _row_readings(self, point: Point) -> list[Reading]:
+        """Return the numbers of the rows, in their order."""
+        readings = [row_reading(one, point) for one in self.constraints]
+        return readings + [objective_reading(one, point) for one, _ in self.caps]
+
+    def violation(self, one: DesignEvaluation) -> Float[np.ndarray, " m"]:
+        """Return by how much rows are beyond their limits, in their sizes."""
+        return violations(self.rows, one.rows.values, self.sizes)
+
+    def worst(self, one: DesignEvaluation) -> float:
+        """Return the largest violation."""
+        return float(np.abs(self.violation(one)).max(initial=0.0))
+
+    @property
+    def is_least_squares(self) -> bool:
+        """Whether all that is asked is to come near to something."""
+        return bool(self.objectives) and not self.rows and all(map(is_square, self.objectives))
+
+    def is_followed(self, one: DesignEvaluation) -> bool:
+        """Return whether nothing but curves is asked, and all are followed well enough."""
+        if not self.is_least_squares:
+            return False
+        curves = [(wish.asked, wish.curve) for wish in self.objectives]
+        enough = [asked.weight * (_ENOUGH * curve.within) ** 2 for asked, curve in curves if curve]
+        return len(enough) == len(curves) and one.total <= sum(enough)
+
+    def residuals(self, one: DesignEvaluation) -> Reading:
+        """Return what misses limits, in its size; without limits, what is to be 0."""
+        if not self.rows:
+            tables = [squared(wish, one.point).table for wish in self.objectives]
+            return Reading(np.concatenate(tables))
+        missed = self.violation(one)
+        slopes = np.where(missed[:, None] != 0.0, one.rows.slopes / self.sizes[:, None], 0.0)
+        return Reading(np.column_stack([missed, slopes]))
+
+    def set_sizes(self, reached: Sequence[DesignEvaluation]) -> None:
+        """Take the sizes of rows without a limit of a size from what robots reach."""
+        values = np.array([one.rows.values for one in reached]).reshape(len(reached), -1)
+        most = np.abs(values).max(axis=0, initial=0.0)
+        sizes = [
+            row.size or (size if size > 1e-9 else 1.0)
+            for row, size in zip(self.rows, most.tolist(), strict=True)
+        ]
+        self.sizes = np.array(sizes)
+
+    def program(self, first: DesignEvaluation) -> tuple[Program, Vector]:
+        """Return the problem for SLSQP, its bounds scaled for where it begins, and that start."""
+        sides = np.array([bound.sign for bound in self.bounds])
+        factors = np.array([bound.factor for bound in self.bounds])
+        sizes = np.array([np.ptp(one.values) or 1.0 for one in first.bounded])
+        tops = [
+            side * (side * r.values).max() for side, r in zip(sides, first.bounded, strict=True)
+        ]
+        # The bound of each number that one is above or below.
+        of = np.repeat(np.arange(len(sides)), [len(one.values) for one in first.bounded])
+        by_bound = np.eye(len(sides))[of] * (sides * sizes)
+
+        def linearised(y: Vector) -> Linearisation | None:
+            z = y[: self.count]
+            is_first = len(first.point.along) and np.array_equal(z, first.z)
+            one = first if is_first else self.evaluate(z)
+            if one is None:
+                return None
+            bounds = tops + sizes * y[self.count :]
+            numbers = np.concatenate(
+                [np.zeros((0, 1 + self.count)), *(r.table for r in one.bounded)]
+            )
+            apart = -sides[of, None] * numbers
+            apart[:, 0] += (sides * bounds)[of]
+            rows = np.concatenate([one.rows.table, apart])
+            by_bounds = np.concatenate([np.zeros((len(self.rows), len(sides))), by_bound])
+            return Linearisation(
+                one.objective.values[0] + factors @ bounds,
+                np.concatenate([one.objective.slopes[0], factors * sizes]),
+                rows[:, 0],
+                np.concatenate([rows[:, 1:], by_bounds], axis=1),
+                one,
+            )
+
+        bounds = [(0.0, 1.0)] * self.count + [(-np.inf, np.inf)] * len(sides)
+        limits = [(row.lower, row.upper) for row in self.rows] + [(0.0, np.inf)] * len(of)
+        program = Program(
+            linearised,
+            np.reshape(bounds, (-1, 2)),
+            np.reshape(limits, (-1, 2)),
+            np.concatenate([self.sizes, sizes[of]]),
+        )
+        return program, np.concatenate([first.z, np.zeros(len(sides))])

@@ -1,0 +1,427 @@
+"""Designs whose limits hold for robots made within tolerances.
+
+A number q whose derivatives by the deviations (each in its standard deviations) are g has the mean
+q + g m, with the means m of the deviations, and the standard deviation |g|. A limit holds for a
+part of the robots where it is so many standard deviations away from the mean.
+
+The search holds first-order quantiles. How many standard deviations they need is found by counting:
+robots are drawn at each design, always at the same levels, until the part that meets the limits is
+the one wanted, with the lower end of its 95 % interval.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.special import log_ndtr, ndtri
+
+from notchflex import ErrorCode, InputError
+from notchflex.analysis.closing_loads import closing_tensions_of
+from notchflex.analysis.draws import sources_of, values_at
+from notchflex.designing.model.point import Point
+from notchflex.designing.model.quantities import CLOSING, Reading
+from notchflex.designing.model.variables import deviations_of
+from notchflex.designing.model.wishes import Wish
+from notchflex.designing.problem import (
+    DesignProblem,
+    Progress,
+    Row,
+    row_reading,
+    rows_of,
+    violations,
+)
+from notchflex.designing.search import Searches, SearchResult, search_from
+from notchflex.designing.specification import DesignConstraint, DesignSpec, RobustOptions
+from notchflex.search.slsqp import TOLERANCE, Vector
+from notchflex.support import Tolerance
+from notchflex.tolerancing import (
+    REPLICATES,
+    TAIL,
+    points_of_each,
+    replicates,
+    yield_interval,
+)
+
+# Derivatives of a standard deviation are differences of exact derivatives, over this part of the
+# range of each variable.
+_STEP = 1e-4
+# A number whose standard deviation is less than this part of its limit does not deviate.
+_NOTHING = 1e-12
+# Searches from the best of the plain ones, and how often their standard deviations are corrected.
+_STARTS, _ROUNDS = 2, 6
+# The lower end of a yield may exceed its target by this part of the allowed failures.
+_ABOVE = 0.1
+
+
+class Hold(NamedTuple):
+    """The part of robots that a constraint must hold for, and the standard deviations for it."""
+
+    part: float
+    factor: float
+
+
+class _Quantile(NamedTuple):
+    """A row of a robust problem: number + is_mean * shift + factor * standard deviation."""
+
+    row: Row
+    place: int  # of its number in the rows of the robot of the drawing
+    is_mean: float
+    factor: float
+
+
+@dataclass(eq=False)
+class RobustProblem(DesignProblem):
+    """A design whose limits robots made within tolerances must meet.
+
+    Attributes:
+        holds: How constraints are to hold, by number; the others hold for the robot of the drawing.
+            Where it is empty, the yield is made as great as possible.
+    """
+
+    holds: Mapping[int, Hold] = field(default_factory=dict[int, Hold])
+
+    @cached_property
+    def objectives(self) -> tuple[Wish, ...]:
+        """The objectives; none where the yield is made as great as possible."""
+        return super().objectives if self.holds else ()
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """Every limit: of one number, or of its quantile."""
+        return tuple(one.row for one in self._quantiles)
+
+    @cached_property
+    def _quantiles(self) -> list[_Quantile]:
+        quantiles: list[_Quantile] = []
+        for place, (number, row) in enumerate(self._plain):
+            hold = self.holds.get(number)
+            if hold is None:
+                quantiles.append(_Quantile(row, place, 0.0, 0.0))
+                continue
+            of = f"for {100.0 * hold.part:g} % of the robots"
+            label = f"{row.label}, {of}" if row.label else of
+            for side, limit in _sides(row):
+                low, high = (-np.inf, limit) if side > 0.0 else (limit, np.inf)
+                held = Row(row.wish, label, low, high)
+                quantiles.append(_Quantile(held, place, 1.0, side * hold.factor))
+        return quantiles
+
+    @cached_property
+    def _plain(self) -> list[tuple[int, Row]]:
+        """The rows for the robot of the drawing, with the numbers of their constraints."""
+        return [(k, row) for k, wish in enumerate(self.constraints) for row in rows_of(wish)]
+
+    def _row_readings(self, point: Point) -> list[Reading]:
+        numbers, shift, sd = self._moments(point)
+        places = [one.place for one in self._quantiles]
+        is_mean = np.array([[one.is_mean] for one in self._quantiles])
+        factor = np.array([[one.factor] for one in self._quantiles])
+        return [Reading(numbers[places] + is_mean * shift[places] + factor * sd[places])]
+
+    def _terms(self, point: Point, z: Vector) -> tuple[list[Reading], float]:
+        if self.holds:
+            return super()._terms(point, z)
+        missing = self._missing(point)
+        return [missing], float(missing.values[0])
+
+    def _missing(self, point: Point) -> Reading:
+        """Logarithm of the sum of the parts of robots that miss each limit: all that can miss."""
+        numbers, shift, sd = self._moments(point)
+        mean, counted = numbers + shift, set(limited(self))
+        distances = [np.zeros((0, 1 + self.count))]
+        for place, (number, row) in enumerate(self._plain):
+            for side, limit in _sides(row) if number in counted else ():
+                if sd[place, 0] > _NOTHING * abs(limit):
+                    distance = side * (limit - mean[place, 0]) / sd[place, 0]
+                    by = -side * mean[place, 1:] - distance * sd[place, 1:]
+                    distances.append(np.append(distance, by / sd[place, 0])[None])
+        table = np.concatenate(distances)
+        beta = table[:, 0]
+        total = float(np.logaddexp.reduce(log_ndtr(-beta))) if len(beta) else 0.0
+        density = np.exp(-0.5 * beta**2 - 0.5 * np.log(2.0 * np.pi) - total)
+        return Reading(np.append(total, -density @ table[:, 1:])[None])
+
+    def _moments(self, point: Point) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Numbers of the drawing, shifts of their means, standard deviations, each with slopes."""
+        numbers, here = self._numbers(point), self._spread(point)
+        z = (point.x - self.solver.variables.lower) / self.solver.variables.span
+        slopes: list[np.ndarray] = []
+        for unit, inward in zip(np.eye(len(z)), np.where(z < 0.5, _STEP, -_STEP), strict=True):
+            moved = self.solver.point(self.x(z + inward * unit))
+            slopes.append((self._spread(moved) - here) / inward)
+        shift, sd = np.split(Reading.of(here, slopes).table, 2)
+        return numbers[:, : 1 + self.count], shift, sd
+
+    def _spread(self, point: Point) -> Float[np.ndarray, "2 m"]:
+        """Shift of the mean and standard deviation of the numbers of the drawing."""
+        mean = np.array([one.mean for one in self.solver.deviations(point.robot)])
+        by = self._numbers(point)[:, 1 + self.count :]
+        return np.stack([by @ mean, np.linalg.norm(by, axis=1)])
+
+    def _numbers(self, point: Point) -> Float[np.ndarray, "m 1+v"]:
+        return np.concatenate([row_reading(wish, point).table for wish in self.constraints])
+
+
+def limited(problem: DesignProblem) -> list[int]:
+    """Return the numbers of the constraints that have limits, not a value."""
+    every = enumerate(problem.constraints)
+    return [k for k, one in every if all(row.lower < row.upper for row in rows_of(one))]
+
+
+def _sides(row: Row) -> list[tuple[float, float]]:
+    """Return the limits of a row: 1 with its greatest value, -1 with the least."""
+    return [one for one in ((1.0, row.upper), (-1.0, row.lower)) if np.isfinite(one[1])]
+
+
+def check_limits(problems: Sequence[DesignProblem], tolerances: Sequence[Tolerance]) -> None:
+    """Raise if there is nothing to make robust.
+
+    Raises:
+        InputError: No constraint has a limit, or nothing deviates.
+    """
+    if not any(map(limited, problems)):
+        raise InputError.MISSING_VALUE(
+            "a robust design needs a [[constraint]] with a limit: no robot made within tolerances "
+            "has exactly one value; give `lower` or `upper`."
+        )
+    robot = problems[0].solver.variables.robot
+    if not any(any(one.sd.values()) for one in deviations_of(robot, tolerances)):
+        raise InputError.NO_DATA("nothing deviates: all tolerances are 0; give one that is not.")
+
+
+def met_by(
+    result: SearchResult,
+    tolerances: Sequence[Tolerance],
+    levels: Float[np.ndarray, "draws d"],
+    wishes: Sequence[Wish],
+) -> Bool[np.ndarray, "draws k"]:
+    """Solve robots within tolerances, and return which meet which constraints.
+
+    Args:
+        result: The robot of the drawing.
+        tolerances: What deviates.
+        levels: Levels of what deviates, each between 0 and 1.
+        wishes: The constraints.
+
+    Returns:
+        Whether each robot meets each of these constraints; no robot that cannot be made or solved
+        meets any.
+    """
+    solver, x = result.problem.solver, result.evaluation.point.x
+    exact = result.evaluation.point.robot.replace(tolerance=None)
+    numbers = values_at(sources_of(exact, tolerances), np.clip(levels, TAIL, 1.0 - TAIL))
+    rows = [rows_of(wish) for wish in wishes]
+    met = np.zeros((len(levels), len(wishes)), bool)
+    try:
+        arrays, converged = solver.rows(exact, [x], numbers)
+    except InputError as error:
+        if error.code is not ErrorCode.INVALID_ROBOT:
+            raise
+        return met
+    valid = np.flatnonzero(converged)
+    tensions: Sequence[np.ndarray | None] = [None] * len(valid)
+    if any(wish.asked.quantity == CLOSING for wish in wishes):
+        tensions = [
+            *closing_tensions_of(exact, {name: one[valid] for name, one in numbers.items()})
+        ]
+    # What only states and closings are asked of is read without the robot.
+    of_robot = any(
+        wish.curve is not None or (wish.asked.state is None and wish.asked.quantity != CLOSING)
+        for wish in wishes
+    )
+    for row, tension in zip(valid.tolist(), tensions, strict=True):
+        try:
+            own = {name: float(values[row]) for name, values in numbers.items()}
+            robot = exact.with_values(own) if of_robot else exact
+        except InputError:  # numbers that make no robot
+            continue
+        states = {name: values[row] for name, values in arrays.items()}
+        point = Point(x, robot, solver.paths, states, closing_tensions=tension)
+        met[row] = [_meets(rows_of_wish, point) for rows_of_wish in rows]
+    return met
+
+
+def _meets(rows: Sequence[Row], point: Point) -> bool:
+    sizes = np.array([row.size or 1.0 for row in rows])
+    missed = violations(rows, row_reading(rows[0].wish, point).values, sizes)
+    return bool((np.abs(missed) <= TOLERANCE).all())  # not where a value is NaN
+
+
+@dataclass(frozen=True)
+class YieldOf:
+    """Which part of robots made within tolerances meets a limit, or all of them.
+
+    Attributes:
+        title: The constraint; "all limits" for all together.
+        wanted: The part that is wanted; None where it is maximised or only reported.
+        achieved: The part of the robots drawn of the design.
+        interval: Its 95 % interval.
+        plain: The same part of the design without regard to tolerances.
+    """
+
+    title: str
+    wanted: float | None
+    achieved: float
+    interval: tuple[float, float]
+    plain: float
+
+    @property
+    def met(self) -> bool:
+        """Whether the part that is wanted is reached."""
+        return self.wanted is None or self.achieved >= self.wanted
+
+
+class _Target(NamedTuple):
+    """The yield of several constraints together, by their columns, and the part that is wanted."""
+
+    title: str
+    wanted: float | None
+    columns: list[int]
+
+
+class _Counted(NamedTuple):
+    """A design, and which drawn robots of it meet which limits."""
+
+    result: SearchResult
+    met: Bool[np.ndarray, "draws k"]
+
+    def part(self, target: _Target) -> tuple[float, tuple[float, float]]:
+        """Return which part meets all of some constraints, and its 95 % interval."""
+        meets = self.met[:, target.columns].all(axis=1).reshape(REPLICATES, -1)
+        return float(meets.mean()), yield_interval(meets.sum(axis=1), meets.shape[1])
+
+    def lack(self, targets: Sequence[_Target]) -> float:
+        """Return by how much the lower ends of the yields miss what is wanted, in all."""
+        return sum(max((one.wanted or 0.0) - self.part(one)[1][0], 0.0) for one in targets)
+
+    def is_better(self, best: _Counted, targets: Sequence[_Target], every: _Target) -> bool:
+        """Whether it lacks less yield than the best so far, or has a smaller sum."""
+        if not targets:
+            is_met = self.result.merit[0] == 0.0, best.result.merit[0] == 0.0
+            return is_met[0] >= is_met[1] and self.part(every)[0] >= best.part(every)[0]
+        lack, best_lack = self.lack(targets), best.lack(targets)
+        if lack == best_lack == 0.0:
+            is_first = not isinstance(best.result.problem, RobustProblem)
+            return is_first or self.result.merit[1] < best.result.merit[1]
+        return lack < best_lack
+
+
+def robust_search(
+    spec: DesignSpec,
+    tolerances: Sequence[Tolerance],
+    plain: Searches,
+    progress: Progress | None,
+    place: Callable[[Searches], Searches],
+) -> tuple[Searches, tuple[YieldOf, ...]]:
+    """Search on from plain designs.
+
+    Args:
+        spec: The specification.
+        tolerances: Within what robots are made.
+        plain: The plain searches.
+        progress: Called with what is done.
+        place: Places the robot that was found on a grid.
+
+    Returns:
+        The searches of the robust design, and the yields: of all limits together, and of every
+        constraint with limits; no yields if Ctrl-C ended it before any was counted.
+    """
+    options = spec.robust or RobustOptions()
+    numbers = limited(plain.best.problem)
+    wishes = [plain.best.problem.constraints[number] for number in numbers]
+    every = _Target("all limits", options.wanted_yield, list(range(len(wishes))))
+    single = [_Target(wish.title, _wanted(wish), [k]) for k, wish in enumerate(wishes)]
+    targets = [one for one in (*single, every) if one.wanted is not None]
+    sources = len(sources_of(plain.best.problem.solver.variables.robot, tolerances))
+    draws = replicates(sources, points_of_each(options.draws), options.seed)
+    levels = np.concatenate([*draws])
+
+    def counted(result: SearchResult) -> _Counted:
+        return _Counted(result, met_by(result, tolerances, levels, wishes))
+
+    interrupted = plain.interrupted
+    try:
+        first = best = counted(plain.best)
+    except KeyboardInterrupt:
+        return Searches([plain.best], True), ()
+
+    def search_on(results: Sequence[SearchResult], holds: Mapping[int, Hold]) -> list[_Counted]:
+        nonlocal best
+        found = (_robust(one, tolerances, holds, spec.search.iterations) for one in results)
+        designs = [counted(one) for one in itertools.chain.from_iterable(found)]
+        for one in designs:
+            best = one if one.is_better(best, targets, every) else best
+        return designs
+
+    starts = sorted(plain.outcomes, key=lambda one: one.merit)[:_STARTS]
+    factors = [float(ndtri(one.wanted)) for one in targets]
+    try:
+        for done in range(0 if interrupted else _ROUNDS):
+            if progress is not None:
+                progress("making it robust", done, _ROUNDS)
+            designs = search_on(starts, _holds(targets, factors, numbers))
+            if not designs:
+                break
+            last = min(designs, key=lambda one: one.result.merit)
+            starts, before = [last.result], factors
+            factors = [_corrected(*one, last) for one in zip(targets, factors, strict=True)]
+            if factors == before:
+                break
+        if not interrupted and best.lack(targets) > 0.0:
+            # That with the greatest yield comes nearest.
+            search_on([best.result, plain.best], {})
+    except KeyboardInterrupt:
+        interrupted = True
+    searches = place(Searches([best.result], interrupted))
+    if searches.rounded is not None:
+        best = counted(searches.rounded)
+    yields = (
+        YieldOf(one.title, one.wanted, *best.part(one), first.part(one)[0])
+        for one in (every, *single)
+    )
+    return searches, tuple(yields)
+
+
+def _wanted(wish: Wish) -> float | None:
+    assert isinstance(wish.asked, DesignConstraint)
+    return wish.asked.wanted_yield
+
+
+def _holds(
+    targets: Sequence[_Target], factors: Sequence[float], numbers: Sequence[int]
+) -> dict[int, Hold]:
+    """Return how every constraint is to hold: by the largest factor of those that it needs."""
+    holds: dict[int, Hold] = {}
+    for one, factor in sorted(zip(targets, factors, strict=True), key=lambda pair: pair[1]):
+        holds |= {numbers[column]: Hold(one.wanted or 0.0, factor) for column in one.columns}
+    return holds
+
+
+def _corrected(target: _Target, factor: float, design: _Counted) -> float:
+    """Return a factor moved by what a counted yield lacks, or has more than is wanted."""
+    wanted, low = target.wanted or 0.0, design.part(target)[1][0]
+    if wanted <= low <= wanted + _ABOVE * (1.0 - wanted):
+        return factor
+    edge = 0.5 / len(design.met)
+    aim = wanted + 0.5 * _ABOVE * (1.0 - wanted)
+    return max(factor + float(ndtri(aim) - ndtri(np.clip(low, edge, 1.0 - edge))), 0.0)
+
+
+def _robust(
+    start: SearchResult, tolerances: Sequence[Tolerance], holds: Mapping[int, Hold], iterations: int
+) -> list[SearchResult]:
+    """Search from the end of another search, if that can be solved."""
+    solver = start.problem.solver
+    variables = replace(solver.variables, tolerances=tuple(tolerances))
+    problem = RobustProblem(replace(solver, variables=variables), start.problem.wishes, holds=holds)
+    first = problem.evaluate(start.evaluation.z)
+    if first is None:
+        return []
+    problem.set_sizes([first])
+    return search_from(problem, start.number, first, iterations)
