@@ -194,6 +194,9 @@ def test_loads_are_arrows_where_they_act():
     shape = shape_at(path, 0)
     dead = (path.tip_position[0] - path.body_position[0, 0])[[0, 2]]
     ends = [arrow._posA_posB for arrow in arrows(figure)]
+    # A moment about y, which points away from the viewer, turns clockwise: down on the right.
+    assert ends[1][1][0] > dead[0]
+    assert ends[1][1][1] < ends[1][0][1]
     np.testing.assert_allclose(ends[0][0], dead, atol=1e-9)
     np.testing.assert_allclose(np.sign(np.subtract(*ends[0][::-1])), [-1.0, 0.0])
     np.testing.assert_allclose(ends[2][0], shape.on_body(2, [0.5, 0.0, 0.0])[[0, 2]])

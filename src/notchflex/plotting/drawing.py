@@ -57,7 +57,7 @@ def _ink(points: Any, width: float = 1.0) -> Curve:
 
 
 def _arrow(start: Point, end: Point, colour: Colour = _FINE, width: float = 0.7) -> Arrow:
-    return Arrow(start, end, colour, width=width, head=max(6.0, 5.5 * width))
+    return Arrow([start, end], colour, width, max(6.0, 5.5 * width))
 
 
 def _dimension(

@@ -105,17 +105,11 @@ class Faces(Mark):
 
 @dataclass(frozen=True)
 class Arrow(Mark):
-    """An arrow in the plane or in space; in the plane `bend` makes it an arc (1: a half circle).
+    """An arrow along points to the last of them, (k, 2) in the plane or (2, 3) in space."""
 
-    The axes include `reach`, (k, 2), in place of its ends.
-    """
-
-    start: Any
-    end: Any
+    points: Any
     colour: Colour
-    bend: float = 0.0
     width: float = 1.4
-    reach: Array | None = None
     head: float = 9.0  # its size [pt]
     layer: int = field(default=9, kw_only=True)
 

@@ -229,17 +229,17 @@ def _load_arrows(
         is_force = load.name == "force"
         label = load.label + ("" if is_force or view is not None else ", about its arrow")
         style: dict[str, Any] = {"layer": layer, "name": label}
+        colour = _LOAD_COLOUR[load.kind]
         largest = max(other.size for other in loads if other.name == load.name)
         size = longest * max(load.size / largest, _SHORTEST)  # never too short to see
-        end, colour = load.point + size * load.vector / load.size, _LOAD_COLOUR[load.kind]
+        ends = load.point + np.stack([0.0 * load.vector, size * load.vector / load.size])
         if view is None:
-            yield Arrow(load.point, end, colour, width=1.8 if is_force else 0.9, **style)
+            yield Arrow(ends, colour, 1.8 if is_force else 0.9, **style)
         elif is_force:
-            yield Arrow(project(load.point, view), project(end, view), colour, **style)
+            yield Arrow(project(ends, view), colour, **style)
         else:
             # Seen with z up and the view to the right, a moment about the normal turns z right.
-            turn = np.cross(across_of(view), load.vector)[2]
-            start = project(load.point, view)
-            side = np.array([0.4 * longest * (-1.0 if turn > 0.0 else 1.0), 0.0])
-            reach = np.array([start - longest, start + longest])
-            yield Arrow(start - side, start + side, colour, bend=0.9, reach=reach, **style)
+            turn = np.sign(np.cross(across_of(view), load.vector)[2])
+            angle = np.linspace(0.0, 1.2 * np.pi, 25)[:, None]
+            arc = np.concatenate([-turn * np.cos(angle), np.sin(angle)], axis=1)
+            yield Arrow(project(load.point, view) + 0.4 * longest * arc, colour, **style)

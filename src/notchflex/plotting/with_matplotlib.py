@@ -185,15 +185,16 @@ def _line_style(mark: Curve) -> dict[str, Any]:
 
 
 def _draw_arrow(axes: Any, mark: Arrow, named: dict[str, Any]) -> None:
-    start, end = np.asarray(mark.start, float), np.asarray(mark.end, float)
+    *_, start, end = points = np.asarray(mark.points, float)
     style: dict[str, Any] = {"color": mark.colour, "linewidth": mark.width}
-    if len(start) == 3:
+    if len(end) == 3:
         axes.quiver(*start, *(end - start), **named, **style)
         return
-    style |= {"arrowstyle": "-|>", "mutation_scale": mark.head}
-    style |= {"connectionstyle": f"arc3,rad={mark.bend}", "shrinkA": 0.0, "shrinkB": 0.0}
-    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), zorder=mark.layer, **style))
-    axes.update_datalim(np.stack([start, end]) if mark.reach is None else mark.reach)
+    axes.plot(*points[:-1].T, zorder=mark.layer, **style)
+    head: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": mark.head}
+    head |= {"shrinkA": 0.0, "shrinkB": 0.0, "zorder": mark.layer}
+    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), **head, **style))
+    axes.update_datalim(points)
     if mark.name:
         axes.plot([], [], color=mark.colour, marker=">", markersize=4.0, **named)
 
