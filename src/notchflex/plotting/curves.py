@@ -193,6 +193,7 @@ def load_panel(
     name: str,
     bands: Mapping[str, Band] | None = None,
     extra: Sequence[Mark] = (),
+    names: bool = True,
     **options: Any,
 ) -> Panel:
     """Return a quantity over the load, each entry in its colour, with its band of tolerances.
@@ -202,12 +203,13 @@ def load_panel(
         name: A quantity with one number, or one for each notch.
         bands: Bands by name of the quantity; None for none.
         extra: Further marks.
+        names: Whether the legend names the entries.
         options: Those of `Panel`.
     """
     x, x_label = abscissa(path)
     table = scaled(path, name, getattr(path, name))
     count, items = table.shape[1], list[Mark]()
-    named = evenly(range(count), count if count <= MAX_NAMES else MAX_NAMES // 2)
+    named = evenly(range(count), MAX_NAMES) if names else []
     for entry, colour in enumerate(sequence_colours(count) if count > 1 else [None]):
         group = f"notch {entry + 1}" if count > 1 else ""
         if bands is not None and name in bands:
@@ -243,13 +245,12 @@ def path_panels(path: EquilibriumPath, bands: Mapping[str, Band] | None) -> list
         level, name = 100.0 * allowed, f"allowed {100.0 * allowed:.3g} %"
         limits.append(Span("y", level, VERMILLION, DASHED, 1.2, name=name))
     label = f"{QUANTITIES['peak_strain'].title} of every notch [%]"
-    strain = load_panel(path, "peak_strain", bands, limits, y_label=label, y_range=(0.0, None))
-    # The curves of the notches have their names in the panel of the angles.
-    nameless = [mark if isinstance(mark, Span) else replace(mark, name="") for mark in strain.items]
+    style: dict[str, Any] = {"y_label": label, "from_zero": True, "legend": INSIDE}
     panels = [total_panel(path, bands), notches_panel(path, bands)]
     _, by_stroke, changing = prescribed(path)
     panels += [stroke_panel(path, one) for one in changing if one in by_stroke][:MAX_PROFILES]
-    panels.append(replace(strain, items=nameless, legend=INSIDE))
+    # The curves of the notches have their names in the panel of the angles.
+    panels.append(load_panel(path, "peak_strain", bands, limits, names=False, **style))
     if len(steps_by_branch(path)) > 1:
         tendons = pulled_tendons(path)
         panels += [profile_panel(path, tendon) for tendon in tendons[:MAX_PROFILES]]
@@ -282,7 +283,7 @@ def stroke_panel(path: EquilibriumPath, tendon: int) -> Panel:
     labels = [tendon_label(path, name, tendon) for name in ("stroke", "tension")]
     items: list[Mark] = [*branch_lines(path, path.stroke[:, tendon], path.tension[:, tendon])]
     items += failures(path, path.commanded_stroke[:, tendon])
-    return Panel(items, *labels, legend=INSIDE, y_range=(0.0, None))
+    return Panel(items, *labels, legend=INSIDE, from_zero=True)
 
 
 def pulled_tendons(path: EquilibriumPath) -> list[int]:
@@ -301,7 +302,7 @@ def span_line(path: EquilibriumPath, step: int, tendon: int, colour: Colour, **s
 def span_panel(items: Sequence[Mark], which: str = "") -> Panel:
     """Return a panel of the tension from span to span."""
     label = f"span of tendon{which} [number], 0 at the base"
-    return Panel(items, label, QUANTITIES["span_tension"].label, y_range=(0.0, None), whole="x")
+    return Panel(items, label, QUANTITIES["span_tension"].label, from_zero=True, whole="x")
 
 
 def profile_panel(path: EquilibriumPath, tendon: int) -> Panel:

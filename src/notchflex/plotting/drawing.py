@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from textwrap import shorten
 from typing import Any
@@ -80,32 +80,6 @@ def _dimension(
     yield _arrow(place(start - 0.17, at), first)
     yield _arrow(place(end + 0.17, at), last)
     yield _stroke([first, last], width=0.7)
-
-
-def levels(intervals: Sequence[tuple[float, float, str]]) -> list[int]:
-    """Return levels of dimensions (left end, right end [in], text) at which no texts overlap.
-
-    Example:
-        >>> levels([(0.0, 2.0, "height 1"), (2.0, 4.0, "length 2"), (4.0, 4.1, "thickness 3")])
-        [0, 0, 1]
-    """
-    occupied: list[list[tuple[float, float]]] = []
-    numbers: list[int] = []
-    for start, end, text in intervals:
-        middle, half = 0.5 * (start + end), 0.5 * LETTER * len(text) + 0.04
-        # Arrows outside of a short dimension need room too.
-        out = 0.2 if end - start < _SHORTEST else 0.0
-        low, high = min(start - out, middle - half), max(end + out, middle + half)
-        numbers.append(
-            next(
-                number
-                for number, row in enumerate([*occupied, []])
-                if all(high <= left + 1e-9 or low >= right - 1e-9 for left, right in row)
-            )
-        )
-        occupied += [[]] if numbers[-1] == len(occupied) else []
-        occupied[numbers[-1]].append((low, high))
-    return numbers
 
 
 def _broken(x: float, low: float, high: float) -> Iterator[Mark]:
@@ -204,15 +178,8 @@ class NotchRow:
     @property
     def height(self) -> float:
         """Its height [in]."""
-        above = _LEVEL * max(levels(self.along), default=0)
-        below = 0.17 * len(self.view.notes)
-        return 1.71 + above + self.scale * self.robot.tube.outer_diameter + below
-
-    @property
-    def along(self) -> list[tuple[float, float, str]]:
-        """Ends of the dimensions along the tube [in], and their texts."""
-        scale = self.scale
-        return [(_LEFT + scale * d.start, _LEFT + scale * d.end, d.text) for d in self.view.along]
+        texts = _LEVEL * len(self.view.along) + 0.17 * len(self.view.notes)
+        return 1.46 + self.scale * self.robot.tube.outer_diameter + texts
 
     @property
     def section(self) -> float:
@@ -263,9 +230,8 @@ def notch_rows(robot: Robot, width: float = _WIDTH) -> tuple[list[NotchRow], lis
 
 def draw_row(axes: Axes, row: NotchRow, top: float) -> None:
     """Draw the views of one notch below a height."""
-    stages = max(levels(row.along), default=0)
     outer = row.scale * row.robot.tube.outer_radius
-    axis = top - 0.62 - _LEVEL * (1 + stages) - outer
+    axis = top - 0.62 - _LEVEL * len(row.view.along) - outer
     centre = np.array([row.section, axis])
     for marks in (
         [label((0.25, top - 0.12), _heading(row), "left center", size=9.0, bold=True)],
@@ -290,10 +256,11 @@ def _heading(row: NotchRow) -> str:
 def _dimensions(row: NotchRow, axis: float) -> Iterator[Mark]:
     tube, view, scale = row.robot.tube, row.view, row.scale
     right, outer = _LEFT + scale * view.length, scale * tube.outer_radius
-    for (start, end, text), stage in zip(row.along, levels(row.along), strict=True):
-        height = axis + outer + 0.2 + _LEVEL * stage
-        yield from _dimension(start, end, height, axis + outer)
-        yield label((0.5 * (start + end), height + 0.035), text, "center bottom")
+    for level, (start, end, text) in enumerate(view.along):
+        low, high = _LEFT + scale * start, _LEFT + scale * end
+        height = axis + outer + 0.2 + _LEVEL * level
+        yield from _dimension(low, high, height, axis + outer)
+        yield label((0.5 * (low + high), height + 0.035), text, "center bottom")
     for size, at, name in (
         (tube.outer_diameter, _LEFT - 0.6, "outer"),
         (tube.inner_diameter, _LEFT - 0.25, "inner"),

@@ -81,7 +81,8 @@ def comparison_picture(
              name=f"measured, trial {pull}" if len(pulls) > 1 else "measured")
         for pull, marker in zip(pulls, cycle(MARKERS), strict=False)
     ]  # fmt: skip
-    x, x_label = _measured_load(comparison)
+    measured_load = comparison.measured.measured_tension, comparison.measured.load.stroke
+    x, x_label = _abscissa(*measured_load)
     trial, measured = np.array(comparison.measured.pull), _angles(comparison, "measured_")
     errors = [*comparison.rmse_notches, comparison.rmse_total]
     panels: list[Panel] = []
@@ -100,18 +101,8 @@ def comparison_picture(
             items += [replace(entry, points=computed[run]) for run in runs]
         name = f"notch {column + 1}" if column < len(errors) - 1 else "total"
         title = f"{name}, error {float(error) * DEGREES:.2f}° rms"
-        angles = [curve.rows[:, 1].min(initial=0.0) for curve in items if isinstance(curve, Curve)]
-        panels.append(
-            Panel(
-                items,
-                x_label,
-                "angle [deg]",
-                title=title,
-                legend="",
-                y_range=(0.0, None) if np.nanmin(angles) >= 0.0 else None,
-                shared="x",
-            )
-        )
+        style: dict[str, Any] = {"title": title, "legend": "", "from_zero": True, "shared": "x"}
+        panels.append(Panel(items, x_label, "angle [deg]", **style))
     panels.append(_centre_lines(comparison))
     if others:
         panels.append(_errors(models, [entry.colour for entry in entries]))
@@ -136,15 +127,15 @@ def _runs(rows: Any, x: Array, pull: Any, from_rest: bool) -> list[Any]:
     return [rows[pull[rows] == label] for label in dict.fromkeys(pull[rows].tolist())]
 
 
-def _measured_load(comparison: Comparison) -> tuple[Array, str]:
-    """Return the first tension or stroke that all rows have, and its label; else the row."""
-    measured = comparison.measured
-    tables = {"tension": measured.measured_tension, "stroke": measured.load.stroke}
-    for name, values in tables.items():
-        complete = np.flatnonzero(~np.isnan(values).any(axis=0))
-        if len(complete):
-            return values[:, complete[0]], QUANTITIES[name].label
-    return np.arange(1.0, len(measured) + 1.0), "row of the table"
+def _abscissa(tension: Any, stroke: Any) -> tuple[Array, str]:
+    """Return the first tension or stroke that all rows have and that changes, and its label."""
+    for name, values in (("tension", tension), ("stroke", stroke)):
+        varied = np.isfinite(values).all(axis=0) & (np.ptp(values, axis=0) > 0.0)
+        if varied.any():
+            tendon = int(np.argmax(varied))
+            entry = f"tendon {tendon + 1}" if len(varied) > 1 else ""
+            return values[:, tendon], entry_label(QUANTITIES[name], entry)
+    return np.arange(1.0, len(tension) + 1.0), "row [number]"
 
 
 def _centre_lines(comparison: Comparison) -> Panel:
@@ -237,7 +228,7 @@ def _data_panels(fit: Calibration, label: str) -> Iterator[Panel]:
     for quantity in OBSERVED:
         if quantity != "axis_points":  # thirty points and more: only their residuals
             parts = np.unique(fit.residuals.part[_rows_of(fit, label, quantity)])
-            for part in parts[evenly(range(len(parts)), min(len(parts), MAX_NOTCHES))].tolist():
+            for part in parts[evenly(range(len(parts)), MAX_NOTCHES)].tolist():
                 yield _data_panel(fit, label, quantity, part)
 
 
@@ -246,7 +237,7 @@ def _data_panel(fit: Calibration, label: str, quantity: str, part: int) -> Panel
     from notchflex.fit.assessment.errors_of_parts import edge, part_title
 
     residuals, (name, unit, scale) = fit.residuals, edge(quantity)
-    x, x_label = _abscissa(fit, label)
+    x, x_label = _loads(fit, label)
     half = fit.half_width(residuals.slopes) * scale
     samples, items = [sample.measured for sample in fit.problem.samples.every], list[Mark]()
     shown = np.flatnonzero(_rows_of(fit, label, quantity) & (residuals.part == part))
@@ -282,7 +273,7 @@ def _residual_panel(fit: Calibration, label: str) -> Panel:
     A total angle that is the sum of the notches has no noise of its own and is not drawn.
     """
     residuals, noise = fit.residuals, fit.noise.deviation
-    x, x_label = _abscissa(fit, label)
+    x, x_label = _loads(fit, label)
     points = np.stack([x, residuals.values / noise], axis=1)
     known, angles = np.isfinite(noise), _rows_of(fit, label, *_NOTCHES)
     others = points[_rows_of(fit, label) & known & ~angles]
@@ -320,26 +311,18 @@ def _rows_of(fit: Calibration, label: str, *quantities: str) -> Any:
     return of_robot & np.isin(fit.residuals.quantity, numbers)
 
 
-def _abscissa(fit: Calibration, label: str) -> tuple[Array, str]:
+def _loads(fit: Calibration, label: str) -> tuple[Array, str]:
     """Return tension or stroke of a tendon at every residual of a robot, and its label."""
-    residuals = fit.residuals
-    loads = {
-        number: sample.measured.load
-        for number, sample in enumerate(fit.problem.samples.every)
-        if sample.label == label
-    }
-    for name in ("tension", "stroke"):
-        tables = {number: getattr(load, name) for number, load in loads.items()}
-        together = np.concatenate(list(tables.values()))
-        varied = np.isfinite(together).all(axis=0) & (np.ptp(together, axis=0) > 0.0)
-        if varied.any():
-            tendon, x = int(np.argmax(varied)), np.full(len(residuals), np.nan)
-            for number, table in tables.items():
-                of_sample = residuals.sample == number
-                x[of_sample] = table[residuals.row[of_sample], tendon]
-            entry = f"tendon {tendon + 1}" if len(varied) > 1 else ""
-            return x, entry_label(QUANTITIES[name], entry)
-    return residuals.row + 1.0, "row [number]"
+    residuals, of_robot = fit.residuals, _rows_of(fit, label)
+    loads = [sample.measured.load for sample in fit.problem.samples.every]
+    rows = list(zip(residuals.sample[of_robot], residuals.row[of_robot], strict=True))
+    tension, stroke = (
+        np.array([getattr(loads[sample], name)[row] for sample, row in rows])
+        for name in ("tension", "stroke")
+    )
+    x = np.full(len(residuals), np.nan)
+    x[of_robot], x_label = _abscissa(tension, stroke)
+    return x, x_label
 
 
 def _likelihood_panel(fit: Calibration, name: str) -> Panel:

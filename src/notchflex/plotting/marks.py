@@ -165,6 +165,7 @@ class Panel:
     equal: bool = False  # both axes have the same scale
     shared: str = ""  # axes with the same limits in all panels that share them, as "xy"
     whole: str = ""  # axes with integers only, as "xy"
+    from_zero: bool = False  # the y axis starts at 0, unless something is negative
     ticks: Mapping[str, Sequence[str]] = field(default_factory=dict)
     """Labels at 0, 1, 2, ... of the axes that have some, in place of numbers and grid."""
     x_range: tuple[float | None, float | None] | None = None  # None fits the marks

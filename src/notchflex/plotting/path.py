@@ -197,7 +197,7 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
         )
     shapes: list[Panel] = []
     total, tips, angles, tensions = (list[Mark]() for _ in range(4))
-    labels, total_label, least = set[str](), QUANTITIES["total_angle"].label, 0.0
+    labels, total_label = set[str](), QUANTITIES["total_angle"].label
     for (name, path), colour in zip(paths.items(), MODEL_COLOURS, strict=False):
         steps = representative_steps(path, most=3)
         pale = np.linspace(0.55, 0.0, len(steps))[:, None]
@@ -212,17 +212,16 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
         for step in steps[-1:]:  # the most bent
             tips.append(dots(tip[[step]], colour, 4.0, group=name))
             angles.append(_angle_curve(path, step, colour, group=name))
-            least = min(least, float(path.notch_angle[step].min()))
             pulled = np.flatnonzero(path.tension[step] > SLACK)[:1].tolist()
             tensions += [span_line(path, step, one, colour, group=name) for one in pulled]
     # One label for all, if they are drawn against the same quantity.
     x_label = labels.pop() if len(labels) == 1 else "load of each"
-    bent, y_range = "most bent state", (0.0, None) if least >= 0.0 else None
+    bent = "most bent state"
     notches = angles or [Text("no step was solved")]
     tension = span_panel(tensions or [Text("no tendon is pulled")])
     columns = [
         *([shape] for shape in shapes),
-        [Panel(total, x_label, total_label), _notches_of(notches, title=bent, y_range=y_range)],
+        [Panel(total, x_label, total_label), _notches_of(notches, title=bent, from_zero=True)],
         [Panel(tips, *TIP_LABELS, equal=True), replace(tension, title=f"{bent}, first tendon")],
     ]
     cells = [

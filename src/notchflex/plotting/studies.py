@@ -121,7 +121,7 @@ def batch_picture(
 
 def _over_rows(name: str, x: Array, table: Array, label: str) -> Panel:
     quantity, order, count = QUANTITIES[name], np.argsort(x, kind="stable"), table.shape[1]
-    shown = evenly(range(count), min(count, MAX_COLUMNS))
+    shown = evenly(range(count), MAX_COLUMNS)
     items: list[Mark] = []
     for column, colour in zip(shown, sequence_colours(len(shown)), strict=True):
         name, shade = (f"{quantity.per[0]} {column + 1}", colour) if count > 1 else ("", BLUE)
@@ -305,7 +305,7 @@ def _histogram(analysis: ToleranceAnalysis, index: int) -> Panel:
         items += [Span("x", level, colour, width=1.4, layer=4)] if np.isfinite(level) else []
     for end in analysis.linear.worst_case[index] * scale:
         items.append(Span("x", end, GREY, DASHED, layer=3))
-    return Panel(items, label, "robots [%]", y_range=(0.0, None))
+    return Panel(items, label, "robots [%]", from_zero=True)
 
 
 MAX_POINTS = 4000

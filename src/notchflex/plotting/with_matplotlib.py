@@ -76,6 +76,8 @@ def draw_panel(axes: Any, panel: Panel) -> None:
             axes.grid(visible=False, axis=name)
         if limits := getattr(panel, f"{name}_range"):
             getattr(axes, f"set_{name}lim")(*limits)
+    if panel.from_zero and axes.dataLim.y0 >= 0.0:
+        axes.set_ylim(0.0)
     if panel.z_label:
         every = (axes.xaxis, axes.yaxis, axes.zaxis)
         extent = np.array([np.ptp(axis.get_view_interval()) for axis in every])
