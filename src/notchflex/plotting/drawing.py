@@ -383,7 +383,7 @@ def _section_tendons(row: NotchRow, centre: Any) -> Iterator[Mark]:
     nearest = max(range(len(turns)), key=lambda number: math.cos(turns[number]))
     for number, (tendon, turn) in enumerate(zip(row.robot.tendon, turns, strict=True)):
         place = centre + row.scale * tendon.radius * np.array([-math.sin(turn), math.cos(turn)])
-        yield Curve([place], VERMILLION, None, marker="o", size=5.0, layer=14)
+        yield Curve([place], VERMILLION, None, marker="o", size=4.0, layer=14)
         if number != nearest:
             continue
         limits = with_limits(row.robot.tolerance, "tendon.radius", tendon.radius)

@@ -201,8 +201,7 @@ def _from_the_side(
     if not order:  # the clamp does not move: it is drawn once
         yield Area([seen.held], GREY, 0.5, 0.8, layer=1)
     # Pale and nearly opaque, so that lines of shapes behind others can be seen.
-    pale = tuple(1.0 - 0.3 * (1.0 - part) for part in rgb(colour))
-    polygons = [*seen.flexures, *seen.bodies]
+    polygons, pale = [*seen.flexures, *seen.bodies], _pale(colour, 0.3)
     yield Area(polygons, colour, width=0.8, face=pale, name=label, layer=2 + level)
     gap = np.full((1, 2), np.nan)
     bores = np.concatenate([part for edge in seen.bores for part in (edge, gap)])
@@ -216,9 +215,13 @@ def _in_space(shape: RobotShape, colour: Colour, label: str, order: int) -> Iter
     if not order:  # the base does not move: it is drawn once
         yield Faces(base, GREY)
     faces = np.concatenate([*bodies, *flexure_faces(shape)])
-    yield Faces(faces, colour, name=label)
+    yield Faces(faces, _pale(colour, 0.6), name=label)  # as shading darkens
     for number in range(len(shape.robot.tendon)):
         yield Curve(tendon_line(shape, number), ORANGE, width=0.9, group=label, layer=5)
+
+
+def _pale(colour: Colour, part: float) -> Colour:
+    return tuple(1.0 - part * (1.0 - channel) for channel in rgb(colour))
 
 
 def _load_arrows(
