@@ -8,8 +8,14 @@ from notchflex.loads.load import BodyForce, ExternalLoad
 from notchflex.plotting import path_figure, path_picture, save
 from notchflex.plotting.curves import abscissa, branches, steps_by_branch
 from notchflex.plotting.marks import Area, Span
-from notchflex.plotting.outline import bending_plane, lips, outline, shape_at
-from notchflex.plotting.shapes import load_label, representative_steps
+from notchflex.plotting.shapes import (
+    bending_plane,
+    lips,
+    load_label,
+    outline,
+    representative_steps,
+    shape_at,
+)
 from notchflex.robot import Linear
 from refusals import refused
 

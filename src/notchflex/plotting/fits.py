@@ -32,8 +32,8 @@ from notchflex.plotting.marks import (
     grid,
     line,
 )
-from notchflex.plotting.outline import outline, shape_from_angles
 from notchflex.plotting.output import Picture
+from notchflex.plotting.shapes import outline, shape_from_angles
 from notchflex.plotting.style import (
     BLUE,
     GREY,
