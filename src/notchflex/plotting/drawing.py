@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from notchflex import Robot
-from notchflex.plotting.marks import Area, Arrow, Colour, Curve, Mark, Text, box
+from notchflex.plotting.marks import Area, Arrow, Colour, Curve, Mark, Note, box
 from notchflex.plotting.notch_views import NotchView, notch_view
 from notchflex.plotting.style import BLUE, VERMILLION, house_style
 from notchflex.plotting.with_matplotlib import draw_marks
@@ -38,10 +38,10 @@ _LEVEL = 0.25  # distance of one dimension line from the next [in]
 _SHORTEST = 0.3  # a shorter dimension has its arrows outside [in]
 
 
-def label(at: Point, text: str, align: str = "center center", **options: Any) -> Text:
+def label(at: Point, text: str, align: str = "center center", **options: Any) -> Note:
     """Return a text on a white background."""
     options = {"colour": INK, "size": TEXT, "inside": False} | options
-    return Text(text, tuple(at), align=align, **options)
+    return Note(text, tuple(at), align=align, **options)
 
 
 def _moved(point: Point, right: float, up: float) -> Any:

@@ -23,9 +23,9 @@ from notchflex.plotting.marks import (
     Array,
     Curve,
     Mark,
+    Note,
     Panel,
     Span,
-    Text,
     band,
     bar_panel,
     dots,
@@ -145,7 +145,7 @@ def _centre_lines(comparison: Comparison) -> Panel:
     solved = np.flatnonzero((trial == longest) & comparison.converged)
     points = solved[evenly(comparison.total_angle[solved], 6)]
     view = np.radians(robot.notches[0].direction_deg)
-    items: list[Mark] = [] if len(points) else [Text("no point was solved")]
+    items: list[Mark] = [] if len(points) else [Note("no point was solved")]
     title = "centre lines of the model" if len(points) else ""
     for point, colour in zip(points, sequence_colours(len(points)), strict=True):
         for angles, dash, width in (
@@ -345,7 +345,7 @@ def _likelihood_panel(fit: Calibration, name: str) -> Panel:
         if end is not None
     ]
     if sides := [side for side, end in ends.items() if end is None]:
-        items.append(Text(f"open {' and '.join(sides)}", (0.03, 0.95), VERMILLION, "left top"))
+        items.append(Note(f"open {' and '.join(sides)}", (0.03, 0.95), VERMILLION, "left top"))
     return Panel(
         items,
         f"{_short(name)} [{fit.units[name] or '-'}]",
@@ -373,7 +373,7 @@ def _correlation_panel(fit: Calibration) -> Panel:
         items.append(Area([corners], colour, 1.0, group=names))
         text, shade = f"{value:.2f}" if is_known else "-", "white" if abs(value) > 0.7 else "black"
         part = (x + 0.5) / count, (y + 0.5) / count
-        items.append(Text(text, part, shade, size=min(8.0, 36.0 / count)))
+        items.append(Note(text, part, shade, size=min(8.0, 36.0 / count)))
     ticks = {"x": numbers, "y": numbers[::-1]}
     limits = (-0.5, count - 0.5)
     return Panel(items, label, "", title="correlation", ticks=ticks, x_range=limits, y_range=limits)

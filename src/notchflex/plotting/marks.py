@@ -132,7 +132,7 @@ class Span(Mark):
 
 
 @dataclass(frozen=True)
-class Text(Mark):
+class Note(Mark):
     """A text at a point of the panel; `inside` gives it in parts of the panel, from 0 to 1.
 
     `align` is where the point lies in the text, such as "left top".
@@ -195,7 +195,7 @@ def bar_panel(
     marks = [*extra]
     for row, (value, colour) in enumerate(zip(values[::-1], colours[::-1], strict=True)):
         marks.append(Area([box(0.0, row - 0.3, value, row + 0.3)], colour, 1.0))
-        marks.append(Text(f" {value:.2f}", (value, row), align="left center", inside=False))
+        marks.append(Note(f" {value:.2f}", (value, row), align="left center", inside=False))
     most = max([value for value in values if value > 0.0], default=1.0)
     options = {"x_range": (0.0, 1.2 * most), "ticks": {"y": names[::-1]}} | options
     return Panel(marks, label, "", **options)

@@ -36,8 +36,8 @@ from notchflex.plotting.marks import (
     Colour,
     Curve,
     Mark,
+    Note,
     Panel,
-    Text,
     dots,
     line,
     stack,
@@ -150,7 +150,7 @@ def _notches_of(items: list[Mark], **options: Any) -> Panel:
 
 def _notch_angles(path: EquilibriumPath, step: int) -> Panel:
     if not path.converged[step]:
-        return _notches_of([Text("not converged")])
+        return _notches_of([Note("not converged")])
     items: list[Mark] = [curve := _angle_curve(path, step, BLUE, size=4.0)]
     if np.any(closed := np.asarray(path.closed[step])):
         items.append(dots(curve.rows[closed], VERMILLION, 5.0, name="closed notch", layer=3))
@@ -159,9 +159,9 @@ def _notch_angles(path: EquilibriumPath, step: int) -> Panel:
 
 def _tension_along(path: EquilibriumPath, step: int) -> Panel:
     if not path.converged[step]:
-        return span_panel([Text("not converged")])
+        return span_panel([Note("not converged")])
     pulled = np.flatnonzero(path.tension[step] > SLACK)[:MAX_TENDONS].tolist()
-    items: list[Mark] = [] if pulled else [Text("all tendons are slack")]
+    items: list[Mark] = [] if pulled else [Note("all tendons are slack")]
     for tendon, colour in zip(pulled, sequence_colours(len(pulled)), strict=True):
         name = f"tendon {tendon + 1}" if path.tension.shape[1] > 1 else ""
         items.append(span_line(path, step, tendon, colour, size=2.2, name=name))
@@ -217,8 +217,8 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
     # One label for all, if they are drawn against the same quantity.
     x_label = labels.pop() if len(labels) == 1 else "load of each"
     bent = "most bent state"
-    notches = angles or [Text("no step was solved")]
-    tension = span_panel(tensions or [Text("no tendon is pulled")])
+    notches = angles or [Note("no step was solved")]
+    tension = span_panel(tensions or [Note("no tendon is pulled")])
     columns = [
         *([shape] for shape in shapes),
         [Panel(total, x_label, total_label), _notches_of(notches, title=bent, from_zero=True)],

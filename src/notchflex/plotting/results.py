@@ -24,9 +24,9 @@ from notchflex.plotting.marks import (
     Colour,
     Curve,
     Mark,
+    Note,
     Panel,
     Span,
-    Text,
     band,
     bar_panel,
     box,
@@ -304,7 +304,7 @@ def _histogram(analysis: ToleranceAnalysis, index: int) -> Panel:
     edges, tops = edges * scale, 100.0 * count / analysis.draws
     label = limit.name.replace("_", " ") + (f" [{unit}]" if unit else "")
     if not len(count):
-        return Panel([Text("no robot has a result")], label, "robots [%]")
+        return Panel([Note("no robot has a result")], label, "robots [%]")
     lower, upper = limit.lower * scale, limit.upper * scale
     inside = (edges[:-1] >= lower) & (edges[1:] <= upper)
     items: list[Mark] = []
@@ -472,7 +472,7 @@ def _variables(design: Design) -> Panel:
     """Position of each variable between its limits."""
     chosen = design.variables[:MAX_VALUES]
     if not chosen:
-        return Panel([Text("no variables")], "", "", title="variables")
+        return Panel([Note("no variables")], "", "", title="variables")
     after, before = (
         [(value - v.lower) / (v.upper - v.lower) for value, v in zip(values, chosen, strict=True)]
         for values in ([v.value for v in chosen], [v.before for v in chosen])

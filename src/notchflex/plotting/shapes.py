@@ -27,8 +27,8 @@ from notchflex.plotting.marks import (
     Curve,
     Faces,
     Mark,
+    Note,
     Panel,
-    Text,
     box,
     dots,
 )
@@ -425,7 +425,7 @@ def shape_panel(
     Every step has a colour, by default from dark to light.
     """
     view = plane_of(path) if steps else bending_plane(path.robot) or 0.0
-    items: list[Mark] = [] if steps else [Text("no step was solved")]
+    items: list[Mark] = [] if steps else [Note("no step was solved")]
     closed: list[Array] = []
     loads: list[AppliedLoad] = []
     for order, step in enumerate(steps):

@@ -52,7 +52,7 @@ SETTINGS: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 8.0,
     "lines.linewidth": 1.4,
-    # Text stays text in SVG and PDF: small files, and the words can be searched and edited.
+    # Note stays text in SVG and PDF: small files, and the words can be searched and edited.
     "svg.fonttype": "none",
     "pdf.fonttype": 42,
     "svg.hashsalt": "notchflex",  # the same picture gives the same file

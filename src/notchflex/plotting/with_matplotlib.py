@@ -19,10 +19,10 @@ from notchflex.plotting.marks import (
     Curve,
     Faces,
     Mark,
+    Note,
     Panel,
     Sheet,
     Span,
-    Text,
 )
 from notchflex.plotting.style import for_paper, heading_lines, house_style, new_figure, rgb
 
@@ -153,7 +153,7 @@ def _draw(axes: Any, mark: Mark) -> None:
             else:
                 style |= {"alpha": mark.opacity, "linewidth": 0.0}
                 getattr(axes, f"ax{way}span")(mark.low, mark.high, **style)
-        case Text():
+        case Note():
             _write(axes, mark)
         case _:
             raise NotImplementedError(f"matplotlib draws no {type(mark).__name__}")
@@ -210,7 +210,7 @@ def _draw_arrow(axes: Any, mark: Arrow, named: dict[str, Any]) -> None:
         axes.plot([], [], color=mark.colour, marker=">", markersize=4.0, **named)
 
 
-def _write(axes: Any, mark: Text) -> None:
+def _write(axes: Any, mark: Note) -> None:
     style: dict[str, Any] = dict(zip(("ha", "va"), mark.align.split(), strict=True))
     style |= {"fontsize": mark.size, "color": mark.colour, "zorder": mark.layer}
     style |= {"fontweight": "bold" if mark.bold else "normal", "rotation": 90.0 * mark.turned}

@@ -18,10 +18,10 @@ from notchflex.plotting.marks import (
     Curve,
     Faces,
     Mark,
+    Note,
     Panel,
     Sheet,
     Span,
-    Text,
     box,
 )
 from notchflex.plotting.style import for_browser, heading_lines, rgb
@@ -171,7 +171,7 @@ def _traces(mark: Mark, panel: Panel, where: Layout, layout: Layout) -> Iterator
                 yield _line(Curve(corners[1:3], mark.colour, mark.dash, mark.width, **style), panel)
             else:
                 yield _area(Area([corners], mark.colour, mark.opacity, **style))
-        case Text():
+        case Note():
             anchor = mark.align.replace("center", "middle").split()
             part = " domain" if mark.inside else ""
             layout["annotations"].append(
