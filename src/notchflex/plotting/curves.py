@@ -248,7 +248,9 @@ def path_panels(path: EquilibriumPath, bands: Mapping[str, Band] | None) -> list
     style: dict[str, Any] = {"y_label": label, "from_zero": True, "legend": INSIDE}
     panels = [total_panel(path, bands), notches_panel(path, bands)]
     _, by_stroke, changing = prescribed(path)
-    panels += [stroke_panel(path, one) for one in changing if one in by_stroke][:MAX_PROFILES]
+    panels += [stroke_panel(path, tendon) for tendon in changing if tendon in by_stroke][
+        :MAX_PROFILES
+    ]
     # The curves of the notches have their names in the panel of the angles.
     panels.append(load_panel(path, "peak_strain", bands, limits, names=False, **style))
     if len(steps_by_branch(path)) > 1:
@@ -382,9 +384,9 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
             f"{x} has {len(across)} entries; take one of them for the horizontal axis: {columns}"
         )
     items: list[Mark] = []
-    for one, other, shade in zip(across, upward, sequence_colours(len(upward)), strict=True):
-        style: list[Any] = [shade, other.name] if len(upward) > 1 else []
-        items += branch_lines(path, one.values, other.values, *style)
+    for right, up, shade in zip(across, upward, sequence_colours(len(upward)), strict=True):
+        style: list[Any] = [shade, up.name] if len(upward) > 1 else []
+        items += branch_lines(path, right.values, up.values, *style)
     if len(upward) > 1:
         items += way_entries(path)
     if len({entry.header for entry in across}) == 1:
@@ -400,7 +402,7 @@ def _series(path: EquilibriumPath, name: str) -> tuple[str, list[Any], tuple[str
     if name == STEP:
         number = np.arange(1.0, len(path) + 1.0)
         return STEP, [SimpleNamespace(header="", name="", values=number)], ()
-    listed = [one for one in QUANTITIES.values() if is_listed(one) and one.kind is not str]
+    listed = [row for row in QUANTITIES.values() if is_listed(row) and row.kind is not str]
     choice = [quantity.name for quantity in listed]
     for quantity in listed:
         entries = list(entries_of(path, quantity))

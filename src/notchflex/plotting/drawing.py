@@ -218,12 +218,12 @@ def notch_rows(robot: Robot, width: float = _WIDTH) -> tuple[list[NotchRow], lis
         notes[0] += " Drawn without precurvature."
     if others := [names for names, _ in named[MAX_SHAPES:]]:
         notes.append(f"Not shown: notches {shorten(', '.join(others), 100)}.")
-    if any(one.sd is not None for one in robot.tolerance):
+    if any(tolerance.sd is not None for tolerance in robot.tolerance):
         notes.append("Tolerances that are standard deviations are drawn as ± twice them.")
     single = [
-        f"{one.value} {with_limits(robot.tolerance, one.value, number_at(robot, one.value))}"
-        for one in robot.tolerance
-        if "[" in one.value
+        f"{name} {with_limits(robot.tolerance, name, number_at(robot, name))}"
+        for name in (tolerance.value for tolerance in robot.tolerance)
+        if "[" in name
     ]
     return rows, [*notes, f"Of single parts: {', '.join(single)}."] if single else notes
 

@@ -275,13 +275,13 @@ def _residual_panel(fit: Calibration, label: str) -> Panel:
     residuals, noise = fit.residuals, fit.noise.deviation
     x, x_label = _loads(fit, label)
     points = np.stack([x, residuals.values / noise], axis=1)
-    known, angles = np.isfinite(noise), _rows_of(fit, label, *_NOTCHES)
-    others = points[_rows_of(fit, label) & known & ~angles]
+    noisy, angles = np.isfinite(noise), _rows_of(fit, label, *_NOTCHES)
+    others = points[_rows_of(fit, label) & noisy & ~angles]
     items: list[Mark] = [Span("y", -1.96, GREY, high=1.96, opacity=0.15), Span("y", 0.0, GREY)]
     if len(others):
         items.append(dots(others, GREY, 3.5, marker="X", name=_OTHERS, layer=1))
     for notch, entry in _notch_entries(fit).items():
-        of_notch = angles & known & (residuals.part == notch)
+        of_notch = angles & noisy & (residuals.part == notch)
         if of_notch.any():
             items.append(replace(entry, points=points[of_notch], layer=3))
     title = _titled(fit, label, "model less measured")
@@ -328,15 +328,15 @@ def _loads(fit: Calibration, label: str) -> tuple[Array, str]:
 def _likelihood_panel(fit: Calibration, name: str) -> Panel:
     """Return the rise of twice the misfit over one constant, with all others optimal."""
     interval, level = fit.intervals[name], fit.allowed_rise(name)
-    known = interval.profile[np.isfinite(interval.profile[:, 1])]
-    value, rise = known.T
+    computed = interval.profile[np.isfinite(interval.profile[:, 1])]
+    value, rise = computed.T
     # Interpolates the nearly linear signed roots.
     root = np.sqrt(rise) * np.sign(value - fit.values[name])
     x = np.linspace(value[0], value[-1], 200)
     items: list[Mark] = [
         Span("y", level, GREY, DOTTED, 1.2),
         line(x, np.interp(x, value, root) ** 2, BLUE),
-        dots(known, BLUE, group="profile", layer=3),
+        dots(computed, BLUE, group="profile", layer=3),
     ]
     ends = {"below": interval.lower, "above": interval.upper}
     items += [

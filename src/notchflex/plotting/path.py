@@ -213,7 +213,7 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
             tips.append(dots(tip[[step]], colour, 4.0, group=name))
             angles.append(_angle_curve(path, step, colour, group=name))
             pulled = np.flatnonzero(path.tension[step] > SLACK)[:1].tolist()
-            tensions += [span_line(path, step, one, colour, group=name) for one in pulled]
+            tensions += [span_line(path, step, tendon, colour, group=name) for tendon in pulled]
     # One label for all, if they are drawn against the same quantity.
     x_label = labels.pop() if len(labels) == 1 else "load of each"
     bent = "most bent state"

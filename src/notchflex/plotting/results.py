@@ -371,12 +371,12 @@ def workspaces_picture(found: Mapping[str, Workspace]) -> Picture:
         found: Workspaces by label.
     """
     panels: list[Panel] = []
-    flat = all(np.ptp(one.extent[:, 1]) < 1e-9 for one in found.values())
+    flat = all(np.ptp(workspace.extent[:, 1]) < 1e-9 for workspace in found.values())
     for across in (0,) if flat else (0, 1):
         items: list[Mark] = []
-        for (label, one), colour in zip(found.items(), MODEL_COLOURS, strict=False):
-            name = f"{label}: convex hull {one.hull.size:.3g} {one.hull.unit}"
-            points = one.tip[_thinned(one)][:, [across, 2]]
+        for (label, workspace), colour in zip(found.items(), MODEL_COLOURS, strict=False):
+            name = f"{label}: convex hull {workspace.hull.size:.3g} {workspace.hull.unit}"
+            points = workspace.tip[_thinned(workspace)][:, [across, 2]]
             items.append(dots(points, colour, 2.0, name=name))
         legend = BELOW if across or flat else ""
         panels.append(Panel(items, _LABELS[across], _LABELS[2], equal=True, legend=legend))
@@ -558,16 +558,16 @@ def _tendon_curves(
 
 def _tips(following: Following) -> Panel:
     """Positions of the tip and targets, in a plane if they lie in one."""
-    every, goals = following.path.tip_position, following.targets.values.get("tip_position")
-    spread = np.ptp(every, axis=0)[:2]
+    tips, goals = following.path.tip_position, following.targets.values.get("tip_position")
+    spread = np.ptp(tips, axis=0)[:2]
     axes = [axis for axis in range(3) if axis != np.argmin(spread) or spread.min() >= 1e-6]
-    via = np.setdiff1d(np.arange(len(every)), following.step)
+    via = np.setdiff1d(np.arange(len(tips)), following.step)
     missed = following.tip_position[~following.reached]
-    items: list[Mark] = [Curve(every[:, axes], BLUE, name="tip")]
+    items: list[Mark] = [Curve(tips[:, axes], BLUE, name="tip")]
     if goals is not None:
         items.append(dots(goals[:, axes], GREY, 4.0, hollow=True, name="target", layer=1))
     if len(via):
-        items.append(dots(every[via][:, axes], ORANGE, name="overshoot", layer=3))
+        items.append(dots(tips[via][:, axes], ORANGE, name="overshoot", layer=3))
     if len(missed):
         items.append(dots(missed[:, axes], VERMILLION, 4.0, name="nearest", layer=4))
     if len(axes) == 2:

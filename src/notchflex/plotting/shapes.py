@@ -75,7 +75,7 @@ def smooth(shape: RobotShape, pieces: int) -> RobotShape:
     Between two sections a flexure is the arc of a constant twist.
     """
     flexures = shape.flexures
-    counts = np.array([len(one.area) for one in flexures])
+    counts = np.array([len(flexure.area) for flexure in flexures])
     parts = -(-pieces // (counts - 1))
     first, total = np.cumsum(counts) - counts, counts.sum()
     places = [
@@ -84,7 +84,7 @@ def smooth(shape: RobotShape, pieces: int) -> RobotShape:
     ]
     place = np.concatenate(places)
     rotation, position, *widths = (
-        np.concatenate([getattr(one, name) for one in flexures])
+        np.concatenate([getattr(flexure, name) for flexure in flexures])
         for name in ("rotation", "position", "spine", "near", "area")
     )
     poses = RigidTransform.from_components(position, Rotation.from_matrix(rotation))
@@ -103,7 +103,7 @@ def walls(robot: Robot, side_deg: float) -> list[tuple[float, float] | None]:
     base, *others = robot.geometry.walls(side_deg)
     assert base is not None
     # What is fixed in the last body may enter it beyond its far face.
-    ends = [None if one is None else (min(one), max(one)) for one in others]
+    ends = [None if wall is None else (min(wall), max(wall)) for wall in others]
     return [(-HELD * robot.tube.outer_radius, base[1]), *ends]
 
 
@@ -182,16 +182,16 @@ def outline(shape: RobotShape, view: float) -> ShapeOutline:
             for sign, wall in zip((1.0, -1.0), _sides(shape, body, view), strict=True)
             if wall is not None
         ],
-        flexures=[project(strip(one), view) for one in shape.flexures],
+        flexures=[project(strip(flexure), view) for flexure in shape.flexures],
         tendons=[project(tendon_line(shape, i), view) for i in range(len(shape.robot.tendon))],
         centre_line=project(_centre_line(shape), view),
         held=place(0, box(-side, below, side, 0.0)),
     )
 
 
-def strip(one: FlexureShape) -> Array:
+def strip(flexure: FlexureShape) -> Array:
     """Return the outline of a flexure: along its spine and back along its other edge, (k, 3)."""
-    return np.concatenate([one.fibre(-one.spine), one.fibre(one.near)[::-1]])
+    return np.concatenate([flexure.fibre(-flexure.spine), flexure.fibre(flexure.near)[::-1]])
 
 
 def body_corners(shape: RobotShape, body: int, view: float) -> Corners:
@@ -224,10 +224,11 @@ def _reach(shape: RobotShape, body: int, view: float) -> list[float]:
     The inner radius, or less where a flexure is attached.
     """
     reach = [shape.robot.tube.inner_radius] * 2
-    joined = [(one, -1) for one in shape.flexures[max(body - 1, 0) : body]]
-    joined += [(one, 0) for one in shape.flexures[body : body + 1]]
-    for one, end in joined:
-        edges = np.stack([one.fibre(-one.spine)[end], one.position[end], one.fibre(one.near)[end]])
+    joined = [(flexure, -1) for flexure in shape.flexures[max(body - 1, 0) : body]]
+    joined += [(flexure, 0) for flexure in shape.flexures[body : body + 1]]
+    for flexure, end in joined:
+        lines = flexure.fibre(-flexure.spine), flexure.position, flexure.fibre(flexure.near)
+        edges = np.stack([line[end] for line in lines])
         local = (edges - shape.position[body]) @ shape.rotation[body] @ across_of(view)
         side, sign = (0, 1.0) if local[1] > 0.0 else (1, -1.0)
         reach[side] = min(reach[side], max(float(np.min(sign * local)), 0.0))
@@ -268,17 +269,22 @@ def body_faces(shape: RobotShape) -> Iterator[Array]:
 def flexure_faces(shape: RobotShape) -> Iterator[Array]:
     """Yield every flexure: the wall at its spine, or a band with its thickness and area."""
     outer = shape.robot.tube.outer_radius
-    for one, spine in zip(shape.flexures, shape.robot.geometry.has_spine, strict=True):
+    for flexure, spine in zip(shape.flexures, shape.robot.geometry.has_spine, strict=True):
         if spine:
-            axis = outer - one.spine  # from the neutral axis to the axis of the tube
-            half = float(np.arccos(np.clip((axis[0] - one.near[0]) / outer, -1.0, 1.0)))
+            axis = outer - flexure.spine  # from the neutral axis to the axis of the tube
+            half = float(np.arccos(np.clip((axis[0] - flexure.near[0]) / outer, -1.0, 1.0)))
             angles = np.pi + np.linspace(-half, half, 9)
             edges = [(axis + outer * np.cos(angle), outer * np.sin(angle)) for angle in angles]
         else:
-            half = 0.5 * one.area / (one.spine + one.near)
-            edges = [(-one.spine, -half), (-one.spine, half), (one.near, half), (one.near, -half)]
+            half = 0.5 * flexure.area / (flexure.spine + flexure.near)
+            edges = [
+                (-flexure.spine, -half),
+                (-flexure.spine, half),
+                (flexure.near, half),
+                (flexure.near, -half),
+            ]
             edges.append(edges[0])
-        along = np.stack([one.fibre(across, out) for across, out in edges], axis=1)
+        along = np.stack([flexure.fibre(across, out) for across, out in edges], axis=1)
         corners = [along[:-1, :-1], along[:-1, 1:], along[1:, 1:], along[1:, :-1]]
         yield np.stack(corners, axis=2).reshape(-1, 4, 3)
 

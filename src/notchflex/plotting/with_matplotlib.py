@@ -102,10 +102,10 @@ def draw_panel(axes: Any, panel: Panel) -> None:
 
 def _fill_box(axes: Any) -> None:
     """Give three axes one scale, each at least a third as long as the longest."""
-    every = (axes.xaxis, axes.yaxis, axes.zaxis)
-    ends = np.array([axis.get_view_interval() for axis in every])
+    three = (axes.xaxis, axes.yaxis, axes.zaxis)
+    ends = np.array([axis.get_view_interval() for axis in three])
     extent = np.maximum(np.ptp(ends, axis=1), np.ptp(ends, axis=1).max() / 3.0)
-    for axis, middle, part in zip(every, ends.mean(axis=1), extent, strict=True):
+    for axis, middle, part in zip(three, ends.mean(axis=1), extent, strict=True):
         axis.set_view_interval(middle - 0.5 * part, middle + 0.5 * part, ignore=True)
         axis.set_major_locator(MaxNLocator(round(6.0 * part / extent.max())))
     axes.zaxis.labelpad = 12.0
