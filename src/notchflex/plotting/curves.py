@@ -248,9 +248,8 @@ def path_panels(path: EquilibriumPath, bands: Mapping[str, Band] | None) -> list
     style: dict[str, Any] = {"y_label": label, "from_zero": True, "legend": INSIDE}
     panels = [total_panel(path, bands), notches_panel(path, bands)]
     _, by_stroke, changing = prescribed(path)
-    panels += [stroke_panel(path, tendon) for tendon in changing if tendon in by_stroke][
-        :MAX_PROFILES
-    ]
+    driven = [tendon for tendon in changing if tendon in by_stroke][:MAX_PROFILES]
+    panels += [stroke_panel(path, tendon) for tendon in driven]
     # The curves of the notches have their names in the panel of the angles.
     panels.append(load_panel(path, "peak_strain", bands, limits, names=False, **style))
     if len(steps_by_branch(path)) > 1:
