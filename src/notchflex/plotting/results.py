@@ -559,7 +559,7 @@ def _tendon_curves(
 def _tips(following: Following) -> Panel:
     """Positions of the tip and targets, in a plane if they lie in one."""
     tips, goals = following.path.tip_position, following.targets.values.get("tip_position")
-    spread = np.ptp(tips, axis=0)[:2]
+    spread = np.ptp(tips, axis=0)[:2]  # below 1e-6 mm it is rounding
     axes = [axis for axis in range(3) if axis != np.argmin(spread) or spread.min() >= 1e-6]
     via = np.setdiff1d(np.arange(len(tips)), following.step)
     missed = following.tip_position[~following.reached]
