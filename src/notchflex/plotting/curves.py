@@ -12,6 +12,7 @@ import numpy as np
 
 from notchflex import Band, EquilibriumPath, InputError
 from notchflex.plotting.marks import (
+    BESIDE,
     DASHED,
     DOTTED,
     INSIDE,
@@ -390,7 +391,8 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
         items += way_entries(path)
     if len({entry.header for entry in across}) == 1:
         items += failures(path, across[0].values)
-    return Panel(items, x_label, y_label, whole="x" * (x == STEP))
+    legend = BESIDE if len(upward) > 1 else INSIDE
+    return Panel(items, x_label, y_label, legend=legend, whole="x" * (x == STEP))
 
 
 def _series(path: EquilibriumPath, name: str) -> tuple[str, list[Any], tuple[str, ...]]:

@@ -500,7 +500,7 @@ def _from_the_side(
 def _in_space(shape: RobotShape, colour: Colour, label: str, order: int) -> Iterator[Mark]:
     base, *bodies = body_faces(shape)
     if not order:  # the base does not move: it is drawn once
-        yield Faces(base, GREY)
+        yield Faces(base, _pale(GREY, 0.6))
     faces = np.concatenate([*bodies, *flexure_faces(shape)])
     yield Faces(faces, _pale(colour, 0.6), name=label)  # as shading darkens
     for number in range(len(shape.robot.tendon)):
