@@ -11,7 +11,7 @@ import notchflex as nf
 from notchflex.plotting import save
 from notchflex.plotting.drawing import MAX_SHAPES, dimensioned_figure
 from notchflex.plotting.notch_views import notch_view
-from notchflex.plotting.outline import outline, shape_from_angles
+from notchflex.plotting.shapes import outline, shape_from_angles
 from notchflex.robot.kinds import Notch
 from refusals import refused
 

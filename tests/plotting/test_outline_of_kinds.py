@@ -5,7 +5,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.mechanics.chain import assemble
-from notchflex.plotting.outline import body_faces, lips, outline, shape_from_angles, tendon_line
+from notchflex.plotting.shapes import body_faces, lips, outline, shape_from_angles, tendon_line
 
 
 def shape_of(name, angle=0.0):

@@ -8,8 +8,14 @@ from notchflex.loads.load import BodyForce, ExternalLoad
 from notchflex.plotting import path_figure, path_picture, save
 from notchflex.plotting.curves import abscissa, branches, steps_by_branch
 from notchflex.plotting.marks import Area, Span
-from notchflex.plotting.outline import bending_plane, lips, outline, shape_at
-from notchflex.plotting.shapes import load_label, representative_steps
+from notchflex.plotting.shapes import (
+    bending_plane,
+    lips,
+    load_label,
+    outline,
+    representative_steps,
+    shape_at,
+)
 from notchflex.robot import Linear
 from refusals import refused
 
@@ -194,6 +200,9 @@ def test_loads_are_arrows_where_they_act():
     shape = shape_at(path, 0)
     dead = (path.tip_position[0] - path.body_position[0, 0])[[0, 2]]
     ends = [arrow._posA_posB for arrow in arrows(figure)]
+    # A moment about y, which points away from the viewer, turns clockwise: down on the right.
+    assert ends[1][1][0] > dead[0]
+    assert ends[1][1][1] < ends[1][0][1]
     np.testing.assert_allclose(ends[0][0], dead, atol=1e-9)
     np.testing.assert_allclose(np.sign(np.subtract(*ends[0][::-1])), [-1.0, 0.0])
     np.testing.assert_allclose(ends[2][0], shape.on_body(2, [0.5, 0.0, 0.0])[[0, 2]])

@@ -21,8 +21,27 @@ from notchflex.plotting.fits import (
     friction_picture,
 )
 from notchflex.plotting.marks import Curve, Mark, Panel, dots, line
-from notchflex.plotting.outline import (
+from notchflex.plotting.output import Picture
+from notchflex.plotting.path import (
+    beside_picture,
+    path_figure,
+    path_picture,
+    save_animation,
+    state_picture,
+)
+from notchflex.plotting.results import (
+    batch_picture,
+    following_picture,
+    sensed_picture,
+    sweep_picture,
+    tolerance_picture,
+    workspace_picture,
+    workspaces_picture,
+)
+from notchflex.plotting.shapes import (
     HELD,
+    AppliedLoad,
+    applied_loads,
     bending_plane,
     body_corners,
     fair_growth,
@@ -32,25 +51,10 @@ from notchflex.plotting.outline import (
     shape_at,
     shape_from_angles,
     smooth,
+    state_shape,
     strip,
     tendon_line,
     tube_wall,
-)
-from notchflex.plotting.output import Picture
-from notchflex.plotting.path import (
-    beside_picture,
-    path_figure,
-    path_picture,
-    save_animation,
-    state_picture,
-)
-from notchflex.plotting.shapes import AppliedLoad, applied_loads, state_shape
-from notchflex.plotting.studies import (
-    batch_picture,
-    sweep_picture,
-    tolerance_picture,
-    workspace_picture,
-    workspaces_picture,
 )
 from notchflex.plotting.style import (
     BLACK,
@@ -64,7 +68,6 @@ from notchflex.plotting.style import (
     house_style,
     save,
 )
-from notchflex.plotting.targets import following_picture, sensed_picture
 from notchflex.plotting.usual import picture, plot_on_axes
 from notchflex.plotting.with_matplotlib import draw_marks, draw_panel
 

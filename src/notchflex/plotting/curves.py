@@ -12,6 +12,7 @@ import numpy as np
 
 from notchflex import Band, EquilibriumPath, InputError
 from notchflex.plotting.marks import (
+    BESIDE,
     DASHED,
     DOTTED,
     INSIDE,
@@ -193,6 +194,7 @@ def load_panel(
     name: str,
     bands: Mapping[str, Band] | None = None,
     extra: Sequence[Mark] = (),
+    names: bool = True,
     **options: Any,
 ) -> Panel:
     """Return a quantity over the load, each entry in its colour, with its band of tolerances.
@@ -202,12 +204,13 @@ def load_panel(
         name: A quantity with one number, or one for each notch.
         bands: Bands by name of the quantity; None for none.
         extra: Further marks.
+        names: Whether the legend names the entries.
         options: Those of `Panel`.
     """
     x, x_label = abscissa(path)
     table = scaled(path, name, getattr(path, name))
     count, items = table.shape[1], list[Mark]()
-    named = evenly(range(count), count if count <= MAX_NAMES else MAX_NAMES // 2)
+    named = evenly(range(count), MAX_NAMES) if names else []
     for entry, colour in enumerate(sequence_colours(count) if count > 1 else [None]):
         group = f"notch {entry + 1}" if count > 1 else ""
         if bands is not None and name in bands:
@@ -243,13 +246,13 @@ def path_panels(path: EquilibriumPath, bands: Mapping[str, Band] | None) -> list
         level, name = 100.0 * allowed, f"allowed {100.0 * allowed:.3g} %"
         limits.append(Span("y", level, VERMILLION, DASHED, 1.2, name=name))
     label = f"{QUANTITIES['peak_strain'].title} of every notch [%]"
-    strain = load_panel(path, "peak_strain", bands, limits, y_label=label, y_range=(0.0, None))
-    # The curves of the notches have their names in the panel of the angles.
-    nameless = [mark if isinstance(mark, Span) else replace(mark, name="") for mark in strain.items]
+    style: dict[str, Any] = {"y_label": label, "from_zero": True, "legend": INSIDE}
     panels = [total_panel(path, bands), notches_panel(path, bands)]
     _, by_stroke, changing = prescribed(path)
-    panels += [stroke_panel(path, one) for one in changing if one in by_stroke][:MAX_PROFILES]
-    panels.append(replace(strain, items=nameless, legend=INSIDE))
+    driven = [tendon for tendon in changing if tendon in by_stroke][:MAX_PROFILES]
+    panels += [stroke_panel(path, tendon) for tendon in driven]
+    # The curves of the notches have their names in the panel of the angles.
+    panels.append(load_panel(path, "peak_strain", bands, limits, names=False, **style))
     if len(steps_by_branch(path)) > 1:
         tendons = pulled_tendons(path)
         panels += [profile_panel(path, tendon) for tendon in tendons[:MAX_PROFILES]]
@@ -282,7 +285,7 @@ def stroke_panel(path: EquilibriumPath, tendon: int) -> Panel:
     labels = [tendon_label(path, name, tendon) for name in ("stroke", "tension")]
     items: list[Mark] = [*branch_lines(path, path.stroke[:, tendon], path.tension[:, tendon])]
     items += failures(path, path.commanded_stroke[:, tendon])
-    return Panel(items, *labels, legend=INSIDE, y_range=(0.0, None))
+    return Panel(items, *labels, legend=INSIDE, from_zero=True)
 
 
 def pulled_tendons(path: EquilibriumPath) -> list[int]:
@@ -301,7 +304,7 @@ def span_line(path: EquilibriumPath, step: int, tendon: int, colour: Colour, **s
 def span_panel(items: Sequence[Mark], which: str = "") -> Panel:
     """Return a panel of the tension from span to span."""
     label = f"span of tendon{which} [number], 0 at the base"
-    return Panel(items, label, QUANTITIES["span_tension"].label, y_range=(0.0, None), whole="x")
+    return Panel(items, label, QUANTITIES["span_tension"].label, from_zero=True, whole="x")
 
 
 def profile_panel(path: EquilibriumPath, tendon: int) -> Panel:
@@ -381,14 +384,15 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
             f"{x} has {len(across)} entries; take one of them for the horizontal axis: {columns}"
         )
     items: list[Mark] = []
-    for one, other, shade in zip(across, upward, sequence_colours(len(upward)), strict=True):
-        style: list[Any] = [shade, other.name] if len(upward) > 1 else []
-        items += branch_lines(path, one.values, other.values, *style)
+    for right, up, shade in zip(across, upward, sequence_colours(len(upward)), strict=True):
+        style: list[Any] = [shade, up.name] if len(upward) > 1 else []
+        items += branch_lines(path, right.values, up.values, *style)
     if len(upward) > 1:
         items += way_entries(path)
     if len({entry.header for entry in across}) == 1:
         items += failures(path, across[0].values)
-    return Panel(items, x_label, y_label, whole="x" * (x == STEP))
+    legend = BESIDE if len(upward) > 1 else INSIDE
+    return Panel(items, x_label, y_label, legend=legend, whole="x" * (x == STEP))
 
 
 def _series(path: EquilibriumPath, name: str) -> tuple[str, list[Any], tuple[str, ...]]:
@@ -399,7 +403,7 @@ def _series(path: EquilibriumPath, name: str) -> tuple[str, list[Any], tuple[str
     if name == STEP:
         number = np.arange(1.0, len(path) + 1.0)
         return STEP, [SimpleNamespace(header="", name="", values=number)], ()
-    listed = [one for one in QUANTITIES.values() if is_listed(one) and one.kind is not str]
+    listed = [row for row in QUANTITIES.values() if is_listed(row) and row.kind is not str]
     choice = [quantity.name for quantity in listed]
     for quantity in listed:
         entries = list(entries_of(path, quantity))

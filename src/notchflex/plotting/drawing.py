@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from textwrap import shorten
 from typing import Any
@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from notchflex import Robot
-from notchflex.plotting.marks import Area, Arrow, Colour, Curve, Mark, Text, box
+from notchflex.plotting.marks import Area, Arrow, Colour, Curve, Mark, Note, box
 from notchflex.plotting.notch_views import NotchView, notch_view
 from notchflex.plotting.style import BLUE, VERMILLION, house_style
 from notchflex.plotting.with_matplotlib import draw_marks
@@ -38,10 +38,10 @@ _LEVEL = 0.25  # distance of one dimension line from the next [in]
 _SHORTEST = 0.3  # a shorter dimension has its arrows outside [in]
 
 
-def label(at: Point, text: str, align: str = "center center", **options: Any) -> Text:
+def label(at: Point, text: str, align: str = "center center", **options: Any) -> Note:
     """Return a text on a white background."""
     options = {"colour": INK, "size": TEXT, "inside": False} | options
-    return Text(text, tuple(at), align=align, **options)
+    return Note(text, tuple(at), align=align, **options)
 
 
 def _moved(point: Point, right: float, up: float) -> Any:
@@ -57,7 +57,7 @@ def _ink(points: Any, width: float = 1.0) -> Curve:
 
 
 def _arrow(start: Point, end: Point, colour: Colour = _FINE, width: float = 0.7) -> Arrow:
-    return Arrow(start, end, colour, width=width, head=max(6.0, 5.5 * width))
+    return Arrow([start, end], colour, width, max(6.0, 5.5 * width))
 
 
 def _dimension(
@@ -80,32 +80,6 @@ def _dimension(
     yield _arrow(place(start - 0.17, at), first)
     yield _arrow(place(end + 0.17, at), last)
     yield _stroke([first, last], width=0.7)
-
-
-def levels(intervals: Sequence[tuple[float, float, str]]) -> list[int]:
-    """Return levels of dimensions (left end, right end [in], text) at which no texts overlap.
-
-    Example:
-        >>> levels([(0.0, 2.0, "height 1"), (2.0, 4.0, "length 2"), (4.0, 4.1, "thickness 3")])
-        [0, 0, 1]
-    """
-    occupied: list[list[tuple[float, float]]] = []
-    numbers: list[int] = []
-    for start, end, text in intervals:
-        middle, half = 0.5 * (start + end), 0.5 * LETTER * len(text) + 0.04
-        # Arrows outside of a short dimension need room too.
-        out = 0.2 if end - start < _SHORTEST else 0.0
-        low, high = min(start - out, middle - half), max(end + out, middle + half)
-        numbers.append(
-            next(
-                number
-                for number, row in enumerate([*occupied, []])
-                if all(high <= left + 1e-9 or low >= right - 1e-9 for left, right in row)
-            )
-        )
-        occupied += [[]] if numbers[-1] == len(occupied) else []
-        occupied[numbers[-1]].append((low, high))
-    return numbers
 
 
 def _broken(x: float, low: float, high: float) -> Iterator[Mark]:
@@ -204,15 +178,8 @@ class NotchRow:
     @property
     def height(self) -> float:
         """Its height [in]."""
-        above = _LEVEL * max(levels(self.along), default=0)
-        below = 0.17 * len(self.view.notes)
-        return 1.71 + above + self.scale * self.robot.tube.outer_diameter + below
-
-    @property
-    def along(self) -> list[tuple[float, float, str]]:
-        """Ends of the dimensions along the tube [in], and their texts."""
-        scale = self.scale
-        return [(_LEFT + scale * d.start, _LEFT + scale * d.end, d.text) for d in self.view.along]
+        texts = _LEVEL * len(self.view.along) + 0.17 * len(self.view.notes)
+        return 1.46 + self.scale * self.robot.tube.outer_diameter + texts
 
     @property
     def section(self) -> float:
@@ -251,21 +218,20 @@ def notch_rows(robot: Robot, width: float = _WIDTH) -> tuple[list[NotchRow], lis
         notes[0] += " Drawn without precurvature."
     if others := [names for names, _ in named[MAX_SHAPES:]]:
         notes.append(f"Not shown: notches {shorten(', '.join(others), 100)}.")
-    if any(one.sd is not None for one in robot.tolerance):
+    if any(tolerance.sd is not None for tolerance in robot.tolerance):
         notes.append("Tolerances that are standard deviations are drawn as ± twice them.")
     single = [
-        f"{one.value} {with_limits(robot.tolerance, one.value, number_at(robot, one.value))}"
-        for one in robot.tolerance
-        if "[" in one.value
+        f"{name} {with_limits(robot.tolerance, name, number_at(robot, name))}"
+        for name in (tolerance.value for tolerance in robot.tolerance)
+        if "[" in name
     ]
     return rows, [*notes, f"Of single parts: {', '.join(single)}."] if single else notes
 
 
 def draw_row(axes: Axes, row: NotchRow, top: float) -> None:
     """Draw the views of one notch below a height."""
-    stages = max(levels(row.along), default=0)
     outer = row.scale * row.robot.tube.outer_radius
-    axis = top - 0.62 - _LEVEL * (1 + stages) - outer
+    axis = top - 0.62 - _LEVEL * len(row.view.along) - outer
     centre = np.array([row.section, axis])
     for marks in (
         [label((0.25, top - 0.12), _heading(row), "left center", size=9.0, bold=True)],
@@ -290,10 +256,11 @@ def _heading(row: NotchRow) -> str:
 def _dimensions(row: NotchRow, axis: float) -> Iterator[Mark]:
     tube, view, scale = row.robot.tube, row.view, row.scale
     right, outer = _LEFT + scale * view.length, scale * tube.outer_radius
-    for (start, end, text), stage in zip(row.along, levels(row.along), strict=True):
-        height = axis + outer + 0.2 + _LEVEL * stage
-        yield from _dimension(start, end, height, axis + outer)
-        yield label((0.5 * (start + end), height + 0.035), text, "center bottom")
+    for level, (start, end, text) in enumerate(view.along):
+        low, high = _LEFT + scale * start, _LEFT + scale * end
+        height = axis + outer + 0.2 + _LEVEL * level
+        yield from _dimension(low, high, height, axis + outer)
+        yield label((0.5 * (low + high), height + 0.035), text, "center bottom")
     for size, at, name in (
         (tube.outer_diameter, _LEFT - 0.6, "outer"),
         (tube.inner_diameter, _LEFT - 0.25, "inner"),
@@ -416,7 +383,7 @@ def _section_tendons(row: NotchRow, centre: Any) -> Iterator[Mark]:
     nearest = max(range(len(turns)), key=lambda number: math.cos(turns[number]))
     for number, (tendon, turn) in enumerate(zip(row.robot.tendon, turns, strict=True)):
         place = centre + row.scale * tendon.radius * np.array([-math.sin(turn), math.cos(turn)])
-        yield Curve([place], VERMILLION, None, marker="o", size=5.0, layer=14)
+        yield Curve([place], VERMILLION, None, marker="o", size=4.0, layer=14)
         if number != nearest:
             continue
         limits = with_limits(row.robot.tolerance, "tendon.radius", tendon.radius)

@@ -23,17 +23,17 @@ from notchflex.plotting.marks import (
     Array,
     Curve,
     Mark,
+    Note,
     Panel,
     Span,
-    Text,
     band,
     bar_panel,
     dots,
     grid,
     line,
 )
-from notchflex.plotting.outline import outline, shape_from_angles
 from notchflex.plotting.output import Picture
+from notchflex.plotting.shapes import outline, shape_from_angles
 from notchflex.plotting.style import (
     BLUE,
     GREY,
@@ -81,7 +81,8 @@ def comparison_picture(
              name=f"measured, trial {pull}" if len(pulls) > 1 else "measured")
         for pull, marker in zip(pulls, cycle(MARKERS), strict=False)
     ]  # fmt: skip
-    x, x_label = _measured_load(comparison)
+    measured_load = comparison.measured.measured_tension, comparison.measured.load.stroke
+    x, x_label = _abscissa(*measured_load)
     trial, measured = np.array(comparison.measured.pull), _angles(comparison, "measured_")
     errors = [*comparison.rmse_notches, comparison.rmse_total]
     panels: list[Panel] = []
@@ -100,18 +101,8 @@ def comparison_picture(
             items += [replace(entry, points=computed[run]) for run in runs]
         name = f"notch {column + 1}" if column < len(errors) - 1 else "total"
         title = f"{name}, error {float(error) * DEGREES:.2f}° rms"
-        angles = [curve.rows[:, 1].min(initial=0.0) for curve in items if isinstance(curve, Curve)]
-        panels.append(
-            Panel(
-                items,
-                x_label,
-                "angle [deg]",
-                title=title,
-                legend="",
-                y_range=(0.0, None) if np.nanmin(angles) >= 0.0 else None,
-                shared="x",
-            )
-        )
+        style: dict[str, Any] = {"title": title, "legend": "", "from_zero": True, "shared": "x"}
+        panels.append(Panel(items, x_label, "angle [deg]", **style))
     panels.append(_centre_lines(comparison))
     if others:
         panels.append(_errors(models, [entry.colour for entry in entries]))
@@ -136,15 +127,15 @@ def _runs(rows: Any, x: Array, pull: Any, from_rest: bool) -> list[Any]:
     return [rows[pull[rows] == label] for label in dict.fromkeys(pull[rows].tolist())]
 
 
-def _measured_load(comparison: Comparison) -> tuple[Array, str]:
-    """Return the first tension or stroke that all rows have, and its label; else the row."""
-    measured = comparison.measured
-    tables = {"tension": measured.measured_tension, "stroke": measured.load.stroke}
-    for name, values in tables.items():
-        complete = np.flatnonzero(~np.isnan(values).any(axis=0))
-        if len(complete):
-            return values[:, complete[0]], QUANTITIES[name].label
-    return np.arange(1.0, len(measured) + 1.0), "row of the table"
+def _abscissa(tension: Any, stroke: Any) -> tuple[Array, str]:
+    """Return the first tension or stroke that all rows have and that changes, and its label."""
+    for name, values in (("tension", tension), ("stroke", stroke)):
+        varied = np.isfinite(values).all(axis=0) & (np.ptp(values, axis=0) > 0.0)
+        if varied.any():
+            tendon = int(np.argmax(varied))
+            entry = f"tendon {tendon + 1}" if len(varied) > 1 else ""
+            return values[:, tendon], entry_label(QUANTITIES[name], entry)
+    return np.arange(1.0, len(tension) + 1.0), "row [number]"
 
 
 def _centre_lines(comparison: Comparison) -> Panel:
@@ -154,7 +145,7 @@ def _centre_lines(comparison: Comparison) -> Panel:
     solved = np.flatnonzero((trial == longest) & comparison.converged)
     points = solved[evenly(comparison.total_angle[solved], 6)]
     view = np.radians(robot.notches[0].direction_deg)
-    items: list[Mark] = [] if len(points) else [Text("no point was solved")]
+    items: list[Mark] = [] if len(points) else [Note("no point was solved")]
     title = "centre lines of the model" if len(points) else ""
     for point, colour in zip(points, sequence_colours(len(points)), strict=True):
         for angles, dash, width in (
@@ -237,7 +228,7 @@ def _data_panels(fit: Calibration, label: str) -> Iterator[Panel]:
     for quantity in OBSERVED:
         if quantity != "axis_points":  # thirty points and more: only their residuals
             parts = np.unique(fit.residuals.part[_rows_of(fit, label, quantity)])
-            for part in parts[evenly(range(len(parts)), min(len(parts), MAX_NOTCHES))].tolist():
+            for part in parts[evenly(range(len(parts)), MAX_NOTCHES)].tolist():
                 yield _data_panel(fit, label, quantity, part)
 
 
@@ -246,7 +237,7 @@ def _data_panel(fit: Calibration, label: str, quantity: str, part: int) -> Panel
     from notchflex.fit.assessment.errors_of_parts import edge, part_title
 
     residuals, (name, unit, scale) = fit.residuals, edge(quantity)
-    x, x_label = _abscissa(fit, label)
+    x, x_label = _loads(fit, label)
     half = fit.half_width(residuals.slopes) * scale
     samples, items = [sample.measured for sample in fit.problem.samples.every], list[Mark]()
     shown = np.flatnonzero(_rows_of(fit, label, quantity) & (residuals.part == part))
@@ -282,15 +273,15 @@ def _residual_panel(fit: Calibration, label: str) -> Panel:
     A total angle that is the sum of the notches has no noise of its own and is not drawn.
     """
     residuals, noise = fit.residuals, fit.noise.deviation
-    x, x_label = _abscissa(fit, label)
+    x, x_label = _loads(fit, label)
     points = np.stack([x, residuals.values / noise], axis=1)
-    known, angles = np.isfinite(noise), _rows_of(fit, label, *_NOTCHES)
-    others = points[_rows_of(fit, label) & known & ~angles]
+    noisy, angles = np.isfinite(noise), _rows_of(fit, label, *_NOTCHES)
+    others = points[_rows_of(fit, label) & noisy & ~angles]
     items: list[Mark] = [Span("y", -1.96, GREY, high=1.96, opacity=0.15), Span("y", 0.0, GREY)]
     if len(others):
         items.append(dots(others, GREY, 3.5, marker="X", name=_OTHERS, layer=1))
     for notch, entry in _notch_entries(fit).items():
-        of_notch = angles & known & (residuals.part == notch)
+        of_notch = angles & noisy & (residuals.part == notch)
         if of_notch.any():
             items.append(replace(entry, points=points[of_notch], layer=3))
     title = _titled(fit, label, "model less measured")
@@ -320,40 +311,32 @@ def _rows_of(fit: Calibration, label: str, *quantities: str) -> Any:
     return of_robot & np.isin(fit.residuals.quantity, numbers)
 
 
-def _abscissa(fit: Calibration, label: str) -> tuple[Array, str]:
+def _loads(fit: Calibration, label: str) -> tuple[Array, str]:
     """Return tension or stroke of a tendon at every residual of a robot, and its label."""
-    residuals = fit.residuals
-    loads = {
-        number: sample.measured.load
-        for number, sample in enumerate(fit.problem.samples.every)
-        if sample.label == label
-    }
-    for name in ("tension", "stroke"):
-        tables = {number: getattr(load, name) for number, load in loads.items()}
-        together = np.concatenate(list(tables.values()))
-        varied = np.isfinite(together).all(axis=0) & (np.ptp(together, axis=0) > 0.0)
-        if varied.any():
-            tendon, x = int(np.argmax(varied)), np.full(len(residuals), np.nan)
-            for number, table in tables.items():
-                of_sample = residuals.sample == number
-                x[of_sample] = table[residuals.row[of_sample], tendon]
-            entry = f"tendon {tendon + 1}" if len(varied) > 1 else ""
-            return x, entry_label(QUANTITIES[name], entry)
-    return residuals.row + 1.0, "row [number]"
+    residuals, of_robot = fit.residuals, _rows_of(fit, label)
+    loads = [sample.measured.load for sample in fit.problem.samples.every]
+    rows = list(zip(residuals.sample[of_robot], residuals.row[of_robot], strict=True))
+    tension, stroke = (
+        np.array([getattr(loads[sample], name)[row] for sample, row in rows])
+        for name in ("tension", "stroke")
+    )
+    x = np.full(len(residuals), np.nan)
+    x[of_robot], x_label = _abscissa(tension, stroke)
+    return x, x_label
 
 
 def _likelihood_panel(fit: Calibration, name: str) -> Panel:
     """Return the rise of twice the misfit over one constant, with all others optimal."""
     interval, level = fit.intervals[name], fit.allowed_rise(name)
-    known = interval.profile[np.isfinite(interval.profile[:, 1])]
-    value, rise = known.T
+    computed = interval.profile[np.isfinite(interval.profile[:, 1])]
+    value, rise = computed.T
     # Interpolates the nearly linear signed roots.
     root = np.sqrt(rise) * np.sign(value - fit.values[name])
     x = np.linspace(value[0], value[-1], 200)
     items: list[Mark] = [
         Span("y", level, GREY, DOTTED, 1.2),
         line(x, np.interp(x, value, root) ** 2, BLUE),
-        dots(known, BLUE, group="profile", layer=3),
+        dots(computed, BLUE, group="profile", layer=3),
     ]
     ends = {"below": interval.lower, "above": interval.upper}
     items += [
@@ -362,7 +345,7 @@ def _likelihood_panel(fit: Calibration, name: str) -> Panel:
         if end is not None
     ]
     if sides := [side for side, end in ends.items() if end is None]:
-        items.append(Text(f"open {' and '.join(sides)}", (0.03, 0.95), VERMILLION, "left top"))
+        items.append(Note(f"open {' and '.join(sides)}", (0.03, 0.95), VERMILLION, "left top"))
     return Panel(
         items,
         f"{_short(name)} [{fit.units[name] or '-'}]",
@@ -390,7 +373,7 @@ def _correlation_panel(fit: Calibration) -> Panel:
         items.append(Area([corners], colour, 1.0, group=names))
         text, shade = f"{value:.2f}" if is_known else "-", "white" if abs(value) > 0.7 else "black"
         part = (x + 0.5) / count, (y + 0.5) / count
-        items.append(Text(text, part, shade, size=min(8.0, 36.0 / count)))
+        items.append(Note(text, part, shade, size=min(8.0, 36.0 / count)))
     ticks = {"x": numbers, "y": numbers[::-1]}
     limits = (-0.5, count - 0.5)
     return Panel(items, label, "", title="correlation", ticks=ticks, x_range=limits, y_range=limits)

@@ -105,17 +105,11 @@ class Faces(Mark):
 
 @dataclass(frozen=True)
 class Arrow(Mark):
-    """An arrow in the plane or in space; in the plane `bend` makes it an arc (1: a half circle).
+    """An arrow along points to the last of them, (k, 2) in the plane or (2, 3) in space."""
 
-    The axes include `reach`, (k, 2), in place of its ends.
-    """
-
-    start: Any
-    end: Any
+    points: Any
     colour: Colour
-    bend: float = 0.0
     width: float = 1.4
-    reach: Array | None = None
     head: float = 9.0  # its size [pt]
     layer: int = field(default=9, kw_only=True)
 
@@ -138,7 +132,7 @@ class Span(Mark):
 
 
 @dataclass(frozen=True)
-class Text(Mark):
+class Note(Mark):
     """A text at a point of the panel; `inside` gives it in parts of the panel, from 0 to 1.
 
     `align` is where the point lies in the text, such as "left top".
@@ -171,6 +165,7 @@ class Panel:
     equal: bool = False  # both axes have the same scale
     shared: str = ""  # axes with the same limits in all panels that share them, as "xy"
     whole: str = ""  # axes with integers only, as "xy"
+    from_zero: bool = False  # the y axis starts at 0, unless something is negative
     ticks: Mapping[str, Sequence[str]] = field(default_factory=dict)
     """Labels at 0, 1, 2, ... of the axes that have some, in place of numbers and grid."""
     x_range: tuple[float | None, float | None] | None = None  # None fits the marks
@@ -200,7 +195,7 @@ def bar_panel(
     marks = [*extra]
     for row, (value, colour) in enumerate(zip(values[::-1], colours[::-1], strict=True)):
         marks.append(Area([box(0.0, row - 0.3, value, row + 0.3)], colour, 1.0))
-        marks.append(Text(f" {value:.2f}", (value, row), align="left center", inside=False))
+        marks.append(Note(f" {value:.2f}", (value, row), align="left center", inside=False))
     most = max([value for value in values if value > 0.0], default=1.0)
     options = {"x_range": (0.0, 1.2 * most), "ticks": {"y": names[::-1]}} | options
     return Panel(marks, label, "", **options)

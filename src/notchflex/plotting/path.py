@@ -36,8 +36,8 @@ from notchflex.plotting.marks import (
     Colour,
     Curve,
     Mark,
+    Note,
     Panel,
-    Text,
     dots,
     line,
     stack,
@@ -150,7 +150,7 @@ def _notches_of(items: list[Mark], **options: Any) -> Panel:
 
 def _notch_angles(path: EquilibriumPath, step: int) -> Panel:
     if not path.converged[step]:
-        return _notches_of([Text("not converged")])
+        return _notches_of([Note("not converged")])
     items: list[Mark] = [curve := _angle_curve(path, step, BLUE, size=4.0)]
     if np.any(closed := np.asarray(path.closed[step])):
         items.append(dots(curve.rows[closed], VERMILLION, 5.0, name="closed notch", layer=3))
@@ -159,9 +159,9 @@ def _notch_angles(path: EquilibriumPath, step: int) -> Panel:
 
 def _tension_along(path: EquilibriumPath, step: int) -> Panel:
     if not path.converged[step]:
-        return span_panel([Text("not converged")])
+        return span_panel([Note("not converged")])
     pulled = np.flatnonzero(path.tension[step] > SLACK)[:MAX_TENDONS].tolist()
-    items: list[Mark] = [] if pulled else [Text("all tendons are slack")]
+    items: list[Mark] = [] if pulled else [Note("all tendons are slack")]
     for tendon, colour in zip(pulled, sequence_colours(len(pulled)), strict=True):
         name = f"tendon {tendon + 1}" if path.tension.shape[1] > 1 else ""
         items.append(span_line(path, step, tendon, colour, size=2.2, name=name))
@@ -197,7 +197,7 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
         )
     shapes: list[Panel] = []
     total, tips, angles, tensions = (list[Mark]() for _ in range(4))
-    labels, total_label, least = set[str](), QUANTITIES["total_angle"].label, 0.0
+    labels, total_label = set[str](), QUANTITIES["total_angle"].label
     for (name, path), colour in zip(paths.items(), MODEL_COLOURS, strict=False):
         steps = representative_steps(path, most=3)
         pale = np.linspace(0.55, 0.0, len(steps))[:, None]
@@ -212,17 +212,16 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
         for step in steps[-1:]:  # the most bent
             tips.append(dots(tip[[step]], colour, 4.0, group=name))
             angles.append(_angle_curve(path, step, colour, group=name))
-            least = min(least, float(path.notch_angle[step].min()))
             pulled = np.flatnonzero(path.tension[step] > SLACK)[:1].tolist()
-            tensions += [span_line(path, step, one, colour, group=name) for one in pulled]
+            tensions += [span_line(path, step, tendon, colour, group=name) for tendon in pulled]
     # One label for all, if they are drawn against the same quantity.
     x_label = labels.pop() if len(labels) == 1 else "load of each"
-    bent, y_range = "most bent state", (0.0, None) if least >= 0.0 else None
-    notches = angles or [Text("no step was solved")]
-    tension = span_panel(tensions or [Text("no tendon is pulled")])
+    bent = "most bent state"
+    notches = angles or [Note("no step was solved")]
+    tension = span_panel(tensions or [Note("no tendon is pulled")])
     columns = [
         *([shape] for shape in shapes),
-        [Panel(total, x_label, total_label), _notches_of(notches, title=bent, y_range=y_range)],
+        [Panel(total, x_label, total_label), _notches_of(notches, title=bent, from_zero=True)],
         [Panel(tips, *TIP_LABELS, equal=True), replace(tension, title=f"{bent}, first tendon")],
     ]
     cells = [

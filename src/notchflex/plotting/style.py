@@ -52,7 +52,7 @@ SETTINGS: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 8.0,
     "lines.linewidth": 1.4,
-    # Text stays text in SVG and PDF: small files, and the words can be searched and edited.
+    # Note stays text in SVG and PDF: small files, and the words can be searched and edited.
     "svg.fonttype": "none",
     "pdf.fonttype": 42,
     "svg.hashsalt": "notchflex",  # the same picture gives the same file
@@ -110,7 +110,7 @@ def save(figure: Figure, target: str | FilePath) -> None:
         figure.savefig(temporary, **options)
 
 
-SYMBOLS = frozenset(one.symbol for one in QUANTITIES.values() if one.symbol) | {r"\mu"}
+SYMBOLS = frozenset(row.symbol for row in QUANTITIES.values() if row.symbol) | {r"\mu"}
 
 # A symbol may have the index of one of its entries: p_x, \theta_3, \theta_{12}.
 _INDEX = r"(?:_(?:[xyz]|\d|\{\d+\}))?"

@@ -13,15 +13,17 @@ from notchflex.plotting.curves import quantities_panel
 from notchflex.plotting.fits import calibration_picture, comparison_picture, friction_picture
 from notchflex.plotting.output import Picture
 from notchflex.plotting.path import beside_picture, path_picture, robot_picture, state_picture
-from notchflex.plotting.shapes import robot_shape, state_shape
-from notchflex.plotting.studies import batch_picture, tolerance_picture, workspace_picture
-from notchflex.plotting.style import house_style
-from notchflex.plotting.targets import (
+from notchflex.plotting.results import (
+    batch_picture,
     design_picture,
     following_picture,
     front_picture,
     sensed_picture,
+    tolerance_picture,
+    workspace_picture,
 )
+from notchflex.plotting.shapes import robot_shape, state_shape
+from notchflex.plotting.style import house_style
 from notchflex.plotting.with_matplotlib import draw_panel, projection
 
 # The class of a result, and what describes its picture: a class is loaded by who makes one.

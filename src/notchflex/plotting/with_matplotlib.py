@@ -19,10 +19,10 @@ from notchflex.plotting.marks import (
     Curve,
     Faces,
     Mark,
+    Note,
     Panel,
     Sheet,
     Span,
-    Text,
 )
 from notchflex.plotting.style import for_paper, heading_lines, house_style, new_figure, rgb
 
@@ -65,26 +65,24 @@ def projection(panel: Panel) -> dict[str, Any]:
 def draw_panel(axes: Any, panel: Panel) -> None:
     """Draw a panel into axes of matplotlib, of three dimensions where it is in space."""
     draw_marks(axes, panel.items)
-    for name in panel.axes:
-        label = for_paper(getattr(panel, f"{name}_label"))
-        getattr(axes, f"set_{name}label")(label, **{"labelpad": 12.0} if name == "z" else {})
-        if name in panel.whole:
-            getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(integer=True))
-        if name in panel.ticks:
-            texts = [for_paper(text) for text in panel.ticks[name]]
-            getattr(axes, f"set_{name}ticks")(range(len(texts)), texts)
-            axes.grid(visible=False, axis=name)
-        if limits := getattr(panel, f"{name}_range"):
-            getattr(axes, f"set_{name}lim")(*limits)
     if panel.z_label:
-        every = (axes.xaxis, axes.yaxis, axes.zaxis)
-        extent = np.array([np.ptp(axis.get_view_interval()) for axis in every])
-        axes.set_box_aspect(extent, zoom=0.92)
-        for axis, part in zip(every, extent / extent.max(), strict=True):
-            axis.set_major_locator(MaxNLocator(max(1, round(6.0 * part))))
-        axes.view_init(elev=18.0, azim=-60.0)
+        _fill_box(axes)
     elif panel.equal:
         axes.set_aspect("equal", adjustable="datalim")
+    elif panel.from_zero and axes.dataLim.y0 >= 0.0:
+        axes.set_ylim(0.0)
+    for name in panel.axes:
+        axis, label = getattr(axes, f"{name}axis"), for_paper(getattr(panel, f"{name}_label"))
+        axis.set_label_text(label)
+        if name in panel.ticks:
+            texts = [for_paper(text) for text in panel.ticks[name]]
+            axis.set_ticks(range(len(texts)), texts)
+            axes.grid(visible=False, axis=name)
+        elif name + panel.z_label == "x" or name in panel.whole:  # few, as numbers may be wide
+            steps = [1.0, 2.0, 2.5, 5.0, 10.0]
+            axis.set_major_locator(MaxNLocator(6, steps=steps, integer=name in panel.whole))
+        if limits := getattr(panel, f"{name}_range"):
+            getattr(axes, f"set_{name}lim")(*limits)
     if panel.title:
         axes.set_title(for_paper(panel.title), loc="left")
     entries: dict[str, Any] = {}
@@ -100,6 +98,19 @@ def draw_panel(axes: Any, panel: Panel) -> None:
         corner = (1.25 if panel.z_label else 1.0, 1.0)
         place = {"loc": "upper left", "bbox_to_anchor": corner, "borderaxespad": 0.2}
     axes.legend(entries.values(), entries, **place)
+
+
+def _fill_box(axes: Any) -> None:
+    """Give three axes one scale, each at least a third as long as the longest."""
+    three = (axes.xaxis, axes.yaxis, axes.zaxis)
+    ends = np.array([axis.get_view_interval() for axis in three])
+    extent = np.maximum(np.ptp(ends, axis=1), np.ptp(ends, axis=1).max() / 3.0)
+    for axis, middle, part in zip(three, ends.mean(axis=1), extent, strict=True):
+        axis.set_view_interval(middle - 0.5 * part, middle + 0.5 * part, ignore=True)
+        axis.set_major_locator(MaxNLocator(round(6.0 * part / extent.max())))
+    axes.zaxis.labelpad = 12.0
+    axes.set_box_aspect(extent, zoom=0.92)
+    axes.view_init(elev=18.0, azim=-60.0)
 
 
 def draw_marks(axes: Any, marks: Any) -> None:
@@ -142,7 +153,7 @@ def _draw(axes: Any, mark: Mark) -> None:
             else:
                 style |= {"alpha": mark.opacity, "linewidth": 0.0}
                 getattr(axes, f"ax{way}span")(mark.low, mark.high, **style)
-        case Text():
+        case Note():
             _write(axes, mark)
         case _:
             raise NotImplementedError(f"matplotlib draws no {type(mark).__name__}")
@@ -185,20 +196,21 @@ def _line_style(mark: Curve) -> dict[str, Any]:
 
 
 def _draw_arrow(axes: Any, mark: Arrow, named: dict[str, Any]) -> None:
-    start, end = np.asarray(mark.start, float), np.asarray(mark.end, float)
+    *_, start, end = points = np.asarray(mark.points, float)
     style: dict[str, Any] = {"color": mark.colour, "linewidth": mark.width}
-    if len(start) == 3:
+    if len(end) == 3:
         axes.quiver(*start, *(end - start), **named, **style)
         return
-    style |= {"arrowstyle": "-|>", "mutation_scale": mark.head}
-    style |= {"connectionstyle": f"arc3,rad={mark.bend}", "shrinkA": 0.0, "shrinkB": 0.0}
-    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), zorder=mark.layer, **style))
-    axes.update_datalim(np.stack([start, end]) if mark.reach is None else mark.reach)
+    axes.plot(*points[:-1].T, zorder=mark.layer, **style)
+    head: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": mark.head}
+    head |= {"shrinkA": 0.0, "shrinkB": 0.0, "zorder": mark.layer}
+    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), **head, **style))
+    axes.update_datalim(points)
     if mark.name:
         axes.plot([], [], color=mark.colour, marker=">", markersize=4.0, **named)
 
 
-def _write(axes: Any, mark: Text) -> None:
+def _write(axes: Any, mark: Note) -> None:
     style: dict[str, Any] = dict(zip(("ha", "va"), mark.align.split(), strict=True))
     style |= {"fontsize": mark.size, "color": mark.colour, "zorder": mark.layer}
     style |= {"fontweight": "bold" if mark.bold else "normal", "rotation": 90.0 * mark.turned}

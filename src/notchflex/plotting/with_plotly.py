@@ -18,10 +18,10 @@ from notchflex.plotting.marks import (
     Curve,
     Faces,
     Mark,
+    Note,
     Panel,
     Sheet,
     Span,
-    Text,
     box,
 )
 from notchflex.plotting.style import for_browser, heading_lines, rgb
@@ -123,10 +123,8 @@ def _add_axes(panel: Panel, axes: Any, number: str, layout: Layout) -> Layout:
             scales[f"{name}axis"] |= {"tickvals": [*range(len(texts))], "ticktext": texts}
             scales[f"{name}axis"] |= {"showgrid": False, "ticks": ""}
     if panel.z_label:
-        span = {name: float(np.ptp(scales[f"{name}axis"]["range"])) for name in "xyz"}
         layout[f"scene{number}"] = {
-            "domain": domain, "aspectmode": "manual", **scales,
-            "aspectratio": {name: part / max(span.values()) for name, part in span.items()},
+            "domain": domain, "aspectmode": "data", **scales,
             "camera": {"eye": {"x": 0.8, "y": -1.7, "z": 0.55}},
         }  # fmt: skip
         return {"scene": f"scene{number}"}
@@ -136,10 +134,8 @@ def _add_axes(panel: Panel, axes: Any, number: str, layout: Layout) -> Layout:
         if name in panel.shared and not panel.equal:
             first = layout["meta"].setdefault(name, name + number)
             scale |= {"matches": first} if first != name + number else {}
-        if axes.get_aspect() == 1.0 and name == "y":
+        if panel.equal and name == "y":
             scale["scaleanchor"] = f"x{number}"
-        if axes.get_aspect() == 1.0 and axes.get_adjustable() == "box":
-            scale["constrain"] = "domain"
         layout[f"{name}axis{number}"] = scale
     return {"xaxis": f"x{number}", "yaxis": f"y{number}"}
 
@@ -175,7 +171,7 @@ def _traces(mark: Mark, panel: Panel, where: Layout, layout: Layout) -> Iterator
                 yield _line(Curve(corners[1:3], mark.colour, mark.dash, mark.width, **style), panel)
             else:
                 yield _area(Area([corners], mark.colour, mark.opacity, **style))
-        case Text():
+        case Note():
             anchor = mark.align.replace("center", "middle").split()
             part = " domain" if mark.inside else ""
             layout["annotations"].append(
@@ -244,26 +240,24 @@ def _mesh(mark: Faces) -> Layout:
 
 
 def _arrow(mark: Arrow) -> Iterator[Layout]:
-    start, end = np.asarray(mark.start, float), np.asarray(mark.end, float)
-    step, colour = end - start, css(mark.colour)
+    points, colour = np.asarray(mark.points, float), css(mark.colour)
     line = {"color": colour, "width": POINT * mark.width}
-    style: Layout = {"hoverinfo": "skip", "line": line, **_named(mark)}
-    if len(start) == 3:
-        ends = dict(zip("xyz", np.stack([start, end]).T, strict=True))
-        yield {"type": "scatter3d", "mode": "lines", **ends, **style}
-        yield {
-            "type": "cone", "anchor": "tip", "sizemode": "raw", "showscale": False,
-            "colorscale": [[0, colour], [1, colour]], "hoverinfo": "skip",
-            **dict(zip("xyzuvw", np.concatenate([end, 0.3 * step])[:, None], strict=True)),
-        }  # fmt: skip
+    style: Layout = {
+        "hoverinfo": "skip",
+        **_named(mark),
+        **dict(zip("xyz", points.T, strict=False)),
+    }
+    if points.shape[1] == 2:
+        sizes = [0.0] * (len(points) - 1) + [1.2 * mark.head]
+        head = {"symbol": "arrow", "angleref": "previous", "color": colour, "size": sizes}
+        yield style | {"type": "scatter", "mode": "lines+markers", "line": line, "marker": head}
         return
-    # As matplotlib's arc3: a parabola whose control point is offset by `bend` of the length.
-    control = 0.5 * (start + end) + mark.bend * np.array([step[1], -step[0]])
-    part = np.linspace(0.0, 1.0, 21)[:, None]
-    x, y = ((1 - part) ** 2 * start + 2 * part * (1 - part) * control + part**2 * end).T
-    sizes = [0.0] * 20 + [1.2 * mark.head]
-    head = {"symbol": "arrow", "angleref": "previous", "color": colour, "size": sizes}
-    yield {"type": "scatter", "mode": "lines+markers", "x": x, "y": y, "marker": head, **style}
+    yield style | {"type": "scatter3d", "mode": "lines", "line": line}
+    step = 0.3 * (points[1:] - points[:1])
+    yield style | dict(zip("xyzuvw", np.append(points[1:], step, axis=1).T, strict=True)) | {
+        "type": "cone", "anchor": "tip", "sizemode": "raw", "showscale": False,
+        "colorscale": [[0, colour], [1, colour]],
+    }  # fmt: skip
 
 
 def _axis(layout: Layout, where: Layout, name: str) -> Layout:

@@ -51,7 +51,7 @@ def loop(session: Session, tendon: int) -> Panel:
     x_label = axis(by)
     if session.robot.number_of_tendons > 1:
         x_label = x_label.replace(f"tendon {by}", f"{by} of tendon {tendon + 1}")
-    return Panel(items, x_label, axis("total_angle"))
+    return Panel(items, x_label, axis("total_angle"), legend="")
 
 
 def loop_chart(session: Session, tendon: int) -> str:
