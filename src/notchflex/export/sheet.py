@@ -15,7 +15,7 @@ from notchflex import __version__
 from notchflex.export.drawing import pattern_drawing, plain, title_lines
 from notchflex.export.formats import Document, PatternOptions, Subject
 from notchflex.export.pattern import FlatPattern, PatternCut, flat_pattern
-from notchflex.plotting.drawings import dimension_lines as draw
+from notchflex.plotting.drawings.dimension_lines import INK, LETTER, TEXT, label
 from notchflex.plotting.drawings.dimensioned import (
     MM,
     draw_row,
@@ -79,7 +79,7 @@ class DrawingPage:
         low = _EDGE + 4.0 * _LINE + _GAP
         ends = _LEFT + _GAP, low, width - _EDGE - _GAP, height - _EDGE - _GAP
         left, low, right, top = (MM * end for end in ends)
-        letters = int((right - left) / (draw.LETTER * _WORD / draw.TEXT))
+        letters = int((right - left) / (LETTER * _WORD / TEXT))
         lines = [line for note in notes for line in wrap(note, letters, subsequent_indent="    ")]
         words = low + _NOTE * len(lines)
         self.write(left, words, "\n".join(lines), _WORD, linespacing=60.0 * _NOTE / _WORD)
@@ -93,13 +93,13 @@ class DrawingPage:
 
     def write(self, left: float, top: float, text: str, size: float, **style: Any) -> None:
         """Write a text below or at a height [in]."""
-        style = {"va": "top", "color": draw.INK, "parse_math": False} | style
+        style = {"va": "top", "color": INK, "parse_math": False} | style
         self.axes.text(left, top, text, fontsize=size, **style)
 
     def frame(self, left: float, low: float, width: float, height: float, line: float) -> None:
         """Draw a frame [mm]."""
         corner = MM * left, MM * low
-        box = Rectangle(corner, MM * width, MM * height, fill=False, lw=line, ec=draw.INK)
+        box = Rectangle(corner, MM * width, MM * height, fill=False, lw=line, ec=INK)
         self.axes.add_patch(box)
 
 
@@ -121,11 +121,11 @@ def _add_title_block(page: DrawingPage, pattern: FlatPattern, sheet: str) -> Non
         "sheet": sheet,
     }
     width, _ = _SIZES[pattern.options.paper]
-    for number, (label, value) in enumerate(cells.items()):
+    for number, (name, value) in enumerate(cells.items()):
         left = width - _EDGE - _CELL * (3 - number % 3)
         low = _EDGE + _LINE * (number // 3)
         page.frame(left, low, _CELL, _LINE, 0.7)
-        texts = (5.4, label, 5.5), (1.6, plain(value or "")[:_MOST], draw.TEXT)
+        texts = (5.4, name, 5.5), (1.6, plain(value or "")[:_MOST], TEXT)
         for up, text, size in texts:
             page.write(MM * (left + 1.0), MM * (low + up), text, size, va="baseline")
 
@@ -158,7 +158,7 @@ def _save(pages: Sequence[Figure], file: Path) -> None:
 
 def _pattern_page(pattern: FlatPattern) -> DrawingPage:
     """Draw the pattern to scale, with the numbers of its notches, and the notes below."""
-    lines = pattern_drawing(pattern).lines
+    lines, _ = pattern_drawing(pattern)
     x, y = zip(*(point for line in lines for point in line.points), strict=True)
     colours = "orange: cut; blue: cut off; grey, not cut: edges of the tube, sides of the tendons"
     warnings = (f"WARNING: {text}" for text in pattern.warnings)
@@ -175,7 +175,7 @@ def _pattern_page(pattern: FlatPattern) -> DrawingPage:
         closing = line.points[:1] if line.closed else ()
         axes.plot(*zip(*line.points, *closing, strict=True), clip_on=False, **_LOOKS[line.layer])
     for cut in pattern.cuts:
-        draw.label(axes, *cut.middle, cut.placed.name, fontsize=6.5)
+        label(axes, *cut.middle, cut.placed.name, fontsize=6.5)
     axes.spines[:].set_visible(False)
     axes.tick_params(labelsize=7.0)
     axes.set_xlabel("along the tube [mm]", fontsize=7.0)

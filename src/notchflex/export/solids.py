@@ -24,7 +24,7 @@ from notchflex import InputError, Robot, RobotShape, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject
 from notchflex.plotting.shapes.outline import fair_growth, prism, tube_wall
-from notchflex.plotting.shapes.robot_shape import smooth
+from notchflex.plotting.shapes.robot_shape import shape_at, shape_from_angles
 from notchflex.support import FlexureShape, NotchCut, outline, robot_digest
 
 if TYPE_CHECKING:
@@ -220,10 +220,13 @@ class DeformationMap:
     def __init__(self, subject: Subject, cuts: RobotCuts) -> None:
         """Take the shapes of the straight tube and of the state."""
         path, geometry = subject.path, subject.robot.geometry
-        level = "tendons" if path is None else path.chain.level
-        rest = smooth(geometry.shape(0.0 * geometry.free_angle, level), _PIECES)
-        bent = geometry.shape(geometry.free_angle) if path is None else path[subject.step].shape
-        bent = smooth(bent.from_base(), _PIECES)
+        level, free = "tendons" if path is None else path.chain.level, geometry.free_angle
+        rest = shape_from_angles(subject.robot, 0.0 * free, _PIECES, level)
+        bent = (
+            shape_from_angles(subject.robot, free, _PIECES)
+            if path is None
+            else shape_at(path, subject.step, _PIECES)
+        )
         self.zones = [_zone(rest, bent, cuts, notch) for notch in range(len(rest.flexures))]
         self.bodies = _poses(rest, bent)
 

@@ -103,8 +103,9 @@ class EpisodeSettings:
         """Return tensions from 0 to one random pull after the other, N, (steps, t)."""
         begin, parts, count = np.zeros(len(self.largest)), list[Array](), 0
         while count < self.steps:
-            end, most = self.random_pull(random), _PART_OF_RATE * self.change
-            number = max(1, int(np.ceil(np.abs(end - begin).max() / most)))
+            end = self.random_pull(random)
+            steps = np.abs(end - begin).max() / (_PART_OF_RATE * self.change)
+            number = max(1, int(np.ceil(steps)))
             way = np.arange(1, number + 1)[:, None] / number
             parts.append(begin + way * (end - begin))
             begin, count = end, count + number
