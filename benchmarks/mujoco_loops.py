@@ -18,8 +18,7 @@ import numpy as np
 
 import notchflex as nf
 from notchflex.export.joints import JointModel, joint_model, turned
-from notchflex.export.mujoco_run import measure_errors, run_mujoco
-from notchflex.export.simulators import mjcf
+from notchflex.export.simulators import measure_errors, mjcf, run_mujoco
 
 ROBOTS = {
     "pacheco2021-a": None,

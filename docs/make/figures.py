@@ -14,8 +14,7 @@ from matplotlib.axes import Axes
 
 import notchflex as nf
 from notchflex.export.joints import joint_model
-from notchflex.export.mujoco_run import run_mujoco
-from notchflex.export.simulators import mjcf
+from notchflex.export.simulators import mjcf, run_mujoco
 from notchflex.plotting import dimensioned_figure
 from notchflex.plotting.style import (
     BLUE,

@@ -13,8 +13,7 @@ import notchflex as nf
 from notchflex.export import joints as samples
 from notchflex.export.formats import SimulatorOptions
 from notchflex.export.joints import fit_spring, joint_model
-from notchflex.export.mujoco_run import measure_errors
-from notchflex.export.simulators import mjcf
+from notchflex.export.simulators import measure_errors, mjcf
 from refusals import refused
 
 mujoco: Any = pytest.importorskip("mujoco", reason="needs the extra robotics")

@@ -272,8 +272,7 @@ def _contact(mesh: TubeMesh, material: Any) -> list[str]:
     """Both faces of every notch, over the outer half of the opening, where they meet."""
     lines: list[str] = []
     pairs: list[str] = []
-    for notch, opening in enumerate(mesh.openings, start=1):
-        faces = mesh.faces_of(opening)
+    for notch, faces in enumerate(mesh.lips, start=1):
         if all(map(len, faces)):
             names = f"LOWER{notch}", f"UPPER{notch}"
             pairs += ["*CONTACT PAIR,INTERACTION=FACES,TYPE=SURFACE TO SURFACE", ",".join(names)]

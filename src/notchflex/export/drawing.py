@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 from xml.sax.saxutils import escape
 
@@ -54,28 +53,8 @@ class DrawnText(NamedTuple):
     centred: bool = False
 
 
-@dataclass(frozen=True)
-class PatternDrawing:
-    """Everything that is written of a pattern, in file units."""
-
-    pattern: FlatPattern
-    lines: Sequence[DrawnLine]
-    texts: Sequence[DrawnText]
-
-    @property
-    def box(self) -> tuple[float, float, float, float]:
-        """Left, lower, right and upper end of lines and texts."""
-        points = [point for line in self.lines for point in line.points]
-        for text in self.texts:
-            x, y = text.place
-            wide = 0.0 if text.centred else 0.75 * text.height * len(text.text)
-            points += [(x, y), (x + wide, y + text.height)]
-        xs, ys = zip(*points, strict=True)
-        return min(xs), min(ys), max(xs), max(ys)
-
-
-def pattern_drawing(pattern: FlatPattern) -> PatternDrawing:
-    """Lay a pattern out: lines in the order of cutting, numbers, title block below."""
+def pattern_drawing(pattern: FlatPattern) -> tuple[list[DrawnLine], list[DrawnText]]:
+    """Lay a pattern out in file units: lines in the order of cutting; numbers, title below."""
     (low, high), start, end = pattern.seam, pattern.start, pattern.end
     lines = [
         DrawnLine("CUT", outline, closed=True) for cut in pattern.cuts for outline in cut.outlines
@@ -101,7 +80,16 @@ def pattern_drawing(pattern: FlatPattern) -> PatternDrawing:
     below = min(y for line in lines for _, y in line.points) - 2.0 * size
     for number, text in enumerate(title_lines(pattern)):
         texts.append(DrawnText(text, (start, below - 1.7 * size * number), size))
-    return PatternDrawing(pattern, lines, texts)
+    return lines, texts
+
+
+def _box(lines: Sequence[DrawnLine], texts: Sequence[DrawnText]) -> tuple[float, ...]:
+    """Return left, lower, right and upper end of lines and texts."""
+    points = [point for line in lines for point in line.points]
+    for text, (x, y), height, centred in texts:
+        points += [(x, y), (x + (0.0 if centred else 0.75 * height * len(text)), y + height)]
+    xs, ys = zip(*points, strict=True)
+    return min(xs), min(ys), max(xs), max(ys)
 
 
 def plain(text: str) -> str:
@@ -186,10 +174,11 @@ def dxf_pattern(subject: Subject, options: PatternOptions) -> Document:
         InputError: See `flat_pattern`.
     """
     pattern = flat_pattern(subject, options)
-    return Document(_dxf(pattern_drawing(pattern), options), pattern.warnings, pattern.facts)
+    content = _dxf(*pattern_drawing(pattern), options)
+    return Document(content, pattern.warnings, pattern.facts)
 
 
-def _dxf(drawing: PatternDrawing, options: PatternOptions) -> bytes:
+def _dxf(lines: Sequence[DrawnLine], texts: Sequence[DrawnText], options: PatternOptions) -> bytes:
     from ezdxf._options import options as ezdxf_options
     from ezdxf.document import Drawing
     from ezdxf.enums import TextEntityAlignment
@@ -205,13 +194,13 @@ def _dxf(drawing: PatternDrawing, options: PatternOptions) -> bytes:
             layer = made.layers.add(name, color=content.number)
             if not is_old:  # R12 has neither units nor descriptions
                 made.units, layer.description = _UNITS[options.y_unit], content.content
-        for line in drawing.lines:
+        for line in lines:
             add_line(line.points, close=line.closed, dxfattribs={"layer": line.layer})
-        for one in drawing.texts:
-            text = space.add_text(one.text, height=one.height, dxfattribs={"layer": "TEXT"})
+        for content, place, height, centred in texts:
+            text = space.add_text(content, height=height, dxfattribs={"layer": "TEXT"})
             middle = TextEntityAlignment.MIDDLE_CENTER
-            text.set_placement(one.place, align=middle if one.centred else None)
-        left, low, right, high = drawing.box
+            text.set_placement(place, align=middle if centred else None)
+        left, low, right, high = _box(lines, texts)
         made.header["$EXTMIN"], made.header["$EXTMAX"] = (left, low, 0.0), (right, high, 0.0)
         stream = io.StringIO()
         made.write(stream)
@@ -232,13 +221,13 @@ def svg_pattern(subject: Subject, options: PatternOptions) -> Document:
         InputError: See `flat_pattern`.
     """
     pattern = flat_pattern(subject, options)
-    drawing = pattern_drawing(pattern)
-    left, low, right, top = drawing.box
+    lines, texts = pattern_drawing(pattern)
+    left, low, right, top = _box(lines, texts)
     wide, high = right - left + 2.0 * _MARGIN, top - low + 2.0 * _MARGIN
     # Degrees and mm have no common unit, so the drawing then has no size on paper.
     unit = "mm" if options.y_unit == "mm" else ""
     # y goes down in SVG: it is written as -y, so that the drawing looks like the DXF.
-    text = (
+    svg = (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide:.6g}{unit}" '
         f'height="{high:.6g}{unit}" '
@@ -247,13 +236,13 @@ def svg_pattern(subject: Subject, options: PatternOptions) -> Document:
     )
     for name, layer in LAYERS.items():
         style = f'fill="none" stroke="{layer.colour}" stroke-width="{_LINE}"'
-        items = [_svg_line(line) for line in drawing.lines if line.layer == name]
+        items = [_svg_line(line) for line in lines if line.layer == name]
         if name == "TEXT":
             style = f'fill="{layer.colour}" font-family="sans-serif"'
-            items = [_svg_text(text) for text in drawing.texts]
-        text += f'<g id="{name}" {style} data-content="{layer.content}">\n'
-        text += "".join(f"  {item}\n" for item in items) + "</g>\n"
-    return Document(text + "</svg>\n", pattern.warnings, pattern.facts)
+            items = [_svg_text(text) for text in texts]
+        svg += f'<g id="{name}" {style} data-content="{layer.content}">\n'
+        svg += "".join(f"  {item}\n" for item in items) + "</g>\n"
+    return Document(svg + "</svg>\n", pattern.warnings, pattern.facts)
 
 
 def _svg_line(line: DrawnLine) -> str:
@@ -262,7 +251,7 @@ def _svg_line(line: DrawnLine) -> str:
 
 
 def _svg_text(text: DrawnText) -> str:
-    x, y = text.place
-    middle = ' text-anchor="middle" dominant-baseline="central"' if text.centred else ""
-    size = f'font-size="{1.4 * text.height:.6g}"{middle}'
-    return f'<text x="{x!r}" y="{-y!r}" {size}>{escape(text.text)}</text>'
+    words, (x, y), height, centred = text
+    middle = ' text-anchor="middle" dominant-baseline="central"' if centred else ""
+    size = f'font-size="{1.4 * height:.6g}"{middle}'
+    return f'<text x="{x!r}" y="{-y!r}" {size}>{escape(words)}</text>'

@@ -82,17 +82,21 @@ class HingeSpring:
         """Largest slope of the elastic moment over the range."""
         return float(np.abs(np.gradient(self.moment(self.range), self.range)).max())
 
-    @property
-    def largest_friction(self) -> float:
-        """Largest friction moment over the range; 0 for rounding."""
-        friction = np.abs(self.friction_moment(self.range)).max()
-        elastic = np.abs(self.moment(self.range)).max()
-        return float(friction) if friction > _ROUNDING * elastic else 0.0
+    def drum(self) -> tuple[float, float, Array] | None:
+        """Return the friction as that of a drum which the hinge turns by a polynomial of its angle.
 
-    @property
-    def potential_range(self) -> float:
-        """Range of the friction potential over that of the hinge, N mm."""
-        return float(np.abs(self.range[:, None] ** _FRICTION_POWERS @ self.friction).max())
+        Returns:
+            The moment at which the drum yields, N mm; the largest slope of the polynomial, and its
+            coefficients. None where all friction is rounding.
+        """
+        angle = self.range
+        friction, elastic = (
+            float(np.abs(moment(angle)).max()) for moment in (self.friction_moment, self.moment)
+        )
+        if friction <= _ROUNDING * elastic:
+            return None
+        moment = float(np.abs(angle[:, None] ** _FRICTION_POWERS @ self.friction).max())
+        return moment, friction / moment, np.concatenate([np.zeros(2), self.friction / moment])
 
 
 def fit_spring(

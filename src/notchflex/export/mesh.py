@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,24 +33,10 @@ _NODES = np.array(
 _ROUND = 1.4
 # The narrowest and widest element round the tube, in parts of an even one.
 _NARROW, _WIDE = 0.25, 3.0
+# Nodes that lie nearer to the plane of symmetry are in it, mm.
+_IN_PLANE = 1e-9
 # Directions that differ by less are the same, deg.
 _SAME = 1e-6
-
-
-class GridOpening(NamedTuple):
-    """Opening of a notch on the grid.
-
-    Attributes:
-        first: Index of the angle at its first edge.
-        cells: Number of elements round its opening, to its last edge; in half a tube to the middle.
-        low: Index along z of its first face.
-        high: Index along z of its last face.
-    """
-
-    first: int
-    cells: int
-    low: int
-    high: int
 
 
 @dataclass(frozen=True)
@@ -59,23 +44,20 @@ class TubeMesh:
     """A mesh of m elements of a tube, or of the half of it with y >= 0. Units mm.
 
     Attributes:
-        nodes: Number of every node on the grid of half elements, -1 where there is none; (radii,
-            angles, heights).
-        heights: Height of every layer of the grid, mm.
+        heights: Height of every layer of nodes, mm, (c,).
         place: Places of the nodes, in the order of their numbers, from 1; (nodes, 3).
         elements: Nodes of every element, (m, 20).
-        cell: Which cell of the grid every element is, (radius, angle, z); (m, 3).
-        openings: Where the notches are open.
+        faces: Layers of the first and last face of every notch, (n, 2).
+        lips: Elements below and above every notch whose faces may meet, by their numbers, from 1.
         is_half: Whether y = 0 is a plane of symmetry.
         x_deg: Direction of the x axis on the robot, deg.
     """
 
-    nodes: Numbers
     heights: Array
     place: Array
     elements: Numbers
-    cell: Numbers
-    openings: Sequence[GridOpening]
+    faces: Numbers
+    lips: Sequence[tuple[Numbers, Numbers]]
     is_half: bool
     x_deg: float
 
@@ -84,76 +66,54 @@ class TubeMesh:
         """The part of the tube that is meshed."""
         return 0.5 if self.is_half else 1.0
 
-    @property
-    def faces(self) -> Numbers:
-        """Indices along z of the grid at the first and last face of every notch, (n, 2)."""
-        return np.array([opening[2:] for opening in self.openings])
-
     def layer(self, index: int) -> Numbers:
-        """Return the nodes of one layer across the tube, by its index along z."""
-        numbers = self.nodes[:, :, index]
-        return np.unique(numbers[numbers > 0])
+        """Return the nodes of one layer across the tube."""
+        return 1 + np.flatnonzero(self.place[:, 2] == self.heights[index])
 
     def in_plane(self) -> Numbers:
         """Return the nodes in the plane of symmetry of half a tube."""
-        numbers = self.nodes[:, [0, -1], :]
-        return numbers[numbers > 0]
-
-    def faces_of(self, opening: GridOpening) -> tuple[Numbers, Numbers]:
-        """Return the elements below and above a notch whose faces may meet, by their numbers.
-
-        They lie behind the outer half of its faces.
-        """
-        first, cells, low, high = opening
-        along = (self.cell[:, 1] - first // 2) % (self.nodes.shape[1] // 2)
-        both_sides = np.abs(2 * along + 1 - cells) <= 0.5 * cells
-        outer = np.where(self.is_half, 2 * along >= cells, both_sides) & (along < cells)
-        below, above = (
-            1 + np.flatnonzero(outer & (self.cell[:, 2] == layer))
-            for layer in (low // 2 - 1, high // 2)
-        )
-        return below, above
+        return 1 + np.flatnonzero(np.abs(self.place[:, 1]) < _IN_PLANE)
 
 
 def _numbered(
-    radius: Array,
-    angle: Array,
-    heights: Array,
-    openings: Sequence[GridOpening],
-    *,
-    is_half: bool,
-    x_deg: float,
+    position: Array, faces: Numbers, openings: Sequence[tuple[int, int]], *, x_deg: float | None
 ) -> TubeMesh:
     """Drop the cells of the notches and number the nodes that are left.
 
     Args:
-        radius: Radii of the grid, mm, (a,).
-        angle: Angles of the grid from x on, rad, (a, b, c); a whole tube closes from the last to
-            the first.
-        heights: Heights of the layers, mm, (c,).
-        openings: Where the notches are open.
-        is_half: Whether half a tube is meshed.
-        x_deg: Direction of the x axis on the robot.
+        position: The grid of half elements: radii, angles, heights; (a, b, c, 3). A whole tube
+            closes from the last angle to the first.
+        faces: Layers of the first and last face of every notch, (n, 2).
+        openings: Of every notch the first cell round its opening, and how many there are; in half
+            a tube to the middle of the opening.
+        x_deg: Direction of the x axis on the robot, of half a tube; None for a whole one.
     """
-    across = radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle])
-    position = np.moveaxis(across, 0, -1) + heights[:, None] * [0.0, 0.0, 1.0]
-    shape = position.shape[:3]
+    is_half, shape = x_deg is not None, position.shape[:3]
     cells = np.argwhere(np.ones([size // 2 for size in shape]))
-    for first, count, low, high in openings:
-        inside = (2 * cells[:, 2] >= low) & (2 * cells[:, 2] < high)
-        cut = inside & ((cells[:, 1] - first // 2) % (shape[1] // 2) < count)
-        cells = cells[~cut]
+
+    def way(first: int) -> Numbers:
+        return (cells[:, 1] - first) % (shape[1] // 2)
+
+    for (first, count), (low, high) in zip(openings, faces // 2, strict=True):
+        inside = (low <= cells[:, 2]) & (cells[:, 2] < high)
+        cells = cells[~(inside & (way(first) < count))]
+    lips: list[tuple[Numbers, Numbers]] = []
+    for (first, count), (low, high) in zip(openings, faces // 2, strict=True):
+        along = way(first)
+        # They lie behind the outer half of the faces.
+        both_sides = np.abs(2 * along + 1 - count) <= 0.5 * count
+        outer = np.where(is_half, 2 * along >= count, both_sides) & (along < count)
+        below, above = (np.flatnonzero(outer & (cells[:, 2] == z)) for z in (low - 1, high))
+        lips.append((1 + below, 1 + above))
     # Half a tube counts its angles from the spine, the other way round.
     grid = 2 * cells[:, None] + (_NODES if is_half else [0, 2, 0] + _NODES * [1, -1, 1])
     grid[..., 1] %= shape[1]
     flat = np.ravel_multi_index(tuple(np.moveaxis(grid, -1, 0)), shape)
-    used = np.unique(flat)
-    numbers = np.full(shape, -1)
-    numbers.ravel()[used] = np.arange(1, len(used) + 1)
+    used, elements = np.unique(flat, return_inverse=True)
     places = position.reshape(-1, 3)[used]
-    return TubeMesh(
-        numbers, heights, places, numbers.ravel()[flat], cells, openings, is_half, x_deg
-    )
+    elements = 1 + elements.reshape(flat.shape)
+    heights, x_deg = position[0, 0, :, 2], x_deg or 0.0
+    return TubeMesh(heights, places, elements, faces, lips, is_half, x_deg)
 
 
 def check_shape(robot: Robot) -> list[ArcNotch]:
@@ -261,16 +221,12 @@ def mesh_of(robot: Robot, options: DeckOptions, tendons: Sequence[int] = (0,)) -
             for count in (options.spine, options.opening)
         )
         angle = [(1.0 - spine[::-1]) * edge, edge + beyond[1:] * (np.pi - edge)]
-        openings = [
-            GridOpening(2 * options.spine, options.opening, *face) for face in faces.tolist()
-        ]
         angle = np.pi - np.concatenate(angle, axis=1)
-        return _numbered(radius, angle, heights, openings, is_half=True, x_deg=first)
+        openings = [(options.spine, options.opening)] * len(notches)
+        return _numbered(_grid(radius, angle, heights), faces, openings, x_deg=first)
     around = 4 * int(np.ceil(_ROUND * (options.spine + options.opening) / 2.0))
-    openings, shifts = list[GridOpening](), list[Array]()
-    for number, (notch, face, edge) in enumerate(
-        zip(notches, faces.tolist(), edges, strict=True), 1
-    ):
+    openings, shifts = list[tuple[int, int]](), list[Array]()
+    for number, (notch, edge) in enumerate(zip(notches, edges, strict=True), start=1):
         name = f"notch {number} of {robot.name}"
         if notch.uncut_length <= 0.0 and number < len(notches):
             raise InputError.UNSUPPORTED(
@@ -280,10 +236,18 @@ def mesh_of(robot: Robot, options: DeckOptions, tendons: Sequence[int] = (0,)) -
         low, high = _spine_lines(notch, float(edge[-1]), around, options)
         knots = _knots(notch, edge, (low, high), np.radians(sides).tolist(), around)
         shifts.append(_shifts(knots, around, name))
-        openings.append(GridOpening(2 * high, around - (high - low), *face))
+        openings.append((high, around - (high - low)))
     angle = _over(heights, faces, np.stack(shifts))
     angle += (np.arange(2 * around) * np.pi / around)[:, None]
-    return _numbered(radius, angle, heights, openings, is_half=False, x_deg=0.0)
+    return _numbered(_grid(radius, angle, heights), faces, openings, x_deg=None)
+
+
+def _grid(radius: Array, angle: Array, heights: Array) -> Array:
+    """Return places of radii (a,), angles (a, b, c) and heights (c,), (a, b, c, 3)."""
+    radius = radius[:, None, None]
+    return np.stack(
+        [radius * np.cos(angle), radius * np.sin(angle), heights + 0.0 * angle], axis=-1
+    )
 
 
 def _spine_lines(

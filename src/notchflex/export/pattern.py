@@ -233,9 +233,9 @@ class FlatPattern:
         robot: The robot.
         options: How it is drawn.
         tube: The tube that is cut, before polishing.
-        cuts: The cuts in order, the one nearest the tip first.
         start: Where the tube is cut off [mm].
         end: Where it ends [mm].
+        cuts: The cuts in order, the one nearest the tip first.
         web: The thinnest web.
         warnings: Sentences about the pattern.
     """
@@ -243,16 +243,17 @@ class FlatPattern:
     robot: Robot
     options: PatternOptions
     tube: Tube
-    cuts: Sequence[PatternCut]
     start: float
     end: float
+    cuts: Sequence[PatternCut]
     web: Web
     warnings: tuple[str, ...]
 
     @property
     def seam(self) -> tuple[float, float]:
         """The two sides of the seam [mm]."""
-        return _seam(self.tube, self.options)
+        high = self.tube.outer_radius * math.radians(self.options.seam_deg)
+        return high - self.around, high
 
     @property
     def around(self) -> float:
@@ -290,10 +291,11 @@ def flat_pattern(subject: Subject, options: PatternOptions) -> FlatPattern:
     if options.two_axis:
         _check_two_axis(placed)
     radius, corner = tube.outer_radius, max(options.corner_radius - options.polishing, 0.0)
-    low, high = _seam(tube, options)
+    high = radius * math.radians(options.seam_deg)
+    around = math.tau * radius
     cuts: list[PatternCut] = []
     for cut in sorted(placed, key=lambda cut: (-cut.end, -cut.start, cut.cut.side_deg)):
-        middle = high - (high - radius * math.radians(cut.cut.side_deg)) % (high - low)
+        middle = high - (high - radius * math.radians(cut.cut.side_deg)) % around
         ways = (
             ((0.0, 0.0), max(options.chord, _WEB_CHORD * radius)),
             (options.inside, options.chord),
@@ -303,17 +305,12 @@ def flat_pattern(subject: Subject, options: PatternOptions) -> FlatPattern:
                 [(x, y + middle) for x, y in unrolled(cut.cut, radius, inside, corner, chord)]
                 for inside, chord in ways
             )
-        outlines = _split(path, low, high) if options.seam == "split" else [path]
+        outlines = _split(path, high - around, high) if options.seam == "split" else [path]
         cuts.append(PatternCut(cut, nominal, outlines))
     edges = {f"cut of notch {cut.placed.name}": cut.nominal for cut in cuts}
-    web = smallest_web(edges, math.tau * radius, start, end)
+    web = smallest_web(edges, around, start, end)
     warnings += _web_warnings(web, options)
-    return FlatPattern(robot, options, tube, cuts, start, end, web, warnings)
-
-
-def _seam(tube: Tube, options: PatternOptions) -> tuple[float, float]:
-    high = tube.outer_radius * math.radians(options.seam_deg)
-    return high - math.tau * tube.outer_radius, high
+    return FlatPattern(robot, options, tube, start, end, cuts, web, warnings)
 
 
 def _check_two_axis(cuts: Sequence[PlacedCut]) -> None:

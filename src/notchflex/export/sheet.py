@@ -162,7 +162,7 @@ def _save(pages: Sequence[Figure], file: Path) -> None:
 
 def _pattern_page(pattern: FlatPattern) -> DrawingPage:
     """Draw the pattern to scale, with the numbers of its notches, and the notes below."""
-    lines = pattern_drawing(pattern).lines
+    lines, _ = pattern_drawing(pattern)
     x, y = zip(*(point for line in lines for point in line.points), strict=True)
     colours = "orange: cut; blue: cut off; grey, not cut: edges of the tube, sides of the tendons"
     warnings = (f"WARNING: {text}" for text in pattern.warnings)

@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation, Slerp
 
 from notchflex import InputError, Robot, RobotShape, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject
-from notchflex.plotting import fair_growth, prism, smooth, tube_wall
+from notchflex.plotting import fair_growth, prism, shape_at, shape_from_angles, tube_wall
 from notchflex.support import FlexureShape, NotchCut, outline, robot_digest
 
 if TYPE_CHECKING:
@@ -91,19 +92,19 @@ def channels(robot: Robot, options: SolidOptions) -> tuple[float, list[tuple[flo
             f"need no drill; give more than {2.0 * options.polishing:g} mm."
         )
     for number, tendon in enumerate(robot.tendon, start=1):
-        far = tendon.radius + 0.5 * diameter
-        if not tube.inner_radius < far < tube.outer_radius:
-            limit = (
-                f"reaches {far:.6g} mm from the axis and the wall ends at {tube.outer_radius:.6g} "
-                f"mm; give less than {2.0 * (tube.outer_radius - tendon.radius):.6g} mm."
-                if far >= tube.outer_radius
-                else f"lies within the bore, {tube.inner_radius:.6g} mm from the axis, and cuts "
+        far, angle = tendon.radius + 0.5 * diameter, math.radians(tendon.direction_deg)
+        what = f"channels: {diameter:g} mm wide, the channel of tendon {number}"
+        if far >= tube.outer_radius:
+            raise InputError.OUT_OF_RANGE(
+                f"{what} reaches {far:.6g} mm from the axis and the wall ends at "
+                f"{tube.outer_radius:.6g} mm; give less than "
+                f"{2.0 * (tube.outer_radius - tendon.radius):.6g} mm."
+            )
+        if far <= tube.inner_radius:
+            raise InputError.OUT_OF_RANGE(
+                f"{what} lies within the bore, {tube.inner_radius:.6g} mm from the axis, and cuts "
                 "nothing; leave channels out."
             )
-            raise InputError.OUT_OF_RANGE(
-                f"channels: {diameter:g} mm wide, the channel of tendon {number} {limit}"
-            )
-        angle = math.radians(tendon.direction_deg)
         places.append((tendon.radius * math.cos(angle), tendon.radius * math.sin(angle)))
     return 0.5 * diameter - options.polishing, places
 
@@ -167,34 +168,27 @@ class Zone(NamedTuple):
         end: Where it ends.
         direction: What the place of a point in the flexure is measured along, a unit vector.
         places: Place of each section, rising [mm], (k,).
-        turns: Rotation of each section from the straight tube to the state, (k, 3, 3).
-        moves: Its displacement after that rotation [mm], (k, 3).
+        poses: Rotation of each section from the straight tube to the state, and its displacement
+            after that [mm], (k, 3, 4).
     """
 
     start: float
     end: float
     direction: Points
     places: Points
-    turns: Points
-    moves: Points
+    poses: Points
 
-    def pose_at(self, height: float) -> tuple[Points, Points]:
+    def pose_at(self, height: float) -> Points:
         """Return rotation and displacement at a height of a spine, between two sections [mm]."""
-        between = Slerp(self.places, Rotation.from_matrix(self.turns))
+        between = Slerp(self.places, Rotation.from_matrix(self.poses[..., :3]))
         turn = between(np.clip(height, self.places[0], self.places[-1])).as_matrix()
         middle = np.array([[0.0, 0.0, height]])
-        return turn, self.moved(middle)[0] - turn @ middle[0]
+        return np.column_stack([turn, self.moved(middle)[0] - turn @ middle[0]])
 
     def moved(self, points: Points) -> Points:
         """Return points of the zone where they are in the state [mm], (v, 3)."""
         along = np.clip(points @ self.direction, self.places[0], self.places[-1])
-        before = np.clip(np.searchsorted(self.places, along) - 1, 0, len(self.places) - 2)
-        part = ((along - self.places[before]) / np.diff(self.places)[before])[:, None]
-        first, second = (
-            _turned(self.turns[section], points) + self.moves[section]
-            for section in (before, before + 1)
-        )
-        return (1.0 - part) * first + part * second
+        return _moved(make_interp_spline(self.places, self.poses, k=1)(along), points)
 
 
 def is_bent(subject: Subject, polishing: float) -> bool:
@@ -219,51 +213,54 @@ class DeformationMap:
 
     Attributes:
         zones: Where the flexures lie, base to tip.
-        bodies: Rotations and displacements of the bodies from the straight tube, base to tip.
+        bodies: Rotations and displacements of the bodies from the straight tube, (n + 1, 3, 4).
     """
 
     def __init__(self, subject: Subject, cuts: RobotCuts) -> None:
         """Take the shapes of the straight tube and of the state."""
-        robot, path = subject.robot, subject.path
-        geometry, count = robot.geometry, robot.number_of_notches
-        level = "tendons" if path is None else path.chain.level
-        rest = smooth(geometry.shape(np.zeros(count), level), _PIECES)
-        bent = geometry.shape(geometry.free_angle) if path is None else path[subject.step].shape
-        bent = smooth(bent.from_base(), _PIECES)
-        self.zones = [_zone(rest, bent, cuts, notch) for notch in range(count)]
-        self.bodies = _motion(rest, bent)
+        path, geometry = subject.path, subject.robot.geometry
+        level, free = "tendons" if path is None else path.chain.level, geometry.free_angle
+        rest = shape_from_angles(subject.robot, 0.0 * free, _PIECES, level)
+        bent = (
+            shape_from_angles(subject.robot, free, _PIECES)
+            if path is None
+            else shape_at(path, subject.step, _PIECES)
+        )
+        self.zones = [_zone(rest, bent, cuts, notch) for notch in range(len(rest.flexures))]
+        self.bodies = _poses(rest, bent)
 
     def __call__(self, points: Points) -> Points:
         """Return points of the straight tube where they are in the state [mm], (v, 3)."""
-        along, (turns, moves) = points[:, 2], self.bodies
+        along = points[:, 2]
         body = np.searchsorted([zone.end for zone in self.zones], along, side="left")
-        new = _turned(turns[body], points) + moves[body]
+        new = _moved(self.bodies[body], points)
         for zone in self.zones:
             inside = (along >= zone.start) & (along <= zone.end)
             new[inside] = zone.moved(points[inside])
         return new
 
 
-def _turned(turns: Points, points: Points) -> Points:
-    return np.einsum("vij,vj->vi", turns, points)
+def _moved(poses: Points, points: Points) -> Points:
+    """Return points after rotations and displacements, (v, 3)."""
+    return np.einsum("vij,vj->vi", poses[..., :3], points) + poses[..., 3]
 
 
-def _motion(rest: RobotShape | FlexureShape, bent: RobotShape | FlexureShape) -> tuple[Points, ...]:
+def _poses(rest: RobotShape | FlexureShape, bent: RobotShape | FlexureShape) -> Points:
     """Return rotations and displacements of bodies or sections."""
     turns = bent.rotation @ np.swapaxes(rest.rotation, 1, 2)
-    return turns, bent.position - _turned(turns, rest.position)
+    moves = bent.position - np.einsum("vij,vj->vi", turns, rest.position)
+    return np.concatenate([turns, moves[..., None]], axis=-1)
 
 
 def _zone(rest: RobotShape, bent: RobotShape, cuts: RobotCuts, notch: int) -> Zone:
     """Return the zone of a flexure."""
     robot, line = rest.robot, rest.flexures[notch]
-    turns, moves = _motion(line, bent.flexures[notch])
+    poses = _poses(line, bent.flexures[notch])
     first = next(number for number, cut in enumerate(cuts.cuts) if cut.notch == notch + 1)
-    has_spine, cut, direction = robot.geometry.has_spine[notch], cuts.cuts[first], [0.0, 0.0, 1.0]
-    if not has_spine:
-        side = math.radians(robot.notches[notch].direction_deg)
-        direction = [math.cos(side), math.sin(side), 0.0]
-    direction = np.array(direction)
+    has_spine, cut = robot.geometry.has_spine[notch], cuts.cuts[first]
+    side, outer = math.radians(robot.notches[notch].direction_deg), robot.tube.outer_radius
+    across = [math.cos(side), math.sin(side), 0.0]
+    direction = np.array([0.0, 0.0, 1.0] if has_spine else across)
     places = line.position @ direction
     if places[0] > places[-1]:  # the proximal end of a strip lies on the side of the bend
         direction, places = -direction, -places
@@ -271,16 +268,14 @@ def _zone(rest: RobotShape, bent: RobotShape, cuts: RobotCuts, notch: int) -> Zo
     low, high = np.flatnonzero(places == places[0])[-1], np.flatnonzero(places == places[-1])[0]
     if has_spine:
         shown = slice(low, high + 1)
-        return Zone(cut.start, cut.end, direction, places[shown], turns[shown], moves[shown])
+        return Zone(cut.start, cut.end, direction, places[shown], poses[shown])
     # Those of a strip run along the wall, and are spread over it, to the outer surface.
-    outer = robot.tube.outer_radius
-    lower, upper = places[: low + 1], places[high:]
-    lower[:] = np.linspace(places[0], min(-outer, places[0]), low + 1)[::-1]
-    upper[:] = np.linspace(places[-1], max(outer, places[-1]), len(upper))
+    before, beyond = places[: low + 1], places[high:]
+    before[:] = np.linspace(places[0], min(-outer, places[0]), len(before))[::-1]
+    beyond[:] = np.linspace(places[-1], max(outer, places[-1]), len(beyond))
     places, kept = np.unique(places, return_index=True)
     # It lies between this notch's first cut and the next one along the tube.
-    end = cuts.cuts[first + 1].start
-    return Zone(cut.end, end, direction, places, turns[kept], moves[kept])
+    return Zone(cut.end, cuts.cuts[first + 1].start, direction, places, poses[kept])
 
 
 def bent_solid(straight: Manifold, motion: DeformationMap, cuts: RobotCuts) -> Manifold:

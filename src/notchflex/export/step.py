@@ -125,7 +125,6 @@ def _bent(straight: Any, motion: DeformationMap, cuts: RobotCuts) -> Any:
     """
     cad = import_module("build123d")
     edges = [edge for placed in cuts.cuts for edge in (placed.start, placed.end)]
-    turns, moves = motion.bodies
     parts: list[Any] = []
     for number, (low, high) in enumerate(pairwise([cuts.start, *edges, cuts.end])):
         if high - low <= 0.0:
@@ -136,7 +135,7 @@ def _bent(straight: Any, motion: DeformationMap, cuts: RobotCuts) -> Any:
         if number % 2:
             parts.append(_spine(found[0], motion.zones[number // 2], low, high))
         else:
-            parts.append(found[0].moved(_location(turns[number // 2], moves[number // 2])))
+            parts.append(found[0].moved(_location(motion.bodies[number // 2])))
     solids = parts[0].fuse(*parts[1:]).solids()
     return solids[0] if len(solids) == 1 else cad.Compound(solids)
 
@@ -150,15 +149,13 @@ def _spine(piece: Any, zone: Zone, low: float, high: float) -> Any:
             "a STEP file of a bent robot needs spines without holes; leave channels out, or write "
             "an STL file."
         )
-    wires: list[Any] = []
-    for height in np.linspace(low, high, _SECTIONS):
-        turn, move = zone.pose_at(height)
-        lifted = move + turn @ [0.0, 0.0, height - low]
-        wires.append(foot.outer_wire().moved(_location(turn, lifted)))
-    return cad.Solid.make_loft(wires)
+    poses = ((zone.pose_at(height), height - low) for height in np.linspace(low, high, _SECTIONS))
+    places = [_location(pose, lift) for pose, lift in poses]
+    return cad.Solid.make_loft([foot.outer_wire().moved(place) for place in places])
 
 
-def _location(turn: Any, move: Any) -> Any:
-    """Return a rotation and the displacement after it as a location of build123d."""
-    cad = import_module("build123d")
-    return cad.Plane(tuple(move), x_dir=tuple(turn[:, 0]), z_dir=tuple(turn[:, 2])).location
+def _location(pose: Any, lift: float = 0.0) -> Any:
+    """Return a rotation and the displacement after it, of what is lifted before, as a location."""
+    x_dir, _, z_dir, move = pose.T
+    place = tuple(move + lift * z_dir)
+    return import_module("build123d").Plane(place, x_dir=tuple(x_dir), z_dir=tuple(z_dir)).location

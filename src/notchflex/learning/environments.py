@@ -7,25 +7,27 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import register, registry
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
 
 from notchflex import InputError
-from notchflex.learning.episode import EpisodeRows, EpisodeSettings, frame
+from notchflex.learning.episode import EpisodeRows, EpisodeSettings
 from notchflex.support import check_integer, short_repr
 
-RENDER_MODES = ["rgb_array"]
+_MODES: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}
 _ROW = np.zeros(1, int)
 
 
-def check_render_mode(render_mode: str | None) -> str | None:
+def _check_render_mode(render_mode: str | None) -> str | None:
     """Return a mode of rendering that there is.
 
     Raises:
         InputError: There is no such mode.
     """
-    if render_mode not in (None, *RENDER_MODES):
+    if render_mode not in (None, *_MODES["render_modes"]):
         raise InputError.UNKNOWN_NAME(
             f'render_mode is "rgb_array" or None; got {short_repr(render_mode)}'
         )
@@ -48,12 +50,12 @@ class RobotEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         InputError: Settings that cannot be used.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES, "render_fps": 20}  # pyright: ignore[reportIncompatibleVariableOverride]
+    metadata: ClassVar[dict[str, Any]] = _MODES  # pyright: ignore[reportIncompatibleVariableOverride]
     follows: ClassVar[bool]
 
     def __init__(self, *, render_mode: str | None = None, **settings: Any) -> None:
         self.settings = EpisodeSettings(**settings)
-        self.render_mode = check_render_mode(render_mode)
+        self.render_mode = _check_render_mode(render_mode)
         self.observation_space, self.action_space = self.settings.spaces()
         self._rows = EpisodeRows(self.settings, 1, follow=self.follows, cores=1)
 
@@ -86,15 +88,14 @@ class RobotEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         Raises:
             InputError: An action of another shape, or not finite.
         """
-        outcome = self._rows.step(_ROW, np.asarray(action)[None])
-        reached = bool(outcome.terminated[0])
-        info = self._information(float(outcome.distance[0]), outcome.code[0], reached)
-        reward, truncated = float(outcome.reward[0]), bool(outcome.truncated[0])
-        return self._rows.observation[0], reward, reached, truncated, info
+        outcome: Any = self._rows.step(_ROW, np.asarray(action)[None])
+        reward, reached, last, code, distance = (values.item() for values in outcome)
+        information = self._information(distance, code, reached)
+        return self._rows.observation[0], reward, reached, last, information
 
     def render(self) -> Any:
         """Return a picture of the robot and its target; None without a mode of rendering."""
-        return frame(self._rows, 0) if self.render_mode == "rgb_array" else None
+        return self._rows.picture(0) if self.render_mode else None
 
     def _information(
         self, distance: float, code: str = "", reached: bool = False
@@ -155,8 +156,7 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # pyright: ignore[reportIncompatibleVariableOverride]
-        "render_modes": RENDER_MODES,
-        "render_fps": 20,
+        **_MODES,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
     follows: ClassVar[bool]
@@ -173,7 +173,7 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             if check_integer(value, name) < 1:
                 raise InputError.OUT_OF_RANGE(f"{name} must be 1 or more; got {value}")
         self.settings, self.num_envs = EpisodeSettings(**settings), num_envs
-        self.render_mode = check_render_mode(render_mode)
+        self.render_mode = _check_render_mode(render_mode)
         self.single_observation_space, self.single_action_space = self.settings.spaces()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -200,15 +200,28 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         Raises:
             InputError: Seeds or a mask of another number than that of the rows.
         """
-        which = np.flatnonzero(self._masked(options))
-        seeds = self._seeds(seed)
-        for row in which:
+        count, mask = self.num_envs, (options or {}).get("reset_mask")
+        is_reset = np.ones(count, bool) if mask is None else np.asarray(mask)
+        if is_reset.dtype != bool or is_reset.shape != (count,):
+            raise InputError.WRONG_SHAPE(
+                f"reset_mask is one flag per row, {count}; got {short_repr(mask)}"
+            )
+        if isinstance(seed, int | np.integer):
+            seed = range(int(seed), int(seed) + count)
+        seeds = [None] * count if seed is None else list(seed)
+        if len(seeds) != count:
+            raise InputError.WRONG_SHAPE(
+                f"seed is one number or one per row, {count}; got {len(seeds)}"
+            )
+        for row in np.flatnonzero(is_reset):
             if seeds[row] is not None or self._random[row] is None:
                 self._random[row] = seeding.np_random(seeds[row])[0]
-        self._begin(which)
-        self._ended[which] = False
-        is_reset = np.isin(np.arange(self.num_envs), which)
-        return self._rows.observation, self._information(is_reset, self._rows.distance)
+        self._begin(is_reset)
+        self._ended[is_reset] = False
+        codes, reached = np.full(count, "", object), np.zeros(count, bool)
+        return self._rows.observation, self._information(
+            is_reset, self._rows.distance, codes, reached
+        )
 
     def step(
         self, actions: np.ndarray
@@ -224,72 +237,37 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         Raises:
             InputError: Actions of another shape, or not finite.
         """
-        every, count = np.ones(self.num_envs, bool), self.num_envs
-        which, anew = np.flatnonzero(~self._ended), np.flatnonzero(self._ended)
-        numbers = np.asarray(actions)
-        some = numbers[which] if numbers.shape[:1] == (count,) else numbers
-        outcome = self._rows.step(which, some)
-        if len(anew):
+        anew = self._ended
+        reward, reached, last, code, distance = self._rows.step(np.flatnonzero(~anew), actions)
+        if anew.any():
             self._begin(anew)
-        reward, distance = np.zeros(count), self._rows.distance
-        terminated, truncated = np.zeros(count, bool), np.zeros(count, bool)
-        reward[which], distance[which] = outcome.reward, outcome.distance
-        terminated[which], truncated[which] = outcome.terminated, outcome.truncated
-        self._ended = terminated | truncated
-        codes = [""] * count
-        for row, code in zip(which, outcome.code, strict=True):
-            codes[row] = code
-        info = self._information(every, distance, codes, terminated)
-        return self._rows.observation, reward, terminated, truncated, info
+            distance[anew] = self._rows.distance[anew]
+        self._ended = reached | last
+        information = self._information(np.ones(len(anew), bool), distance, code, reached.copy())
+        return self._rows.observation, reward, reached, last, information
 
     def render(self) -> tuple[Any, ...] | None:
         """Return a picture of every row; None without a mode of rendering."""
-        if self.render_mode is None:
-            return None
-        return tuple(frame(self._rows, row) for row in range(self.num_envs))
+        return tuple(map(self._rows.picture, range(self.num_envs))) if self.render_mode else None
 
-    def _begin(self, which: np.ndarray) -> None:
+    def _begin(self, rows: NDArray[np.bool_]) -> None:
+        which = np.flatnonzero(rows)
         sources = [self._random[row] or np.random.default_rng() for row in which]
         self._rows.reset(which, sources)
 
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + row for row in range(self.num_envs)]
-        seeds = list(seed)
-        if len(seeds) != self.num_envs:
-            raise InputError.WRONG_SHAPE(
-                f"seed is one number or one per row, {self.num_envs}; got {len(seeds)}"
-            )
-        return seeds
-
-    def _masked(self, options: dict[str, Any] | None) -> np.ndarray:
-        mask: Any = (options or {}).get("reset_mask")
-        if mask is None:
-            return np.ones(self.num_envs, bool)
-        mask = np.asarray(mask)
-        if mask.dtype != bool or mask.shape != (self.num_envs,):
-            raise InputError.WRONG_SHAPE(
-                f"reset_mask is one flag per row, {self.num_envs}; got {short_repr(mask)}"
-            )
-        return mask
-
     def _information(
         self,
-        is_reset: np.ndarray,
-        distance: np.ndarray,
-        code: list[str] | None = None,
-        reached: np.ndarray | None = None,
+        shown: NDArray[np.bool_],
+        distance: NDArray[np.float64],
+        code: NDArray[Any],
+        reached: NDArray[np.bool_],
     ) -> dict[str, Any]:
         """Information in the form of gymnasium: an array, and which of its rows are given."""
-        codes = np.full(self.num_envs, None, object)
-        codes[is_reset] = np.array(code or [""] * self.num_envs, object)[is_reset]
-        values: dict[str, Any] = {"distance": np.where(is_reset, distance, 0.0), "code": codes}
+        code[~shown] = None
+        values = {"distance": np.where(shown, distance, 0.0), "code": code}
         if not self.follows:
-            none = np.zeros(self.num_envs, bool)
-            values["is_success"] = none if reached is None else reached.copy()
-        return values | {f"_{name}": is_reset.copy() for name in values}
+            values["is_success"] = reached
+        return values | {f"_{name}": shown.copy() for name in values}
 
 
 class FollowVectorEnv(RobotVectorEnv):
@@ -313,22 +291,13 @@ class ReachVectorEnv(RobotVectorEnv):
     follows = False
 
 
-IDENTIFIERS = {"notchflex/Follow-v0": "Follow", "notchflex/Reach-v0": "Reach"}
-"""Each with the beginning of the names of its classes."""
-
-
 def register_environments() -> None:
     """Register all environments in gymnasium; those that are registered stay.
 
     The environments count their steps themselves, so that gymnasium adds no limit: a vector
     environment would have none.
     """
-    from gymnasium.envs.registration import register, registry
-
-    for name, begin in IDENTIFIERS.items():
+    for kind in ("Follow", "Reach"):
+        name, entry = f"notchflex/{kind}-v0", f"notchflex.learning:{kind}"
         if name not in registry:
-            register(
-                id=name,
-                entry_point=f"notchflex.learning:{begin}Env",
-                vector_entry_point=f"notchflex.learning:{begin}VectorEnv",
-            )
+            register(name, f"{entry}Env", vector_entry_point=f"{entry}VectorEnv")

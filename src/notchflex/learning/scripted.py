@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from numpy.typing import NDArray
 
 from notchflex import Frictionless, InputError
 from notchflex.control import Controller, Limits, TargetSearch
@@ -58,7 +58,7 @@ class ScriptedPolicy:
         search = TargetSearch(tolerance=_TOLERANCE, solves=_SOLVES)
         self._controller = Controller(self._robot, limits=self._limits, search=search)
 
-    def __call__(self, observation: Float[np.ndarray, " size"]) -> Float[np.ndarray, " t"]:
+    def __call__(self, observation: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the action for an observation.
 
         Args:

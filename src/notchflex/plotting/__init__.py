@@ -50,7 +50,6 @@ from notchflex.plotting.shapes import (
     project,
     shape_at,
     shape_from_angles,
-    smooth,
     state_shape,
     strip,
     tendon_line,
@@ -79,7 +78,7 @@ __all__ = [
     "dimensioned_figure", "dots", "draw_marks", "draw_panel", "draw_row", "fair_growth",
     "following_picture", "friction_picture", "house_style", "label", "line", "lips", "notch_rows",
     "paper", "path_figure", "path_picture", "picture", "plot_on_axes", "prism", "project", "save",
-    "save_animation", "scale_text", "sensed_picture", "shape_at", "shape_from_angles", "smooth",
+    "save_animation", "scale_text", "sensed_picture", "shape_at", "shape_from_angles",
     "state_picture", "state_shape", "strip", "sweep_picture", "tendon_line", "tolerance_picture",
     "tube_wall", "usual_scale", "workspace_picture", "workspaces_picture",
 ]  # fmt: skip
