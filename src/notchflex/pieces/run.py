@@ -27,7 +27,6 @@ from notchflex.pieces.folder import (
     locked,
     open_folder,
     stored_piece,
-    unsolved,
     versions,
     write_piece,
 )
@@ -122,21 +121,24 @@ class PieceFolder:
         check_target(self.directory, manifest.kind, "--folder")
         open_folder(self.directory, manifest)
         pieces = range(manifest.pieces) if pieces is None else pieces
+        if not pieces:
+            return
         rows = {
             piece: stop - start for piece in pieces for start, stop in [manifest.between(piece)]
         }
+        total = sum(rows.values())
         # Products of matrices by several threads may have other last digits.
         with threadpool_limits(1), locked(self.directory, pieces):
             stored = {piece: stored_piece(folder, manifest, piece) for piece in pieces}
-            lost = sum(unsolved(head) for head in stored.values() if head)
-            before = done = sum(rows[piece] for piece, head in stored.items() if head)
-            left = [piece for piece, head in stored.items() if head is None]
+            left = [piece for piece, lost in stored.items() if lost is None]
+            before = done = total - sum(rows[piece] for piece in left)
+            lost = sum(filter(None, stored.values()))
             try:
                 with contextlib.closing(self._finished(task, folder, left, cores)) as finished:
-                    for piece, without in finished:
-                        done, lost = done + rows[piece], lost + without
+                    for piece, lost_here in finished:
+                        done, lost = done + rows[piece], lost + lost_here
                         if progress is not None:
-                            progress(done, sum(rows.values()), lost, before)
+                            progress(done, total, lost, before)
             except InputError as problem:
                 if problem.code is not ErrorCode.FILE_UNWRITABLE:
                     raise

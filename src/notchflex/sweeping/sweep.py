@@ -458,7 +458,7 @@ def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = 
     )
 
 
-def _timed(task: SweepTask) -> tuple[bytes, dict[str, Any], float]:
+def _timed(task: SweepTask) -> tuple[memoryview, dict[str, Any], float]:
     """Return the bytes of the first piece, its head, and the seconds that it took."""
     start = time.perf_counter()
     data, head = encoded(task, 0)
