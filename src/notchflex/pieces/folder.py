@@ -21,8 +21,7 @@ import numpy as np
 from pydantic_core import to_jsonable_python
 
 from notchflex import InputError, __version__
-from notchflex.solver.programs.compiled import backend
-from notchflex.support import check_folder, read_text, replacing, unwritable, write_text
+from notchflex.support import backend, check_folder, read_text, replacing, unwritable, write_text
 
 if TYPE_CHECKING:
     from polars import DataFrame
