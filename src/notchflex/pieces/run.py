@@ -9,9 +9,15 @@ import os
 import pickle
 import re
 import threading
-import time
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -278,18 +284,17 @@ def _on_cluster(client: Any, work: _Work, pieces: Iterable[int]) -> Generator[tu
     from distributed import KilledWorker
 
     stream = client.scheduler_comm
-    manned = time.monotonic()
+    alone = 0.0  # seconds without a worker
 
     def is_lost() -> bool:
         return client.status != "running" or client.scheduler_comm is not stream or stream.closed()
 
     def check() -> None:
-        nonlocal manned
+        nonlocal alone
         if is_lost():
             raise OSError("the connection was closed")
-        if _within(_ANSWER, client.nthreads):
-            manned = time.monotonic()
-        elif time.monotonic() - manned > _ALONE:
+        alone = 0.0 if _within(_ANSWER, client.nthreads) else alone + _BEAT
+        if alone > _ALONE:
             raise OSError(f"no worker for {_ALONE:.0f} s")
 
     # A piece is not a pure function: its file may be gone while its result is remembered.
@@ -303,7 +308,8 @@ def _on_cluster(client: Any, work: _Work, pieces: Iterable[int]) -> Generator[tu
         ) from None
     except Exception as problem:
         # dask raises errors of many types if its connection is lost in the middle of a call.
-        if isinstance(problem, InputError) or not (isinstance(problem, OSError) or is_lost()):
+        is_expected = isinstance(problem, OSError | CancelledError) or is_lost()
+        if isinstance(problem, InputError) or not is_expected:
             raise
         raise InputError.NO_CONNECTION(
             f"the scheduler or its workers are gone ({_in_words(problem)}); all finished pieces "
@@ -315,8 +321,9 @@ def _on_cluster(client: Any, work: _Work, pieces: Iterable[int]) -> Generator[tu
                 executor.shutdown(wait=False)
 
 
-def _in_words(problem: object) -> str:
-    return " ".join(str(problem).split())[:200] or "no answer"
+def _in_words(problem: Exception) -> str:
+    silent = "no answer" if isinstance(problem, TimeoutError) else "the connection was closed"
+    return " ".join(str(problem).split())[:200] or silent
 
 
 def _within(seconds: float, call: Callable[[], T]) -> T:
