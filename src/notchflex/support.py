@@ -41,6 +41,14 @@ _HOME = {
             "round_number",
             "short",
         ),
+        "notchflex.analysis.draws": (
+            "ToleranceSource",
+            "deviation",
+            "moments",
+            "sources_of",
+            "tolerances_of",
+            "values_at",
+        ),
         "notchflex.analysis.geometry": ("FlexureShape",),
         "notchflex.analysis.slopes": ("changes", "derivatives", "load_change"),
         "notchflex.analysis.tangent": ("Change",),
@@ -157,6 +165,7 @@ _HOME = {
             "numbers_at",
         ),
         "notchflex.solver.programs.compiled": (
+            "backend",
             "number_of_cores",
             "on_cores",
         ),

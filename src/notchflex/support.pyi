@@ -19,6 +19,12 @@ from notchflex._summary import Displayed as Displayed
 from notchflex._summary import Summary as Summary
 from notchflex._summary import round_number as round_number
 from notchflex._summary import short as short
+from notchflex.analysis.draws import ToleranceSource as ToleranceSource
+from notchflex.analysis.draws import deviation as deviation
+from notchflex.analysis.draws import moments as moments
+from notchflex.analysis.draws import sources_of as sources_of
+from notchflex.analysis.draws import tolerances_of as tolerances_of
+from notchflex.analysis.draws import values_at as values_at
 from notchflex.analysis.geometry import FlexureShape as FlexureShape
 from notchflex.analysis.slopes import changes as changes
 from notchflex.analysis.slopes import derivatives as derivatives
@@ -110,5 +116,6 @@ from notchflex.robot.robot import source_of as source_of
 from notchflex.robot.value_names import described_at as described_at
 from notchflex.robot.value_names import number_at as number_at
 from notchflex.robot.value_names import numbers_at as numbers_at
+from notchflex.solver.programs.compiled import backend as backend
 from notchflex.solver.programs.compiled import number_of_cores as number_of_cores
 from notchflex.solver.programs.compiled import on_cores as on_cores

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,9 @@ import tomlkit
 
 import notchflex as nf
 from notchflex.pieces import run as connection
-from notchflex.pieces.run import _connected, _on_cluster
+from notchflex.pieces.folder import versions
+from notchflex.pieces.run import _connected, _on_cluster, _work
+from notchflex.sweeping.sweep import SweepTask
 from swept import TABLE, digests, plan
 
 pytest.importorskip("distributed")
@@ -85,14 +89,12 @@ def test_a_real_scheduler_with_two_workers(many, tmp_path, start):
     assert digests(tmp_path / "swept") == digests(many)
 
 
-def _piece(number: int) -> tuple[int, int]:
-    time.sleep(0.1)
-    return number, 0
-
-
-def test_a_piece_handed_over_while_the_scheduler_dies(start):
+def test_a_piece_handed_over_while_the_scheduler_dies(tmp_path, start):
     """dask would wait 20 s for a new scheduler, and may then wait for ever."""
     address, (scheduler, *_) = cluster(start)
+    (tmp_path / "pieces").mkdir()
+    task = SweepTask(plan(**MANY), nf.load_robot("pacheco2021-a"))
+    work = partial(_work, pickle.dumps(task), versions(), str(tmp_path))
     died: list[float] = []
 
     def pieces(client: Any) -> Iterator[int]:
@@ -103,12 +105,12 @@ def test_a_piece_handed_over_while_the_scheduler_dies(start):
             time.sleep(0.01)
         yield 12
 
-    def work() -> None:
+    def run() -> None:
         with _connected(address) as client:
-            list(_on_cluster(client, _piece, pieces(client)))
+            list(_on_cluster(client, work, pieces(client)))
 
     with pytest.raises(nf.InputError) as caught:
-        work()
+        run()
     assert caught.value.code.name == "NO_CONNECTION"
     assert time.monotonic() - died[0] < 15
 

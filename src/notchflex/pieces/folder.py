@@ -21,8 +21,7 @@ import numpy as np
 from pydantic_core import to_jsonable_python
 
 from notchflex import InputError, __version__
-from notchflex.solver.programs.compiled import backend
-from notchflex.support import check_folder, read_text, replacing, unwritable, write_text
+from notchflex.support import backend, check_folder, read_text, replacing, unwritable, write_text
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -212,11 +211,20 @@ def open_folder(folder: str | os.PathLike[str], manifest: Manifest) -> None:
 
 def _difference(path: str, here: Any, there: Any) -> str:
     """Return the first difference of two documents in words."""
-    for key in {**here, **there} if isinstance(here, dict) and isinstance(there, dict) else ():
-        if here.get(key) != there.get(key):
-            return _difference(f"{path}.{key}" if path else key, here.get(key), there.get(key))
+    mine, theirs = _parts(path, here), _parts(path, there)
+    for name in {**mine, **theirs} if mine and theirs else ():
+        if mine.get(name) != theirs.get(name):
+            return _difference(name, mine.get(name), theirs.get(name))
     words = ["not given" if one is None else json.dumps(one)[:60] for one in (there, here)]
     return f"`{path}` is {words[0]} there and {words[1]} here"
+
+
+def _parts(path: str, document: Any) -> dict[str, Any]:
+    """Return the parts of a document by their paths."""
+    if isinstance(document, list):
+        return {f"{path}[{place}]": part for place, part in enumerate(document, start=1)}
+    parts = document.items() if isinstance(document, Mapping) else ()
+    return {f"{path}.{key}".lstrip("."): part for key, part in parts}
 
 
 @contextlib.contextmanager
@@ -248,7 +256,7 @@ def piece_file(folder: str | os.PathLike[str], piece: int) -> Path:
     return Path(folder) / _PIECES / f"piece-{piece:09d}.parquet"
 
 
-def encoded(task: Task, piece: int) -> tuple[bytes, dict[str, Any]]:
+def encoded(task: Task, piece: int) -> tuple[memoryview, dict[str, Any]]:
     """Return the bytes of the file of a piece, and its head."""
     frame, content = task.piece(piece)
     head = {"sweep": task.manifest.digest, "piece": piece, **content}
@@ -258,7 +266,7 @@ def encoded(task: Task, piece: int) -> tuple[bytes, dict[str, Any]]:
     data = buffer.getbuffer()
     place, _, checksum = _checksum(data)
     data[place] = checksum
-    return bytes(data), head
+    return data, head
 
 
 def _checksum(data: memoryview) -> tuple[slice, bytes, bytes]:
@@ -284,24 +292,22 @@ def write_piece(task: Task, folder: str | os.PathLike[str], piece: int) -> tuple
     data, head = encoded(task, piece)
     with replacing(piece_file(folder, piece)) as temporary:
         temporary.write_bytes(data)
-    return piece, unsolved(head)
+    return piece, _lost(head)
 
 
-def unsolved(head: dict[str, Any]) -> int:
+def _lost(head: dict[str, Any]) -> int:
     """Return how many rows of a piece have no result."""
     return sum(head["codes"][FAILED:])
 
 
-def stored_piece(
-    folder: str | os.PathLike[str], manifest: Manifest, piece: int
-) -> dict[str, Any] | None:
-    """Return the head of a piece, None where its file is missing or damaged."""
+def stored_piece(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> int | None:
+    """Return the rows without a result of a piece, None where its file is missing or damaged."""
     head = _head(folder, manifest, piece)
     if head is None:
         return None
-    data = memoryview(bytearray(piece_file(folder, piece).read_bytes()))
-    _, there, needed = _checksum(data)
-    return head if there == needed else None
+    data = bytearray(piece_file(folder, piece).read_bytes())
+    _, there, needed = _checksum(memoryview(data))
+    return _lost(head) if there == needed else None
 
 
 def heads(

@@ -9,9 +9,15 @@ import os
 import pickle
 import re
 import threading
-import time
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -27,7 +33,6 @@ from notchflex.pieces.folder import (
     locked,
     open_folder,
     stored_piece,
-    unsolved,
     versions,
     write_piece,
 )
@@ -122,21 +127,24 @@ class PieceFolder:
         check_target(self.directory, manifest.kind, "--folder")
         open_folder(self.directory, manifest)
         pieces = range(manifest.pieces) if pieces is None else pieces
+        if not pieces:
+            return
         rows = {
             piece: stop - start for piece in pieces for start, stop in [manifest.between(piece)]
         }
+        total = sum(rows.values())
         # Products of matrices by several threads may have other last digits.
         with threadpool_limits(1), locked(self.directory, pieces):
             stored = {piece: stored_piece(folder, manifest, piece) for piece in pieces}
-            lost = sum(unsolved(head) for head in stored.values() if head)
-            before = done = sum(rows[piece] for piece, head in stored.items() if head)
-            left = [piece for piece, head in stored.items() if head is None]
+            left = [piece for piece, lost in stored.items() if lost is None]
+            before = done = total - sum(rows[piece] for piece in left)
+            lost = sum(filter(None, stored.values()))
             try:
                 with contextlib.closing(self._finished(task, folder, left, cores)) as finished:
-                    for piece, without in finished:
-                        done, lost = done + rows[piece], lost + without
+                    for piece, lost_here in finished:
+                        done, lost = done + rows[piece], lost + lost_here
                         if progress is not None:
-                            progress(done, sum(rows.values()), lost, before)
+                            progress(done, total, lost, before)
             except InputError as problem:
                 if problem.code is not ErrorCode.FILE_UNWRITABLE:
                     raise
@@ -276,18 +284,17 @@ def _on_cluster(client: Any, work: _Work, pieces: Iterable[int]) -> Generator[tu
     from distributed import KilledWorker
 
     stream = client.scheduler_comm
-    manned = time.monotonic()
+    alone = 0.0  # seconds without a worker
 
     def is_lost() -> bool:
         return client.status != "running" or client.scheduler_comm is not stream or stream.closed()
 
     def check() -> None:
-        nonlocal manned
+        nonlocal alone
         if is_lost():
             raise OSError("the connection was closed")
-        if _within(_ANSWER, client.nthreads):
-            manned = time.monotonic()
-        elif time.monotonic() - manned > _ALONE:
+        alone = 0.0 if _within(_ANSWER, client.nthreads) else alone + _BEAT
+        if alone > _ALONE:
             raise OSError(f"no worker for {_ALONE:.0f} s")
 
     # A piece is not a pure function: its file may be gone while its result is remembered.
@@ -301,7 +308,8 @@ def _on_cluster(client: Any, work: _Work, pieces: Iterable[int]) -> Generator[tu
         ) from None
     except Exception as problem:
         # dask raises errors of many types if its connection is lost in the middle of a call.
-        if isinstance(problem, InputError) or not (isinstance(problem, OSError) or is_lost()):
+        is_expected = isinstance(problem, OSError | CancelledError) or is_lost()
+        if isinstance(problem, InputError) or not is_expected:
             raise
         raise InputError.NO_CONNECTION(
             f"the scheduler or its workers are gone ({_in_words(problem)}); all finished pieces "
@@ -313,8 +321,9 @@ def _on_cluster(client: Any, work: _Work, pieces: Iterable[int]) -> Generator[tu
                 executor.shutdown(wait=False)
 
 
-def _in_words(problem: object) -> str:
-    return " ".join(str(problem).split())[:200] or "no answer"
+def _in_words(problem: Exception) -> str:
+    silent = "no answer" if isinstance(problem, TimeoutError) else "the connection was closed"
+    return " ".join(str(problem).split())[:200] or silent
 
 
 def _within(seconds: float, call: Callable[[], T]) -> T:

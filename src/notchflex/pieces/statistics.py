@@ -75,11 +75,15 @@ class Sketch:
         moved = values - middle
         bins = _bins(moved / half)
         first = int(bins.min())
+        counts = np.bincount(bins - first)
         with np.errstate(over="ignore"):
             total, squares = float(moved.sum()), float(np.square(moved).sum())
-        smallest = _least(values, rows, keep)
-        largest = [[-value, row] for value, row in _least(-values, rows, keep)]
-        counts = np.bincount(bins - first)
+        # Extremes are in the outermost bins: never are all values put in order.
+        below = np.cumsum(counts)
+        low = bins - first <= np.searchsorted(below, keep)
+        high = bins - first >= np.searchsorted(below, len(values) - keep, side="right")
+        smallest = _least(values[low], rows[low], keep)
+        largest = [[-value, row] for value, row in _least(-values[high], rows[high], keep)]
         return cls(len(values), total, squares, smallest, largest, first, counts, scale)
 
     def merged(self, more: Sketch, keep: int) -> Sketch:
@@ -155,9 +159,6 @@ def _least(
     values: Float[np.ndarray, " k"], rows: Int[np.ndarray, " k"], keep: int
 ) -> list[list[Any]]:
     """Return the smallest values with their rows; of equal ones those of the first rows."""
-    if keep < len(values):
-        near = values <= np.partition(values, keep - 1)[keep - 1]
-        values, rows = values[near], rows[near]
     order = np.argsort(values, kind="stable")[:keep]
     return list(map(list, zip(values[order].tolist(), rows[order].tolist(), strict=True)))
 

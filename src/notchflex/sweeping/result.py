@@ -12,7 +12,7 @@ import numpy as np
 
 from notchflex import InputError, Robot
 from notchflex.pieces import CODES, Manifest, Sketch, add_to, damaged, heads, piece_file
-from notchflex.support import Displayed, Summary, from_table, nearest, need, short, write_json
+from notchflex.support import Displayed, Summary, from_table, nearest, need, short
 from notchflex.sweeping.plan import SweepPlan, plan_from_table
 
 if TYPE_CHECKING:
@@ -104,24 +104,22 @@ class Sweep(Displayed):
                 "to_xarray needs all rows of a finished sweep, at most 1e8; use lazy()."
             )
         plan, frame = self.plan, self.lazy().collect()
-        sampling = plan.sampling
-        sizes = [len(one.values or ()) or one.count or 1 for one in plan.grid]
-        dimensions = [one.value for one in plan.grid]
-        if sampling is not None:
-            dimensions, sizes = [*dimensions, "point"], [*sizes, sampling.points]
+        axes: dict[str, Any] = {
+            variable.value: frame[variable.value].unique(maintain_order=True).to_numpy()
+            for variable in plan.grid
+        }
+        dimensions, sizes = list(axes), [len(values) for values in axes.values()]
+        if plan.sampled:
+            dimensions, sizes = [*dimensions, "point"], [*sizes, -1]
 
         def column(name: str) -> np.ndarray:
             return frame[name].to_numpy().reshape(sizes)
 
         code = frame["code"].cast(str).to_numpy().reshape(sizes).astype(str)
         values: dict[str, Any] = {name: (dimensions, column(name)) for name in self.columns}
-        values["code"] = (dimensions, code)
-        for one in plan.sampled:
-            values[one.value] = (["point"], column(one.value)[(0,) * len(plan.grid)])
-        axes = {
-            one.value: np.moveaxis(column(one.value), number, 0).reshape(sizes[number], -1)[:, 0]
-            for number, one in enumerate(plan.grid)
-        }
+        values["code"] = dimensions, code
+        for variable in plan.sampled:
+            values[variable.value] = ["point"], column(variable.value)[(0,) * len(axes)]
         attributes = {"sweep": plan.name, "robot": self.robot.name}
         return xarray.Dataset(values, coords=axes, attrs=attributes)
 
@@ -218,15 +216,6 @@ class Sweep(Displayed):
             if sketch.count:
                 rows.append((name, " to ".join(map(short, sketch.ends))))
         return Summary(title, rows, ".lazy() is a frame of polars, .to_xarray() a data set")
-
-
-def write_summary(sweep: Sweep) -> None:
-    """Write what is summed up of all rows into the folder, as `summary.json`.
-
-    Raises:
-        InputError: It cannot be written.
-    """
-    write_json(str(sweep.directory / "summary.json"), sweep.document())
 
 
 def read_sweep(directory: str | os.PathLike[str]) -> Sweep:

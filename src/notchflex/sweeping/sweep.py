@@ -44,6 +44,7 @@ from notchflex.support import (
     number_of_cores,
     short_repr,
     to_table,
+    write_json,
 )
 from notchflex.sweeping.plan import (
     KeptQuantity,
@@ -54,7 +55,7 @@ from notchflex.sweeping.plan import (
     plan_table,
     read_plan,
 )
-from notchflex.sweeping.result import KIND, Sweep, read_sweep, write_summary
+from notchflex.sweeping.result import KIND, Sweep, read_sweep
 from notchflex.tolerancing import Study, piece_rows
 from notchflex.tolerancing.spec import (
     AXES,
@@ -359,7 +360,7 @@ def sweep(
     folder.run(task, pieces=pieces, progress=progress)
     result = read_sweep(directory)
     if result.finished:
-        write_summary(result)
+        write_json(str(result.directory / "summary.json"), result.document())
     return result
 
 
@@ -458,7 +459,7 @@ def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = 
     )
 
 
-def _timed(task: SweepTask) -> tuple[bytes, dict[str, Any], float]:
+def _timed(task: SweepTask) -> tuple[memoryview, dict[str, Any], float]:
     """Return the bytes of the first piece, its head, and the seconds that it took."""
     start = time.perf_counter()
     data, head = encoded(task, 0)

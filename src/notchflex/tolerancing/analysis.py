@@ -14,7 +14,6 @@ from scipy.optimize import brentq
 from scipy.stats import qmc, sobol_indices
 
 from notchflex import EquilibriumPath, InputError, Robot, Settings
-from notchflex.analysis.draws import deviation, moments
 from notchflex.pieces import CODES, FAILED, INVALID, PieceFolder
 from notchflex.support import (
     Displayed,
@@ -22,6 +21,8 @@ from notchflex.support import (
     Tolerance,
     check_integer,
     check_is_robot,
+    deviation,
+    moments,
     short,
     short_repr,
 )

@@ -26,7 +26,6 @@ from notchflex import (
     batch,
     simulate,
 )
-from notchflex.analysis.draws import ToleranceSource, sources_of, tolerances_of, values_at
 from notchflex.pieces import (
     ACCEPTED,
     CODES,
@@ -45,7 +44,14 @@ from notchflex.pieces import (
     sobol_points,
     summed_up,
 )
-from notchflex.support import Tolerance, to_table
+from notchflex.support import (
+    Tolerance,
+    ToleranceSource,
+    sources_of,
+    to_table,
+    tolerances_of,
+    values_at,
+)
 from notchflex.tolerancing.spec import Criterion, ToleranceSpec, criteria_of
 
 if TYPE_CHECKING:

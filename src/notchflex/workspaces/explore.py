@@ -26,7 +26,6 @@ from notchflex import (
     simulate_batch,
     tip_response,
 )
-from notchflex.loads.load import NO_VECTOR
 from notchflex.pieces import (
     Manifest,
     PieceFolder,
@@ -173,7 +172,7 @@ def _around(
 
 def _under(load: ExternalLoad, tension: Float[np.ndarray, "s t"]) -> LoadPath:
     """Return a path of valid tensions under a load that acts all the time."""
-    turn = np.array(getattr(load, "base_rotation", NO_VECTOR))
+    turn = np.array(getattr(load, "base_rotation", (0.0, 0.0, 0.0)))
     external = (load.external,) * len(tension)
     return LoadPath.of_valid(tension, np.full(tension.shape, np.nan), turn, external)
 
