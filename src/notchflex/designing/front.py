@@ -24,9 +24,10 @@ from notchflex.designing.problem import (
     objective_reading,
 )
 from notchflex.designing.result import Design
-from notchflex.designing.search import Searches, SearchResult, drawn_robots
+from notchflex.designing.search import Searches, SearchResult
 from notchflex.designing.specification import DesignSpec
 from notchflex.search.slsqp import TOLERANCE, minimise
+from notchflex.search.starts import sobol_points
 from notchflex.support import Displayed, Summary, need, short
 
 _MAX_OBJECTIVES = 3
@@ -128,7 +129,7 @@ def design_front(
     try:
         for number, problem in enumerate(problems):
             report("spreading over the front", number, len(problems))
-            spread += _spread(problem, number, points, generations, asked.search.seed)
+            spread += _spread(problem, points, generations, asked.search.seed)
         chosen = _chosen(spread, points)
         for number, one in enumerate(chosen):
             report("polishing", number, len(chosen))
@@ -147,16 +148,14 @@ def sums(problem: DesignProblem, one: DesignEvaluation) -> Float[np.ndarray, " m
     return np.array([objective_reading(w, one.point).values[0] for w in problem.objectives])
 
 
-def _spread(
-    problem: DesignProblem, number: int, points: int, generations: int, seed: int
-) -> list[SearchResult]:
+def _spread(problem: DesignProblem, points: int, generations: int, seed: int) -> list[SearchResult]:
     """Return the last generation of a genetic search of one form of robots."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem as PymooProblem
     from pymoo.optimize import minimize
 
     size = 4 * points
-    start = drawn_robots(problem, size, seed)
+    start = sobol_points(size, problem.count, seed)
     problem.set_sizes([one for one in problem.evaluate_all(start) if one is not None])
     evaluated: dict[bytes, DesignEvaluation] = {}
 
@@ -181,7 +180,7 @@ def _spread(
     algorithm: Any = NSGA2(pop_size=size, sampling=start)
     result: Any = minimize(Batched(), algorithm, ("n_gen", generations), seed=seed, verbose=False)
     last = [evaluated.get(z.tobytes()) for z in result.pop.get("X")]
-    return [SearchResult(problem, number, one) for one in last if one is not None]
+    return [SearchResult(problem, one) for one in last if one is not None]
 
 
 def _polished(one: SearchResult, iterations: int) -> list[SearchResult]:

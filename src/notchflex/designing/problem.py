@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -20,7 +21,7 @@ from notchflex.designing.model.point import Point, Solver
 from notchflex.designing.model.quantities import Reading, taken
 from notchflex.designing.model.wishes import Source, Wish
 from notchflex.designing.specification import DesignConstraint, DesignObjective
-from notchflex.search.slsqp import Linearisation, Program, Vector
+from notchflex.search.slsqp import TOLERANCE, Linearisation, Program, Vector
 
 # A curve is followed well enough at this part of the distance at which its points are reached.
 _ENOUGH = 0.1
@@ -127,30 +128,24 @@ def squared(wish: Wish, source: Source) -> Reading:
     return Reading(off).scaled(float(np.sqrt(asked.weight)))
 
 
-@dataclass(frozen=True)
-class EpigraphBound:
+class EpigraphBound(NamedTuple):
     """A variable of the search that is above (sign 1) or below (-1) all numbers of an objective."""
 
     wish: Wish
     sign: float
-
-    @property
-    def factor(self) -> float:
-        """Its factor in the sum that is minimised."""
-        assert isinstance(self.wish.asked, DesignObjective)
-        return self.sign * self.wish.asked.weight
+    factor: float  # in the sum that is minimised
 
 
-def epigraphs(wish: Wish) -> Iterator[EpigraphBound]:
-    """Yield the bounds for the largest or smallest of several numbers in an objective."""
+def epigraphs(wish: Wish) -> list[EpigraphBound]:
+    """Return the bounds for the largest or smallest of several numbers in an objective."""
     asked = wish.asked
     assert isinstance(asked, DesignObjective)
-    if asked.target is not None or len(wish.rows) < 2:
-        return
-    if (asked.goal == "minimise") and wish.take in ("largest", "range"):
-        yield EpigraphBound(wish, 1.0)
-    if (wish.take, asked.goal) in (("smallest", "maximise"), ("range", "minimise")):
-        yield EpigraphBound(wish, -1.0)
+    signs = {
+        ("largest", "minimise"): (1.0,),
+        ("smallest", "maximise"): (-1.0,),
+        ("range", "minimise"): (1.0, -1.0),
+    }.get((wish.take, asked.goal or ""), ())
+    return [EpigraphBound(wish, sign, sign * asked.weight) for sign in signs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,6 +302,11 @@ class DesignProblem:
         """Return the largest violation."""
         return float(np.abs(self.violation(one)).max(initial=0.0))
 
+    def merit(self, one: DesignEvaluation) -> tuple[float, float]:
+        """Return the largest violation, 0 within the tolerance, and the sum; less is better."""
+        worst = self.worst(one)
+        return (worst if worst > TOLERANCE else 0.0), one.total
+
     @property
     def is_least_squares(self) -> bool:
         """Whether all that is asked is to come near to something."""
@@ -331,54 +331,42 @@ class DesignProblem:
 
     def set_sizes(self, reached: Sequence[DesignEvaluation]) -> None:
         """Take the sizes of rows without a limit of a size from what robots reach."""
-        values = np.array([one.rows.values for one in reached]).reshape(len(reached), -1)
-        most = np.abs(values).max(axis=0, initial=0.0)
-        sizes = [
-            row.size or (size if size > 1e-9 else 1.0)
-            for row, size in zip(self.rows, most.tolist(), strict=True)
-        ]
-        self.sizes = np.array(sizes)
+        values = [np.abs(one.rows.values) for one in reached] or [np.zeros(len(self.rows))]
+        most = np.max(values, axis=0)
+        sizes = np.array([row.size for row in self.rows])
+        self.sizes = np.where(sizes > 0.0, sizes, np.where(most > 1e-9, most, 1.0))
 
     def program(self, first: DesignEvaluation) -> tuple[Program, Vector]:
         """Return the problem for SLSQP, its bounds scaled for where it begins, and that start."""
-        sides = np.array([bound.sign for bound in self.bounds])
+        extra, end = len(self.bounds), self.count + len(self.bounds)
         factors = np.array([bound.factor for bound in self.bounds])
-        sizes = np.array([np.ptp(one.values) or 1.0 for one in first.bounded])
-        tops = [
-            side * (side * r.values).max() for side, r in zip(sides, first.bounded, strict=True)
-        ]
-        # The bound of each number that one is above or below.
-        of = np.repeat(np.arange(len(sides)), [len(one.values) for one in first.bounded])
-        by_bound = np.eye(len(sides))[of] * (sides * sizes)
+        pairs = [*zip(self.bounds, first.bounded, strict=True)]
+        tops = np.array([b.sign * (b.sign * reading.values).max() for b, reading in pairs])
+        sizes = np.array([np.ptp(reading.values) or 1.0 for _, reading in pairs])
 
         def linearised(y: Vector) -> Linearisation | None:
-            z = y[: self.count]
-            is_first = len(first.point.along) and np.array_equal(z, first.z)
-            one = first if is_first else self.evaluate(z)
+            is_first = len(first.point.along) and np.array_equal(y[: self.count], first.z)
+            one = first if is_first else self.evaluate(y[: self.count])
             if one is None:
                 return None
             bounds = tops + sizes * y[self.count :]
-            numbers = np.concatenate(
-                [np.zeros((0, 1 + self.count)), *(r.table for r in one.bounded)]
-            )
-            apart = -sides[of, None] * numbers
-            apart[:, 0] += (sides * bounds)[of]
-            rows = np.concatenate([one.rows.table, apart])
-            by_bounds = np.concatenate([np.zeros((len(self.rows), len(sides))), by_bound])
-            return Linearisation(
-                one.objective.values[0] + factors @ bounds,
-                np.concatenate([one.objective.slopes[0], factors * sizes]),
-                rows[:, 0],
-                np.concatenate([rows[:, 1:], by_bounds], axis=1),
-                one,
-            )
+            rows = [np.pad(one.rows.table, ((0, 0), (0, extra)))]
+            for k, (bound, reading) in enumerate(zip(self.bounds, one.bounded, strict=True)):
+                apart = np.pad(-bound.sign * reading.table, ((0, 0), (0, extra)))
+                apart[:, 0] += bound.sign * bounds[k]
+                apart[:, 1 + self.count + k] = bound.sign * sizes[k]
+                rows.append(apart)
+            table, total = np.concatenate(rows), one.objective.table[0]
+            gradient = np.append(total[1:], factors * sizes)
+            value = float(total[0] + factors @ bounds)
+            return Linearisation(value, gradient, table[:, 0], table[:, 1:], one)
 
-        bounds = [(0.0, 1.0)] * self.count + [(-np.inf, np.inf)] * len(sides)
-        limits = [(row.lower, row.upper) for row in self.rows] + [(0.0, np.inf)] * len(of)
+        numbers = [len(reading.values) for _, reading in pairs]
+        limits = [(row.lower, row.upper) for row in self.rows] + [(0.0, np.inf)] * sum(numbers)
         program = Program(
             linearised,
-            np.reshape(bounds, (-1, 2)),
+            np.array([(0.0, 1.0)] * self.count + [(-np.inf, np.inf)] * extra).reshape(end, 2),
             np.reshape(limits, (-1, 2)),
-            np.concatenate([self.sizes, sizes[of]]),
+            np.append(self.sizes, np.repeat(sizes, numbers)),
         )
-        return program, np.concatenate([first.z, np.zeros(len(sides))])
+        return program, np.append(first.z, np.zeros(extra))

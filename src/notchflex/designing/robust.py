@@ -419,4 +419,4 @@ def _robust(
     if first is None:
         return []
     problem.set_sizes([first])
-    return search_from(problem, start.number, first, iterations)
+    return search_from(problem, first, iterations)

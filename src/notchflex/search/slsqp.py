@@ -23,7 +23,7 @@ TOLERANCE = 1e-6
 _REACHED, _REST, _FLAT = 1e-5, 1e-3, 1e-4
 # SLSQP's estimate of the curvature is wrong beyond a kink, such as a notch that closes: it starts
 # anew where it ended, while that lowers the value or the violation.
-_GAIN, _PRECISION = 1e-7, 1e-12
+_GAIN, _PRECISION, _PATIENCE = 1e-7, 1e-12, 10
 # A slope below this part of its size is none. What the value is raised by where there is none, and
 # what may be left of it at the end, in sizes of its slope.
 _NO_SLOPE, _PENALTY, _LEFT = 1e-9, 1e3, 1e-5
@@ -118,6 +118,14 @@ class _Search:
                 jac=lambda y: at(y).jacobian[rows] / sizes[:, None],
             )
 
+        stale, seen = 0, self.best
+
+        def watch(_: Vector) -> None:
+            nonlocal stale, seen
+            stale, seen = (stale + 1 if self.best is seen else 0), self.best
+            if stale == _PATIENCE:
+                raise StopIteration
+
         is_equal = program.limits[:, 0] == program.limits[:, 1]
         found = minimize(
             lambda y: at(y).value / scale,
@@ -126,6 +134,7 @@ class _Search:
             bounds=program.bounds,
             constraints=[constraint(rows) for rows in (is_equal, ~is_equal) if rows.any()],
             method="SLSQP",
+            callback=watch,
             options={"maxiter": max(iterations, 1), "ftol": _PRECISION},
         )
         # The end keeps limits exactly; others may have been better by what the tolerance leaves.

@@ -203,7 +203,9 @@ class Solver:
         along = [variables.parts_of(name) * variables.span for name in names]
         by_variable = np.reshape(along, (len(names), len(variables.columns))).T
         by_deviation = [[one.sd.get(name, 0.0) for name in names] for one in deviations]
-        return names, np.concatenate([by_variable, np.reshape(by_deviation, (-1, len(names)))])
+        return names, np.concatenate(
+            [by_variable, np.reshape(by_deviation, (len(deviations), len(names)))]
+        )
 
     def _changes(
         self, path: EquilibriumPath, x: np.ndarray, names: Sequence[str], along: np.ndarray
