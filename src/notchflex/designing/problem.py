@@ -50,20 +50,20 @@ class Row:
         return max((abs(one) for one in (self.lower, self.upper) if np.isfinite(one)), default=0.0)
 
 
-def limits(asked: DesignConstraint) -> tuple[float, float]:
-    """Return least and greatest value of a constraint, for steps from notch to notch if ordered."""
-    if asked.order is not None:
-        return (-np.inf, -asked.margin) if asked.order == "tip-first" else (asked.margin, np.inf)
-    if asked.equal is not None:
-        return asked.equal, asked.equal
-    low, high = asked.lower, asked.upper
-    return -np.inf if low is None else low, np.inf if high is None else high
-
-
 def _searched(wish: Wish) -> tuple[str, float, float]:
-    """Return how the search takes a constraint, smooth where that asks for the same."""
-    assert isinstance(wish.asked, DesignConstraint)
-    low, high = limits(wish.asked)
+    """Return how the search takes a constraint, smooth where that asks for the same, and limits.
+
+    Ordered numbers have limits of the steps from notch to notch.
+    """
+    asked = wish.asked
+    assert isinstance(asked, DesignConstraint)
+    low = asked.equal if asked.lower is None else asked.lower
+    high = asked.equal if asked.upper is None else asked.upper
+    low, high = -np.inf if low is None else low, np.inf if high is None else high
+    if asked.order is not None:
+        low, high = (
+            (-np.inf, -asked.margin) if asked.order == "tip-first" else (asked.margin, np.inf)
+        )
     if (wish.take == "largest" and low == -np.inf) or (wish.take == "smallest" and high == np.inf):
         return "each", low, high
     if wish.take == "range" and low <= 0.0:

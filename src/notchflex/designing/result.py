@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -196,11 +197,10 @@ def asked_in_words(wish: Wish) -> str:
     if asked.equal is not None:
         return f"{asked.equal:g}{unit}"
     of = "" if asked.wanted_yield is None else f" for {100.0 * asked.wanted_yield:g} % of robots"
-    if asked.lower is not None and asked.upper is not None:
-        return f"{asked.lower:g} to {asked.upper:g}{unit}{of}"
-    if asked.lower is not None:
-        return f"at least {asked.lower:g}{unit}{of}"
-    return f"at most {asked.upper:g}{unit}{of}"
+    low, high = (None if end is None else f"{end:g}" for end in (asked.lower, asked.upper))
+    if low and high:
+        return f"{low} to {high}{unit}{of}"
+    return (f"at least {low}" if low else f"at most {high}") + f"{unit}{of}"
 
 
 def design_document(made: Design) -> dict[str, Any]:
@@ -211,43 +211,26 @@ def design_document(made: Design) -> dict[str, Any]:
         `converged`, `met`, `reason`, `wishes`, `variables`, `explanation`, `solves`, `gradients`
         and `starts`, and of a robust design `yields`. Angles in deg, lengths in mm, forces in N.
     """
-    return {
-        **document_head(made.robot),
-        "design": made.spec.name,
-        "converged": made.converged,
-        "met": made.met,
-        "reason": made.reason,
-        "wishes": [
-            {
-                "quantity": one.title,
-                "unit": one.unit,
-                "asked": one.asked,
-                "achieved": list(one.achieved),
-                "before": list(one.before),
-                "met": one.met,
-                "parts": list(one.parts),
-            }
-            for one in made.wishes
-        ],
-        "variables": [vars(one) for one in made.variables],
-        "explanation": list(made.explanation),
-        "solves": made.solves,
-        "gradients": made.gradients,
-        "starts": made.starts,
-        **({"yields": [vars(one) for one in made.yields]} if made.yields else {}),
-    }
+    names = ("converged", "met", "reason", "wishes", "variables", "explanation")
+    names += ("solves", "gradients", "starts")
+    document = document_head(made.robot) | {"design": made.spec.name}
+    document |= {name: getattr(made, name) for name in names}
+    document["wishes"] = [
+        {"quantity": wish.title}
+        | {key: value for key, value in vars(wish).items() if key != "title"}
+        for wish in made.wishes
+    ]
+    document["variables"] = [vars(variable) for variable in made.variables]
+    return document | ({"yields": [vars(part) for part in made.yields]} if made.yields else {})
 
 
-def wish_rows(design: Design) -> list[tuple[str, str, str, str, str, str, str]]:
-    """Return a row for every number asked: quantity, part, unit, asked, achieved, before, met."""
-    rows: list[tuple[str, str, str, str, str, str, str]] = []
-    for one in design.wishes:
-        met = "" if one.met is None else "yes" if one.met else "no"
-        for number, value in enumerate(one.achieved):
-            part = one.parts[number] if len(one.parts) == len(one.achieved) else ""
-            was = repr(one.before[number]) if number < len(one.before) else ""
-            rows.append((one.title, part, one.unit, one.asked, repr(value), was, met))
-    return rows
+def wish_rows(design: Design) -> Iterator[tuple[Any, ...]]:
+    """Yield a row for every number asked: quantity, part, unit, asked, achieved, before, met."""
+    for wish in design.wishes:
+        met = {None: "", True: "yes", False: "no"}[wish.met]
+        parts = wish.parts if len(wish.parts) == len(wish.achieved) else ("",) * len(wish.achieved)
+        for part, value, before in zip_longest(parts, wish.achieved, wish.before):
+            yield wish.title, part, wish.unit, wish.asked, value, before, met
 
 
 HEADS = ("quantity", "part", "unit", "asked", "achieved", "before", "met")
@@ -281,7 +264,7 @@ def write_design(
     """
     names = file_names()
     files = check_folder(os.fspath(folder), names, "-o", inputs=inputs)
-    make_folder(folder)
+    _make_folder(folder)
     write_text(files[0], designed_text(made))
     write_csv(files[1], HEADS, wish_rows(made))
     write_json(files[2], design_document(made))
@@ -303,7 +286,7 @@ def write_front(
     robots = [f"point_{number:02d}.toml" for number in range(1, len(front.points) + 1)]
     drawn = [FRONT_PICTURE] if PICTURE in file_names() else []
     files = check_folder(os.fspath(folder), (*robots, FRONT_TABLE, *drawn), "-o", inputs=inputs)
-    make_folder(folder)
+    _make_folder(folder)
     for file, point in zip(files, front.points, strict=False):
         write_text(file, designed_text(point))
     names = [f"{v.name} [{v.unit}]" if v.unit else v.name for v in front.points[0].variables]
@@ -319,7 +302,7 @@ def write_front(
     return files
 
 
-def make_folder(folder: str | os.PathLike[str]) -> None:
+def _make_folder(folder: str | os.PathLike[str]) -> None:
     """Make a folder, if it is missing.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The search of a design: from several starts, and for what comes nearest where limits are missed."""
+"""The search of a design: from several starts, for the best robot or for what comes nearest."""
 
 from __future__ import annotations
 
@@ -140,13 +140,7 @@ def search_from(
     """Search from a robot; return where that ended, if it could begin."""
     if problem.is_least_squares:  # SLSQP hardly settles among the many robots that follow a curve
         end, settled = _least_squares(problem, first)
-        results = _descended(problem, end, 0)  # for the multipliers
-        return [
-            replace(one, minimum=one.minimum._replace(is_stationary=True))
-            if settled and one.minimum
-            else one
-            for one in results
-        ]
+        return _descended(problem, end, 0, settled)  # for the multipliers
     results = _descended(problem, first, iterations)
     if results and results[0].merit[0] > 0.0:
         near, _ = _least_squares(problem, first)
@@ -159,8 +153,12 @@ def search_from(
 def _descended(
     problem: DesignProblem, first: DesignEvaluation, iterations: int, settled: bool = False
 ) -> list[SearchResult]:
+    """Return where SLSQP ended, if it could begin."""
     found = minimise(*problem.program(first), iterations)
-    return [] if found is None else [SearchResult(problem, found.reached.source, found)]
+    if found is None:
+        return []
+    found = found._replace(is_stationary=found.is_stationary or settled)
+    return [SearchResult(problem, found.reached.source, found)]
 
 
 def _least_squares(
@@ -185,9 +183,7 @@ def _least_squares(
 
     def stop(intermediate_result: Any) -> None:
         one = evaluated(intermediate_result.x.tobytes())
-        if one is not None and (
-            problem.is_followed(one) or (problem.rows and problem.worst(one) <= _NEARLY)
-        ):
+        if one is not None and problem.is_followed(one):
             raise StopIteration
 
     found: Any = least_squares(
@@ -262,7 +258,7 @@ def on_grid(searches: Searches, grid: float) -> Searches:
     places = np.array([*itertools.product(*sides)])
     z = (np.where(variables.lengths, places * grid, exact) - variables.lower) / variables.span
     inside = z[(np.abs(z - 0.5) <= 0.5 + 1e-9).all(axis=1)]
-    robots = [one for one in problem.evaluate_all(inside) if one is not None]
+    robots = [one for one in map(problem.evaluate, inside) if one is not None]
     if not robots:
         reasons = "; ".join(problem.failures) or "all lie beyond the limits of the variables"
         raise InputError.UNSUPPORTED(

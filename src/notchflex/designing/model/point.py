@@ -42,7 +42,7 @@ from notchflex.support import (
     numbers_at,
 )
 
-_BODIES = ("body_position", "body_rotation")
+BODIES = ("body_position", "body_rotation")
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +129,8 @@ class Point:
     def offsets(self, curve: TargetCurve) -> Reading:
         """Return the vectors from the points of a curve to the axis, mm."""
         step = self.paths.step[curve.state]
-        bodies = Bodies(*(self.arrays[name][step] for name in _BODIES))
-        slopes = Bodies(*(self.slopes[name][:, step] for name in _BODIES)) if self.slopes else None
+        bodies = Bodies(*(self.arrays[name][step] for name in BODIES))
+        slopes = Bodies(*(self.slopes[name][:, step] for name in BODIES)) if self.slopes else None
         lengths = self._of_robot(lambda robot: robot.geometry.body_length).slopes.T
         return offsets(self.robot, bodies, target_points(curve), slopes, lengths)
 
@@ -256,8 +256,7 @@ class Solver:
         """
         if robots == [] or not self.paths.pieces:
             return {}, np.ones(len(next(iter(numbers.values()), vectors)), bool)
-        same = all(column.load is None for column in self.variables.columns)
-        loads = [self._loads(x) for x in (vectors[:1] if same else vectors)]
+        loads = [self._loads(x) for x in vectors]
         ends = np.cumsum(self.paths.lengths)
         pieces = [
             batch(robots, numbers, [path[start:end] for path in loads], outputs=self.outputs)
