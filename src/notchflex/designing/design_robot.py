@@ -91,29 +91,23 @@ def _problem(spec: DesignSpec, robot: Robot) -> DesignProblem:
 
 
 def _check_stock(spec: DesignSpec, robot: Robot) -> None:
-    seen: dict[str, int] = {}
-    for number, stock in enumerate(spec.stock, start=1):
-        for path in stock.values:
-            try:
-                single = numbers_at(robot, path)
-            except InputError as error:
-                raise InputError(f"`stock[{number}]`: {error}", error.code) from None
-            for one in single:
-                if one in seen:
-                    raise InputError.CONFLICT(f"`stock[{number}]`: `{path}` is given twice.")
-                seen[one] = number
-    for number, variable in enumerate(spec.variable, start=1):
-        if variable.value.startswith("state."):
-            continue
+    """Raise if a number of the robot is chosen by a stock and by something else."""
+    paths = [(f"stock[{k}]", path) for k, one in enumerate(spec.stock, 1) for path in one.values]
+    variables = enumerate(spec.variable, 1)
+    paths += [(f"variable[{k}]", v.value) for k, v in variables if not v.value.startswith("state.")]
+    chosen: dict[str, str] = {}
+    for place, path in paths:
         try:
-            both = [one for one in numbers_at(robot, variable.value) if one in seen]
+            numbers = numbers_at(robot, path)
         except InputError as error:
-            raise InputError(f"`variable[{number}]`: {error}", error.code) from None
-        if both:
-            raise InputError.CONFLICT(
-                f"`variable[{number}]`: `{both[0]}` is chosen by `stock[{seen[both[0]]}]` too; "
-                "leave one of them out."
-            )
+            raise InputError(f"`{place}`: {error}", error.code) from None
+        for number in numbers:
+            before = chosen.get(number, "")
+            if before.startswith("stock"):
+                raise InputError.CONFLICT(
+                    f"`{place}`: `{number}` is chosen by `{before}` too; leave one of them out."
+                )
+            chosen[number] = place
 
 
 def _forms(spec: DesignSpec, robot: Robot) -> list[Robot]:

@@ -19,7 +19,7 @@ from notchflex.support import numbers_at, round_number, short
 _MAX_SENTENCES = 12
 # Change of a limit, relative to its size, for which its cost is stated.
 _PART = 0.05
-# An effect below this part of the sum is none; a variable is at a limit within this part of its range.
+# No effect is below this part of the sum; a limit of a variable is reached within this part.
 _NO_EFFECT, _AT_LIMIT = 1e-9, 1e-6
 
 
@@ -88,30 +88,26 @@ def _active_limits(outcome: SearchResult) -> list[_ActiveLimit]:
     """Return the limits that are reached, that with the greatest effect first."""
     problem, minimum = outcome.problem, outcome.minimum
     assert minimum is not None
-    rows, columns = problem.rows, problem.solver.variables.columns
-    first = len(minimum.multipliers) - len(minimum.variables)  # of the variables
-    titled = [
-        (k, row.title, row.wish.unit, row, row.size or problem.sizes[k])
-        for k, row in enumerate(rows)
+    rows = [
+        (row.title, row.wish.unit, row, row.size or size, 1.0)
+        for row, size in zip(problem.rows, problem.sizes.tolist(), strict=True)
     ]
-    titled += [(first + k, c.name, c.unit, c, c.span) for k, c in enumerate(columns)]
+    columns = [(c.name, c.unit, c, c.span, c.span) for c in problem.solver.variables.columns]
+    numbers = np.append(outcome.evaluation.rows.values, outcome.evaluation.point.x)
+    first = len(minimum.multipliers) - len(minimum.variables)  # of the variables
+    places = [*range(len(rows)), *range(first, first + len(columns))]
     limits: list[_ActiveLimit] = []
-    for k, title, unit, one, size in titled:
-        if not minimum.active[k]:
-            continue
-        number = (
-            outcome.evaluation.rows.values[k]
-            if k < first
-            else outcome.evaluation.point.x[k - first]
-        )
-        is_low = one.upper - number > number - one.lower
-        side = "wanted" if one.lower == one.upper else "least" if is_low else "greatest"
-        step = round_number(_PART * size)
-        cost = -minimum.multipliers[k] / (size if k >= first else 1.0)
-        limits.append(
-            _ActiveLimit(title, unit, one.lower if is_low else one.upper, side, step, cost * step)
-        )
-    return sorted(limits, key=lambda one: -abs(one.effect))
+    for place, number, described in zip(places, numbers, [*rows, *columns], strict=True):
+        if minimum.active[place]:
+            title, unit, between, size, scale = described
+            is_low = between.upper - number > number - between.lower
+            limit = between.lower if is_low else between.upper
+            is_equal = between.lower == between.upper
+            side = "wanted" if is_equal else "least" if is_low else "greatest"
+            step = round_number(_PART * size)
+            effect = -minimum.multipliers[place] / scale * step
+            limits.append(_ActiveLimit(title, unit, limit, side, step, effect))
+    return sorted(limits, key=lambda limit: -abs(limit.effect))
 
 
 def _held(outcome: SearchResult) -> tuple[str, ...]:
@@ -145,7 +141,7 @@ def _objective_name(problem: DesignProblem) -> tuple[str, str, str] | None:
         return None
     if len(problem.objectives) > 1:
         return "the weighted sum of the objectives", "", "save"
-    (wish,) = problem.objectives
+    wish = next(iter(problem.objectives))
     asked = wish.asked
     assert isinstance(asked, DesignObjective)
     if asked.target is not None:

@@ -21,10 +21,7 @@ from notchflex.designing.model.point import Point, Solver
 from notchflex.designing.model.quantities import Reading, taken
 from notchflex.designing.model.wishes import Source, Wish
 from notchflex.designing.specification import DesignConstraint, DesignObjective
-from notchflex.search.slsqp import TOLERANCE, Linearisation, Program, Vector
-
-# A curve is followed well enough at this part of the distance at which its points are reached.
-_ENOUGH = 0.1
+from notchflex.search.slsqp import TOLERANCE, Linearisation, Program, Vector, violation
 
 Progress = Callable[[str, int, int], None]
 """Called with the stage, how much of it is done, and how much there is."""
@@ -84,17 +81,14 @@ def rows_of(wish: Wish) -> list[Row]:
     return [Row(wish, label, low, high) for label in labels]
 
 
+def limits_of(rows: Sequence[Row]) -> Float[np.ndarray, "m 2"]:
+    """Return the limits of some rows."""
+    return np.reshape([(row.lower, row.upper) for row in rows], (-1, 2))
+
+
 def row_reading(wish: Wish, source: Source) -> Reading:
     """Return the numbers of the rows of a constraint."""
     return taken(wish.every(source), _searched(wish)[0])
-
-
-def violations(
-    rows: Sequence[Row], values: Float[np.ndarray, "*robots m"], sizes: Float[np.ndarray, " m"]
-) -> Float[np.ndarray, "*robots m"]:
-    """Return by how much numbers are beyond their limits, signed, in their sizes."""
-    low, high = (np.array([getattr(one, side) for one in rows]) for side in ("lower", "upper"))
-    return (values - np.clip(values, low, high)) / sizes
 
 
 def objective_reading(wish: Wish, source: Source) -> Reading:
@@ -296,7 +290,7 @@ class DesignProblem:
 
     def violation(self, one: DesignEvaluation) -> Float[np.ndarray, " m"]:
         """Return by how much rows are beyond their limits, in their sizes."""
-        return violations(self.rows, one.rows.values, self.sizes)
+        return violation(one.rows.values, limits_of(self.rows), self.sizes)
 
     def worst(self, one: DesignEvaluation) -> float:
         """Return the largest violation."""
@@ -311,14 +305,6 @@ class DesignProblem:
     def is_least_squares(self) -> bool:
         """Whether all that is asked is to come near to something."""
         return bool(self.objectives) and not self.rows and all(map(is_square, self.objectives))
-
-    def is_followed(self, one: DesignEvaluation) -> bool:
-        """Return whether nothing but curves is asked, and all are followed well enough."""
-        if not self.is_least_squares:
-            return False
-        curves = [(wish.asked, wish.curve) for wish in self.objectives]
-        enough = [asked.weight * (_ENOUGH * curve.within) ** 2 for asked, curve in curves if curve]
-        return len(enough) == len(curves) and one.total <= sum(enough)
 
     def residuals(self, one: DesignEvaluation) -> Reading:
         """Return what misses limits, in its size; without limits, what is to be 0."""
@@ -362,11 +348,11 @@ class DesignProblem:
             return Linearisation(value, gradient, table[:, 0], table[:, 1:], one)
 
         numbers = [len(reading.values) for _, reading in pairs]
-        limits = [(row.lower, row.upper) for row in self.rows] + [(0.0, np.inf)] * sum(numbers)
+        above = np.tile([0.0, np.inf], (sum(numbers), 1))
         program = Program(
             linearised,
             np.array([(0.0, 1.0)] * self.count + [(-np.inf, np.inf)] * extra).reshape(end, 2),
-            np.reshape(limits, (-1, 2)),
+            np.concatenate([limits_of(self.rows), above]),
             np.append(self.sizes, np.repeat(sizes, numbers)),
         )
         return program, np.append(first.z, np.zeros(extra))

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -26,8 +25,9 @@ _NUMBER = re.compile(r"\[\d+\]")
 _SAME = 1e-3
 # Lengths that are tried on both sides of where the search ended; of more, the nearest is taken.
 _SIDES = 6
-# Least squares: a residual where there is no robot, precision, and most evaluations.
-_PENALTY, _PRECISION, _EVALUATIONS = 1e3, 1e-5, 60
+# Least squares: a residual where there is no robot, precision, and most evaluations. Many robots
+# follow a curve equally well, and among them a search hardly settles more precisely.
+_PENALTY, _PRECISION, _EVALUATIONS = 1e3, 1e-3, 60
 # Largest violation of a robot from which SLSQP begins once more.
 _NEARLY = 0.05
 
@@ -82,16 +82,13 @@ class Searches:
         return self.rounded or self.optimum
 
     def has_agreed(self, problem: DesignProblem, count: int) -> bool:
-        """Return whether nothing is to be gained from further searches of a form.
-
-        So many have settled at the best robot that it has, or a curve is followed.
-        """
+        """Return whether so many searches of a form have settled at the best robot that it has."""
         settled = [one for one in self.outcomes if one.problem is problem and one.is_stationary]
-        if not settled:
+        best = min(settled, key=lambda result: result.merit, default=None)
+        if best is None:
             return False
-        best = min(settled, key=lambda result: result.merit).evaluation
-        apart = [np.abs(one.evaluation.z - best.z).max(initial=0.0) for one in settled]
-        return sum(distance < _SAME for distance in apart) >= count or problem.is_followed(best)
+        apart = [np.abs(one.evaluation.z - best.evaluation.z).max(initial=0.0) for one in settled]
+        return sum(distance < _SAME for distance in apart) >= count
 
 
 def search(
@@ -144,9 +141,8 @@ def search_from(
     results = _descended(problem, first, iterations)
     if results and results[0].merit[0] > 0.0:
         near, _ = _least_squares(problem, first)
-        results.append(SearchResult(problem, near))
-        if problem.worst(near) <= _NEARLY:
-            results += _descended(problem, near, iterations)
+        can_be_met = problem.worst(near) <= _NEARLY
+        results += _descended(problem, near, iterations if can_be_met else 0)
     return results
 
 
@@ -181,12 +177,7 @@ def _least_squares(
         one = evaluated(z.tobytes())
         return failed if one is None else problem.residuals(one).table
 
-    def stop(intermediate_result: Any) -> None:
-        one = evaluated(intermediate_result.x.tobytes())
-        if one is not None and problem.is_followed(one):
-            raise StopIteration
-
-    found: Any = least_squares(
+    found = least_squares(
         lambda z: table(z)[:, 0],
         first.z,
         lambda z: table(z)[:, 1:],  # pyright: ignore[reportArgumentType]
@@ -196,10 +187,9 @@ def _least_squares(
         gtol=1e-12,
         loss="linear" if problem.is_least_squares else "soft_l1",
         max_nfev=_EVALUATIONS,
-        callback=stop,
     )
     end = evaluated(found.x.tobytes()) or first
-    return end, int(found.status) > 0 or problem.is_followed(end)
+    return end, int(found.status) > 0
 
 
 def starts(problem: DesignProblem, several: int, most: int, seed: int) -> list[DesignEvaluation]:

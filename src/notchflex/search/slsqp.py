@@ -30,6 +30,15 @@ _NO_SLOPE, _WEIGHT, _PENALTY = 1e-9, 1e3, 1e3
 _GAIN, _PRECISION = 1e-7, 1e-12
 
 
+def violation(
+    numbers: Float[np.ndarray, " m"],
+    limits: Float[np.ndarray, "m 2"],
+    sizes: Float[np.ndarray, " m"],
+) -> Float[np.ndarray, " m"]:
+    """Return by how much numbers are beyond their limits, signed, in their sizes."""
+    return (numbers - np.clip(numbers, *limits.T)) / sizes
+
+
 class Linearisation(NamedTuple):
     """Value and rows at one vector, with their slopes."""
 
@@ -49,13 +58,9 @@ class Program:
     limits: Float[np.ndarray, "m 2"]  # equal where a row must have one value
     sizes: Float[np.ndarray, " m"]  # in which violations are measured
 
-    def violation(self, rows: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
-        """Return by how much rows are beyond their limits, signed, in their sizes."""
-        return (rows - np.clip(rows, *self.limits.T)) / self.sizes
-
     def worst(self, here: Linearisation) -> float:
         """Return the largest violation."""
-        return float(np.abs(self.violation(here.rows)).max(initial=0.0))
+        return float(np.abs(violation(here.rows, self.limits, self.sizes)).max(initial=0.0))
 
 
 class Minimum(NamedTuple):
@@ -119,7 +124,7 @@ def _descend(
         return NonlinearConstraint(
             lambda y: (at(y).rows / sizes)[rows],
             *(program.limits.T / sizes)[:, rows],
-            jac=lambda y: (at(y).jacobian / sizes[:, None])[rows],
+            jac=lambda y: (at(y).jacobian / sizes[:, None])[rows],  # pyright: ignore
         )
 
     is_equal = program.limits[:, 0] == program.limits[:, 1]
