@@ -254,7 +254,6 @@ class DesignProblem:
         Raises:
             InputError: One of them is not a number.
         """
-        terms, total = self._terms(point, z)
         width = 1 + (self.count if len(point.along) else 0)  # without slopes by what deviates
 
         def joined(readings: Iterable[Reading]) -> Reading:

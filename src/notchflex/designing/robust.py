@@ -112,6 +112,8 @@ class RobustProblem(DesignProblem):
         return [(k, row) for k, wish in enumerate(self.constraints) for row in rows_of(wish)]
 
     def _row_readings(self, point: Point) -> list[Reading]:
+        if not self.holds:
+            return super()._row_readings(point)
         moments = self._moments(point)[:, [one.place for one in self._quantiles]]
         weights = np.array([one.weights for one in self._quantiles])
         return [Reading(np.einsum("mk,kmv->mv", weights, moments))]

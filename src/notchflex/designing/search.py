@@ -217,8 +217,7 @@ def drawn_robots(problem: DesignProblem, most: int, seed: int) -> Float[np.ndarr
     first, last = np.split(sobol_points(half, 2 * len(groups), seed), 2, axis=1)
     last = np.where(np.arange(len(first))[:, None] % 2, last, first)
     smooth = first[:, group] + along * (last - first)[:, group]
-    drawn = sobol_points(half, problem.count, seed)
-    return np.stack([smooth, drawn], axis=1).reshape(-1, problem.count)
+    return np.concatenate([smooth, sobol_points(half, problem.count, seed)])
 
 
 def on_grid(searches: Searches, grid: float) -> Searches:

@@ -98,7 +98,7 @@ def minimise(program: Program, start: Vector, iterations: int) -> Minimum | None
 
     done, before = 0, np.inf
     found = _minimum(program, *best, steepest)
-    while done < iterations and not found.is_stationary and merit(best[1]) < before - _GAIN:
+    while len(start) and done < iterations and not found.is_stationary and merit(best[1]) < before - _GAIN:
         before = merit(best[1])
         done += _descend(program, evaluated, *best, scale, iterations - done)
         found = _minimum(program, *best, steepest)
@@ -149,7 +149,7 @@ def _minimum(program: Program, variables: Vector, here: Linearisation, steepest:
     at_low, at_high = numbers - low <= near, high - numbers <= near
     active = at_low | at_high
     multipliers = np.zeros(len(numbers))
-    if active.any():
+    if active.any() and len(variables):
         sizes = np.linalg.norm(slopes[active], axis=1)
         sizes = np.where(sizes > 0.0, sizes, 1.0)
         signs = np.where(at_low, -np.inf, 0.0)[active], np.where(at_high, np.inf, 0.0)[active]
