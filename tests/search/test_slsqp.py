@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from notchflex.search.slsqp import Linearisation, Program, minimise
+from notchflex.search.slsqp import Linearisation, NonlinearProgram, minimise
 from notchflex.search.starts import sobol_points, spread_out
 
 
@@ -21,7 +21,7 @@ def hock_schittkowski_71(x: np.ndarray) -> Linearisation:
 
 LIMITS = np.array([[25.0, np.inf], [40.0, 40.0]])
 BOUNDS = np.tile([1.0, 5.0], (4, 1))
-PROGRAM = Program(hock_schittkowski_71, BOUNDS, LIMITS, np.array([25.0, 40.0]))
+PROGRAM = NonlinearProgram(hock_schittkowski_71, BOUNDS, LIMITS, np.array([25.0, 40.0]))
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,9 @@ def test_a_known_minimum_with_its_multipliers(start):
             limits = LIMITS.copy()
             limits[row, side] += step
             moved = minimise(
-                Program(hock_schittkowski_71, BOUNDS, limits, PROGRAM.sizes), found.variables, 100
+                NonlinearProgram(hock_schittkowski_71, BOUNDS, limits, PROGRAM.sizes),
+                found.variables,
+                100,
             )
             assert moved is not None
             values.append(moved.reached.value)
@@ -51,7 +53,7 @@ def test_a_known_minimum_with_its_multipliers(start):
 
 def test_limits_that_contradict_each_other_are_not_met():
     limits = np.array([[25.0, np.inf], [3.0, 3.0]])  # the sum of four squares is 4 or more
-    program = Program(hock_schittkowski_71, BOUNDS, limits, np.array([25.0, 3.0]))
+    program = NonlinearProgram(hock_schittkowski_71, BOUNDS, limits, np.array([25.0, 3.0]))
     found = minimise(program, np.full(4, 2.0), 100)
     assert found is not None
     assert not found.is_stationary
@@ -64,7 +66,7 @@ def test_where_there_is_no_value_a_step_is_refused():
             None if x[0] < 1.5 else Linearisation(x[0] ** 2, 2.0 * x, np.zeros(0), np.zeros((0, 1)))
         )
 
-    program = Program(evaluate, np.array([[0.0, 5.0]]), np.zeros((0, 2)), np.zeros(0))
+    program = NonlinearProgram(evaluate, np.array([[0.0, 5.0]]), np.zeros((0, 2)), np.zeros(0))
     found = minimise(program, np.array([4.0]), 50)
     assert found is not None
     assert 1.5 <= found.variables[0] < 4.0

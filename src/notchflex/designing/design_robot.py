@@ -258,20 +258,7 @@ def made_of(
         )
         for wish in problem.wishes
     )
-    reason = ""
-    if searches.interrupted:
-        reason = "interrupted; this is the best robot so far"
-    elif missed:
-        where = f" on a grid of {variables.grid:g} mm" if variables.grid else ""
-        reason = f"not all constraints can be met{where}; this is the robot that comes nearest"
-    elif far := curves_missed(best):
-        reason = far[0].rstrip(".")
-    elif not best.is_stationary:
-        reason = "the search ended before it settled; try more starts or iterations"
-    elif lacking:
-        reason = "the wanted yield cannot be reached; this is the robot that comes nearest"
-    every = [*problems, *(one.problem for one in searches.outcomes)]
-    counts = {id(one.solver.counts): one.solver.counts for one in every}.values()
+    reason = _reason(searches, bool(missed), bool(lacking))
     values = zip(variables.columns, one.point.x.tolist(), variables.start.tolist(), strict=True)
     return Design(
         spec=spec,
@@ -289,9 +276,27 @@ def made_of(
             *chosen_form(spec, one.point.robot, len(problems)),
             *explain(searches.optimum),
         ),
-        solves=sum(one["solves"] for one in counts),
-        gradients=sum(one["gradients"] for one in counts),
+        solves=sum(form.solver.counts["solves"] for form in problems),
+        gradients=sum(form.solver.counts["gradients"] for form in problems),
         starts=len(searches.outcomes),
         outcome=best,
         yields=yields,
     )
+
+
+def _reason(searches: Searches, is_missed: bool, lacks_yield: bool) -> str:
+    """Return why a design has not converged, "" if it has."""
+    best = searches.best
+    if searches.interrupted:
+        return "interrupted; this is the best robot so far"
+    if lacks_yield:
+        return "the wanted yield cannot be reached; this is the robot that comes nearest"
+    if is_missed:
+        grid = best.problem.solver.variables.grid
+        where = f" on a grid of {grid:g} mm" if grid else ""
+        return f"not all constraints can be met{where}; this is the robot that comes nearest"
+    if far := curves_missed(best):
+        return far[0].rstrip(".")
+    if not best.is_stationary:
+        return "the search ended before it settled; try more starts or iterations"
+    return ""

@@ -21,7 +21,7 @@ from notchflex.designing.model.point import Point, Solver
 from notchflex.designing.model.quantities import Reading, taken
 from notchflex.designing.model.wishes import Source, Wish
 from notchflex.designing.specification import DesignConstraint, DesignObjective
-from notchflex.search.slsqp import TOLERANCE, Linearisation, Program, Vector, violation
+from notchflex.search.slsqp import TOLERANCE, Linearisation, NonlinearProgram, Vector, violation
 
 Progress = Callable[[str, int, int], None]
 """Called with the stage, how much of it is done, and how much there is."""
@@ -321,7 +321,7 @@ class DesignProblem:
         sizes = np.array([row.size for row in self.rows])
         self.sizes = np.where(sizes > 0.0, sizes, np.where(most > 1e-9, most, 1.0))
 
-    def program(self, first: DesignEvaluation) -> tuple[Program, Vector]:
+    def program(self, first: DesignEvaluation) -> tuple[NonlinearProgram, Vector]:
         """Return the problem for SLSQP, its bounds scaled for where it begins, and that start."""
         extra, end = len(self.bounds), self.count + len(self.bounds)
         factors = np.array([bound.factor for bound in self.bounds])
@@ -348,7 +348,7 @@ class DesignProblem:
 
         numbers = [len(reading.values) for _, reading in pairs]
         above = np.tile([0.0, np.inf], (sum(numbers), 1))
-        program = Program(
+        program = NonlinearProgram(
             linearised,
             np.array([(0.0, 1.0)] * self.count + [(-np.inf, np.inf)] * extra).reshape(end, 2),
             np.concatenate([limits_of(self.rows), above]),

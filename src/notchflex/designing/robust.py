@@ -330,8 +330,8 @@ def robust_search(
     single = [_Target(wish.title, _wanted(wish), [k]) for k, wish in enumerate(wishes)]
     targets = [one for one in (*single, every) if one.wanted is not None]
     sources = len(sources_of(plain.best.problem.solver.variables.robot, tolerances))
-    draws = replicates(sources, points_of_each(options.draws), options.seed)
-    levels = np.concatenate([*draws])
+    each = points_of_each(options.draws)
+    levels = np.concatenate([*replicates(sources, each, options.seed)])
 
     def counted(result: SearchResult) -> _Counted:
         return _Counted(result, met_by(result, tolerances, levels, wishes))
@@ -364,19 +364,17 @@ def robust_search(
             factors = [_corrected(*one, last) for one in zip(targets, factors, strict=True)]
             if factors == before:
                 break
-        if not interrupted and best.lack(targets) > 0.0:
-            # That with the greatest yield comes nearest.
+        if not interrupted and best.lack(targets) > 0.0:  # the greatest yield comes nearest
             search_on([best.result, plain.best], {})
     except KeyboardInterrupt:
         interrupted = True
     searches = place(Searches([best.result], interrupted))
     if searches.rounded is not None:
         best = counted(searches.rounded)
-    yields = (
+    return searches, tuple(
         YieldOf(one.title, one.wanted, *best.part(one), first.part(one)[0])
         for one in (every, *single)
     )
-    return searches, tuple(yields)
 
 
 def _wanted(wish: Wish) -> float | None:

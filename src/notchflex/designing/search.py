@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from notchflex import InputError
 from notchflex.designing.problem import DesignEvaluation, DesignProblem, Progress
 from notchflex.designing.specification import SearchOptions
-from notchflex.search.slsqp import Minimum, Vector, minimise
+from notchflex.search.slsqp import SearchMinimum, Vector, minimise
 from notchflex.search.starts import sobol_points, spread_out
 
 _NUMBER = re.compile(r"\[\d+\]")
@@ -44,7 +44,7 @@ class SearchResult:
 
     problem: DesignProblem
     evaluation: DesignEvaluation
-    minimum: Minimum | None = None
+    minimum: SearchMinimum | None = None
 
     @property
     def is_stationary(self) -> bool:

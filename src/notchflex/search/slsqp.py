@@ -50,7 +50,7 @@ class Linearisation(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class NonlinearProgram:
     """A value to minimise over variables within bounds, and rows within limits."""
 
     evaluate: Callable[[Vector], Linearisation | None]  # None where there is no value
@@ -63,7 +63,7 @@ class Program:
         return float(np.abs(violation(here.rows, self.limits, self.sizes)).max(initial=0.0))
 
 
-class Minimum(NamedTuple):
+class SearchMinimum(NamedTuple):
     """Where a search ended."""
 
     variables: Vector
@@ -73,7 +73,7 @@ class Minimum(NamedTuple):
     is_stationary: bool  # whether no small change improves it, to first order
 
 
-def minimise(program: Program, start: Vector, iterations: int) -> Minimum | None:
+def minimise(program: NonlinearProgram, start: Vector, iterations: int) -> SearchMinimum | None:
     """Search from a start by SLSQP, if it has a value; without iterations it stays there."""
     first = program.evaluate(start)
     if first is None:
@@ -98,7 +98,12 @@ def minimise(program: Program, start: Vector, iterations: int) -> Minimum | None
 
     done, before = 0, np.inf
     found = _minimum(program, *best, steepest)
-    while len(start) and done < iterations and not found.is_stationary and merit(best[1]) < before - _GAIN:
+    while (
+        len(start)
+        and done < iterations
+        and not found.is_stationary
+        and merit(best[1]) < before - _GAIN
+    ):
         before = merit(best[1])
         done += _descend(program, evaluated, *best, scale, iterations - done)
         found = _minimum(program, *best, steepest)
@@ -106,7 +111,7 @@ def minimise(program: Program, start: Vector, iterations: int) -> Minimum | None
 
 
 def _descend(
-    program: Program,
+    program: NonlinearProgram,
     evaluated: Callable[[bytes], Linearisation],
     start: Vector,
     first: Linearisation,
@@ -140,7 +145,9 @@ def _descend(
     return int(found.nit)
 
 
-def _minimum(program: Program, variables: Vector, here: Linearisation, steepest: float) -> Minimum:
+def _minimum(
+    program: NonlinearProgram, variables: Vector, here: Linearisation, steepest: float
+) -> SearchMinimum:
     """Return a vector with the multipliers of the limits that it reaches."""
     slopes = np.concatenate([here.jacobian, np.eye(len(variables))])
     numbers = np.concatenate([here.rows, variables])
@@ -158,4 +165,4 @@ def _minimum(program: Program, variables: Vector, here: Linearisation, steepest:
     rest = np.linalg.norm(here.gradient + multipliers @ slopes)
     most = _REST * max(float(np.linalg.norm(here.gradient)), _FLAT * steepest)
     settled = program.worst(here) <= TOLERANCE and bool(rest <= most)
-    return Minimum(variables, here, multipliers, active, settled)
+    return SearchMinimum(variables, here, multipliers, active, settled)
