@@ -40,7 +40,7 @@ def problem_of(along: str = "polynomial") -> DesignProblem:
 
 def merit(problem: DesignProblem, z: np.ndarray) -> float:
     """Sum and penalties."""
-    one = problem.evaluate(z)
+    (one,) = problem.evaluate_all(z[None])
     if one is None:
         return 1e3
     return one.total + _PENALTY * float(np.abs(problem.violation(one)).sum())

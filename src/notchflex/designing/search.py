@@ -150,11 +150,11 @@ def _descended(
     problem: DesignProblem, first: DesignEvaluation, iterations: int, settled: bool = False
 ) -> list[SearchResult]:
     """Return where SLSQP ended, if it could begin."""
-    found = minimise(*problem.program(first), iterations)
-    if found is None:
+    minimum = minimise(*problem.program(first), iterations)
+    if minimum is None:
         return []
-    found = found._replace(is_stationary=found.is_stationary or settled)
-    return [SearchResult(problem, found.reached.source, found)]
+    minimum = minimum._replace(is_stationary=minimum.is_stationary or settled)
+    return [SearchResult(problem, minimum.reached.source, minimum)]
 
 
 def _least_squares(
@@ -177,7 +177,7 @@ def _least_squares(
         one = evaluated(z.tobytes())
         return failed if one is None else problem.residuals(one).table
 
-    found = least_squares(
+    result = least_squares(
         lambda z: table(z)[:, 0],
         first.z,
         lambda z: table(z)[:, 1:],  # pyright: ignore[reportArgumentType]
@@ -188,8 +188,8 @@ def _least_squares(
         loss="linear" if problem.is_least_squares else "soft_l1",
         max_nfev=_EVALUATIONS,
     )
-    end = evaluated(found.x.tobytes()) or first
-    return end, int(found.status) > 0
+    end = evaluated(result.x.tobytes()) or first
+    return end, int(result.status) > 0
 
 
 def starts(problem: DesignProblem, several: int, most: int, seed: int) -> list[DesignEvaluation]:

@@ -78,7 +78,7 @@ def minimise(program: NonlinearProgram, start: Vector, iterations: int) -> Searc
     first = program.evaluate(start)
     if first is None:
         return None
-    best, known = (start, first), first
+    best, last = (start, first), first
     steepest, size = float(np.linalg.norm(first.gradient)), 1.0 + abs(first.value)
     scale = steepest if steepest > _NO_SLOPE * size else size
 
@@ -87,27 +87,27 @@ def minimise(program: NonlinearProgram, start: Vector, iterations: int) -> Searc
 
     @lru_cache(maxsize=1)  # SLSQP asks for the parts of one vector one after the other
     def evaluated(key: bytes) -> Linearisation:
-        nonlocal best, known, steepest
+        nonlocal best, last, steepest
         variables = np.clip(np.frombuffer(key), *program.bounds.T)
         here = program.evaluate(variables)
         if here is None:  # so large that the step is refused
-            return known._replace(value=known.value + _PENALTY * scale)
-        known, steepest = here, max(steepest, float(np.linalg.norm(here.gradient)))
+            return last._replace(value=last.value + _PENALTY * scale)
+        last, steepest = here, max(steepest, float(np.linalg.norm(here.gradient)))
         best = (variables, here) if merit(here) < merit(best[1]) else best
         return here
 
     done, before = 0, np.inf
-    found = _minimum(program, *best, steepest)
+    minimum = _minimum(program, *best, steepest)
     while (
         len(start)
         and done < iterations
-        and not found.is_stationary
+        and not minimum.is_stationary
         and merit(best[1]) < before - _GAIN
     ):
         before = merit(best[1])
         done += _descend(program, evaluated, *best, scale, iterations - done)
-        found = _minimum(program, *best, steepest)
-    return found
+        minimum = _minimum(program, *best, steepest)
+    return minimum
 
 
 def _descend(
@@ -122,27 +122,27 @@ def _descend(
     steepness = np.linalg.norm(first.jacobian, axis=1)
     sizes = np.where(steepness > _NO_SLOPE * program.sizes, steepness, program.sizes)
 
-    def at(variables: Vector) -> Linearisation:
+    def linearised(variables: Vector) -> Linearisation:
         return evaluated(variables.tobytes())
 
     def constraint(rows: Bool[np.ndarray, " m"]) -> NonlinearConstraint:
         return NonlinearConstraint(
-            lambda y: (at(y).rows / sizes)[rows],
+            lambda y: (linearised(y).rows / sizes)[rows],
             *(program.limits.T / sizes)[:, rows],
-            jac=lambda y: (at(y).jacobian / sizes[:, None])[rows],  # pyright: ignore
+            jac=lambda y: (linearised(y).jacobian / sizes[:, None])[rows],  # pyright: ignore
         )
 
     is_equal = program.limits[:, 0] == program.limits[:, 1]
-    found = minimize(
-        lambda y: at(y).value / scale,
+    result = minimize(
+        lambda y: linearised(y).value / scale,
         start,
-        jac=lambda y: at(y).gradient / scale,
+        jac=lambda y: linearised(y).gradient / scale,
         bounds=program.bounds,
         constraints=[constraint(rows) for rows in (is_equal, ~is_equal) if rows.any()],
         method="SLSQP",
         options={"maxiter": iterations, "ftol": _PRECISION},
     )
-    return int(found.nit)
+    return int(result.nit)
 
 
 def _minimum(
