@@ -13,13 +13,6 @@ import numpy as np
 
 from notchflex import InputError, Robot, load_robot
 from notchflex.analysis.draws import tolerances_of
-from notchflex.designing.explanation import (
-    chosen_form,
-    curves_missed,
-    explain,
-    missed_rows,
-    yield_sentences,
-)
 from notchflex.designing.model.point import BODIES, Solver
 from notchflex.designing.model.quantities import COMPLIANCE, CURVE, OF_STATES
 from notchflex.designing.model.variables import Direction, check_states, state_paths, variables_of
@@ -30,6 +23,11 @@ from notchflex.designing.result import (
     VariableResult,
     WishResult,
     asked_in_words,
+    chosen_form,
+    curves_missed,
+    explain,
+    missed_rows,
+    yield_sentences,
 )
 from notchflex.designing.robust import YieldOf, check_limits, robust_search
 from notchflex.designing.search import Searches, on_grid, search

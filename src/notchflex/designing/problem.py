@@ -228,25 +228,19 @@ class DesignProblem:
 
     def evaluate(self, z: Vector) -> DesignEvaluation | None:
         """Return the design at a scaled vector; None where there is no robot or no equilibrium."""
-        try:
-            return self.read(self.solver.point(self.x(z)), z)
-        except InputError as error:
-            self.failures[str(error)] += 1
-            return None
+        return self._tried(z, lambda: self.solver.point(self.x(z)))
 
     def evaluate_all(self, vectors: Float[np.ndarray, "k v"]) -> list[DesignEvaluation | None]:
         """Evaluate many vectors at once, without slopes."""
-        evaluations: list[DesignEvaluation | None] = []
         points = self.solver.points([self.x(z) for z in vectors])
-        for z, point in zip(vectors, points, strict=True):
-            try:
-                if isinstance(point, InputError):
-                    raise point
-                evaluations.append(self.read(point, z))
-            except InputError as error:
-                self.failures[str(error)] += 1
-                evaluations.append(None)
-        return evaluations
+        return [self._tried(*pair) for pair in zip(vectors, points, strict=True)]
+
+    def _tried(self, z: Vector, point: Callable[[], Point]) -> DesignEvaluation | None:
+        try:
+            return self.read(point(), z)
+        except InputError as error:
+            self.failures[str(error)] += 1
+            return None
 
     def read(self, point: Point, z: Vector) -> DesignEvaluation:
         """Return objectives and constraints of a solved robot.

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import compress
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -217,26 +217,30 @@ class Solver:
                 directions[number] = Change(load_change(path, self._loads(more)), None)
         return directions
 
-    def points(self, vectors: Sequence[np.ndarray]) -> list[Point | InputError]:
-        """Solve the robots of several vectors at once, for values only."""
-        points: list[Any] = []
-        for x in vectors:
-            try:
-                points.append(Point(x, self.variables.robot_at(x), self.paths, {}))
-            except InputError as error:
-                points.append(error)
-        valid = [number for number, one in enumerate(points) if isinstance(one, Point)]
-        self.counts["solves"] += len(valid)
-        robots = [points[number].robot for number in valid]
-        arrays, converged = self.rows(robots, [vectors[number] for number in valid], {})
-        for row, number in enumerate(valid):
-            by_name = {name: values[row] for name, values in arrays.items()}
-            points[number] = (
-                Point(vectors[number], robots[row], self.paths, by_name)
-                if converged[row]
-                else InputError.NOT_CONVERGED("a state does not converge")
-            )
-        return points
+    def points(self, vectors: Sequence[np.ndarray]) -> list[Callable[[], Point]]:
+        """Solve the robots of several vectors at once, for values only.
+
+        Returns:
+            Functions that return a point, or raise why there is none.
+        """
+        robots: dict[int, Robot] = {}
+        for number, x in enumerate(vectors):
+            with suppress(InputError):
+                robots[number] = self.variables.robot_at(x)
+        self.counts["solves"] += len(robots)
+        arrays, converged = self.rows([*robots.values()], [vectors[k] for k in robots], {})
+        rows = {number: row for row, number in enumerate(robots)}
+
+        def point(number: int) -> Point:
+            if number not in robots:
+                self.variables.robot_at(vectors[number])
+            row = rows[number]
+            if not converged[row]:
+                raise InputError.NOT_CONVERGED("a state does not converge")
+            states = {name: values[row] for name, values in arrays.items()}
+            return Point(vectors[number], robots[number], self.paths, states)
+
+        return [partial(point, number) for number in range(len(vectors))]
 
     def rows(
         self,
