@@ -188,7 +188,8 @@ def _polished(one: SearchResult, iterations: int) -> list[SearchResult]:
     caps = tuple(zip(wishes[1:], most[1:].tolist(), strict=True))
     capped = replace(problem, wishes=(wishes[0], *problem.constraints), caps=caps)
     capped.sizes[: len(problem.sizes)] = problem.sizes
-    found = minimise(*capped.program(one.evaluation), iterations)
+    first = capped.read(one.evaluation.point, one.evaluation.z)
+    found = minimise(*capped.program(first), iterations)
     if found is None or capped.worst(found.reached.source) > TOLERANCE:
         return []
     end: DesignEvaluation = found.reached.source
