@@ -1,9 +1,10 @@
 """Designs against differential evolution and a grid: `python benchmarks/design_searches.py`.
 
 Prints solves and CPU seconds of `nf.design` for the wrist whose tip closes first, of differential
-evolution (SciPy) for the same sum and penalties, of ten random starts, of a grid of robots, and of
-a robot of 27 links. Give `de`, `de-each` (a depth for every notch), `starts`,
-`grid` or `links` for one of them alone.
+evolution (SciPy) for the same sum and penalties, of ten random starts, of a grid of robots, of
+a robot of 27 links, of curves by least squares and by SLSQP, and of limits that contradict each
+other. Give `de`, `de-each` (a depth for every notch), `starts`, `grid`, `links`, `curves` or
+`nearest` for one of them alone.
 """
 
 from __future__ import annotations
@@ -21,11 +22,12 @@ from scipy.optimize import differential_evolution
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import notchflex as nf
-from design_wishes import tip_first, wide_wrist
+from design_wishes import bend, s_curve, s_wrist, tip_first, wide_wrist
 from notchflex.designing.design_robot import problems_of
-from notchflex.designing.search.local import search_from
-from notchflex.designing.search.problem import DesignProblem
+from notchflex.designing.problem import DesignProblem
+from notchflex.designing.search import search_from
 from notchflex.designing.specification import spec_from_table
+from notchflex.search.slsqp import minimise
 
 # What a limit missed by its size adds to the sum, in sizes of the sum.
 _PENALTY = 10.0
@@ -38,7 +40,7 @@ def problem_of(along: str = "polynomial") -> DesignProblem:
 
 def merit(problem: DesignProblem, z: np.ndarray) -> float:
     """Sum and penalties."""
-    one = problem.evaluate(z)
+    (one,) = problem.evaluate_all(z[None])
     if one is None:
         return 1e3
     return one.total + _PENALTY * float(np.abs(problem.violation(one)).sum())
@@ -89,15 +91,46 @@ def against_evolution(along: str = "polynomial", generations: int = 300) -> None
 def random_starts() -> None:
     """Heights found from ten random starts."""
     problem = problem_of("each")
-    problem.set_sizes([one for one in [problem.evaluate(problem.start)] if one is not None])
     rng = np.random.default_rng(1)
     for number in range(10):
-        begin = time.process_time()
-        found = search_from(problem, rng.random(problem.count), 150)
-        one = found.evaluation
-        text = "no robot" if one is None else f"{one.total:.6f} mm, missed {problem.worst(one):.1e}"
-        print(f"start {number}: {text}, settled {found.stationary}, ", end="")
+        begin, before = time.process_time(), problem.solver.counts["solves"]
+        first = problem.evaluate(rng.random(problem.count))
+        results = [] if first is None else search_from(problem, first, 150)
+        best = min(results, key=lambda result: result.merit, default=None)
+        text = "no robot" if best is None else f"{best.merit[1]:.6f} mm, missed {best.merit[0]:.1e}"
+        settled = best is not None and best.is_stationary
+        solves = problem.solver.counts["solves"] - before
+        print(f"start {number}: {text}, settled {settled}, {solves} solves, ", end="")
         print(f"{time.process_time() - begin:.1f} s", flush=True)
+
+
+def curves() -> None:
+    """Curves of many variables, by least squares as designs are, and by SLSQP."""
+    for spec, robot in ((bend(), nf.load_robot("pacheco2021-a")), (s_curve(), s_wrist())):
+        made = nf.design(spec | {"search": {"starts": 1}}, robot=robot)
+        print(f"{made.spec.name}, least squares: {made.wishes[0].achieved[0]:.6f} mm rms, ", end="")
+        print(f"settled {made.converged}, {made.solves} solves", flush=True)
+        problem = problems_of(spec_from_table(spec), robot)[0]
+        first = problem.initial
+        assert first is not None
+        found = minimise(*problem.program(first), 150)
+        assert found is not None
+        print(
+            f"  SLSQP: {found.reached.value**0.5:.6f} mm rms, settled {found.is_stationary}, ",
+            end="",
+        )
+        print(f"{problem.solver.counts['solves']} solves", flush=True)
+
+
+def nearest() -> None:
+    """A strain that no wrist keeps to: what misses all limits by least."""
+    spec = tip_first() | {"search": {"starts": 2, "candidates": 8}}
+    spec["constraint"][2]["upper"] = 0.02
+    made = nf.design(spec, robot=wide_wrist())
+    problem, best = made.outcome.problem, made.outcome.evaluation
+    squares = float((problem.violation(best) ** 2).sum())
+    print(f"nearest: squared violations {squares:.3f}, largest {problem.worst(best):.3f}, ", end="")
+    print(f"{made.solves} solves")
 
 
 def grid(each: int = 100) -> None:
@@ -199,6 +232,8 @@ if __name__ == "__main__":
         "starts": random_starts,
         "grid": grid,
         "links": links,
+        "curves": curves,
+        "nearest": nearest,
     }
     for name in sys.argv[1:] or runs:
         runs[name]()

@@ -92,6 +92,21 @@ def test_the_robot_is_left_as_it_is_where_it_does_what_is_asked():
     assert made.robot.notches[0].height == pytest.approx(robot.notches[0].height, abs=1e-6)
 
 
+def test_sizes_alone_are_chosen():
+    """Without variables the best of all forms is found, and what none of them meets is said."""
+    length = {"quantity": "length", "goal": "minimise"}
+    angle = {"quantity": "closing_angle", "take": "sum", "lower": 120.0}
+    spec = {"robot": "pacheco2021-a", "number_of_notches": [3, 4, 5], "objective": [length]}
+    made = nf.design(spec | {"constraint": [angle]})
+    assert made.converged, made.reason
+    # Each notch closes at 30.6 degrees.
+    assert made.robot.number_of_notches == 4
+    missed = nf.design(spec | {"constraint": [angle | {"lower": 200.0}]})
+    assert not missed.met
+    assert missed.robot.number_of_notches == 5
+    assert missed.explanation[-2].startswith("sum closing_angle is 153.1 deg, 46.8")
+
+
 @pytest.mark.nightly
 def test_number_of_notches_and_stock():
     made = nf.design(

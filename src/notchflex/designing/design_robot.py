@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -13,23 +13,21 @@ import numpy as np
 
 from notchflex import InputError, Robot, load_robot
 from notchflex.analysis.draws import tolerances_of
-from notchflex.designing.explanation import (
-    chosen_form,
-    curves_missed,
-    explain,
-    missed_rows,
-    yield_sentences,
-)
-from notchflex.designing.model.point import Solver
+from notchflex.designing.model.point import BODIES, Solver
 from notchflex.designing.model.quantities import COMPLIANCE, CURVE, OF_STATES
-from notchflex.designing.model.variables import StatePaths, check_states, state_paths, variables_of
-from notchflex.designing.model.wishes import Wish, wishes_of
+from notchflex.designing.model.variables import Direction, check_states, state_paths, variables_of
+from notchflex.designing.model.wishes import wishes_of
 from notchflex.designing.problem import DesignProblem, Progress
 from notchflex.designing.result import (
     Design,
     VariableResult,
     WishResult,
     asked_in_words,
+    chosen_form,
+    curves_missed,
+    explain,
+    missed_rows,
+    yield_sentences,
 )
 from notchflex.designing.robust import YieldOf, check_limits, robust_search
 from notchflex.designing.search import Searches, on_grid, search
@@ -41,7 +39,6 @@ from notchflex.designing.specification import (
     spec_from_table,
 )
 from notchflex.support import (
-    Tolerance,
     check_number,
     from_table,
     numbers_at,
@@ -61,50 +58,54 @@ def problems_of(spec: DesignSpec, robot: Robot) -> list[DesignProblem]:
         InputError: What is asked does not fit the robot or itself.
     """
     _check_stock(spec, robot)
-    robots = _forms(spec, robot)
-    problems: list[DesignProblem] = []
-    for one in robots:
-        check_states(spec.state, one.number_of_tendons)
-        wishes = wishes_of(spec, one)
-        paths = _paths(spec, wishes, one)
-        variables = variables_of(one, spec.variable, paths.states)
-        names: list[str] = []
-        for quantity in (wish.asked.quantity for wish in wishes):
-            if quantity in OF_STATES:
-                names.append(quantity)
-            elif quantity == COMPLIANCE:
-                names.append("tip_position")
-            elif quantity.startswith(CURVE):
-                names += ["body_position", "body_rotation"]
-        outputs = tuple(dict.fromkeys(names)) or ("total_angle",)
-        problems.append(DesignProblem(Solver(variables, paths, outputs), wishes))
-    return problems
+    return [_problem(spec, form) for form in _forms(spec, robot)]
+
+
+def _problem(spec: DesignSpec, robot: Robot) -> DesignProblem:
+    """Make the problem of one form: its wishes, and the states that they need."""
+    check_states(spec.state, robot.number_of_tendons)
+    wishes = wishes_of(spec, robot)
+    curves = {f"{CURVE}{curve.name}": curve.state for curve in spec.curve}
+    used: list[str] = []
+    probes: list[tuple[str, Direction]] = []
+    outputs: list[str] = []
+    for wish in wishes:
+        quantity = wish.asked.quantity
+        states = [name for name in (wish.asked.state, wish.asked.minus) if name is not None]
+        if quantity == COMPLIANCE:
+            probes += [(name, wish.direction) for name in states]
+            outputs.append("tip_position")
+        elif quantity in curves:
+            used.append(curves[quantity])
+            outputs += BODIES
+        else:
+            used += states
+            outputs += [quantity] if quantity in OF_STATES else []
+    names = list(dict.fromkeys(used))
+    paths = state_paths(spec.state, robot.number_of_tendons, names, probes)
+    variables = variables_of(robot, spec.variable, paths.states)
+    unique = tuple(dict.fromkeys(outputs or ["total_angle"]))
+    return DesignProblem(Solver(variables, paths, unique), wishes)
 
 
 def _check_stock(spec: DesignSpec, robot: Robot) -> None:
-    seen: dict[str, int] = {}
-    for number, stock in enumerate(spec.stock, start=1):
-        for path in stock.values:
-            try:
-                single = numbers_at(robot, path)
-            except InputError as error:
-                raise InputError(f"`stock[{number}]`: {error}", error.code) from None
-            for one in single:
-                if one in seen:
-                    raise InputError.CONFLICT(f"`stock[{number}]`: `{path}` is given twice.")
-                seen[one] = number
-    for number, variable in enumerate(spec.variable, start=1):
-        if variable.value.startswith("state."):
-            continue
+    """Raise if a number of the robot is chosen by a stock and by something else."""
+    paths = [(f"stock[{k}]", path) for k, one in enumerate(spec.stock, 1) for path in one.values]
+    variables = enumerate(spec.variable, 1)
+    paths += [(f"variable[{k}]", v.value) for k, v in variables if not v.value.startswith("state.")]
+    chosen: dict[str, str] = {}
+    for place, path in paths:
         try:
-            both = [one for one in numbers_at(robot, variable.value) if one in seen]
+            numbers = numbers_at(robot, path)
         except InputError as error:
-            raise InputError(f"`variable[{number}]`: {error}", error.code) from None
-        if both:
-            raise InputError.CONFLICT(
-                f"`variable[{number}]`: `{both[0]}` is chosen by `stock[{seen[both[0]]}]` too; "
-                "leave one of them out."
-            )
+            raise InputError(f"`{place}`: {error}", error.code) from None
+        for number in numbers:
+            before = chosen.get(number, "")
+            if before.startswith("stock"):
+                raise InputError.CONFLICT(
+                    f"`{place}`: `{number}` is chosen by `{before}` too; leave one of them out."
+                )
+            chosen[number] = place
 
 
 def _forms(spec: DesignSpec, robot: Robot) -> list[Robot]:
@@ -157,23 +158,6 @@ def with_notches(robot: Robot, count: int) -> Robot:
     return remember_source(from_table(table), source_of(robot))
 
 
-def _paths(spec: DesignSpec, wishes: tuple[Wish, ...], robot: Robot) -> StatePaths:
-    """Lay out the states that anything is asked of."""
-    used: list[str] = []
-    probes: list[tuple[str, tuple[float, float, float]]] = []
-    curves = {f"{CURVE}{one.name}": one.state for one in spec.curve}
-    for wish in wishes:
-        asked = wish.asked
-        names = [one for one in (asked.state, asked.minus) if one is not None]
-        if asked.quantity == COMPLIANCE:
-            probes += [(name, wish.direction) for name in names]
-        elif asked.quantity in curves:
-            used.append(curves[asked.quantity])
-        else:
-            used += names
-    return state_paths(spec.state, robot.number_of_tendons, list(dict.fromkeys(used)), probes)
-
-
 def design(
     spec: DesignSpec | Mapping[str, Any] | str | os.PathLike[str],
     *,
@@ -215,42 +199,15 @@ def design(
     if robust and not asked.is_robust:
         asked = replace(asked, robust=RobustOptions())
     problems = problems_of(asked, first)
-    tolerances = _tolerances(asked, first, problems) if asked.is_robust else ()
-    searches, place = search(problems, asked.search, progress), partial(on_grid, grid=grid)
+    place = partial(on_grid, grid=grid)
     if not asked.is_robust:
-        return made_of(asked, first, problems, place(searches))
-    searches, yields = robust_search(asked, tolerances, searches, progress, place)
-    return with_yields(made_of(asked, first, problems, searches), yields)
-
-
-def _tolerances(
-    spec: DesignSpec, robot: Robot, problems: Sequence[DesignProblem]
-) -> tuple[Tolerance, ...]:
-    """Return the tolerances that a robust design is made for.
-
-    Raises:
-        InputError: They do not fit the robot, nothing deviates, or no constraint has a limit.
-    """
-    given = robot.replace(tolerance=spec.tolerance).tolerance
-    tolerances = given or tolerances_of(robot)[0]
+        return made_of(asked, first, problems, place(search(problems, asked.search, progress)))
+    given = first.replace(tolerance=asked.tolerance).tolerance
+    tolerances = given or tolerances_of(first)[0]
     check_limits(problems, tolerances)
-    return tolerances
-
-
-def with_yields(design: Design, yields: tuple[YieldOf, ...]) -> Design:
-    """Add to a design which parts of the robots made within tolerances meet its limits."""
-    missed = {one.title for one in yields if not one.met}
-    wishes = tuple(replace(w, met=False) if w.title in missed else w for w in design.wishes)
-    reason = design.reason
-    if missed and not reason:
-        reason = "the wanted yield cannot be reached; this is the robot that comes nearest"
-    return replace(
-        design,
-        yields=yields,
-        wishes=wishes,
-        converged=not reason,
-        reason=reason,
-        explanation=(*yield_sentences(yields), *design.explanation),
+    searches = search(problems, asked.search, progress)
+    return made_of(
+        asked, first, problems, *robust_search(asked, tolerances, searches, progress, place)
     )
 
 
@@ -273,13 +230,18 @@ def specification_of(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]
 
 
 def made_of(
-    spec: DesignSpec, first: Robot, problems: list[DesignProblem], searches: Searches
+    spec: DesignSpec,
+    first: Robot,
+    problems: list[DesignProblem],
+    searches: Searches,
+    yields: tuple[YieldOf, ...] = (),
 ) -> Design:
     """Make the result of the best of some searches."""
     best = searches.best
     problem, one, variables = best.problem, best.evaluation, best.problem.solver.variables
     initial = problem.initial
-    missed = {id(problem.rows[number].wish) for number in missed_rows(best)}
+    missed = [id(problem.rows[number].wish) for number in missed_rows(best)]
+    lacking = [part.title for part in yields if not part.met]
     wishes = tuple(
         WishResult(
             title=wish.title,
@@ -287,23 +249,14 @@ def made_of(
             asked=asked_in_words(wish),
             achieved=tuple(wish.measure(one.point).values.tolist()),
             before=() if initial is None else tuple(wish.measure(initial.point).values.tolist()),
-            met=None if isinstance(wish.asked, DesignObjective) else id(wish) not in missed,
+            met=None
+            if isinstance(wish.asked, DesignObjective)
+            else id(wish) not in missed and wish.title not in lacking,
             parts=wish.labels,
         )
         for wish in problem.wishes
     )
-    reason = ""
-    if searches.interrupted:
-        reason = "interrupted; this is the best robot so far"
-    elif missed:
-        where = f" on a grid of {variables.grid:g} mm" if variables.grid else ""
-        reason = f"not all constraints can be met{where}; this is the robot that comes nearest"
-    elif far := curves_missed(best):
-        reason = far[0].rstrip(".")
-    elif not best.is_stationary:
-        reason = "the search ended before it settled; try more starts or iterations"
-    every = [*problems, *(one.problem for one in searches.outcomes)]
-    counts = {id(one.solver.counts): one.solver.counts for one in every}.values()
+    reason = _reason(searches, bool(missed), bool(lacking))
     values = zip(variables.columns, one.point.x.tolist(), variables.start.tolist(), strict=True)
     return Design(
         spec=spec,
@@ -317,11 +270,31 @@ def made_of(
             for column, value, before in values
         ),
         explanation=(
+            *yield_sentences(yields),
             *chosen_form(spec, one.point.robot, len(problems)),
             *explain(searches.optimum),
         ),
-        solves=sum(one["solves"] for one in counts),
-        gradients=sum(one["gradients"] for one in counts),
+        solves=sum(form.solver.counts["solves"] for form in problems),
+        gradients=sum(form.solver.counts["gradients"] for form in problems),
         starts=len(searches.outcomes),
         outcome=best,
+        yields=yields,
     )
+
+
+def _reason(searches: Searches, is_missed: bool, lacks_yield: bool) -> str:
+    """Return why a design has not converged, "" if it has."""
+    best = searches.best
+    if searches.interrupted:
+        return "interrupted; this is the best robot so far"
+    if lacks_yield:
+        return "the wanted yield cannot be reached; this is the robot that comes nearest"
+    if is_missed:
+        grid = best.problem.solver.variables.grid
+        where = f" on a grid of {grid:g} mm" if grid else ""
+        return f"not all constraints can be met{where}; this is the robot that comes nearest"
+    if far := curves_missed(best):
+        return far[0].rstrip(".")
+    if not best.is_stationary:
+        return "the search ended before it settled; try more starts or iterations"
+    return ""

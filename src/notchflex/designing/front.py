@@ -128,7 +128,7 @@ def design_front(
     try:
         for number, problem in enumerate(problems):
             report("spreading over the front", number, len(problems))
-            spread += _spread(problem, number, points, generations, asked.search.seed)
+            spread += _spread(problem, points, generations, asked.search.seed)
         chosen = _chosen(spread, points)
         for number, one in enumerate(chosen):
             report("polishing", number, len(chosen))
@@ -147,41 +147,37 @@ def sums(problem: DesignProblem, one: DesignEvaluation) -> Float[np.ndarray, " m
     return np.array([objective_reading(w, one.point).values[0] for w in problem.objectives])
 
 
-def _spread(
-    problem: DesignProblem, number: int, points: int, generations: int, seed: int
-) -> list[SearchResult]:
+def _spread(problem: DesignProblem, points: int, generations: int, seed: int) -> list[SearchResult]:
     """Return the last generation of a genetic search of one form of robots."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem as PymooProblem
     from pymoo.optimize import minimize
 
     size = 4 * points
-    start = drawn_robots(problem, size, seed)
+    start: Any = drawn_robots(problem, size, seed)
     problem.set_sizes([one for one in problem.evaluate_all(start) if one is not None])
-    evaluated: dict[bytes, DesignEvaluation] = {}
 
     class Batched(PymooProblem):  # pyright: ignore[reportUntypedBaseClass]
         """One batch a generation."""
 
         def __init__(self) -> None:
             objectives, rows = len(problem.objectives), len(problem.rows)
-            super().__init__(
-                n_var=problem.count, n_obj=objectives, n_ieq_constr=rows, xl=0.0, xu=1.0
-            )
+            super().__init__(problem.count, objectives, n_ieq_constr=rows, xl=0.0, xu=1.0)
 
         def _evaluate(self, x: np.ndarray, out: dict[str, Any], *_: Any, **__: Any) -> None:
+            robots = problem.evaluate_all(x)
             out["F"] = np.full((len(x), len(problem.objectives)), _UNSOLVED)
             out["G"] = np.full((len(x), len(problem.rows)), _UNSOLVED)
-            for row, one in enumerate(problem.evaluate_all(x)):
-                if one is not None:
-                    evaluated[x[row].tobytes()] = one
-                    out["F"][row] = sums(problem, one)
-                    out["G"][row] = np.abs(problem.violation(one)) - _NEARLY
+            out["robot"] = np.array(robots, object)
+            for row, robot in enumerate(robots):
+                if robot is not None:
+                    out["F"][row] = sums(problem, robot)
+                    out["G"][row] = np.abs(problem.violation(robot)) - _NEARLY
 
     algorithm: Any = NSGA2(pop_size=size, sampling=start)
     result: Any = minimize(Batched(), algorithm, ("n_gen", generations), seed=seed, verbose=False)
-    last = [evaluated.get(z.tobytes()) for z in result.pop.get("X")]
-    return [SearchResult(problem, number, one) for one in last if one is not None]
+    robots = result.pop.get("robot")
+    return [SearchResult(problem, robot) for robot in robots if robot is not None]
 
 
 def _polished(one: SearchResult, iterations: int) -> list[SearchResult]:
@@ -192,7 +188,8 @@ def _polished(one: SearchResult, iterations: int) -> list[SearchResult]:
     caps = tuple(zip(wishes[1:], most[1:].tolist(), strict=True))
     capped = replace(problem, wishes=(wishes[0], *problem.constraints), caps=caps)
     capped.sizes[: len(problem.sizes)] = problem.sizes
-    found = minimise(*capped.program(one.evaluation), iterations)
+    first = capped.read(one.evaluation.point, one.evaluation.z)
+    found = minimise(*capped.program(first), iterations)
     if found is None or capped.worst(found.reached.source) > TOLERANCE:
         return []
     end: DesignEvaluation = found.reached.source
@@ -202,20 +199,17 @@ def _polished(one: SearchResult, iterations: int) -> list[SearchResult]:
 
 def _chosen(candidates: list[SearchResult], points: int) -> list[SearchResult]:
     """Choose points that none of the others beats, spread evenly, by the first objective."""
+    from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
     feasible = [one for one in candidates if one.merit[0] <= 2.0 * _NEARLY]
     if not feasible:
         return []
     values = np.array([sums(one.problem, one.evaluation) for one in feasible])
     span = np.ptp(values, axis=0)
     scaled = (values - values.min(axis=0)) / np.where(span > 0.0, span, 1.0)
-    kept: list[int] = []
-    for k in np.lexsort(scaled.T[::-1]).tolist():
-        better = (scaled <= scaled[k] + 1e-12).all(axis=1) & (scaled < scaled[k] - 1e-9).any(axis=1)
-        if not better.any() and all(np.abs(scaled[k] - scaled[j]).max() > _APART for j in kept):
-            kept.append(k)
-    if len(kept) > points:  # evenly along the front
-        steps = np.linalg.norm(np.diff(scaled[kept], axis=0), axis=1)
-        along = np.concatenate([[0.0], np.cumsum(steps)])
-        targets = np.linspace(0.0, along[-1], points)
-        kept = [kept[int(np.argmin(np.abs(along - target)))] for target in targets]
-    return [feasible[k] for k in dict.fromkeys(kept)]
+    # By the first objective, each of those that are nearly alike once.
+    _, apart = np.unique(np.round(scaled / _APART), axis=0, return_index=True)
+    best = NonDominatedSorting().do(scaled[apart], only_non_dominated_front=True)
+    kept = apart[np.sort(best)]
+    spread = np.linspace(0, len(kept) - 1, min(points, len(kept)))
+    return [feasible[number] for number in kept[spread.round().astype(int)]]

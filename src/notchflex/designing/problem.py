@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -20,10 +21,7 @@ from notchflex.designing.model.point import Point, Solver
 from notchflex.designing.model.quantities import Reading, taken
 from notchflex.designing.model.wishes import Source, Wish
 from notchflex.designing.specification import DesignConstraint, DesignObjective
-from notchflex.search.slsqp import Linearisation, Program, Vector
-
-# A curve is followed well enough at this part of the distance at which its points are reached.
-_ENOUGH = 0.1
+from notchflex.search.slsqp import TOLERANCE, Linearisation, NonlinearProgram, Vector, violation
 
 Progress = Callable[[str, int, int], None]
 """Called with the stage, how much of it is done, and how much there is."""
@@ -49,20 +47,20 @@ class Row:
         return max((abs(one) for one in (self.lower, self.upper) if np.isfinite(one)), default=0.0)
 
 
-def limits(asked: DesignConstraint) -> tuple[float, float]:
-    """Return least and greatest value of a constraint, for steps from notch to notch if ordered."""
-    if asked.order is not None:
-        return (-np.inf, -asked.margin) if asked.order == "tip-first" else (asked.margin, np.inf)
-    if asked.equal is not None:
-        return asked.equal, asked.equal
-    low, high = asked.lower, asked.upper
-    return -np.inf if low is None else low, np.inf if high is None else high
-
-
 def _searched(wish: Wish) -> tuple[str, float, float]:
-    """Return how the search takes a constraint, smooth where that asks for the same."""
-    assert isinstance(wish.asked, DesignConstraint)
-    low, high = limits(wish.asked)
+    """Return how the search takes a constraint, smooth where that asks for the same, and limits.
+
+    Ordered numbers have limits of the steps from notch to notch.
+    """
+    asked = wish.asked
+    assert isinstance(asked, DesignConstraint)
+    low = asked.equal if asked.lower is None else asked.lower
+    high = asked.equal if asked.upper is None else asked.upper
+    low, high = -np.inf if low is None else low, np.inf if high is None else high
+    if asked.order is not None:
+        low, high = (
+            (-np.inf, -asked.margin) if asked.order == "tip-first" else (asked.margin, np.inf)
+        )
     if (wish.take == "largest" and low == -np.inf) or (wish.take == "smallest" and high == np.inf):
         return "each", low, high
     if wish.take == "range" and low <= 0.0:
@@ -83,17 +81,14 @@ def rows_of(wish: Wish) -> list[Row]:
     return [Row(wish, label, low, high) for label in labels]
 
 
+def limits_of(rows: Sequence[Row]) -> Float[np.ndarray, "m 2"]:
+    """Return the limits of some rows."""
+    return np.reshape([(row.lower, row.upper) for row in rows], (-1, 2))
+
+
 def row_reading(wish: Wish, source: Source) -> Reading:
     """Return the numbers of the rows of a constraint."""
     return taken(wish.every(source), _searched(wish)[0])
-
-
-def violations(
-    rows: Sequence[Row], values: Float[np.ndarray, "*robots m"], sizes: Float[np.ndarray, " m"]
-) -> Float[np.ndarray, "*robots m"]:
-    """Return by how much numbers are beyond their limits, signed, in their sizes."""
-    low, high = (np.array([getattr(one, side) for one in rows]) for side in ("lower", "upper"))
-    return (values - np.clip(values, low, high)) / sizes
 
 
 def objective_reading(wish: Wish, source: Source) -> Reading:
@@ -127,30 +122,24 @@ def squared(wish: Wish, source: Source) -> Reading:
     return Reading(off).scaled(float(np.sqrt(asked.weight)))
 
 
-@dataclass(frozen=True)
-class EpigraphBound:
+class EpigraphBound(NamedTuple):
     """A variable of the search that is above (sign 1) or below (-1) all numbers of an objective."""
 
     wish: Wish
     sign: float
-
-    @property
-    def factor(self) -> float:
-        """Its factor in the sum that is minimised."""
-        assert isinstance(self.wish.asked, DesignObjective)
-        return self.sign * self.wish.asked.weight
+    factor: float  # in the sum that is minimised
 
 
-def epigraphs(wish: Wish) -> Iterator[EpigraphBound]:
-    """Yield the bounds for the largest or smallest of several numbers in an objective."""
+def epigraphs(wish: Wish) -> list[EpigraphBound]:
+    """Return the bounds for the largest or smallest of several numbers in an objective."""
     asked = wish.asked
     assert isinstance(asked, DesignObjective)
-    if asked.target is not None or len(wish.rows) < 2:
-        return
-    if (asked.goal == "minimise") and wish.take in ("largest", "range"):
-        yield EpigraphBound(wish, 1.0)
-    if (wish.take, asked.goal) in (("smallest", "maximise"), ("range", "minimise")):
-        yield EpigraphBound(wish, -1.0)
+    signs = {
+        ("largest", "minimise"): (1.0,),
+        ("smallest", "maximise"): (-1.0,),
+        ("range", "minimise"): (1.0, -1.0),
+    }.get((wish.take, asked.goal or ""), ())
+    return [EpigraphBound(wish, sign, sign * asked.weight) for sign in signs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,25 +228,19 @@ class DesignProblem:
 
     def evaluate(self, z: Vector) -> DesignEvaluation | None:
         """Return the design at a scaled vector; None where there is no robot or no equilibrium."""
-        try:
-            return self.read(self.solver.point(self.x(z)), z)
-        except InputError as error:
-            self.failures[str(error)] += 1
-            return None
+        return self._tried(z, lambda: self.solver.point(self.x(z)))
 
     def evaluate_all(self, vectors: Float[np.ndarray, "k v"]) -> list[DesignEvaluation | None]:
         """Evaluate many vectors at once, without slopes."""
-        evaluations: list[DesignEvaluation | None] = []
         points = self.solver.points([self.x(z) for z in vectors])
-        for z, point in zip(vectors, points, strict=True):
-            try:
-                if isinstance(point, InputError):
-                    raise point
-                evaluations.append(self.read(point, z))
-            except InputError as error:
-                self.failures[str(error)] += 1
-                evaluations.append(None)
-        return evaluations
+        return [self._tried(*pair) for pair in zip(vectors, points, strict=True)]
+
+    def _tried(self, z: Vector, point: Callable[[], Point]) -> DesignEvaluation | None:
+        try:
+            return self.read(point(), z)
+        except InputError as error:
+            self.failures[str(error)] += 1
+            return None
 
     def read(self, point: Point, z: Vector) -> DesignEvaluation:
         """Return objectives and constraints of a solved robot.
@@ -265,7 +248,6 @@ class DesignProblem:
         Raises:
             InputError: One of them is not a number.
         """
-        terms, total = self._terms(point, z)
         width = 1 + (self.count if len(point.along) else 0)  # without slopes by what deviates
 
         def joined(readings: Iterable[Reading]) -> Reading:
@@ -301,24 +283,21 @@ class DesignProblem:
 
     def violation(self, one: DesignEvaluation) -> Float[np.ndarray, " m"]:
         """Return by how much rows are beyond their limits, in their sizes."""
-        return violations(self.rows, one.rows.values, self.sizes)
+        return violation(one.rows.values, limits_of(self.rows), self.sizes)
 
     def worst(self, one: DesignEvaluation) -> float:
         """Return the largest violation."""
         return float(np.abs(self.violation(one)).max(initial=0.0))
 
+    def merit(self, one: DesignEvaluation) -> tuple[float, float]:
+        """Return the largest violation, 0 within the tolerance, and the sum; less is better."""
+        worst = self.worst(one)
+        return (worst if worst > TOLERANCE else 0.0), one.total
+
     @property
     def is_least_squares(self) -> bool:
         """Whether all that is asked is to come near to something."""
         return bool(self.objectives) and not self.rows and all(map(is_square, self.objectives))
-
-    def is_followed(self, one: DesignEvaluation) -> bool:
-        """Return whether nothing but curves is asked, and all are followed well enough."""
-        if not self.is_least_squares:
-            return False
-        curves = [(wish.asked, wish.curve) for wish in self.objectives]
-        enough = [asked.weight * (_ENOUGH * curve.within) ** 2 for asked, curve in curves if curve]
-        return len(enough) == len(curves) and one.total <= sum(enough)
 
     def residuals(self, one: DesignEvaluation) -> Reading:
         """Return what misses limits, in its size; without limits, what is to be 0."""
@@ -331,54 +310,42 @@ class DesignProblem:
 
     def set_sizes(self, reached: Sequence[DesignEvaluation]) -> None:
         """Take the sizes of rows without a limit of a size from what robots reach."""
-        values = np.array([one.rows.values for one in reached]).reshape(len(reached), -1)
-        most = np.abs(values).max(axis=0, initial=0.0)
-        sizes = [
-            row.size or (size if size > 1e-9 else 1.0)
-            for row, size in zip(self.rows, most.tolist(), strict=True)
-        ]
-        self.sizes = np.array(sizes)
+        values = [np.abs(one.rows.values) for one in reached] or [np.zeros(len(self.rows))]
+        most = np.max(values, axis=0)
+        sizes = np.array([row.size for row in self.rows])
+        self.sizes = np.where(sizes > 0.0, sizes, np.where(most > 1e-9, most, 1.0))
 
-    def program(self, first: DesignEvaluation) -> tuple[Program, Vector]:
+    def program(self, first: DesignEvaluation) -> tuple[NonlinearProgram, Vector]:
         """Return the problem for SLSQP, its bounds scaled for where it begins, and that start."""
-        sides = np.array([bound.sign for bound in self.bounds])
+        extra, end = len(self.bounds), self.count + len(self.bounds)
         factors = np.array([bound.factor for bound in self.bounds])
-        sizes = np.array([np.ptp(one.values) or 1.0 for one in first.bounded])
-        tops = [
-            side * (side * r.values).max() for side, r in zip(sides, first.bounded, strict=True)
-        ]
-        # The bound of each number that one is above or below.
-        of = np.repeat(np.arange(len(sides)), [len(one.values) for one in first.bounded])
-        by_bound = np.eye(len(sides))[of] * (sides * sizes)
+        pairs = [*zip(self.bounds, first.bounded, strict=True)]
+        tops = np.array([b.sign * (b.sign * reading.values).max() for b, reading in pairs])
+        sizes = np.array([np.ptp(reading.values) or 1.0 for _, reading in pairs])
 
         def linearised(y: Vector) -> Linearisation | None:
-            z = y[: self.count]
-            is_first = len(first.point.along) and np.array_equal(z, first.z)
-            one = first if is_first else self.evaluate(z)
+            is_first = len(first.point.along) and np.array_equal(y[: self.count], first.z)
+            one = first if is_first else self.evaluate(y[: self.count])
             if one is None:
                 return None
             bounds = tops + sizes * y[self.count :]
-            numbers = np.concatenate(
-                [np.zeros((0, 1 + self.count)), *(r.table for r in one.bounded)]
-            )
-            apart = -sides[of, None] * numbers
-            apart[:, 0] += (sides * bounds)[of]
-            rows = np.concatenate([one.rows.table, apart])
-            by_bounds = np.concatenate([np.zeros((len(self.rows), len(sides))), by_bound])
-            return Linearisation(
-                one.objective.values[0] + factors @ bounds,
-                np.concatenate([one.objective.slopes[0], factors * sizes]),
-                rows[:, 0],
-                np.concatenate([rows[:, 1:], by_bounds], axis=1),
-                one,
-            )
+            rows = [np.pad(one.rows.table, ((0, 0), (0, extra)))]
+            for k, (bound, reading) in enumerate(zip(self.bounds, one.bounded, strict=True)):
+                apart = np.pad(-bound.sign * reading.table, ((0, 0), (0, extra)))
+                apart[:, 0] += bound.sign * bounds[k]
+                apart[:, 1 + self.count + k] = bound.sign * sizes[k]
+                rows.append(apart)
+            table, total = np.concatenate(rows), one.objective.table[0]
+            gradient = np.append(total[1:], factors * sizes)
+            value = float(total[0] + factors @ bounds)
+            return Linearisation(value, gradient, table[:, 0], table[:, 1:], one)
 
-        bounds = [(0.0, 1.0)] * self.count + [(-np.inf, np.inf)] * len(sides)
-        limits = [(row.lower, row.upper) for row in self.rows] + [(0.0, np.inf)] * len(of)
-        program = Program(
+        numbers = [len(reading.values) for _, reading in pairs]
+        above = np.tile([0.0, np.inf], (sum(numbers), 1))
+        program = NonlinearProgram(
             linearised,
-            np.reshape(bounds, (-1, 2)),
-            np.reshape(limits, (-1, 2)),
-            np.concatenate([self.sizes, sizes[of]]),
+            np.array([(0.0, 1.0)] * self.count + [(-np.inf, np.inf)] * extra).reshape(end, 2),
+            np.concatenate([limits_of(self.rows), above]),
+            np.append(self.sizes, np.repeat(sizes, numbers)),
         )
-        return program, np.concatenate([first.z, np.zeros(len(sides))])
+        return program, np.append(first.z, np.zeros(extra))

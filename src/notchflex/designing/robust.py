@@ -32,13 +32,13 @@ from notchflex.designing.problem import (
     DesignProblem,
     Progress,
     Row,
+    limits_of,
     row_reading,
     rows_of,
-    violations,
 )
 from notchflex.designing.search import Searches, SearchResult, search_from
 from notchflex.designing.specification import DesignConstraint, DesignSpec, RobustOptions
-from notchflex.search.slsqp import TOLERANCE, Vector
+from notchflex.search.slsqp import TOLERANCE, Vector, violation
 from notchflex.support import Tolerance
 from notchflex.tolerancing import (
     REPLICATES,
@@ -67,12 +67,11 @@ class Hold(NamedTuple):
 
 
 class _Quantile(NamedTuple):
-    """A row of a robust problem: number + is_mean * shift + factor * standard deviation."""
+    """A row of a robust problem."""
 
     row: Row
     place: int  # of its number in the rows of the robot of the drawing
-    is_mean: float
-    factor: float
+    weights: tuple[float, float, float]  # of that number, shift of its mean, standard deviation
 
 
 @dataclass(eq=False)
@@ -102,14 +101,14 @@ class RobustProblem(DesignProblem):
         for place, (number, row) in enumerate(self._plain):
             hold = self.holds.get(number)
             if hold is None:
-                quantiles.append(_Quantile(row, place, 0.0, 0.0))
+                quantiles.append(_Quantile(row, place, (1.0, 0.0, 0.0)))
                 continue
             of = f"for {100.0 * hold.part:g} % of the robots"
             label = f"{row.label}, {of}" if row.label else of
             for side, limit in _sides(row):
                 low, high = (-np.inf, limit) if side > 0.0 else (limit, np.inf)
                 held = Row(row.wish, label, low, high)
-                quantiles.append(_Quantile(held, place, 1.0, side * hold.factor))
+                quantiles.append(_Quantile(held, place, (1.0, 1.0, side * hold.factor)))
         return quantiles
 
     @cached_property
@@ -118,11 +117,11 @@ class RobustProblem(DesignProblem):
         return [(k, row) for k, wish in enumerate(self.constraints) for row in rows_of(wish)]
 
     def _row_readings(self, point: Point) -> list[Reading]:
-        numbers, shift, sd = self._moments(point)
-        places = [one.place for one in self._quantiles]
-        is_mean = np.array([[one.is_mean] for one in self._quantiles])
-        factor = np.array([[one.factor] for one in self._quantiles])
-        return [Reading(numbers[places] + is_mean * shift[places] + factor * sd[places])]
+        if not self.holds:
+            return super()._row_readings(point)
+        moments = self._moments(point)[:, [one.place for one in self._quantiles]]
+        weights = np.array([one.weights for one in self._quantiles])
+        return [Reading(np.einsum("mk,kmv->mv", weights, moments))]
 
     def _terms(self, point: Point, z: Vector) -> tuple[list[Reading], float]:
         if self.holds:
@@ -147,25 +146,22 @@ class RobustProblem(DesignProblem):
         density = np.exp(-0.5 * beta**2 - 0.5 * np.log(2.0 * np.pi) - total)
         return Reading(np.append(total, -density @ table[:, 1:])[None])
 
-    def _moments(self, point: Point) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Numbers of the drawing, shifts of their means, standard deviations, each with slopes."""
-        numbers, here = self._numbers(point), self._spread(point)
+    def _moments(self, point: Point) -> Float[np.ndarray, "3 m 1+v"]:
+        """Numbers of the drawing, shifts of their means and standard deviations, with slopes."""
+        numbers, spread = self._spread(point)
         z = (point.x - self.solver.variables.lower) / self.solver.variables.span
         slopes: list[np.ndarray] = []
         for unit, inward in zip(np.eye(len(z)), np.where(z < 0.5, _STEP, -_STEP), strict=True):
-            moved = self.solver.point(self.x(z + inward * unit))
-            slopes.append((self._spread(moved) - here) / inward)
-        shift, sd = np.split(Reading.of(here, slopes).table, 2)
-        return numbers[:, : 1 + self.count], shift, sd
+            _, moved = self._spread(self.solver.point(self.x(z + inward * unit)))
+            slopes.append((moved - spread) / inward)
+        return np.concatenate([numbers[None], np.stack([spread, *slopes], axis=-1)])
 
-    def _spread(self, point: Point) -> Float[np.ndarray, "2 m"]:
-        """Shift of the mean and standard deviation of the numbers of the drawing."""
+    def _spread(self, point: Point) -> tuple[np.ndarray, Float[np.ndarray, "2 m"]]:
+        """Numbers of the drawing, and shifts of their means and standard deviations."""
         mean = np.array([one.mean for one in self.solver.deviations(point.robot)])
-        by = self._numbers(point)[:, 1 + self.count :]
-        return np.stack([by @ mean, np.linalg.norm(by, axis=1)])
-
-    def _numbers(self, point: Point) -> Float[np.ndarray, "m 1+v"]:
-        return np.concatenate([row_reading(wish, point).table for wish in self.constraints])
+        table = np.concatenate([row_reading(wish, point).table for wish in self.constraints])
+        numbers, by = np.split(table, [1 + self.count], axis=1)
+        return numbers, np.stack([by @ mean, np.linalg.norm(by, axis=1)])
 
 
 def limited(problem: DesignProblem) -> list[int]:
@@ -249,7 +245,7 @@ def met_by(
 
 def _meets(rows: Sequence[Row], point: Point) -> bool:
     sizes = np.array([row.size or 1.0 for row in rows])
-    missed = violations(rows, row_reading(rows[0].wish, point).values, sizes)
+    missed = violation(row_reading(rows[0].wish, point).values, limits_of(rows), sizes)
     return bool((np.abs(missed) <= TOLERANCE).all())  # not where a value is NaN
 
 
@@ -339,8 +335,8 @@ def robust_search(
     single = [_Target(wish.title, _wanted(wish), [k]) for k, wish in enumerate(wishes)]
     targets = [one for one in (*single, every) if one.wanted is not None]
     sources = len(sources_of(plain.best.problem.solver.variables.robot, tolerances))
-    draws = replicates(sources, points_of_each(options.draws), options.seed)
-    levels = np.concatenate([*draws])
+    each = points_of_each(options.draws)
+    levels = np.concatenate([*replicates(sources, each, options.seed)])
 
     def counted(result: SearchResult) -> _Counted:
         return _Counted(result, met_by(result, tolerances, levels, wishes))
@@ -373,19 +369,17 @@ def robust_search(
             factors = [_corrected(*one, last) for one in zip(targets, factors, strict=True)]
             if factors == before:
                 break
-        if not interrupted and best.lack(targets) > 0.0:
-            # That with the greatest yield comes nearest.
+        if not interrupted and best.lack(targets) > 0.0:  # the greatest yield comes nearest
             search_on([best.result, plain.best], {})
     except KeyboardInterrupt:
         interrupted = True
     searches = place(Searches([best.result], interrupted))
     if searches.rounded is not None:
         best = counted(searches.rounded)
-    yields = (
+    return searches, tuple(
         YieldOf(one.title, one.wanted, *best.part(one), first.part(one)[0])
         for one in (every, *single)
     )
-    return searches, tuple(yields)
 
 
 def _wanted(wish: Wish) -> float | None:
@@ -424,4 +418,4 @@ def _robust(
     if first is None:
         return []
     problem.set_sizes([first])
-    return search_from(problem, start.number, first, iterations)
+    return search_from(problem, first, iterations)

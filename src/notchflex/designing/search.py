@@ -1,4 +1,4 @@
-"""The search of a design: SLSQP from several starts, and what comes nearest where limits are missed."""
+"""The search of a design: from several starts, for the best robot or for what comes nearest."""
 
 from __future__ import annotations
 
@@ -8,29 +8,28 @@ from collections import Counter
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import least_squares
 
 from notchflex import InputError
-from notchflex.designing.model.quantities import Reading
 from notchflex.designing.problem import DesignEvaluation, DesignProblem, Progress
 from notchflex.designing.specification import SearchOptions
-from notchflex.search.slsqp import TOLERANCE, Minimum, Vector, minimise
+from notchflex.search.slsqp import SearchMinimum, Vector, minimise
 from notchflex.search.starts import sobol_points, spread_out
 
 _NUMBER = re.compile(r"\[\d+\]")
-# Penalty on a violation of one size, relative to the spread of the sums.
-_WEIGHT = 10.0
 # Largest difference of scaled variables of equal robots.
 _SAME = 1e-3
 # Lengths that are tried on both sides of where the search ended; of more, the nearest is taken.
 _SIDES = 6
-# Least squares: a residual where there is no robot, in sizes of those at the start; the start's
-# distance from limits; precision; most evaluations; what SLSQP can go on from.
-_PENALTY, _INSIDE, _PRECISION, _EVALUATIONS, _NEARLY = 1e2, 1e-9, 1e-5, 60, 1e-3
+# Least squares: a residual where there is no robot, precision, and most evaluations. Many robots
+# follow a curve equally well, and among them a search hardly settles more precisely.
+_PENALTY, _PRECISION, _EVALUATIONS = 1e3, 1e-3, 60
+# Largest violation of a robot from which SLSQP begins once more.
+_NEARLY = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +38,13 @@ class SearchResult:
 
     Attributes:
         problem: Robots of which form.
-        number: Number of that form.
         evaluation: The robot.
-        minimum: Which limits hold the best robot without a grid; None where SLSQP was not used.
+        minimum: Which limits hold the best robot without a grid; None where nothing says so.
     """
 
     problem: DesignProblem
-    number: int
     evaluation: DesignEvaluation
-    minimum: Minimum | None = None
+    minimum: SearchMinimum | None = None
 
     @property
     def is_stationary(self) -> bool:
@@ -57,8 +54,7 @@ class SearchResult:
     @property
     def merit(self) -> tuple[float, float]:
         """Largest violation, and the sum; less is better."""
-        worst = self.problem.worst(self.evaluation)
-        return (worst if worst > TOLERANCE else 0.0), self.evaluation.total
+        return self.problem.merit(self.evaluation)
 
 
 @dataclass(eq=False)
@@ -78,29 +74,21 @@ class Searches:
     @property
     def optimum(self) -> SearchResult:
         """The best of all."""
-        return min(self.outcomes, key=lambda one: one.merit)
+        return min(self.outcomes, key=lambda result: result.merit)
 
     @property
     def best(self) -> SearchResult:
         """The best on the grid, or of all."""
         return self.rounded or self.optimum
 
-    @property
-    def has_followed(self) -> bool:
-        """Whether nothing but curves is asked, and a robot follows all well enough."""
-        return any(one.problem.is_followed(one.evaluation) for one in self.outcomes)
-
-    def has_agreed(self, number: int, count: int) -> bool:
-        """Return whether nothing is to be gained from further searches of a form.
-
-        So many have settled at the best robot that it has, or a curve is followed.
-        """
-        results = [one for one in self.outcomes if one.number == number and one.is_stationary]
-        best = min(results, key=lambda one: one.merit, default=None)
-        if best is None or self.has_followed:
-            return best is not None
-        apart = [np.abs(one.evaluation.z - best.evaluation.z).max(initial=0.0) for one in results]
-        return bool((np.array(apart) < _SAME).sum() >= count)
+    def has_agreed(self, problem: DesignProblem, count: int) -> bool:
+        """Return whether so many searches of a form have settled at the best robot that it has."""
+        settled = [one for one in self.outcomes if one.problem is problem and one.is_stationary]
+        best = min(settled, key=lambda result: result.merit, default=None)
+        if best is None:
+            return False
+        apart = [np.abs(one.evaluation.z - best.evaluation.z).max(initial=0.0) for one in settled]
+        return sum(distance < _SAME for distance in apart) >= count
 
 
 def search(
@@ -126,14 +114,9 @@ def search(
             firsts = starts(problem, several, candidates, options.seed)
             for done, first in enumerate(firsts):
                 report("searching", number * several + done, several * len(problems))
-                searches.outcomes += search_from(problem, number, first, options.iterations)
-                if searches.has_agreed(number, max(2, (several + 1) // 2)):
+                searches.outcomes += search_from(problem, first, options.iterations)
+                if searches.has_agreed(problem, max(2, (several + 1) // 2)):
                     break
-            if searches.has_followed:
-                break
-        if searches.outcomes and searches.best.merit[0] > 0.0:
-            report("searching what comes nearest", 0, 1)
-            _approach(searches, options)
     except KeyboardInterrupt:
         searches.interrupted = True
         if not searches.outcomes:
@@ -149,30 +132,29 @@ def search(
 
 
 def search_from(
-    problem: DesignProblem, number: int, first: DesignEvaluation, iterations: int
+    problem: DesignProblem, first: DesignEvaluation, iterations: int
 ) -> list[SearchResult]:
-    """Search from a robot by SLSQP, or by least squares; return where it ended, if it could begin."""
-    settled = False
-    if problem.is_least_squares:
-        first, settled = _least_squares(problem, first)
-        iterations = 0  # for the multipliers alone
-    found = minimise(*problem.program(first), iterations)
-    if found is None:
+    """Search from a robot; return where that ended, if it could begin."""
+    if problem.is_least_squares:  # SLSQP hardly settles among the many robots that follow a curve
+        end, settled = _least_squares(problem, first)
+        return _descended(problem, end, 0, settled)  # for the multipliers
+    results = _descended(problem, first, iterations)
+    if results and results[0].merit[0] > 0.0:
+        near, _ = _least_squares(problem, first)
+        can_be_met = problem.worst(near) <= _NEARLY
+        results += _descended(problem, near, iterations if can_be_met else 0)
+    return results
+
+
+def _descended(
+    problem: DesignProblem, first: DesignEvaluation, iterations: int, settled: bool = False
+) -> list[SearchResult]:
+    """Return where SLSQP ended, if it could begin."""
+    minimum = minimise(*problem.program(first), iterations)
+    if minimum is None:
         return []
-    found = found._replace(is_stationary=settled or found.is_stationary)
-    return [SearchResult(problem, number, found.reached.source, found)]
-
-
-def _approach(searches: Searches, options: SearchOptions) -> None:
-    """Search from what misses least for what misses less, until nothing is missed."""
-    for one in sorted(searches.outcomes, key=lambda one: one.merit):
-        problem, number = one.problem, one.number
-        near, _ = _least_squares(problem, one.evaluation)
-        searches.outcomes.append(SearchResult(problem, number, near))
-        if problem.worst(near) <= _NEARLY:
-            searches.outcomes += search_from(problem, number, near, options.iterations)
-        if searches.best.merit[0] == 0.0:
-            return
+    minimum = minimum._replace(is_stationary=minimum.is_stationary or settled)
+    return [SearchResult(problem, minimum.reached.source, minimum)]
 
 
 def _least_squares(
@@ -182,95 +164,60 @@ def _least_squares(
 
     What misses limits counts by soft_l1: what is missed by far must not decide alone.
     """
-    robots: dict[bytes, DesignEvaluation | None] = {}
+    if not problem.count:
+        return first, True
+    size = len(problem.residuals(first).values)
+    failed = np.column_stack([np.full(size, _PENALTY), np.zeros((size, problem.count))])
 
-    def residuals(z: Vector) -> Reading | None:
-        if z.tobytes() not in robots:
-            robots[z.tobytes()] = problem.evaluate(z)
-        one = robots[z.tobytes()]
-        return None if one is None else problem.residuals(one)
+    @cache
+    def evaluated(key: bytes) -> DesignEvaluation | None:
+        return problem.evaluate(np.frombuffer(key))
 
-    start = np.clip(first.z, _INSIDE, 1.0 - _INSIDE)
-    at_start = residuals(start)
-    if at_start is None or not problem.count:
-        return first, not problem.count
-    large = _PENALTY * (1.0 + np.abs(at_start.values))
+    def table(z: Vector) -> np.ndarray:
+        one = evaluated(z.tobytes())
+        return failed if one is None else problem.residuals(one).table
 
-    def values(z: Vector) -> np.ndarray:
-        reading = residuals(z)
-        return large if reading is None else reading.values
-
-    def slopes(z: Vector) -> np.ndarray:
-        reading = residuals(z)
-        return np.zeros_like(at_start.slopes) if reading is None else reading.slopes
-
-    def stop(intermediate_result: Any) -> None:
-        one = robots[intermediate_result.x.tobytes()]
-        if one is not None and problem.is_followed(one):
-            raise StopIteration
-
-    found: Any = least_squares(
-        values,
-        start,
-        slopes,  # pyright: ignore[reportArgumentType]
-        (np.zeros(problem.count), np.ones(problem.count)),
+    result = least_squares(
+        lambda z: table(z)[:, 0],
+        first.z,
+        lambda z: table(z)[:, 1:],  # pyright: ignore[reportArgumentType]
+        bounds=(0.0, 1.0),
         ftol=_PRECISION,
         xtol=_PRECISION,
         gtol=1e-12,
         loss="linear" if problem.is_least_squares else "soft_l1",
         max_nfev=_EVALUATIONS,
-        callback=stop,
     )
-    end = robots[found.x.tobytes()] or first
-    return end, int(found.status) > 0 or problem.is_followed(end)
+    end = evaluated(result.x.tobytes()) or first
+    return end, int(result.status) > 0
 
 
 def starts(problem: DesignProblem, several: int, most: int, seed: int) -> list[DesignEvaluation]:
-    """Return robots to start from: the robot as it is, and the best drawn ones far from each other."""
-    initial = problem.initial
-    if several == 1 and initial is not None:
-        problem.set_sizes([initial])
-        return [initial]
-    drawn = ranked(problem, drawn_robots(problem, most, seed))
-    if initial is None and not drawn:
-        return []
-    problem.set_sizes([one for one in (initial, *drawn) if one is not None])
-    ordered = ([] if initial is None else [initial]) + drawn
-    chosen = spread_out([one.z for one in ordered], several)
-    by_vector = {one.z.tobytes(): one for one in reversed(ordered)}
-    return [by_vector[z.tobytes()] for z in chosen]
+    """Return robots to start from: the robot as it is, then the best drawn ones, far apart."""
+    firsts = [one for one in (problem.initial,) if one is not None]
+    if len(firsts) < several:
+        drawn = problem.evaluate_all(drawn_robots(problem, most, seed))
+        firsts += sorted((one for one in drawn if one is not None), key=problem.merit)
+    problem.set_sizes(firsts)
+    chosen = spread_out([one.z for one in firsts], several)
+    return [firsts[number] for number in chosen]
 
 
 def drawn_robots(problem: DesignProblem, most: int, seed: int) -> Float[np.ndarray, "most v"]:
-    """Return scaled vectors: of Sobol's sequence, and in turn with values straight along the tube.
+    """Return scaled vectors, values of notches in turn one by one and straight along the tube.
 
     Good designs are smooth, and among many values drawn one by one none is.
     """
-    groups: dict[str, list[int]] = {}
-    for number, column in enumerate(problem.solver.variables.columns):
-        groups.setdefault(_NUMBER.sub("", column.name), []).append(number)
+    names = [_NUMBER.sub("", column.name) for column in problem.solver.variables.columns]
+    groups = list(dict.fromkeys(names))
+    group = [groups.index(name) for name in names]
+    place = np.array([names[:number].count(name) for number, name in enumerate(names)])
+    along = place / np.maximum([names.count(name) - 1 for name in names], 1)
     half = max(1, most // 2)
-    ends = sobol_points(half, 2 * len(groups), seed)
-    smooth = np.zeros((len(ends), problem.count))
-    for k, columns in enumerate(groups.values()):
-        first, last = ends[:, 2 * k, None], ends[:, 2 * k + 1, None]
-        # Every second has nearly one value.
-        last = np.where(np.arange(len(ends))[:, None] % 2, last, first + 0.1 * (last - first))
-        smooth[:, columns] = first + np.linspace(0.0, 1.0, len(columns)) * (last - first)
-    drawn = np.stack([smooth, sobol_points(half, problem.count, seed)], axis=1)
-    return drawn.reshape(-1, problem.count)
-
-
-def ranked(problem: DesignProblem, vectors: Float[np.ndarray, "k v"]) -> list[DesignEvaluation]:
-    """Return the robots of some vectors, the smallest sum with a penalty on violations first."""
-    robots = [one for one in problem.evaluate_all(vectors) if one is not None]
-    totals = np.array([one.total for one in robots])
-    if not robots:
-        return []
-    spread = float(np.subtract(*np.quantile(totals, [0.75, 0.25]))) or 1.0
-    missed = [np.minimum(np.abs(problem.violation(one)), 1.0).sum() for one in robots]
-    order = np.argsort(totals / spread + _WEIGHT * np.array(missed), kind="stable")
-    return [robots[number] for number in order]
+    first, last = np.split(sobol_points(half, 2 * len(groups), seed), 2, axis=1)
+    last = np.where(np.arange(len(first))[:, None] % 2, last, first)
+    smooth = first[:, group] + along * (last - first)[:, group]
+    return np.concatenate([smooth, sobol_points(half, problem.count, seed)])
 
 
 def on_grid(searches: Searches, grid: float) -> Searches:
@@ -294,20 +241,18 @@ def on_grid(searches: Searches, grid: float) -> Searches:
     problem.solver, problem.failures = replace(solver, variables=variables), Counter[str]()
     exact = problem.x(best.evaluation.z)
     steps = np.where(variables.lengths, exact / grid, 0.0)
-    sides = [sorted({np.floor(one), np.ceil(one)}) for one in steps]
+    sides = [sorted({np.floor(step), np.ceil(step)}) for step in steps]
     if sum(map(len, sides)) > len(sides) + _SIDES:
-        sides = [[np.round(one)] for one in steps]
-    results: list[SearchResult] = []
-    for places in itertools.product(*sides):
-        x = np.where(variables.lengths, np.array(places) * grid, exact)
-        z = (x - variables.lower) / variables.span
-        one = problem.evaluate(z) if np.abs(z - 0.5).max(initial=0.0) <= 0.5 + 1e-9 else None
-        if one is not None:
-            results.append(replace(best, problem=problem, evaluation=one))
-    if not results:
+        sides = [[np.round(step)] for step in steps]
+    places = np.array([*itertools.product(*sides)])
+    z = (np.where(variables.lengths, places * grid, exact) - variables.lower) / variables.span
+    inside = z[(np.abs(z - 0.5) <= 0.5 + 1e-9).all(axis=1)]
+    robots = [one for one in map(problem.evaluate, inside) if one is not None]
+    if not robots:
         reasons = "; ".join(problem.failures) or "all lie beyond the limits of the variables"
         raise InputError.UNSUPPORTED(
             f"no robot on a grid of {grid:g} mm beside the best one can be made: {reasons}; give a "
             "smaller grid."
         )
-    return replace(searches, rounded=min(results, key=lambda one: one.merit))
+    rounded = replace(best, problem=problem, evaluation=min(robots, key=problem.merit))
+    return replace(searches, rounded=rounded)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,12 +22,21 @@ TOLERANCE = 1e-6
 
 # A limit is reached within this part of its size; of the steepest gradient this part may be left.
 _REACHED, _REST, _FLAT = 1e-5, 1e-3, 1e-4
+# A slope below this part of its size is none. What the largest violation weighs beside the value,
+# and what the value is raised by where there is none, in sizes of its slope.
+_NO_SLOPE, _WEIGHT, _PENALTY = 1e-9, 1e3, 1e3
 # SLSQP's estimate of the curvature is wrong beyond a kink, such as a notch that closes: it starts
-# anew where it ended, while that lowers the value or the violation.
+# anew where it ended, while that brings so much.
 _GAIN, _PRECISION = 1e-7, 1e-12
-# A slope below this part of its size is none. What the value is raised by where there is none, and
-# what may be left of it at the end, in sizes of its slope.
-_NO_SLOPE, _PENALTY, _LEFT = 1e-9, 1e3, 1e-5
+
+
+def violation(
+    numbers: Float[np.ndarray, " m"],
+    limits: Float[np.ndarray, "m 2"],
+    sizes: Float[np.ndarray, " m"],
+) -> Float[np.ndarray, " m"]:
+    """Return by how much numbers are beyond their limits, signed, in their sizes."""
+    return (numbers - np.clip(numbers, *limits.T)) / sizes
 
 
 class Linearisation(NamedTuple):
@@ -40,7 +50,7 @@ class Linearisation(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class NonlinearProgram:
     """A value to minimise over variables within bounds, and rows within limits."""
 
     evaluate: Callable[[Vector], Linearisation | None]  # None where there is no value
@@ -48,16 +58,12 @@ class Program:
     limits: Float[np.ndarray, "m 2"]  # equal where a row must have one value
     sizes: Float[np.ndarray, " m"]  # in which violations are measured
 
-    def violation(self, rows: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
-        """Return by how much rows are beyond their limits, signed, in their sizes."""
-        return (rows - np.clip(rows, *self.limits.T)) / self.sizes
-
     def worst(self, here: Linearisation) -> float:
         """Return the largest violation."""
-        return float(np.abs(self.violation(here.rows)).max(initial=0.0))
+        return float(np.abs(violation(here.rows, self.limits, self.sizes)).max(initial=0.0))
 
 
-class Minimum(NamedTuple):
+class SearchMinimum(NamedTuple):
     """Where a search ended."""
 
     variables: Vector
@@ -67,112 +73,96 @@ class Minimum(NamedTuple):
     is_stationary: bool  # whether no small change improves it, to first order
 
 
-@dataclass(eq=False)
-class _Search:
-    """What a search has met so far."""
-
-    program: Program
-    variables: Vector  # of the best
-    best: Linearisation
-    steepest: float = 0.0  # the largest gradient
-    last: tuple[bytes, Linearisation | None] = (b"", None)
-
-    def evaluate(self, variables: Vector) -> Linearisation | None:
-        """Evaluate a vector; SLSQP asks for the parts of one vector one after the other."""
-        variables = np.clip(variables, *self.program.bounds.T)
-        if self.last[0] != variables.tobytes():
-            here = self.program.evaluate(variables)
-            self.last = variables.tobytes(), here
-            if here is not None:
-                self.steepest = max(self.steepest, float(np.linalg.norm(here.gradient)))
-                if self._is_better(here):
-                    self.variables, self.best = variables, here
-        return self.last[1]
-
-    def _is_better(self, here: Linearisation) -> bool:
-        worst, best_worst = self.program.worst(here), self.program.worst(self.best)
-        if max(worst, best_worst) <= TOLERANCE:
-            return here.value < self.best.value
-        return worst < best_worst
-
-    def descend(self, iterations: int) -> int:
-        """Run SLSQP from the best vector, scaled by the slopes there; return its iterations."""
-        program, first, known = self.program, self.best, self.best
-        steepness, size = float(np.linalg.norm(first.gradient)), 1.0 + abs(first.value)
-        scale = steepness if steepness > _NO_SLOPE * size else size
-        by_row = np.linalg.norm(first.jacobian, axis=1)
-        by_row = np.where(by_row > _NO_SLOPE * program.sizes, by_row, program.sizes)
-
-        def at(variables: Vector) -> Linearisation:
-            nonlocal known
-            here = self.evaluate(variables)
-            known = known if here is None else here
-            # Where there is no value it is so large that the step is refused.
-            return known if here else known._replace(value=known.value + _PENALTY * scale)
-
-        def constraint(rows: Bool[np.ndarray, " m"]) -> NonlinearConstraint:
-            sizes = by_row[rows]
-            return NonlinearConstraint(
-                lambda y: at(y).rows[rows] / sizes,
-                *(program.limits[rows].T / sizes),
-                jac=lambda y: at(y).jacobian[rows] / sizes[:, None],
-            )
-
-        is_equal = program.limits[:, 0] == program.limits[:, 1]
-        found = minimize(
-            lambda y: at(y).value / scale,
-            self.variables,
-            jac=lambda y: at(y).gradient / scale,
-            bounds=program.bounds,
-            constraints=[constraint(rows) for rows in (is_equal, ~is_equal) if rows.any()],
-            method="SLSQP",
-            options={"maxiter": max(iterations, 1), "ftol": _PRECISION},
-        )
-        # The end keeps limits exactly; others may have been better by what the tolerance leaves.
-        end, variables = self.evaluate(found.x), np.clip(found.x, *program.bounds.T)
-        if found.success and end is not None and program.worst(end) <= TOLERANCE:
-            if end.value - self.best.value <= _LEFT * scale:
-                self.variables, self.best = variables, end
-        return int(found.nit)
-
-    def minimum(self) -> Minimum:
-        """Return the best vector, with the multipliers of its limits."""
-        program, here = self.program, self.best
-        slopes = np.concatenate([here.jacobian, np.eye(len(self.variables))])
-        numbers = np.concatenate([here.rows, self.variables])
-        low, high = np.concatenate([program.limits, program.bounds]).T
-        near = _REACHED * np.concatenate([program.sizes, np.ones(len(self.variables))])
-        at_low, at_high = numbers - low <= near, high - numbers <= near
-        active = at_low | at_high
-        sizes = np.linalg.norm(slopes, axis=1)
-        sizes = np.where(sizes > 0.0, sizes, 1.0)
-        multipliers = np.zeros(len(numbers))
-        if active.any():
-            signs = np.where(at_low, -np.inf, 0.0)[active], np.where(at_high, np.inf, 0.0)[active]
-            matrix = (slopes[active] / sizes[active, None]).T
-            fitted = lsq_linear(matrix, -here.gradient, signs, method="bvls")
-            multipliers[active] = fitted.x / sizes[active]
-        rest = float(np.linalg.norm(here.gradient + multipliers @ slopes))
-        steepest = max(float(np.linalg.norm(here.gradient)), _FLAT * self.steepest)
-        settled = program.worst(here) <= TOLERANCE and rest <= _REST * steepest
-        return Minimum(self.variables, here, multipliers, active, settled)
-
-
-def minimise(program: Program, start: Vector, iterations: int) -> Minimum | None:
-    """Search from a start by SLSQP; None where it has no value. Without iterations it stays there."""
+def minimise(program: NonlinearProgram, start: Vector, iterations: int) -> SearchMinimum | None:
+    """Search from a start by SLSQP, if it has a value; without iterations it stays there."""
     first = program.evaluate(start)
     if first is None:
         return None
-    search = _Search(program, start, first, float(np.linalg.norm(first.gradient)))
-    found, done, gains = search.minimum(), 0, True
-    while gains and done < iterations and not found.is_stationary:
-        done += search.descend(iterations - done)
-        before, found = found, search.minimum()
-        gains = _gained(program, before.reached, found.reached)
-    return found
+    best, last = (start, first), first
+    steepest, size = float(np.linalg.norm(first.gradient)), 1.0 + abs(first.value)
+    scale = steepest if steepest > _NO_SLOPE * size else size
+
+    def merit(here: Linearisation) -> float:
+        return here.value / scale + _WEIGHT * program.worst(here)
+
+    @lru_cache(maxsize=1)  # SLSQP asks for the parts of one vector one after the other
+    def evaluated(key: bytes) -> Linearisation:
+        nonlocal best, last, steepest
+        variables = np.clip(np.frombuffer(key), *program.bounds.T)
+        here = program.evaluate(variables)
+        if here is None:  # so large that the step is refused
+            return last._replace(value=last.value + _PENALTY * scale)
+        last, steepest = here, max(steepest, float(np.linalg.norm(here.gradient)))
+        best = (variables, here) if merit(here) < merit(best[1]) else best
+        return here
+
+    done, before = 0, np.inf
+    minimum = _minimum(program, *best, steepest)
+    while (
+        len(start)
+        and done < iterations
+        and not minimum.is_stationary
+        and merit(best[1]) < before - _GAIN
+    ):
+        before = merit(best[1])
+        done += _descend(program, evaluated, *best, scale, iterations - done)
+        minimum = _minimum(program, *best, steepest)
+    return minimum
 
 
-def _gained(program: Program, before: Linearisation, after: Linearisation) -> bool:
-    if program.worst(before) > TOLERANCE:
-        return program.worst(after) < 0.9 * program.worst(before)
-    return before.value - after.value > _GAIN * abs(before.value)
+def _descend(
+    program: NonlinearProgram,
+    evaluated: Callable[[bytes], Linearisation],
+    start: Vector,
+    first: Linearisation,
+    scale: float,
+    iterations: int,
+) -> int:
+    """Run SLSQP from a start, scaled by the slopes there; return its iterations."""
+    steepness = np.linalg.norm(first.jacobian, axis=1)
+    sizes = np.where(steepness > _NO_SLOPE * program.sizes, steepness, program.sizes)
+
+    def linearised(variables: Vector) -> Linearisation:
+        return evaluated(variables.tobytes())
+
+    def constraint(rows: Bool[np.ndarray, " m"]) -> NonlinearConstraint:
+        return NonlinearConstraint(
+            lambda y: (linearised(y).rows / sizes)[rows],
+            *(program.limits.T / sizes)[:, rows],
+            jac=lambda y: (linearised(y).jacobian / sizes[:, None])[rows],  # pyright: ignore
+        )
+
+    is_equal = program.limits[:, 0] == program.limits[:, 1]
+    result = minimize(
+        lambda y: linearised(y).value / scale,
+        start,
+        jac=lambda y: linearised(y).gradient / scale,
+        bounds=program.bounds,
+        constraints=[constraint(rows) for rows in (is_equal, ~is_equal) if rows.any()],
+        method="SLSQP",
+        options={"maxiter": iterations, "ftol": _PRECISION},
+    )
+    return int(result.nit)
+
+
+def _minimum(
+    program: NonlinearProgram, variables: Vector, here: Linearisation, steepest: float
+) -> SearchMinimum:
+    """Return a vector with the multipliers of the limits that it reaches."""
+    slopes = np.concatenate([here.jacobian, np.eye(len(variables))])
+    numbers = np.concatenate([here.rows, variables])
+    low, high = np.concatenate([program.limits, program.bounds]).T
+    near = _REACHED * np.append(program.sizes, np.ones(len(variables)))
+    at_low, at_high = numbers - low <= near, high - numbers <= near
+    active = at_low | at_high
+    multipliers = np.zeros(len(numbers))
+    if active.any() and len(variables):
+        sizes = np.linalg.norm(slopes[active], axis=1)
+        sizes = np.where(sizes > 0.0, sizes, 1.0)
+        signs = np.where(at_low, -np.inf, 0.0)[active], np.where(at_high, np.inf, 0.0)[active]
+        matrix = (slopes[active] / sizes[:, None]).T
+        multipliers[active] = lsq_linear(matrix, -here.gradient, signs, method="bvls").x / sizes
+    rest = np.linalg.norm(here.gradient + multipliers @ slopes)
+    most = _REST * max(float(np.linalg.norm(here.gradient)), _FLAT * steepest)
+    settled = program.worst(here) <= TOLERANCE and bool(rest <= most)
+    return SearchMinimum(variables, here, multipliers, active, settled)

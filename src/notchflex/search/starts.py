@@ -20,14 +20,12 @@ def sobol_points(count: int, variables: int, seed: int) -> Float[np.ndarray, "co
     return qmc.Sobol(variables, rng=np.random.default_rng(seed)).random_base2(power)[:count]
 
 
-def spread_out(
-    points: Sequence[Float[np.ndarray, " variables"]], count: int
-) -> list[Float[np.ndarray, " variables"]]:
-    """Choose points in their order that are far from all before; where few are, nearer ones too."""
-    chosen: list[np.ndarray] = []
-    rest: list[np.ndarray] = []
-    for point in points:
-        apart = _APART * np.sqrt(max(len(point), 1))
-        near = any(np.linalg.norm(point - other) < apart for other in chosen)
-        (rest if near else chosen).append(point)
-    return [*chosen, *rest][:count]
+def spread_out(points: Sequence[Float[np.ndarray, " variables"]], count: int) -> list[int]:
+    """Choose points in their order that are far from all before, then nearer ones; by number."""
+    far: list[int] = []
+    near: list[int] = []
+    for number, point in enumerate(points):
+        apart = _APART * np.sqrt(len(point))
+        is_near = any(np.linalg.norm(point - points[other]) < apart for other in far)
+        (near if is_near else far).append(number)
+    return [*far, *near][:count]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import compress
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -42,7 +42,7 @@ from notchflex.support import (
     numbers_at,
 )
 
-_BODIES = ("body_position", "body_rotation")
+BODIES = ("body_position", "body_rotation")
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +129,8 @@ class Point:
     def offsets(self, curve: TargetCurve) -> Reading:
         """Return the vectors from the points of a curve to the axis, mm."""
         step = self.paths.step[curve.state]
-        bodies = Bodies(*(self.arrays[name][step] for name in _BODIES))
-        slopes = Bodies(*(self.slopes[name][:, step] for name in _BODIES)) if self.slopes else None
+        bodies = Bodies(*(self.arrays[name][step] for name in BODIES))
+        slopes = Bodies(*(self.slopes[name][:, step] for name in BODIES)) if self.slopes else None
         lengths = self._of_robot(lambda robot: robot.geometry.body_length).slopes.T
         return offsets(self.robot, bodies, target_points(curve), slopes, lengths)
 
@@ -203,7 +203,9 @@ class Solver:
         along = [variables.parts_of(name) * variables.span for name in names]
         by_variable = np.reshape(along, (len(names), len(variables.columns))).T
         by_deviation = [[one.sd.get(name, 0.0) for name in names] for one in deviations]
-        return names, np.concatenate([by_variable, np.reshape(by_deviation, (-1, len(names)))])
+        return names, np.concatenate(
+            [by_variable, np.reshape(by_deviation, (len(deviations), len(names)))]
+        )
 
     def _changes(
         self, path: EquilibriumPath, x: np.ndarray, names: Sequence[str], along: np.ndarray
@@ -215,26 +217,30 @@ class Solver:
                 directions[number] = Change(load_change(path, self._loads(more)), None)
         return directions
 
-    def points(self, vectors: Sequence[np.ndarray]) -> list[Point | InputError]:
-        """Solve the robots of several vectors at once, for values only."""
-        points: list[Any] = []
-        for x in vectors:
-            try:
-                points.append(Point(x, self.variables.robot_at(x), self.paths, {}))
-            except InputError as error:
-                points.append(error)
-        valid = [number for number, one in enumerate(points) if isinstance(one, Point)]
-        self.counts["solves"] += len(valid)
-        robots = [points[number].robot for number in valid]
-        arrays, converged = self.rows(robots, [vectors[number] for number in valid], {})
-        for row, number in enumerate(valid):
-            by_name = {name: values[row] for name, values in arrays.items()}
-            points[number] = (
-                Point(vectors[number], robots[row], self.paths, by_name)
-                if converged[row]
-                else InputError.NOT_CONVERGED("a state does not converge")
-            )
-        return points
+    def points(self, vectors: Sequence[np.ndarray]) -> list[Callable[[], Point]]:
+        """Solve the robots of several vectors at once, for values only.
+
+        Returns:
+            Functions that return a point, or raise why there is none.
+        """
+        robots: dict[int, Robot] = {}
+        for number, x in enumerate(vectors):
+            with suppress(InputError):
+                robots[number] = self.variables.robot_at(x)
+        self.counts["solves"] += len(robots)
+        arrays, converged = self.rows([*robots.values()], [vectors[k] for k in robots], {})
+        rows = {number: row for row, number in enumerate(robots)}
+
+        def point(number: int) -> Point:
+            if number not in robots:
+                self.variables.robot_at(vectors[number])
+            row = rows[number]
+            if not converged[row]:
+                raise InputError.NOT_CONVERGED("a state does not converge")
+            states = {name: values[row] for name, values in arrays.items()}
+            return Point(vectors[number], robots[number], self.paths, states)
+
+        return [partial(point, number) for number in range(len(vectors))]
 
     def rows(
         self,
@@ -254,8 +260,7 @@ class Solver:
         """
         if robots == [] or not self.paths.pieces:
             return {}, np.ones(len(next(iter(numbers.values()), vectors)), bool)
-        same = all(column.load is None for column in self.variables.columns)
-        loads = [self._loads(x) for x in (vectors[:1] if same else vectors)]
+        loads = [self._loads(x) for x in vectors]
         ends = np.cumsum(self.paths.lengths)
         pieces = [
             batch(robots, numbers, [path[start:end] for path in loads], outputs=self.outputs)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -216,9 +216,10 @@ def offsets(
         The vectors one after the other, mm; their slopes across the axis, as the nearest point
         slides along.
     """
+    poses: Any = bodies
 
     def axis(stations: np.ndarray) -> np.ndarray:
-        return np.asarray(points_on_axis(axis_places(robot, stations), *bodies))
+        return np.asarray(points_on_axis(axis_places(robot, stations), *poses))
 
     stations = np.linspace(0.0, robot.geometry.length, _STATIONS)
     line = axis(stations)
