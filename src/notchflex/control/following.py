@@ -12,8 +12,8 @@ from jaxtyping import Bool, Float, Int
 
 from notchflex import Equilibrium, EquilibriumPath, Failure, Load, LoadPath, Robot, State, simulate
 from notchflex._summary import vector
-from notchflex.control.search.branches import KEPT
-from notchflex.control.search.problem import Attempt
+from notchflex.control.problem import Attempt
+from notchflex.control.search import KEPT
 from notchflex.control.targets import DIRECTION, Targets, unit_hint
 from notchflex.support import (
     DEGREES,
@@ -91,8 +91,8 @@ class Following(Displayed):
         )
         near &= {*self.units} <= {"mm", "deg"}
         return [
-            None if is_near and one.response.converged and one.excess <= KEPT else one.failure
-            for one, is_near in zip(self.attempts, near, strict=True)
+            None if is_near and attempt.solved and attempt.excess <= KEPT else attempt.failure
+            for attempt, is_near in zip(self.attempts, near, strict=True)
         ]
 
     @property
