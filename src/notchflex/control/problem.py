@@ -153,7 +153,8 @@ class Problem(NamedTuple):
             left = bound.side * (bound.limit - values[place])
             limited = np.isfinite(left)
             scale = np.maximum(np.abs(bound.limit), _MIN_LIMIT)[limited]
-            rows.append(bound.side * slopes[place][limited] / scale[:, None])
+            # At a kink some have no slopes.
+            rows.append(bound.side * np.nan_to_num(slopes[place][limited]) / scale[:, None])
             room.append(left[limited] / scale)
         return np.concatenate(rows), np.concatenate(room)
 

@@ -7,6 +7,7 @@ search takes the slopes with which it last slid, and leaps over the dead band.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from notchflex import Failure
+from notchflex import Failure, Step
 from notchflex.control.problem import Attempt, Problem, Response
 from notchflex.search.least_squares import BoundedLeastSquares, SearchEnd, SearchPoint
 
@@ -36,6 +37,8 @@ _SMALL_LEAP = 1e-3
 _ACROSS = 100.0
 # Width of differences where slopes are not known, as a part of the drives.
 _WIDTH = 1e-6
+# A tendon that was slack is pulled above this part of what about closes a notch.
+_PULLED = 1e-6
 # Steps whose slopes promise less than this part of the squared error bring nothing.
 _FLAT = 1e-6
 # Notches hold on where the target changes by less than this (mm, N or rad, by weights) for a change
@@ -114,31 +117,32 @@ class DriveSearch:
         if not step.converged:
             return None
         slopes = step.flat_jacobian
-        if not np.isfinite(slopes).all():
-            slopes = self._differences(step.drives, step.flat_values, slopes)
-        size = (slopes[self._entries] ** 2).sum(axis=0)
+        size = self._size(slopes)
+        if not np.isfinite(size).all():
+            slopes = self._differences(step)
+            size = self._size(slopes)
         if like is None:
             return Response(step, slopes, self.problem.driven & (size <= _STUCK))
-        stuck = size <= _NO_SLOPE * (like.sliding[self._entries] ** 2).sum(axis=0)
-        return Response(step, np.where(stuck, like.sliding, slopes), stuck)
+        stuck = size <= _NO_SLOPE * self._size(like.sliding)
+        if stuck.any():
+            slopes = np.where(stuck, like.sliding, slopes)
+        return Response(step, slopes, stuck)
 
-    def _differences(
-        self,
-        drives: Float[np.ndarray, " t"],
-        values: Float[np.ndarray, " m"],
-        slopes: Float[np.ndarray, "m t"],
-    ) -> Float[np.ndarray, "m t"]:
-        """Slopes by differences where those of the target are not known; 0 where others are not."""
-        if not np.isfinite(slopes[self._entries]).all():
-            width = _WIDTH * max(float(np.abs(drives).max()), self.problem.unit)
-            slopes = np.zeros_like(slopes)
-            for tendon in np.flatnonzero(self.problem.driven):
-                moved = drives.copy()
-                moved[tendon] += width
-                step = self.problem.stepper.step(self.before, moved)
-                if step.converged:
-                    slopes[:, tendon] = (step.flat_values - values) / width
-        return np.nan_to_num(slopes)
+    def _size(self, slopes: Float[np.ndarray, "m t"]) -> Float[np.ndarray, " t"]:
+        """Squares of the slopes of the target by every drive."""
+        return np.square(slopes[self._entries]).sum(axis=0)
+
+    def _differences(self, step: Step) -> Float[np.ndarray, "m t"]:
+        """Slopes by differences, where they are not known."""
+        width = _WIDTH * max(float(np.abs(step.drives).max()), self.problem.unit)
+        slopes = np.zeros_like(step.flat_jacobian)
+        for tendon in np.flatnonzero(self.problem.driven):
+            moved = step.drives.copy()
+            moved[tendon] += width
+            beside = self.problem.stepper.step(self.before, moved)
+            if beside.converged:
+                slopes[:, tendon] = (beside.flat_values - step.flat_values) / width
+        return slopes
 
     def point(self, response: Response, across: float = 0.0) -> SearchPoint:
         """Return a solution as a point of the search."""
@@ -153,17 +157,9 @@ class DriveSearch:
     def move(self, point: SearchPoint, step: Float[np.ndarray, " t"]) -> SearchPoint | None:
         """Return the point after a step, over the dead bands of tendons that stick."""
         problem, response, drives = self.problem, point.solution, point.variables
-        ahead, leaping = drives + step, response.stuck & (step != 0.0)
-        if leaping.any():
-            low, high = problem.stepper.dead_band(response.step.state).T
-            leap = np.where(step > 0.0, high - drives, low - drives)
-            onward = _ONWARD * np.abs(drives - problem.present(self.before))
-            at_edge = np.abs(leap) <= _AT_LIMIT * problem.unit
-            leap = np.where(at_edge, np.sign(step) * onward, leap)
-            several = int(problem.driven.sum()) > 1
-            stays = leaping & several & (np.abs(step) <= _SMALL_LEAP * np.abs(leap))
-            leaping &= ~stays & (leap != 0.0)
-            ahead = np.where(stays, drives, np.where(leaping, ahead + leap, ahead))
+        ahead, leapt = drives + step, []
+        if response.stuck.any():
+            leapt = self._leap(response, step, ahead)
         near = ahead <= problem.low + _AT_LIMIT * problem.unit
         ahead = np.where(near, problem.low, np.minimum(ahead, problem.high))
         if (ahead == drives).all():
@@ -172,9 +168,29 @@ class DriveSearch:
         if solved is None:
             return None
         across = 0.0
-        if leaping.any():
-            across = 1.0 + 1e-9 if solved.stuck[leaping].any() else _ACROSS
+        if leapt:
+            across = 1.0 + 1e-9 if solved.stuck[leapt].any() else _ACROSS
         return self.point(solved, across)
+
+    def _leap(
+        self, response: Response, step: Float[np.ndarray, " t"], ahead: Float[np.ndarray, " t"]
+    ) -> list[int]:
+        """Move drives of tendons that stick on to the end of the dead band; return which."""
+        problem, drives, leapt = self.problem, response.step.drives, []
+        band = problem.stepper.dead_band(response.step.state).tolist()
+        several = np.count_nonzero(problem.driven) > 1
+        for tendon in np.flatnonzero(response.stuck).tolist():
+            change = float(step[tendon])
+            leap = band[tendon][int(change > 0.0)] - float(drives[tendon])
+            if abs(leap) <= _AT_LIMIT * problem.unit:
+                way = float(drives[tendon] - problem.present(self.before)[tendon])
+                leap = math.copysign(_ONWARD * way, change)
+            if several and abs(change) <= _SMALL_LEAP * abs(leap):
+                ahead[tendon] = drives[tendon]
+            elif change != 0.0 and leap != 0.0:
+                ahead[tendon] += leap
+                leapt.append(tendon)
+        return leapt
 
     def moving(
         self, moved: Bool[np.ndarray, " t"], drives: Float[np.ndarray, " t"]
@@ -267,8 +283,8 @@ def find(
         attempt = part.attempt(end, solves)
         best = attempt if best is None or _quality(attempt) < _quality(best) else best
         # Where a slack tendon was pulled the others may suffice.
-        pulls = (best.drives > problem.low)[slack].any() and moved is problem.driven
-        if best.failure is None and not pulls:
+        pulls = (best.drives > problem.low + _PULLED * problem.unit)[slack].any()
+        if best.failure is None and not (pulls and moved is problem.driven):
             break
     assert best is not None
     return best._replace(solves=solves)
@@ -315,10 +331,3 @@ def smallest_tensions(
         solves += more
     point = search.point(response)
     return Attempt(response, point.error, point.excess, solves, None)
-
-def best_of(problem, before, goal, known):
-    a = find(problem, before, goal, known)
-    return smallest_tensions(problem, before, goal, a)
-TRACE=[]
-import collections
-FIRST=collections.Counter()

@@ -51,29 +51,29 @@ def bounded_step(
     (Lawson and Hanson 1974, *Solving Least Squares Problems*, ch. 23). Limits C that contradict
     each other are violated as little as possible.
     """
-    alone = len(gradient) == 1
-    free = -gradient / hessian[0] if alone else np.linalg.solve(hessian, -gradient)
-    inside = (free >= low).all() and (free <= high).all()
-    if inside and (not room.size or (limits @ free <= room).all()):
-        return free
-    if alone and not room.size:
-        return np.minimum(np.maximum(free, low), high)
-    eye = np.eye(len(gradient))
-    normals = np.concatenate([eye, -eye, limits])
+    count = len(gradient)
+    # The inverse of the factor maps to variables in which the Hessian is the identity.
+    inverse = 1.0 / np.sqrt(hessian) if count == 1 else np.linalg.inv(np.linalg.cholesky(hessian))
+    free = -inverse.T @ (inverse @ gradient)
+    bounded = np.minimum(np.maximum(free, low), high)
+    inside = bool((bounded == free).all()) or count == 1
+    if inside and (not room.size or (limits @ bounded <= room).all()):
+        return bounded
+    normals = np.concatenate([np.eye(count), -np.eye(count), limits])
     excess = np.concatenate([free - high, low - free, limits @ free - room])
-    finite = np.isfinite(excess)
-    # Every limit C has a slack of its own, which is stiff.
-    slack = np.zeros((len(room), len(normals)))
-    slack[:, 2 * len(eye) :] = np.eye(len(room)) / math.sqrt(_STIFF * np.trace(hessian))
-    factor = np.linalg.cholesky(hessian)
-    columns = np.concatenate([-np.linalg.solve(factor, normals.T), slack])[:, finite]
+    columns = -inverse @ normals.T
+    if room.size:  # every limit C has a slack of its own, which is stiff
+        slack = np.zeros((len(room), len(normals)))
+        slack[:, 2 * count :] = np.eye(len(room)) / math.sqrt(_STIFF * np.trace(hessian))
+        columns = np.concatenate([columns, slack])
     size = np.sqrt((columns**2).sum(axis=0))
-    scale = float(np.abs(excess[finite] / size).max())
-    rows = np.vstack([columns, excess[finite] / scale]) / size
-    goal = np.append(np.zeros(len(columns)), 1.0)
+    scale = float(np.abs(excess / size).max())
+    rows = np.concatenate([columns, excess[None] / scale]) / size
+    goal = np.zeros(len(rows))
+    goal[-1] = 1.0
     left = goal - rows @ nnls(rows, goal)[0]
-    nearest = -scale * left[: len(eye)] / max(left[-1], 1e-14)
-    return np.clip(free + np.linalg.solve(factor.T, nearest), low, high)
+    nearest = -scale * left[:count] / max(left[-1], 1e-14)
+    return np.minimum(np.maximum(free + inverse.T @ nearest, low), high)
 
 
 @dataclass(frozen=True, eq=False)
