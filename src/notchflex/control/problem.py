@@ -10,7 +10,7 @@ from typing import NamedTuple, get_args
 import numpy as np
 from jaxtyping import Bool, Float
 
-from notchflex import Failure, InputError, Load, LoadPath, Robot, State, Step, Stepper
+from notchflex import Failure, InputError, Load, Robot, State, Step, Stepper
 from notchflex.control.limits import Bound, Drive, Limits, bounds_of_robot
 from notchflex.control.targets import Aim, Targets, aim_at
 from notchflex.support import check_integer, check_number, load_path, short_repr

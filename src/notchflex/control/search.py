@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from notchflex import Failure, Step
+from notchflex import Failure
 from notchflex.control.problem import Attempt, Problem, Response
 from notchflex.search.least_squares import BoundedLeastSquares, SearchEnd, SearchPoint
 
@@ -35,8 +35,6 @@ _AT_LIMIT = 1e-10
 _SMALL_LEAP = 1e-3
 # Beyond the dead band slopes show the way back if the error has grown by less than this factor.
 _ACROSS = 100.0
-# Width of differences where slopes are not known, as a part of the drives.
-_WIDTH = 1e-6
 # A tendon that was slack is pulled above this part of what about closes a notch.
 _PULLED = 1e-6
 # Steps whose slopes promise less than this part of the squared error bring nothing.
@@ -118,31 +116,18 @@ class DriveSearch:
             return None
         slopes = step.flat_jacobian
         size = self._size(slopes)
-        if not np.isfinite(size).all():
-            slopes = self._differences(step)
-            size = self._size(slopes)
         if like is None:
-            return Response(step, slopes, self.problem.driven & (size <= _STUCK))
+            return Response(step, np.nan_to_num(slopes), self.problem.driven & (size <= _STUCK))
         stuck = size <= _NO_SLOPE * self._size(like.sliding)
-        if stuck.any():
-            slopes = np.where(stuck, like.sliding, slopes)
+        # After a step in parts slopes are not known: those of the other one are corrected.
+        unknown = stuck | ~np.isfinite(size)
+        if unknown.any():
+            slopes = np.where(unknown, like.sliding, slopes)
         return Response(step, slopes, stuck)
 
     def _size(self, slopes: Float[np.ndarray, "m t"]) -> Float[np.ndarray, " t"]:
         """Squares of the slopes of the target by every drive."""
         return np.square(slopes[self._entries]).sum(axis=0)
-
-    def _differences(self, step: Step) -> Float[np.ndarray, "m t"]:
-        """Slopes by differences, where they are not known."""
-        width = _WIDTH * max(float(np.abs(step.drives).max()), self.problem.unit)
-        slopes = np.zeros_like(step.flat_jacobian)
-        for tendon in np.flatnonzero(self.problem.driven):
-            moved = step.drives.copy()
-            moved[tendon] += width
-            beside = self.problem.stepper.step(self.before, moved)
-            if beside.converged:
-                slopes[:, tendon] = (beside.flat_values - step.flat_values) / width
-        return slopes
 
     def point(self, response: Response, across: float = 0.0) -> SearchPoint:
         """Return a solution as a point of the search."""
@@ -192,9 +177,7 @@ class DriveSearch:
                 leapt.append(tendon)
         return leapt
 
-    def moving(
-        self, moved: Bool[np.ndarray, " t"], drives: Float[np.ndarray, " t"]
-    ) -> DriveSearch:
+    def moving(self, moved: Bool[np.ndarray, " t"], drives: Float[np.ndarray, " t"]) -> DriveSearch:
         """Return the search in which only some tendons move."""
         problem = self.problem
         if moved is problem.driven:

@@ -1,9 +1,10 @@
 """Bounded least squares with exact slopes, kinks and linear limits.
 
-Levenberg and Marquardt's method. Residuals are smooth but for kinks, at which slopes hold for one
-side only. So a step is judged by what it brings, slopes are taken anew at every point, and a step
-that brings nothing corrects the slopes along it (Broyden 1965, *A Class of Methods for Solving
-Nonlinear Simultaneous Equations*).
+Gauss and Newton's method within a box that shrinks after a step that brings nothing and grows
+after one that brings what the slopes promise. Residuals are smooth but for kinks, at which slopes
+hold for one side only. So slopes are taken anew at every point, and a step that brings nothing
+corrects them along it (Broyden 1965, *A Class of Methods for Solving Nonlinear Simultaneous
+Equations*).
 """
 
 from __future__ import annotations
@@ -17,20 +18,23 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
-# What a violated limit counts beside the residuals, in a step as a part of the Hessian.
+# What a violated limit counts beside the residuals: in a step as a part of the Hessian, and in the
+# merit of a point.
 _STIFF, _PENALTY = 1e10, 1e4
-# Damping of a step as a part of the Hessian: after a step that failed, its factor from then on, and
-# after a step without a solution.
-_FAR = 0.01
-_DAMPING, _FACTOR, _HALF, _MAX_DAMPING = 1e-3, 8.0, 1.0, 1e9
-# Smallest accepted part of what the slopes promise; above the second the damping falls.
-_MIN_GAIN, _GOOD_GAIN = 1e-3, 0.5
-# A search has settled where slopes promise less than this part of the squared residuals, or where
-# this number of solves leaves more than this part of them.
-_FLAT, _PATIENCE, _SLOW = 1e-9, 12, 1.0 - 1e-3
+# Far from a solution slopes hold roughly: directions that move little are left for later by a
+# damping of this part of the Hessian.
+_DAMPING = 0.01
+# A step is accepted with this part of what the slopes promise; with the second part the next one
+# may be longer by the third number, and without the first it is shorter by the fourth.
+_MIN_GAIN, _GOOD_GAIN, _LONGER, _SHORTER = 1e-3, 0.5, 2.0, 0.5
+# A search has settled where slopes promise less than this part of the squared residuals, where
+# steps are this part of the variables, or where this number of solves leaves more than this part of
+# the squared residuals.
+_FLAT, _NO_STEP, _PATIENCE, _SLOW = 1e-9, 1e-11, 12, 1.0 - 1e-3
 # Weight of the variables that makes them small where the residuals leave them open.
 _SMALL = 1e-10
-# Open variables are small enough when a step would change them by this part.
+# They are small enough when a step would change them, or has shortened them, by these parts; a step
+# is corrected by at most this number of solves.
 _SMALL_CHANGE, _LESS, _CORRECTIONS = 1e-3, 1e-4, 5
 
 KEPT = 1e-7
@@ -171,22 +175,24 @@ class BoundedLeastSquares:
     small: bool = False
     weak: float = 0.0
 
-    def step(self, point: SearchPoint, damping: float = 0.0) -> Float[np.ndarray, " n"]:
-        """Return the step that the slopes of a point suggest."""
+    def step(self, point: SearchPoint, radius: float = np.inf) -> Float[np.ndarray, " n"]:
+        """Return the step that the slopes of a point suggest, of no more than a radius."""
         slopes, variables = point.slopes, point.variables
         hessian = slopes.T @ slopes
         size = float(hessian.trace()) / len(variables)
         if size == 0.0:
             return np.zeros_like(variables)
         reach = self.size(variables)
+        least = _SMALL * size + self.weak**2
         if len(variables) > 1:
-            damping += _FAR * min(point.error / (math.sqrt(size) * reach), 1.0)
-        hessian.flat[:: len(variables) + 1] += (damping + _SMALL) * size + self.weak**2
+            least += _DAMPING * size * min(point.error / (math.sqrt(size) * reach), 1.0)
+        hessian.flat[:: len(variables) + 1] += least
         gradient = slopes.T @ point.residuals
         if self.small:
             gradient += _SMALL * size * variables
-        low = np.maximum(self.low - variables, -reach)
-        high = np.minimum(self.high - variables, reach)
+        radius = min(reach, radius)
+        low = np.maximum(self.low - variables, -radius)
+        high = np.minimum(self.high - variables, radius)
         return bounded_step(hessian, gradient, low, high, point.limits, point.room)
 
     def size(self, variables: Float[np.ndarray, " n"]) -> float:
@@ -199,13 +205,14 @@ class BoundedLeastSquares:
 
     def search(self, point: SearchPoint, budget: int) -> SearchEnd:
         """Search from a point, with at most a number of solves."""
-        best, damping, solves, settled = point, 0.0, 0, False
+        best, radius, solves, settled = point, np.inf, 0, False
         mark, before = _PATIENCE, point.merit()
         while not (settled or self.is_met(point)) and solves < budget:
-            step = self.step(point, damping)
-            merit = point.merit()
+            step, merit = self.step(point, radius), point.merit()
             promised = merit - point.merit(step)
-            trial = self.move(point, step) if promised > _FLAT * merit else point
+            length = float(np.abs(step).max())
+            moves = promised > _FLAT * merit and length > _NO_STEP * self.size(point.variables)
+            trial = self.move(point, step) if moves else point
             if trial is point:
                 settled = True
                 break
@@ -215,20 +222,16 @@ class BoundedLeastSquares:
                 gain = (merit - trial.merit()) / promised
                 if self.is_met(trial) or trial.error <= trial.across * point.error:
                     gain = max(gain, _MIN_GAIN)
-            if trial is None:
-                damping = max(_HALF, _FACTOR * damping)
-            elif gain >= _MIN_GAIN:
-                if gain >= _GOOD_GAIN:
-                    damping = 0.0 if damping <= _DAMPING else damping / _FACTOR
+            if trial is None or gain < _MIN_GAIN:
+                radius = _SHORTER * length
+                point = point if trial is None else point.corrected(trial)
+            else:
+                radius = max(radius, _LONGER * length) if gain >= _GOOD_GAIN else radius
                 point = trial
                 # On a plateau the farther one is nearer to its end.
                 best = trial if trial.merit() <= best.merit() * (1.0 + 1e-9) else best
-            else:
-                point = point.corrected(trial)
-                damping = max(_DAMPING, _FACTOR * damping)
-            settled = damping > _MAX_DAMPING
             if solves >= mark:
-                settled = settled or best.merit() > _SLOW * before
+                settled = best.merit() > _SLOW * before
                 mark, before = solves + _PATIENCE, best.merit()
         if not self.is_met(point):
             return SearchEnd(best, solves, False, settled)

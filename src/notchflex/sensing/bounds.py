@@ -64,6 +64,7 @@ def bounds(
     for number, members in enumerate(readings):
         point = history.best[number]
         first: list[_Tracker] = []
+        after = extremes
         for reading in members:
             # The first reading comes from the state before; the force of another may change after
             # that, with tendons held: from the mean, or from the ends of the first. None goes on

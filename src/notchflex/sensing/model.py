@@ -285,7 +285,7 @@ class SensingModel:
                 load.external * len(moves),
             )
             values = self.values(self._each.solve(self.robot, moved, start))
-            solved = np.isfinite(values).all(axis=1)
+            solved = np.asarray(np.isfinite(values).all(axis=1))
             apart += side * np.where(solved[:, None], values, here).T
             over += width * solved
         return apart / np.where(over > 0.0, over, np.inf)

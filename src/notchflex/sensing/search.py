@@ -27,6 +27,8 @@ _WEAK = 1e-3
 # The end of an interval: the first move, as a part of the range, where slopes predict none, its
 # growth, and the accuracy, as a part of the interval and of the range.
 _FIRST_MOVE, _GROWTH, _SMALL_MOVE, _NARROW = 1e-4, 4.0, 1e-3, 1e-7
+# Number of forces that are solved together.
+_TOGETHER = 6
 # Slopes predict an end too near by about this factor.
 _BEYOND = 1.02
 
@@ -64,12 +66,16 @@ class ReadingProblem:
             weak=_WEAK / largest,
         )
 
-    def point(self, force: Float[np.ndarray, " d"]) -> SearchPoint | None:
+    def point(
+        self, force: Float[np.ndarray, " d"], *, with_slopes: bool = True
+    ) -> SearchPoint | None:
         """Solve a force."""
         path = self.model.solve(self.start, self.step.number, force[None])
         if not path.converged[0]:
             return None
-        slopes = self.model.slopes(path)[0][self.step.entries]
+        slopes = np.zeros((len(self.step.entries), self.model.size))
+        if with_slopes:
+            slopes = self.model.slopes(path)[0][self.step.entries]
         if not np.isfinite(slopes).all():
             slopes = self._differences(force)
         none = np.zeros((0, self.model.size))
@@ -143,7 +149,9 @@ class Extreme:
     limited: bool
 
 
-def extreme(problem: ReadingProblem, point: SearchPoint, component: int, side: float, most: float) -> Extreme:
+def extreme(
+    problem: ReadingProblem, point: SearchPoint, component: int, side: float, most: float
+) -> Extreme:
     """Go as far along a component as forces fit, while the other components follow.
 
     Args:
@@ -157,48 +165,59 @@ def extreme(problem: ReadingProblem, point: SearchPoint, component: int, side: f
         The end of the connected part around the force.
     """
     largest, origin = problem.model.largest, float(point.variables[component])
-    inside, beyond, end = point, None, side * largest
     move = max(_predicted(problem, point, component, most), _FIRST_MOVE * largest)
-    limited = side * origin >= largest * (1.0 - 1e-9)
-    while not limited:
-        here = float(inside.variables[component])
+    beyond = None
+    while not side * (here := float(point.variables[component])) >= largest * (1.0 - 1e-9):
         if beyond is None:
-            value = here + side * move
-            value = end if side * value > largest else value
-            move *= _GROWTH
+            values = here + side * move * _GROWTH ** np.arange(_TOGETHER)
+            move = _GROWTH * abs(float(values[-1]) - here)
         else:
             gap = abs(float(beyond[component]) - here)
             if gap <= max(_SMALL_MOVE * abs(here - origin), _NARROW * largest):
-                break
-            value = 0.5 * (here + float(beyond[component]))
-        trial = _with_component(problem, inside, component, value, most)
-        if trial is not None and trial.merit() <= most:
-            inside = trial
-            limited = value == end
-        else:
-            beyond = inside.variables.copy() if trial is None else trial.variables
-            beyond[component] = value
-    return Extreme(inside, inside.variables if beyond is None else beyond, limited)
+                return Extreme(point, beyond, False)
+            values = np.linspace(here, beyond[component], _TOGETHER + 2)[1:-1]
+        values = np.clip(values, -largest, largest)
+        point, beyond = _farthest(problem, point, beyond, component, values, most)
+    return Extreme(point, point.variables, True)
 
 
-def _with_component(
-    problem: ReadingProblem, point: SearchPoint, component: int, value: float, most: float
-) -> SearchPoint | None:
-    """A force with one component set, and the others such that it fits, if it can."""
-    step = np.zeros_like(point.variables)
-    step[component] = value - point.variables[component]
-    slopes = np.delete(point.slopes, component, axis=1)
-    if slopes.shape[1]:  # the others follow, to first order
-        behind = point.residuals + point.slopes @ step
-        normal = slopes.T @ slopes + problem.least_squares.weak**2 * np.eye(slopes.shape[1])
-        step[np.arange(len(step)) != component] = -np.linalg.solve(normal, slopes.T @ behind)
-    low, high = problem.least_squares.low.copy(), problem.least_squares.high.copy()
-    start = problem.point(np.clip(point.variables + step, low, high))
-    if start is None or not slopes.shape[1]:
-        return start
-    low[component] = high[component] = value
-    others = replace(problem.least_squares, low=low, high=high, tolerance=math.sqrt(most))
-    return others.search(start, _MAX_SOLVES).point
+def _farthest(
+    problem: ReadingProblem,
+    point: SearchPoint,
+    beyond: Float[np.ndarray, " d"] | None,
+    component: int,
+    values: Float[np.ndarray, " k"],
+    most: float,
+) -> tuple[SearchPoint, Float[np.ndarray, " d"] | None]:
+    """Return the last of some values of a component that fits, and the first that does not."""
+    others = np.arange(problem.model.size) != component
+    forces = np.tile(point.variables, (len(values), 1))
+    forces[:, component] = values
+    if others.any():  # the others follow, to first order
+        slopes, weak = point.slopes[:, others], problem.least_squares.weak
+        normal = slopes.T @ slopes + weak**2 * np.eye(int(others.sum()))
+        behind = point.residuals[:, None] + point.slopes @ (forces - point.variables).T
+        forces[:, others] -= np.linalg.solve(normal, slopes.T @ behind).T
+        largest = problem.model.largest
+        forces[:, others] = np.clip(forces[:, others], -largest, largest)
+    fits = np.append(problem.misfits(forces) <= most, False)
+    count = int(np.argmin(fits))
+    if count < len(forces):
+        beyond = failing = forces[count]
+        trial = problem.point(failing) if others.any() else None
+        if trial is not None:
+            low, high = (
+                np.where(others, end, trial.variables)
+                for end in (problem.least_squares.low, problem.least_squares.high)
+            )
+            search = replace(problem.least_squares, low=low, high=high, tolerance=math.sqrt(most))
+            trial = search.search(trial, _MAX_SOLVES).point
+            if trial.merit() <= most:
+                return trial, None
+    if count:
+        ahead = problem.point(forces[count - 1], with_slopes=bool(others.any()))
+        point = point if ahead is None else ahead
+    return point, beyond
 
 
 def _predicted(problem: ReadingProblem, point: SearchPoint, component: int, most: float) -> float:

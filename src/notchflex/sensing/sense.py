@@ -167,7 +167,9 @@ def _result(
         places=places,
         level=LEVEL,
         largest=model.largest,
-        path=model.follow(np.array([point.variables for point in candidates])) if candidates else None,
+        path=model.follow(np.array([point.variables for point in candidates]))
+        if candidates
+        else None,
         reason=_reason(model, candidates, group),
     )
 
@@ -180,7 +182,9 @@ def _filled(rows: object, shape: tuple[int, ...]) -> np.ndarray:
     return values
 
 
-def _reason(model: SensingModel, candidates: list[SearchPoint], group: Int[np.ndarray, " s"]) -> str:
+def _reason(
+    model: SensingModel, candidates: list[SearchPoint], group: Int[np.ndarray, " s"]
+) -> str:
     """Return why the history ended before its last reading."""
     if len(candidates) == len(model.readings):
         return ""
