@@ -245,7 +245,7 @@ def find(
     if known is None:
         known, solves = search.present()
     if not known.step.converged:
-        return Attempt(known, np.nan, np.inf, solves, Failure.SEARCH_STOPPED)
+        return Attempt(known, np.nan, np.inf, solves, Failure.NO_EQUILIBRIUM)
     present = problem.present(before)
     step = replace(known.step, state=before, drives=present)
     here = Response(step, known.sliding, problem.driven)

@@ -24,13 +24,12 @@ _EXACT, _MAX_SOLVES = 1e-9, 60
 _STARTS = 9
 # Weight of a prior that keeps an unobservable force near the range.
 _WEAK = 1e-3
-# The end of an interval: the first move, as a part of the range, where slopes predict none, its
-# growth, and the accuracy, as a part of the interval and of the range.
-_FIRST_MOVE, _GROWTH, _SMALL_MOVE, _NARROW = 1e-4, 4.0, 1e-3, 1e-7
-# Number of forces that are solved together.
-_TOGETHER = 6
-# Slopes predict an end too near by about this factor.
-_BEYOND = 1.02
+# The end of an interval: the first move, as a part of the range, where slopes predict none, and the
+# accuracy, as a part of the interval and of the range.
+_FIRST_MOVE, _SMALL_MOVE, _NARROW = 1e-4, 1e-3, 1e-7
+# Lengths of the moves that are solved together, as parts of what slopes predict, and the number of
+# solves in which other components follow.
+_LENGTHS, _FEW_SOLVES = np.array([0.9, 0.98, 1.02, 1.2, 2.0, 4.0]), 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,16 +168,18 @@ def extreme(
     beyond = None
     while not side * (here := float(point.variables[component])) >= largest * (1.0 - 1e-9):
         if beyond is None:
-            values = here + side * move * _GROWTH ** np.arange(_TOGETHER)
-            move = _GROWTH * abs(float(values[-1]) - here)
+            values = here + side * move * _LENGTHS
+            move *= _LENGTHS[-1]
         else:
             gap = abs(float(beyond[component]) - here)
             if gap <= max(_SMALL_MOVE * abs(here - origin), _NARROW * largest):
-                return Extreme(point, beyond, False)
-            values = np.linspace(here, beyond[component], _TOGETHER + 2)[1:-1]
+                break
+            values = np.linspace(here, beyond[component], len(_LENGTHS) + 2)[1:-1]
         values = np.clip(values, -largest, largest)
         point, beyond = _farthest(problem, point, beyond, component, values, most)
-    return Extreme(point, point.variables, True)
+    inside = problem.point(point.variables, with_slopes=False) or point
+    limited = side * here >= largest * (1.0 - 1e-9)
+    return Extreme(inside, inside.variables if limited or beyond is None else beyond, limited)
 
 
 def _farthest(
@@ -204,19 +205,20 @@ def _farthest(
     count = int(np.argmin(fits))
     if count < len(forces):
         beyond = failing = forces[count]
-        trial = problem.point(failing) if others.any() else None
+        trial = problem.point(failing) if others.any() and not count else None
         if trial is not None:
             low, high = (
                 np.where(others, end, trial.variables)
                 for end in (problem.least_squares.low, problem.least_squares.high)
             )
             search = replace(problem.least_squares, low=low, high=high, tolerance=math.sqrt(most))
-            trial = search.search(trial, _MAX_SOLVES).point
+            trial = search.search(trial, _FEW_SOLVES).point
             if trial.merit() <= most:
                 return trial, None
-    if count:
-        ahead = problem.point(forces[count - 1], with_slopes=bool(others.any()))
-        point = point if ahead is None else ahead
+    if count and others.any():
+        point = problem.point(forces[count - 1]) or point
+    elif count:  # one component needs no slopes
+        point = replace(point, variables=forces[count - 1])
     return point, beyond
 
 
@@ -225,5 +227,5 @@ def _predicted(problem: ReadingProblem, point: SearchPoint, component: int, most
     slopes = point.slopes
     normal = slopes.T @ slopes + problem.least_squares.weak**2 * np.eye(slopes.shape[1])
     lean = float(np.linalg.inv(normal)[component, component])
-    move = _BEYOND * math.sqrt(max(most - point.merit(), 0.0) * lean)
+    move = math.sqrt(max(most - point.merit(), 0.0) * lean)
     return move if move < problem.model.largest else 0.0
