@@ -15,11 +15,9 @@ import time
 import numpy as np
 
 import notchflex as nf
-from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
-from notchflex.control.program.drive_model import DriveModel
-from notchflex.control.search.branches import approach_target
+from notchflex.control.problem import Problem, ProblemOptions, Response, make_problem
+from notchflex.control.search import find, smallest_tensions
 from notchflex.control.targets import make_targets
-from notchflex.loads.load_path import load_path
 
 PATHS, STEPS = 200, 20
 OPTIONS = ProblemOptions(None, None, "tension", None, None, None)
@@ -50,11 +48,19 @@ def forward_drives(random: np.random.Generator, tendons: int, largest: float) ->
     return drives
 
 
-def repeats(model: DriveModel, before: np.ndarray, drive: np.ndarray) -> bool:
+def repeats(stepper: nf.Stepper, before: np.ndarray, drive: np.ndarray) -> bool:
     """Whether a load comes to the same state where rounding changes its tensions."""
     changed = [drive * (1.0 + part) for part in (1e-12, -1e-12, 1e-11, -1e-11, 1e-10, -1e-10)]
-    tips = [model.solve(before, one).values for one in (drive, *changed)]
+    tips = [stepper.step(before, one).flat_values for one in (drive, *changed)]
     return bool(np.ptp(tips, axis=0).max() < 1e-7)
+
+
+def known_of(problem: Problem, step: nf.Step, last: Response | None) -> Response:
+    """Return a step with the slopes of tendons that stick as they last slid."""
+    slopes = np.nan_to_num(step.flat_jacobian)
+    like = slopes if last is None else last.sliding
+    stuck = (slopes[problem.entries] ** 2).sum(0) <= 1e-12 * (like[problem.entries] ** 2).sum(0)
+    return Response(step, np.where(stuck, like, slopes), stuck)
 
 
 def paths() -> None:
@@ -66,36 +72,38 @@ def paths() -> None:
         robot, random = nf.load_robot(name), np.random.default_rng(24)
         some = make_targets((1.0, 0.0, 9.0), robot, several=False)
         problem, _ = make_problem(robot, some, OPTIONS)
-        model, entries = problem.model, problem.entries
+        stepper, entries = problem.stepper, problem.entries
         met = silent = count = 0
         larger, unsure = [0, 0], 0
         errors: list[float] = []
         times: list[tuple[float, float]] = []
         for _ in range(PATHS):
-            before, known = model.first, None
+            before, known = stepper.start(), None
             for drive in forward_drives(random, robot.number_of_tendons, largest):
-                there = model.solve(before, drive)
+                there = stepper.step(before, drive)
                 if not there.converged:
                     break
                 one, start = nf.Load(tension=drive.tolist()), time.process_time()
                 nf.solve(robot, one)
                 solved = time.process_time()
-                present, goal = present_drives(problem, before), there.values[entries]
-                way = approach_target(problem, before, present, goal, "direct", known)
+                goal = there.flat_values[entries]
+                found = find(problem, before, goal, known)
+                found = smallest_tensions(problem, before, goal, found)
                 times.append((time.process_time() - solved, solved - start))
-                found, count = way.last, count + 1
+                count += 1
                 # Solved anew from the same state, as a robot is pulled.
-                came_to = model.solve(before, found.drive).values[entries]
+                came_to = stepper.step(before, found.drives).flat_values[entries]
                 miss = float(np.linalg.norm(came_to - goal))
                 missed = found.failure is not None
                 met += not missed
                 silent += not missed and miss > 1e-6
                 errors.append(0.0 if missed else miss)
-                more = not missed and found.effort > (1.0 + 1e-6) * np.linalg.norm(drive)
-                sure = repeats(model, before, drive) if missed or more else True
+                effort = np.linalg.norm(found.drives)
+                more = not missed and effort > (1.0 + 1e-6) * np.linalg.norm(drive)
+                sure = repeats(stepper, before, drive) if missed or more else True
                 larger[int(not sure)] += more
                 unsure += missed and not sure
-                before, known = there.state, there
+                before, known = there.state, known_of(problem, there, known)
         steps, solves = np.array(times).T
         q = np.quantile(steps, (0.5, 0.99, 0.999)) / np.median(solves)
         print(
@@ -151,12 +159,11 @@ def fed_back(robot: nf.Robot, real: nf.Robot, goals: np.ndarray, axes: int) -> n
     """Tips of a real robot under the controller of another, with a measured tip."""
     free, random = [np.nan] * (3 - axes), np.random.default_rng(24)
     controller = nf.Controller(robot, search=nf.TargetSearch(tolerance=1e-4, solves=12))
-    one = load_path(nf.Load(tension=[0.0] * robot.number_of_tendons), robot.number_of_tendons)
-    plant = DriveModel(real, one, ("tip_position", "tip_rotation", "total_angle"))
-    state, seen, tips = plant.first, None, []
+    plant = nf.Stepper(real)
+    state, seen, tips = plant.rest(), None, []
     for goal in goals:
-        found = plant.solve(state, controller.step([*goal, *free], measured=seen))
-        state, tip = found.state, found.values[:3]
+        found = plant.step(state, controller.step([*goal, *free], measured=seen))
+        state, tip = found.state, found.values["tip_position"]
         seen = tip + random.normal(0.0, 0.01, 3)
         tips.append(tip[:axes])
     return np.array(tips)

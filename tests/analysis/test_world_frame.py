@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,7 +11,6 @@ from scipy.spatial.transform import Rotation
 import notchflex as nf
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import OUTPUTS
-from notchflex.control.program.drive_model import DriveModel
 from notchflex.errors import ErrorCode
 from refusals import refused
 
@@ -42,13 +43,12 @@ def test_all_agree(wrist: nf.Robot, seed: int):
     rows = nf.simulate_batch(wrist, [loads, loads], outputs=IN_WORLD)
     bands = nf.uncertain(wrist, loads, draws=2, tolerances=(), outputs=("tip_position",))
     at_once = nf.differentiable(wrist, loads, "notch.depth", outputs=("tip_position",))
-    first = loads[:1]
-    follower = DriveModel(wrist, first, IN_WORLD)
-    driven = follower.solve(follower.first, first.tension[0]).values
+    external = replace(loads[0], tension=None)
+    stepper = nf.Stepper(wrist, IN_WORLD, loads=external)
+    driven = stepper.step(stepper.rest(), loads.tension[0]).values
     for name in IN_WORLD:
         agree(rows[name][1], path.quantity(name), name)
-        in_control = driven[follower.slices[name]].reshape(path.quantity(name)[0].shape)
-        agree(in_control, path.quantity(name)[0], name)
+        agree(driven[name], path.quantity(name)[0], name)
     agree(path.body_rotation[:, 0], np.broadcast_to(turn.as_matrix(), (3, 3, 3)), "base")
     agree(at_once()["tip_position"], path.tip_position, "differentiable")
     agree(bands.samples["tip_position"], np.stack([path.tip_position] * 2), "bands")

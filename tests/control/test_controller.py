@@ -104,7 +104,7 @@ def test_a_fault_of_the_program_is_no_invalid_input(monkeypatch):
     def fails(*_):
         raise ValueError("a fault")
 
-    monkeypatch.setattr("notchflex.control.controller.solve_directly", fails)
+    monkeypatch.setattr("notchflex.control.controller.find", fails)
     with pytest.raises(ValueError, match="a fault"):
         controller.step(0.3)
 

@@ -5,12 +5,10 @@ import pytest
 
 import notchflex as nf
 from notchflex.sensing import SensorNoise, sense
-from notchflex.sensing.history import estimate, with_noise
+from notchflex.sensing.history import estimate, own_readings, with_noise
 from notchflex.sensing.model import SensingModel, unknown_force
-from notchflex.sensing.own_reading import own_readings
 from notchflex.sensing.readings import merged, readings_of
 from notchflex.sensing.tables import sensed_document
-from notchflex.solver.newton import DEFAULT
 from refusals import refused
 
 EXACT = SensorNoise(tension=0.0, stroke=0.0, tip=0.0, angle=0.0)
@@ -178,9 +176,9 @@ def test_the_standard_deviation_is_that_of_repeated_readings(wrist):
         noise = 0.01 * rng.normal(size=(2, 3, 1))
         drawn = (path.tension + noise[0], path.stroke + noise[1])
         readings = readings_of(wrist, *drawn, None, None, SensorNoise())
-        model = SensingModel(wrist, readings, unknown_force(wrist, "x", "tip", None), 0.2, DEFAULT)
+        model = SensingModel(wrist, readings, unknown_force(wrist, "x", "tip", None), 0.2)
         history = with_noise(estimate(model))
-        found.append((history.best[-1].force[0], np.linalg.norm(history.gain[-1])))
+        found.append((history.best[-1].variables[0], np.linalg.norm(history.gain[-1])))
     forces, deviations = np.transpose(found)
     # The deviation of 60 draws is itself known to a tenth: three of its deviations.
     assert forces.std(ddof=1) == pytest.approx(deviations.mean(), rel=0.3)
@@ -234,7 +232,7 @@ def test_a_force_that_noise_could_explain_is_in_the_interval_of_its_own_reading(
 def test_a_reading_alone_is_its_own_mean(wrist):
     readings = readings_of(wrist, [0.3, 0.6, 0.6], [0.37, 0.76, 0.77], None, None, SensorNoise())
     means, group = merged(readings)
-    model = SensingModel(wrist, means, unknown_force(wrist, "x", "tip", None), 0.2, DEFAULT)
+    model = SensingModel(wrist, means, unknown_force(wrist, "x", "tip", None), 0.2)
     history = with_noise(estimate(model))
     (alone,), (first, second) = own_readings(history, readings, group)
     assert alone.step is history.steps[0]

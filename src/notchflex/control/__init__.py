@@ -5,7 +5,7 @@ from notchflex.control.following import Following, Reach
 from notchflex.control.inverse import follow, reach
 from notchflex.control.limits import Limits
 from notchflex.control.observer import Observer
-from notchflex.control.search.problem import TargetSearch
+from notchflex.control.problem import TargetSearch
 from notchflex.control.targets import Targets, read_targets
 
 __all__ = [

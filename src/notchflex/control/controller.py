@@ -9,14 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex import Failure, InputError, Load, Robot, State
+from notchflex import InputError, Load, Robot, State, Stepper
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.observer import Observer
-from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
-from notchflex.control.program.drive_model import Response
-from notchflex.control.search.iterative_search import search_iteratively, solve_directly
-from notchflex.control.search.problem import TargetSearch
-from notchflex.control.search.rate import cross_dead_bands, limit_rate
+from notchflex.control.problem import ProblemOptions, Response, TargetSearch, make_problem
+from notchflex.control.search import DriveSearch, find
 from notchflex.control.targets import DIRECTION, LARGEST_TARGET, Targets, target_shapes
 from notchflex.support import check_is_robot, check_number, short_repr
 
@@ -99,17 +96,17 @@ class Controller:
         self._shapes = {name: shapes[name] for name in names}
         some = Targets({name: np.zeros((1, *shape)) for name, shape in self._shapes.items()})
         search = search or TargetSearch(tolerance=1e-5, solves=16)
-        options = ProblemOptions(state, load, drive, limits, weights, search)
-        self._problem, aims = make_problem(robot, some, options)
-        self._rate = options.rate
+        self._problem, aims = make_problem(
+            robot, some, ProblemOptions(state, load, drive, limits, weights, search)
+        )
         self._feedback, self.observer = feedback, observer
+        self._steppers: dict[int, Stepper] = {}
         self._deviation = np.zeros(aims.goals.shape[1])
-        self._before = self._problem.model.first
-        self._command = present_drives(self._problem, self._before)
-        self._known: Response | None = None
+        self._before = self._problem.stepper.start()
+        self._command = self._problem.present(self._before)
         self.status = _START
         # Programs are compiled or read now, not within the loop.
-        self._problem.model.solve(self._before, self._command)
+        self._known = self._present()
 
     def step(
         self,
@@ -156,9 +153,11 @@ class Controller:
     @property
     def values(self) -> Float[np.ndarray, " m"]:
         """Model values of the target quantities at the last command, flattened."""
-        if self._known is None:
-            self._known = self._problem.model.solve(self._before, self._command)
-        return self._known.values[self._problem.entries]
+        return self._known.step.flat_values[self._problem.entries]
+
+    def _present(self) -> Response:
+        """Solve the present command."""
+        return DriveSearch(self._problem, self._before, self._deviation).present()[0]
 
     def _flat(self, given: Any) -> np.ndarray:
         """Values by name, or those of the only quantity, as one vector."""
@@ -194,39 +193,26 @@ class Controller:
                 "tension and stroke are finite numbers, one for each tendon"
             )
         if state.shape == self._before.shape:
-            self._problem = self._problem._replace(
-                model=self.observer.seen_by(model, self._problem)
-            )
-            self._before, self._known = state, None
+            if model not in self._steppers:
+                own = replace(
+                    self._problem.stepper, robot=self.observer.robots[model], from_state=None
+                )
+                self._steppers[model] = own
+            self._problem = self._problem._replace(stepper=self._steppers[model])
+            self._before = state
+            self._known = self._present()
 
     def _seek(self, goal: np.ndarray) -> None:
-        problem = limit_rate(self._problem, self._command, self._rate)
-        attempt = solve_directly(problem, self._before, self._command, goal, self._known)
-        left = problem.search.solves - attempt.solves
-        if attempt.failure is not None and left > 0:
-            fewer = problem._replace(search=replace(problem.search, solves=left))
-            # One tendon goes on from where it came nearest. Several, of which one may have turned
-            # round, begin anew; so does one whose dead band is still to be crossed.
-            begin, response = attempt.drive, attempt.response
-            if problem.driven.sum() > 1:
-                begin, response = self._command, self._known
-            alone = bool(np.count_nonzero(self._command) < 2)
-            stays = begin is self._command and alone
-            other = search_iteratively(fewer, self._before, begin, goal, response, over_bands=stays)
-            attempt = other._replace(solves=attempt.solves + other.solves)
-        attempt = cross_dead_bands(
-            self._problem, self._rate, self._before, self._command, goal, attempt, self._known
-        )
-        failure, solved = attempt.failure, attempt.response.converged and np.isfinite(attempt.error)
-        code = failure.name if failure else ""
-        if solved:
-            self._command, self._before, self._known = (
-                attempt.drive,
-                attempt.response.state,
-                attempt.response,
-            )
-        elif failure is None:
-            code = Failure.SEARCH_STOPPED.name
+        problem = self._problem.near(self._command)
+        attempt = find(problem, self._before, goal, self._known, problem.search.solves)
+        if attempt.solved:
+            self._known = attempt.response
+            self._command, self._before = attempt.drives, attempt.response.step.state
+        failure = attempt.failure
         self.status = ControlStatus(
-            failure is None, code, attempt.error, attempt.solves, not solved
+            failure is None,
+            failure.name if failure else "",
+            attempt.error,
+            attempt.solves,
+            not attempt.solved,
         )

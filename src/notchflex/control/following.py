@@ -12,8 +12,8 @@ from jaxtyping import Bool, Float, Int
 
 from notchflex import Equilibrium, EquilibriumPath, Failure, Load, LoadPath, Robot, State, simulate
 from notchflex._summary import vector
-from notchflex.control.search.branches import KEPT
-from notchflex.control.search.problem import Attempt
+from notchflex.control.problem import Attempt
+from notchflex.control.search import KEPT
 from notchflex.control.targets import DIRECTION, Targets, unit_hint
 from notchflex.support import (
     DEGREES,
@@ -91,13 +91,13 @@ class Following(Displayed):
         )
         near &= {*self.units} <= {"mm", "deg"}
         return [
-            None if is_near and one.response.converged and one.excess <= KEPT else one.failure
-            for one, is_near in zip(self.attempts, near, strict=True)
+            None if is_near and attempt.solved and attempt.excess <= KEPT else attempt.failure
+            for attempt, is_near in zip(self.attempts, near, strict=True)
         ]
 
     @property
     def error_mm(self) -> Float[np.ndarray, " k"]:
-        """Distance from the lengths of each target, mm; 0 for a target without."""
+        """Distance from the lengths of each target, mm; 0 without any, NaN without equilibrium."""
         return self._distance("mm")
 
     @property
@@ -108,7 +108,8 @@ class Following(Displayed):
     def _distance(self, unit: str) -> Float[np.ndarray, " k"]:
         of_unit = self.misses[:, [one == unit for one in self.units]]
         scale = DEGREES if unit == "deg" else 1.0
-        return scale * np.sqrt(np.nansum(of_unit**2, axis=1))
+        solved = [attempt.solved for attempt in self.attempts]
+        return np.where(solved, scale * np.sqrt(np.nansum(of_unit**2, axis=1)), np.nan)
 
     def missed(self, targets: int | slice) -> str:
         """Return the distance from a target, or the largest from some, in words with units."""
@@ -141,6 +142,8 @@ class Following(Displayed):
         failure = self.failures[target]
         if failure is None:
             return ""
+        if failure is Failure.NO_EQUILIBRIUM:
+            return self.path.reason[int(self.step[target])]
         hint = ""
         if failure is not Failure.SEARCH_STOPPED:
             positions = self.targets.values.get("tip_position")

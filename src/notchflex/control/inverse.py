@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
+from jaxtyping import Float
 
 from notchflex import InputError, Load, LoadPath, Robot, State
 from notchflex.control.following import Following, Reach
 from notchflex.control.limits import Drive, Limits
-from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
-from notchflex.control.search.branches import Approach, approach_target
-from notchflex.control.search.problem import Attempt, Problem, TargetSearch
-from notchflex.control.search.rate import cross_dead_bands, limit_rate
+from notchflex.control.problem import (
+    Attempt,
+    Problem,
+    ProblemOptions,
+    Response,
+    TargetSearch,
+    make_problem,
+)
+from notchflex.control.search import KEPT, find, smallest_tensions
 from notchflex.control.targets import Targets, make_targets, units_of
-from notchflex.support import check_is_robot, short_repr
+from notchflex.support import check_is_robot, load_path, short_repr
+
+Approach = Literal["direct", "loading", "unloading", "least"]
+
+# Overshoot beyond the drives that reverse all contacts, relative.
+_OVERSHOOT = 0.05
 
 
 def reach(
@@ -122,43 +133,31 @@ def follow(
 
 
 def _follow(
-    robot: Robot,
-    targets: Targets,
-    options: ProblemOptions,
-    approach: Approach,
+    robot: Robot, targets: Targets, options: ProblemOptions, approach: Approach
 ) -> Following:
     if approach not in get_args(Approach):
         raise InputError.UNKNOWN_NAME(
             f"approach is one of {', '.join(get_args(Approach))}; got {short_repr(approach)}"
         )
     problem, aim = make_problem(robot, targets, options)
-    model, rate = problem.model, options.rate
-    before, response = model.first, None
-    present = present_drives(problem, before)
+    before, response = problem.stepper.start(), None
     drives: list[np.ndarray] = []
     last: list[int] = []
     attempts: list[Attempt] = []
     for goal in aim.goals:
-        near = limit_rate(problem, present, rate)
-        way = approach_target(near, before, present, goal, approach, response)
-        attempt, solves = way.last._replace(solves=0), way.solves
-        if way.via is None:
-            attempt = cross_dead_bands(problem, rate, before, present, goal, attempt, response)
-        else:
-            drives.append(way.via)
-        attempt = attempt._replace(solves=solves + attempt.solves)
-        drives.append(attempt.drive)
+        near = problem.near(problem.present(before))
+        way = _approach(near, before, goal, approach, response)
+        drives += [*way.via, way.last.drives]
         last.append(len(drives) - 1)
-        attempts.append(attempt)
-        if attempt.response.converged:
-            present, response = attempt.drive, attempt.response
-            before = response.state
-    applied = _load_path(problem, np.array(drives))
-    values = np.array([attempt.response.values[aim.entries] for attempt in attempts])
+        attempts.append(way.last)
+        if way.last.solved:
+            response = way.last.response
+            before = response.step.state
+    values = np.array([attempt.response.step.flat_values[aim.entries] for attempt in attempts])
     return Following(
         robot,
         targets,
-        applied,
+        _load_path(problem, np.array(drives)),
         np.array(last),
         tuple(attempts),
         options.state,
@@ -169,10 +168,82 @@ def _follow(
     )
 
 
-def _load_path(problem: Problem, drives: np.ndarray) -> LoadPath:
-    one = problem.model.load
-    by_stroke = ~np.isnan(one.stroke[0])
-    tension = np.where(by_stroke, np.nan, drives)
+def _load_path(problem: Problem, drives: Float[np.ndarray, "k t"]) -> LoadPath:
+    stepper = problem.stepper
+    by_stroke = np.array(stepper.drives) == "stroke"
+    loads = load_path(stepper.loads, len(by_stroke))
+    tension = np.where(by_stroke, np.nan, np.maximum(drives, 0.0))
     stroke = np.where(by_stroke, drives, np.nan)
-    external = tuple(one.external[0] for _ in drives)
-    return LoadPath(np.maximum(tension, 0.0), stroke, one.base_rotation, external)
+    return LoadPath(tension, stroke, loads.base_rotation, loads.external * len(drives))
+
+
+class _ApproachPath(NamedTuple):
+    """Loads to a target: drives of an overshoot if any, and where the search ended."""
+
+    via: list[Float[np.ndarray, " t"]]
+    last: Attempt
+
+    @property
+    def rank(self) -> tuple[bool, bool, float, float]:
+        """Order of paths to one target, the best first."""
+        failed = self.last.failure is not None
+        effort = float(np.linalg.norm(self.last.drives))
+        return failed, self.last.excess > KEPT, self.last.error if failed else 0.0, effort
+
+
+def _approach(
+    problem: Problem,
+    before: Float[np.ndarray, " state"],
+    goal: Float[np.ndarray, " m"],
+    approach: Approach,
+    known: Response | None,
+) -> _ApproachPath:
+    """Find drives that meet a target, direct or through an overshoot that reverses friction.
+
+    At one tension a robot is bent more after unloading than after loading. A target can often be
+    met on either branch: by loading up to it, or by overshooting it and unloading.
+    """
+    direct = _met(problem, before, goal, known)
+    rise = float(np.sum(direct.drives - problem.present(before)))
+    right_way = {"loading": rise > 0.0, "unloading": rise < 0.0}.get(approach, approach == "direct")
+    if right_way or not direct.solved:
+        return _ApproachPath([], direct)
+    paths, solves = [_ApproachPath([], direct)], direct.solves
+    sides = {"loading": (False,), "unloading": (True,)}.get(approach, (True, False))
+    for over in sides:
+        via = _overshoot(problem, direct, over, rise > 0.0)
+        between = problem.stepper.step(before, via)
+        solves += 1
+        room = problem.limited(between.flat_values, between.flat_jacobian)[1]
+        if not between.converged or (room < -KEPT).any():
+            continue
+        last = _met(problem, between.state, goal, None)
+        solves += last.solves
+        falls = float(np.sum(last.drives - via)) < 0.0
+        if falls is over or last.failure is not None:
+            paths.append(_ApproachPath([via], last))
+    best = min(paths if approach == "least" else paths[1:] or paths, key=lambda path: path.rank)
+    return best._replace(last=best.last._replace(solves=solves))
+
+
+def _met(
+    problem: Problem,
+    before: Float[np.ndarray, " state"],
+    goal: Float[np.ndarray, " m"],
+    known: Response | None,
+) -> Attempt:
+    return smallest_tensions(problem, before, goal, find(problem, before, goal, known))
+
+
+def _overshoot(
+    problem: Problem, direct: Attempt, over: bool, rises: bool
+) -> Float[np.ndarray, " t"]:
+    """Drives above or below those of a target, from which all contacts turn round on the way."""
+    state, places = direct.response.step.state, problem.stepper.contact_places[1]
+    friction = np.where(places >= 0, state[places], 0.0).sum(axis=1) * problem.by_tension
+    # The same shape needs a tension that is about the friction of all contacts (as a logarithm)
+    # smaller after unloading than after loading; to turn all contacts round takes twice that.
+    turn = friction if rises is over else 2.0 * friction
+    factor = np.exp(turn) * (1.0 + _OVERSHOOT) if over else np.exp(-turn) * (1.0 - _OVERSHOOT)
+    via = np.where(problem.driven, direct.drives * factor, direct.drives)
+    return np.clip(via, problem.low, problem.high)

@@ -8,15 +8,14 @@ draw as much tendon as the robot count more.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from notchflex import InputError, Load, Robot
-from notchflex.control.program.drive_model import DriveModel
-from notchflex.control.search.problem import Problem
-from notchflex.support import check_is_robot, check_number, load_path, number_at
+from notchflex import InputError, Load, Robot, Stepper
+from notchflex.support import check_is_robot, check_number, number_at
 
 FRICTION = "friction.coefficient"
 
@@ -69,19 +68,15 @@ class Observer:
                 raise InputError.OUT_OF_RANGE(
                     f"{what} of an observer must be positive; got {value!r}"
                 )
-        coefficient = number_at(check_is_robot(robot), FRICTION)
-        tendons = robot.number_of_tendons
-        pulled = load_path(load or Load(), tendons)
-        one = type(pulled)(
-            np.zeros((1, tendons)), pulled.stroke, pulled.base_rotation, pulled.external
-        )
-        self._coefficients = coefficient * np.array(factors, float)
-        robots = [robot.with_value(FRICTION, float(one)) for one in self._coefficients]
-        self._models = [DriveModel(each, one, OUTPUTS) for each in robots]
-        self._states = [model.first for model in self._models]
+        self._coefficients = number_at(check_is_robot(robot), FRICTION) * np.array(factors, float)
+        loads = replace(load or Load(), tension=None, stroke=None)
+        self._models = [
+            Stepper(robot.with_value(FRICTION, float(coefficient)), "stroke", loads=loads)
+            for coefficient in self._coefficients
+        ]
+        self._states = [model.rest() for model in self._models]
         self._noise, self._forgets = noise, 1.0 - 1.0 / max(memory, 1.0)
-        self._cost = np.zeros(len(robots))
-        self._seen: dict[int, DriveModel] = {}
+        self._cost = np.zeros(len(self._models))
         self.accepted = True
 
     def observe(self, tension: Any, stroke: Any) -> tuple[int, Float[np.ndarray, " state"]]:
@@ -110,17 +105,17 @@ class Observer:
             pulled, drawn = np.maximum(np.asarray(tension, float), 0.0), np.asarray(stroke, float)
         except (ArithmeticError, TypeError, ValueError):
             return None
-        shape = (self._models[0].robot.number_of_tendons,)
+        shape = (len(self._models[0].drives),)
         right = pulled.shape == drawn.shape == shape and np.isfinite(pulled).all()
         return (pulled, drawn) if right and not np.isinf(drawn).any() else None
 
     def _compare(self, pulled: np.ndarray, drawn: np.ndarray) -> None:
         for number, model in enumerate(self._models):
-            response = model.solve(self._states[number], pulled)
-            if not response.converged:
+            step = model.step(self._states[number], pulled)
+            if not step.converged:
                 continue
-            self._states[number] = response.state
-            miss = (response.values[model.slices["stroke"]] - drawn) / self._noise
+            self._states[number] = step.state
+            miss = (step.flat_values - drawn) / self._noise
             miss = miss[np.isfinite(miss) & (pulled > 0.0)]
             self._cost[number] = self._forgets * self._cost[number] + float(miss @ miss)
 
@@ -135,18 +130,7 @@ class Observer:
         """Coefficient of friction, the mean of the models by their weights."""
         return float(self.weights @ self._coefficients)
 
-    def seen_by(self, number: int, problem: Problem) -> DriveModel:
-        """Return a model, asked for what a controller aims at.
-
-        Args:
-            number: Which.
-            problem: What the controller searches.
-        """
-        if number not in self._seen:
-            own, other = self._models[number], problem.model
-            self._seen[number] = DriveModel(own.robot, other.load, other.outputs, other.start)
-        return self._seen[number]
-
-
-OUTPUTS = ("tension", "stroke", "peak_strain", "gap")
-"""What the models are asked: as limits are, so that they share a program."""
+    @property
+    def robots(self) -> list[Robot]:
+        """The robots of the models."""
+        return [model.robot for model in self._models]

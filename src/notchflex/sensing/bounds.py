@@ -14,10 +14,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
-from notchflex.sensing.history import History, Progress, whitening_of
-from notchflex.sensing.own_reading import OwnReading
-from notchflex.sensing.search import Known, ReadingProblem, bad_fit, best, best_of_all, extreme
-from notchflex.solver.residual import SolverState
+from notchflex.sensing.history import History, OwnReading, Progress, state_after, whitening_of
+from notchflex.sensing.model import SolvedState
+from notchflex.sensing.search import ReadingProblem, best, best_of_all, extreme, fits_badly
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,26 +52,28 @@ def bounds(
         level: Part of all cases that the interval of a component shall contain.
         progress: Called with the means done and their number.
     """
-    size = history.model.size
+    size, count = history.model.size, sum(map(len, readings))
     most = float(chi2.ppf(level, 1))
-    directions = [sign * row for row in np.eye(size) for sign in (-1.0, 1.0)]
-    extremes = [_Tracker(None, np.zeros(size), direction) for direction in directions]
-    state = None
-    count = sum(map(len, readings))
+    rest = np.zeros(size)
+    best = _Tracker(None, rest)
+    extremes = [
+        _Tracker(None, rest, component, side) for component in range(size) for side in (-1.0, 1.0)
+    ]
     force, low, high = np.zeros((3, count, size))
     ends = Bounds(force, low, high, np.zeros((count, size), bool), np.zeros(count))
-    for number, (candidate, members) in enumerate(zip(history.best, readings, strict=True)):
-        before = [_Tracker(state, candidate.force, None), *extremes]
-        for column, one in enumerate(members):
+    for number, members in enumerate(readings):
+        point = history.best[number]
+        first: list[_Tracker] = []
+        after = extremes
+        for reading in members:
             # The first reading comes from the state before; the force of another may change after
             # that, with tendons held: from the mean, or from the ends of the first. None goes on
             # from the one before it, whose noise the contacts would remember.
-            trackers = [replace(tracker) for tracker in before]
-            _add(ends, history, number, one, trackers, most)
-            extremes = trackers[1:]
-            if column == 0:
-                before = [_Tracker(candidate.state, candidate.force, None), *extremes]
-        state = candidate.state
+            before = [replace(best, force=point.variables), *(first or extremes)]
+            after = _add(ends, history, number, reading, before, most)
+            first = first or after
+            best = _Tracker(state_after(point), point.variables)
+        extremes = after
         if progress is not None:
             progress(number + 1, len(history.best))
     return ends
@@ -85,64 +86,49 @@ def _add(
     reading: OwnReading,
     trackers: list[_Tracker],
     most: float,
-) -> None:
-    """Find the ends of one reading; the trackers go on to it."""
-    model, candidate, row = history.model, history.best[number], reading.number
-    before, size = trackers[0].state, history.model.size
+) -> list[_Tracker]:
+    """Find the ends of one reading; return the extreme histories that go on to it."""
+    model, mean, row = history.model, history.best[number].variables, reading.number
     forces: list[np.ndarray] = []
-    worse: list[float] = []
-    solved = _SolvedFrom()
+    after: list[_Tracker] = []
+    worse = np.inf
     for tracker in trackers:
         # The noise of the readings before is in the covariance for the best history, and for the
         # others in what they are.
-        covariance = history.covariance if tracker.direction is None else history.alone
+        covariance = history.alone if tracker.side else history.covariance
         white = whitening_of(covariance[number] + reading.extra)
-        problem = ReadingProblem(
-            model, reading.step, tracker.state, white, solved.known(tracker.state)
-        )
-        at = best_of_all(problem, np.stack([tracker.force, candidate.force]))
-        if bad_fit(at):  # no force makes this history fit: it was none, the best goes on
-            problem = replace(problem, start=before, known=solved.known(before))
-            at = best(problem, candidate.force[None])
-        if tracker is trackers[0]:
+        problem = ReadingProblem(model, reading.step, tracker.state, white)
+        point = best_of_all(problem, [tracker.force, mean])
+        if point is None or fits_badly(point):
+            # No force makes this history fit: it was none, the best goes on.
+            problem = replace(problem, start=trackers[0].state)
+            point = best(problem, [mean]) or history.best[number]
+        if not tracker.side:
             # What noise does not explain of its distance from the mean is a change of the force.
-            ends.force[row] = candidate.force + reading.part * (at.force - candidate.force)
-            forces = [ends.force[row]]
-        for which, direction in enumerate(one.direction for one in trackers[1:]):
-            assert direction is not None
-            own = direction is tracker.direction
-            if not own and size > 1 and tracker.direction is not None:
+            ends.force[row] = mean + reading.part * (point.variables - mean)
+            forces.append(ends.force[row])
+        least = point.merit()
+        for goal in trackers[1:]:
+            own = goal is tracker
+            if not own and model.size > 1 and tracker.side:
                 continue  # in space each follows its own component
-            end = extreme(problem, at, direction, at.misfit + most)
-            forces += [end.inside.force, end.force]
-            ends.limited[row, which // 2] |= end.limited
+            end = extreme(problem, point, goal.component, goal.side, least + most)
+            forces += [end.inside.variables, end.force]
+            ends.limited[row, goal.component] |= end.limited
             if own:
-                tracker.state, tracker.force = end.inside.state, end.inside.force
-        worse.append(problem.candidates(np.zeros((1, size)))[0].misfit - at.misfit)
+                inside = end.inside
+                after.append(replace(goal, state=state_after(inside), force=inside.variables))
+        worse = min(worse, float(problem.misfits(np.zeros((1, model.size)))[0]) - least)
     ends.low[row], ends.high[row] = np.min(forces, axis=0), np.max(forces, axis=0)
-    ends.no_force[row] = max(min(worse, default=0.0), 0.0)
+    ends.no_force[row] = max(worse, 0.0)
+    return after
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class _Tracker:
     """A history that is followed: its last state and force, and what it keeps extreme if any."""
 
-    state: SolverState | None
+    state: SolvedState
     force: Float[np.ndarray, " d"]
-    direction: Float[np.ndarray, " d"] | None
-
-
-class _SolvedFrom:
-    """Results in one reading, by their initial state: histories may share one."""
-
-    def __init__(self) -> None:
-        """Begin with nothing."""
-        self._known: list[tuple[SolverState | None, Known]] = []
-
-    def known(self, state: SolverState | None) -> Known:
-        """Return what was solved from a state."""
-        for one, known in self._known:
-            if one is state:
-                return known
-        self._known.append((state, {}))
-        return self._known[-1][1]
+    component: int = 0
+    side: float = 0.0

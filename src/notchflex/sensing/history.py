@@ -10,14 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from notchflex import EquilibriumPath
-from notchflex.analysis.tangent import PathTangents
-from notchflex.sensing.model import SensingModel, SensingStep
-from notchflex.sensing.search import Candidate, ReadingProblem, best, best_of_all
-from notchflex.solver.residual import SolverState
-from notchflex.support import Change
+from notchflex.search.least_squares import SearchPoint
+from notchflex.sensing.model import SensingModel, SensingStep, SolvedState
+from notchflex.sensing.readings import Readings
+from notchflex.sensing.search import ReadingProblem, best, best_of_all
 
 Progress = Callable[[int, int], None]
 
@@ -42,7 +40,7 @@ class History:
 
     model: SensingModel
     steps: list[SensingStep]
-    best: list[Candidate]
+    best: list[SearchPoint]
     covariance: list[Float[np.ndarray, "m m"]]
     alone: list[Float[np.ndarray, "m m"]]
     by_force: list[Float[np.ndarray, "m d"]]
@@ -55,39 +53,43 @@ class History:
         return LINEAR * self.model.largest
 
 
+def state_after(point: SearchPoint) -> SolvedState:
+    """Return the solved state of a force, to go on from."""
+    path = point.solution
+    return path.prepared.state.unpack(path.run.states[-1])
+
+
 def estimate(model: SensingModel, progress: Progress | None = None) -> History:
     """Find the force of every reading, one after the other; without their noise yet."""
     history = History(model, [], [], [], [], [], [], [])
     state, force = None, np.zeros(model.size)
     for number in range(len(model.readings)):
-        step, candidate = _estimate_one(model, number, state, force)
-        if not np.isfinite(candidate.misfit):
+        step, point = _estimate_one(model, number, state, force)
+        if point is None:
             break
         history.steps.append(step)
-        history.best.append(candidate)
-        state, force = candidate.state, candidate.force
+        history.best.append(point)
+        state, force = state_after(point), point.variables
         if progress is not None:
             progress(number + 1, len(model.readings))
     return history
 
 
 def _estimate_one(
-    model: SensingModel, number: int, state: SolverState | None, force: Float[np.ndarray, " d"]
-) -> tuple[SensingStep, Candidate]:
+    model: SensingModel, number: int, state: SolvedState, force: Float[np.ndarray, " d"]
+) -> tuple[SensingStep, SearchPoint | None]:
     step = model.step(number)
     problem = ReadingProblem(model, step, state, np.diag(step.variance**-0.5))
-    at = best_of_all(problem, force[None])
-    if not len(step.entries):
-        return step, at
-    if np.isfinite(at.misfit):
-        drives = model.drive_slopes(state, at.solved.alone, number)[step.entries]
-        noise = np.diag(step.variance) + (drives * step.driving) @ drives.T
-        problem = replace(problem, whitening=whitening_of(noise))
-        at = best(problem, at.force[None])
-    if state is not None and np.isfinite(at.misfit):
-        way = model.between_readings(state, number, np.stack([force, at.force]))
+    point = best_of_all(problem, [force])
+    if point is None or not len(step.entries):
+        return step, point
+    drives = model.drive_slopes(state, point.solution, number)[step.entries]
+    noise = np.diag(step.variance) + (drives * step.driving) @ drives.T
+    point = best(replace(problem, whitening=whitening_of(noise)), [point.variables])
+    if state is not None and point is not None:
+        way = model.between_readings(state, number, np.stack([force, point.variables]))
         step = replace(step, variance=step.variance + way[step.entries] ** 2)
-    return step, at
+    return step, point
 
 
 def whitening_of(covariance: Float[np.ndarray, "m m"]) -> Float[np.ndarray, "m m"]:
@@ -103,21 +105,22 @@ def with_noise(history: History) -> History:
     A noise is one number that was read in one reading. It changes the force of its own reading and,
     by what the contacts remember, those after it.
     """
-    model, steps, candidate = history.model, history.steps, history.best
-    history = History(model, steps, candidate, [], [], [], [], [])
-    if not candidate:
+    model, steps, points = history.model, history.steps, history.best
+    history = History(model, steps, points, [], [], [], [], [])
+    if not points:
         return history
-    forces = np.array([one.force for one in candidate])
-    path = model.follow(forces)
-    by_drive, by_force = _slopes_along(model, path)
-    for k, own in enumerate(by_drive[range(len(candidate)), range(len(candidate))]):
-        if not np.isfinite(own).all():
-            start = candidate[k - 1].state if k else None
-            by_drive[k, k] = model.drive_slopes(start, candidate[k].solved.alone, k).T
+    path = model.follow(np.array([point.variables for point in points]))
+    every = range(len(points))
+    by_drive = np.array([model.slopes(path, step, of_drives=True) for step in every])
+    by_force = np.array([model.slopes(path, step) for step in every])
+    for k in every:
+        if not np.isfinite(by_drive[k, k]).all():
+            start = state_after(points[k - 1]) if k else None
+            by_drive[k, k] = model.drive_slopes(start, points[k].solution, k)
     # What is not known of the memory of so hard a state is left out.
     by_drive, by_force = np.nan_to_num(by_drive), np.nan_to_num(by_force)
     sizes = [len(step.entries) for step in steps]
-    tendons = by_drive.shape[2]
+    tendons = by_drive.shape[-1]
     first = np.cumsum([0, *sizes])
     noises = int(first[-1]) + len(steps) * tendons
     before = np.zeros((model.size, noises))
@@ -127,15 +130,15 @@ def with_noise(history: History) -> History:
         read[np.arange(len(rows)), first[k] + np.arange(len(rows))] = np.sqrt(step.variance)
         for j in range(k, -1, -1):
             columns = slice(int(first[-1]) + j * tendons, int(first[-1]) + (j + 1) * tendons)
-            read[:, columns] -= by_drive[j, k][:, rows].T * np.sqrt(steps[j].driving)
+            read[:, columns] -= by_drive[j, k][rows] * np.sqrt(steps[j].driving)
             if j == k:
                 history.alone.append(read @ read.T)
             else:
-                read -= by_force[j, k][:, rows].T @ history.gain[j]
+                read -= by_force[j, k][rows] @ history.gain[j]
         covariance = read @ read.T
         white = whitening_of(covariance)
-        history.by_force.append(by_force[k, k][:, rows].T)
-        history.by_drive.append(by_drive[k, k][:, rows].T)
+        history.by_force.append(by_force[k, k][rows])
+        history.by_drive.append(by_drive[k, k][rows])
         slopes = white @ history.by_force[-1]
         gain = known_inverse(slopes, history.linear)
         before = before + gain @ (white @ read - slopes @ before)
@@ -160,22 +163,89 @@ def known_inverse(slopes: Float[np.ndarray, "m d"], most: float) -> Float[np.nda
     return (right.T * inverse) @ left.T
 
 
-def _slopes_along(
-    model: SensingModel, path: EquilibriumPath
-) -> tuple[Float[np.ndarray, "s s t outputs"], Float[np.ndarray, "s s d outputs"]]:
-    """Change of each reading by the command of each tendon, and by the force, of each before."""
-    tangents = PathTangents(path, model.outputs)
-    results = []
-    for changes in (model.drive_changes(path), model.force_changes(path)):
-        slopes = []
-        for step in range(len(path)):
-            row = []
-            for change in changes:
-                load = np.zeros((len(path), len(change)))
-                load[step] = change
-                along = tangents.along([Change(load, None)])[0]
-                parts = [along[name].reshape(len(path), -1) for name in model.outputs]
-                row.append(np.concatenate(parts, axis=1))
-            slopes.append(np.stack(row, axis=1))
-        results.append(np.array(slopes))
-    return results[0], results[1]
+# A reading that was averaged with others. The model follows the means, for its contacts must not
+# follow the noise. That noise explains how far readings are apart does not show that the force was
+# the same in all of them. So the force and the interval of each are found from its own numbers and
+# its own noise, at the tension of the mean and from the state before it.
+
+
+@dataclass(frozen=True, eq=False)
+class OwnReading:
+    """One reading, compared with the model of the mean that it went into.
+
+    Attributes:
+        number: Which reading, from 0.
+        step: The mean, with the numbers of this reading at the tension of the mean.
+        extra: Covariance of its noise beyond that of the mean, (m, m).
+        part: Which part of its distance from the mean is taken for a change of the force, 0 to 1.
+        information: Slopes by the force, whitened by its own noise, (m, d).
+        gain: Change of its force by every unit of noise of the mean, (d, noises).
+        more: The same by its own noise beyond that, (d, m).
+    """
+
+    number: int
+    step: SensingStep
+    extra: Float[np.ndarray, "m m"]
+    part: float
+    information: Float[np.ndarray, "m d"]
+    gain: Float[np.ndarray, "d noises"]
+    more: Float[np.ndarray, "d m"]
+
+
+def own_readings(
+    history: History, readings: Readings, group: Int[np.ndarray, " s"]
+) -> list[list[OwnReading]]:
+    """Return the readings of every mean of a history.
+
+    Args:
+        history: The means, with their noise.
+        readings: The readings before they were averaged.
+        group: Which mean each went into, counted from 0.
+    """
+    compared = np.concatenate([readings.compared[name] for name in history.model.outputs], axis=1)
+    tension, stroke = readings.commands
+    drives = np.where(np.isnan(stroke), tension, stroke)
+    every = range(len(history.best))
+    rows = [np.flatnonzero(group == number) for number in every]
+    return [_of_mean(history, one, rows[one], compared, drives[rows[one]]) for one in every]
+
+
+def _of_mean(
+    history: History,
+    number: int,
+    rows: Int[np.ndarray, " n"],
+    compared: Float[np.ndarray, "s outputs"],
+    drives: Float[np.ndarray, "n t"],
+) -> list[OwnReading]:
+    step, by_drive = history.steps[number], history.by_drive[number]
+    count = len(rows)
+    # What one reading differs from the mean, but for what its tension explains.
+    measured = compared[np.ix_(rows, step.entries)] - (drives - drives.mean(axis=0)) @ by_drive.T
+    noise = np.diag(step.noise) + by_drive * (step.driving * count) @ by_drive.T
+    part = _change(measured - step.measured, noise + np.diag(step.resolution))
+    extra = noise * (1.0 - 1.0 / count)
+    white = whitening_of(history.covariance[number] + extra)
+    information = white @ history.by_force[number]
+    inverse = known_inverse(information, history.linear) @ white
+    scale = np.sqrt(step.noise), by_drive * np.sqrt(step.driving * count)
+    root = np.sqrt(1.0 - 1.0 / count) * np.concatenate([np.diag(scale[0]), scale[1]], axis=1)
+    rest = extra, part, information, history.gain[number], inverse @ root
+    if count == 1:  # it is its mean, to the last digit
+        return [OwnReading(int(rows[0]), step, *rest)]
+    return [
+        OwnReading(int(row), replace(step, measured=values), *rest)
+        for row, values in zip(rows, measured, strict=True)
+    ]
+
+
+def _change(apart: Float[np.ndarray, "n m"], noise: Float[np.ndarray, "m m"]) -> float:
+    """Return the part of distances from a mean that noise does not explain.
+
+    As James and Stein estimate means (Efron and Morris 1973, *Stein's Estimation Rule and Its
+    Competitors*): 0 where the distances are those of noise alone, towards 1 where they are larger.
+    """
+    freedom = (len(apart) - 1) * apart.shape[1]
+    if not freedom:
+        return 0.0
+    total = float(((apart @ whitening_of(noise).T) ** 2).sum())
+    return 1.0 - freedom / total if total > freedom else 0.0

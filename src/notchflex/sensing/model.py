@@ -5,20 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from notchflex import BodyForce, EquilibriumPath, InputError, LoadPath, Robot, Settings
-from notchflex._jax import constant
+from notchflex import BodyForce, EquilibriumPath, InputError, LoadPath, Robot
 from notchflex.analysis.forward_model import ForwardModel
-from notchflex.analysis.tangent import PathTangents
-from notchflex.loads.command import make_commands
-from notchflex.loads.load import NO_VECTOR
 from notchflex.mechanics.chain import bending_normal
 from notchflex.sensing.readings import Readings
-from notchflex.solver.residual import SolverState
-from notchflex.support import AXES, Change, ExternalLoad, check_integer, short_repr
+from notchflex.support import (
+    AXES,
+    Change,
+    ExternalLoad,
+    check_integer,
+    derivatives,
+    load_change,
+    short_repr,
+)
+
+SolvedState = Any
+"""A state to go on from, as the solver has it; None for rest."""
+
+_NO_TURN = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,21 +45,23 @@ class UnknownForce:
     names: tuple[str, ...]
     directions: Float[np.ndarray, "d 3"]
     known: ExternalLoad
-    base_rotation: tuple[float, float, float] = NO_VECTOR
+    base_rotation: tuple[float, float, float] = _NO_TURN
     body: int | None = None
 
     def load(self, components: Float[np.ndarray, " d"]) -> ExternalLoad:
         """Return the external loads with some components of the force, N."""
-        force = components @ self.directions
-        if self.body is None:
-            at_tip = np.asarray(self.known.tip_force, float) + force
-            return replace(self.known, tip_force=tuple(at_tip.tolist()))
-        more = BodyForce(self.body, tuple(force.tolist()))
-        return replace(self.known, body_forces=(*self.known.body_forces, more))
+        return added_force(self.known, components @ self.directions, self.body)
 
-    def on(self, body: int | None) -> UnknownForce:
-        """Return the same force on another body."""
-        return replace(self, body=body)
+
+def added_force(
+    loads: ExternalLoad, force: Float[np.ndarray, " 3"], body: int | None
+) -> ExternalLoad:
+    """Return external loads and a force, N, on a body, or at the tip where it is None."""
+    if body is None:
+        at_tip = np.asarray(loads.tip_force, float) + force
+        return replace(loads, tip_force=tuple(at_tip.tolist()))
+    more = BodyForce(body, tuple(force.tolist()))
+    return replace(loads, body_forces=(*loads.body_forces, more))
 
 
 def unknown_force(
@@ -76,7 +87,7 @@ def unknown_force(
     letters = "".join(axis for axis in AXES if axis in letters)
     directions = np.eye(3)[[AXES.index(axis) for axis in letters]]
     loads = ExternalLoad() if known is None else known.external
-    turn = getattr(known, "base_rotation", NO_VECTOR)
+    turn = getattr(known, "base_rotation", _NO_TURN)
     return UnknownForce(tuple(letters), directions, loads, turn, _body(robot, place))
 
 
@@ -143,14 +154,12 @@ class SensingModel:
         readings: What was read.
         unknown: The force that is looked for.
         largest: Largest component of it, N.
-        settings: Tolerance and limits of the solver.
     """
 
     robot: Robot
     readings: Readings
     unknown: UnknownForce
     largest: float
-    settings: Settings
 
     @property
     def size(self) -> int:
@@ -188,14 +197,14 @@ class SensingModel:
         return LoadPath.of_valid(commands, stroke[rows], turn, external)
 
     def solve(
-        self, start: SolverState | None, number: int, forces: Float[np.ndarray, "k d"]
+        self, start: SolvedState, number: int, forces: Float[np.ndarray, "k d"]
     ) -> EquilibriumPath:
         """Solve a reading with some forces, each from the same state; rest where it is None."""
         load = self.load([number] * len(forces), forces)
         return self._each.solve(self.robot, load, start)
 
     def between_readings(
-        self, start: SolverState, number: int, forces: Float[np.ndarray, "2 d"]
+        self, start: SolvedState, number: int, forces: Float[np.ndarray, "2 d"]
     ) -> Float[np.ndarray, " outputs"]:
         """Return by how much what is read depends on the way from the reading before.
 
@@ -211,7 +220,7 @@ class SensingModel:
         tension, stroke = (one[rows] for one in self.readings.commands)
         driven = np.isnan(stroke)
         if (driven[0] != driven[1]).any() or not np.nanmax(tension[0], initial=0.0) > 0.0:
-            return np.zeros(self._width)
+            return np.zeros(len(self.values(self.solve(start, number, forces[1:]))[0]))
         at_once = self.load(rows, forces)
         middle = self.unknown.load(forces.mean(axis=0))
         halves = LoadPath.of_valid(
@@ -224,11 +233,6 @@ class SensingModel:
         first, second = (self.values(way)[-1] for way in ways)
         return np.nan_to_num(first - second)
 
-    @property
-    def _width(self) -> int:
-        read = self.readings.read
-        return sum(read[name].shape[1] for name in self.outputs)
-
     def follow(self, forces: Float[np.ndarray, "s d"]) -> EquilibriumPath:
         """Follow the whole history with a force in every reading."""
         return self._along.solve(self.robot, self.load(range(len(forces)), forces))
@@ -240,20 +244,21 @@ class SensingModel:
         return np.where(path.converged[:, None], values, np.nan)
 
     def slopes(
-        self, path: EquilibriumPath, *, of_drives: bool = False
-    ) -> Float[np.ndarray, "k outputs u"]:
-        """Return the change of what is read by each component, or by each tendon's command."""
-        every = self.drive_changes(path) if of_drives else self.force_changes(path)
-        tangents = PathTangents(path, self.outputs, remembers=False)
-        columns = []
-        directions = [Change(np.tile(change, (len(path), 1)), None) for change in every]
-        for along in tangents.along(directions):
-            parts = [along[name].reshape(len(path), -1) for name in self.outputs]
-            columns.append(np.concatenate(parts, axis=1))
-        return np.stack(columns, axis=-1)
+        self, path: EquilibriumPath, step: int = 0, *, of_drives: bool = False
+    ) -> Float[np.ndarray, "s outputs u"]:
+        """Return the change of what is read by each component of the force in a step of a path.
+
+        Or by each tendon's command in it; NaN where derivatives are not known.
+        """
+        loads = self._moved_by_drives(path) if of_drives else self._moved_by_force(path)
+        rows = (np.arange(len(path)) == step)[:, None]
+        changes = [Change(rows * load_change(path, load), None) for load in loads]
+        by = derivatives(path, changes, self.outputs)
+        parts = [by[name].reshape(*by[name].shape[:2], -1) for name in self.outputs]
+        return np.moveaxis(np.concatenate(parts, axis=-1), 0, -1)
 
     def drive_slopes(
-        self, start: SolverState | None, path: EquilibriumPath, number: int
+        self, start: SolvedState, path: EquilibriumPath, number: int
     ) -> Float[np.ndarray, "outputs t"]:
         """Return the change of what is read by each tendon's command, in one reading.
 
@@ -269,46 +274,38 @@ class SensingModel:
         width = self.readings.driving_deviation[number]
         if np.isfinite(change).all() or not width.any():
             return np.nan_to_num(change)
-        load, count = path.load, len(width)
-        moves = np.concatenate([np.diag(width), -np.diag(width)])
-        moved = LoadPath.of_valid(
-            np.maximum(load.tension + moves, 0.0),  # NaN stays NaN: not commanded
-            load.stroke + moves,
-            load.base_rotation,
-            load.external * len(moves),
-        )
-        values = self.values(self._each.solve(self.robot, moved, start))
-        solved = np.asarray(np.isfinite(values).all(axis=1))
-        values = np.where(solved[:, None], values, self.values(path))
-        over = width * solved.reshape(2, count).sum(axis=0)
-        apart = values[:count] - values[count:]
-        return np.asarray(apart.T / np.where(over > 0.0, over, np.inf))
-
-    def force_changes(self, path: EquilibriumPath) -> list[Float[np.ndarray, " command"]]:
-        """Change of a packed load by a unit of each component; loads are linear in them."""
-        load = path.load
-        kind = tuple(np.isnan(load.stroke[0]).tolist())
-        if kind not in self._changes:
-            forces = np.concatenate([np.zeros((1, self.size)), np.eye(self.size)])
-            external = tuple(map(self.unknown.load, forces))
-            tension, stroke = (
-                np.tile(one[:1], (len(forces), 1)) for one in (load.tension, load.stroke)
+        load, here = path.load, self.values(path)
+        apart, over = np.zeros_like(change), np.zeros(len(width))
+        for side in (1.0, -1.0):
+            moves = side * np.diag(width)
+            moved = LoadPath.of_valid(
+                np.maximum(load.tension + moves, 0.0),  # NaN stays NaN: not commanded
+                load.stroke + moves,
+                load.base_rotation,
+                load.external * len(moves),
             )
-            probe = LoadPath.of_valid(tension, stroke, load.base_rotation, external)
-            packed = make_commands(probe, self.robot, path.chain).packed()
-            self._changes[kind] = list(packed[1:] - packed[0])
-        return self._changes[kind]
+            values = self.values(self._each.solve(self.robot, moved, start))
+            solved = np.asarray(np.isfinite(values).all(axis=1))
+            apart += side * np.where(solved[:, None], values, here).T
+            over += width * solved
+        return apart / np.where(over > 0.0, over, np.inf)
 
-    @cached_property
-    def _changes(self) -> dict[tuple[bool, ...], list[Float[np.ndarray, " command"]]]:
-        return {}
+    def _moved_by_force(self, path: EquilibriumPath) -> list[LoadPath]:
+        """The loads of a path with a unit more of each component in every step."""
+        body = self.unknown.body
+        loads: list[LoadPath] = []
+        for direction in self.unknown.directions:
+            external = tuple(added_force(one, direction, body) for one in path.load.external)
+            loads.append(replace(path.load, external=external))
+        return loads
 
-    def drive_changes(self, path: EquilibriumPath) -> list[Float[np.ndarray, " command"]]:
-        """Change of a packed load by a unit of what drives each tendon."""
-        form = path.prepared.command_layout(path.commands)
-        none = form.unpack(np.zeros(form.size))
-        units = np.eye(path.chain.tendons)
-        return [np.asarray(form.pack(none._replace(target=constant(row)))) for row in units]
+    def _moved_by_drives(self, path: EquilibriumPath) -> list[LoadPath]:
+        """The loads of a path with a unit more of what drives each tendon in every step."""
+        load = path.load
+        return [
+            replace(load, tension=load.tension + unit, stroke=load.stroke + unit)
+            for unit in np.eye(load.tension.shape[1])
+        ]
 
     @cached_property
     def _each(self) -> ForwardModel:
@@ -320,4 +317,4 @@ class SensingModel:
 
     def _model(self, from_rest: bool) -> ForwardModel:
         probe = self.load([0], np.full((1, self.size), 1.0))
-        return ForwardModel(self.robot, probe, self.settings, from_rest=from_rest)
+        return ForwardModel(self.robot, probe, from_rest=from_rest)

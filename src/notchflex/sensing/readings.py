@@ -9,7 +9,7 @@ known: what each says of it is in `own_reading`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -225,24 +225,17 @@ def merged(readings: Readings) -> tuple[Readings, Int[np.ndarray, " s"]]:
         0, that every reading went into.
     """
     noise = readings.noise
-    sensors = (readings.tension, readings.stroke, readings.tip, readings.angles)
-    values = np.concatenate(sensors, axis=1)
-    deviations = np.concatenate(
-        [
-            np.full(table.shape[1], one)
-            for table, one in zip(
-                sensors, (noise.tension, noise.stroke, noise.tip, noise.angle), strict=True
-            )
-        ]
+    tables = [readings.tension, readings.stroke, readings.tip, readings.angles]
+    deviations = np.repeat(
+        [noise.tension, noise.stroke, noise.tip, noise.angle], [table.shape[1] for table in tables]
     )
-    group = _groups(values, deviations)
+    group = _groups(np.concatenate(tables, axis=1), deviations)
     count = np.bincount(group)
-    means = [_means(table, group) for table in sensors]
-    tension, stroke, tip, angles = means
-    joined = replace(
-        readings, tension=tension, stroke=stroke, tip=tip, angles=angles, count=count.astype(float)
+    rows = np.split(np.arange(len(group)), np.cumsum(count)[:-1])
+    tension, stroke, tip, angles = (
+        np.array([table[some].mean(axis=0) for some in rows]) for table in tables
     )
-    return joined, group
+    return Readings(tension, stroke, tip, angles, noise, count.astype(float)), group
 
 
 def _groups(
@@ -261,11 +254,3 @@ def _groups(
             total, size = row.copy(), 1
             group[number] = group[number - 1] + 1
     return group
-
-
-def _means(table: Float[np.ndarray, "s m"], group: Int[np.ndarray, " s"]) -> np.ndarray:
-    first = np.flatnonzero(np.diff(group, prepend=-1))
-    size = np.diff(np.append(first, len(group)))
-    means = np.add.reduceat(table, first, axis=0) / size[:, None]
-    # One reading alone stays what it is, to the last digit.
-    return np.where((size == 1)[:, None], table[first], means)

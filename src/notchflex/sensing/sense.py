@@ -10,14 +10,12 @@ from jaxtyping import Int
 from numpy.typing import ArrayLike
 
 from notchflex import InputError, Robot
+from notchflex.search.least_squares import SearchPoint
 from notchflex.sensing.bounds import Bounds, bounds
-from notchflex.sensing.history import estimate, with_noise
+from notchflex.sensing.history import estimate, own_readings, state_after, with_noise
 from notchflex.sensing.model import SensingModel, unknown_force
-from notchflex.sensing.own_reading import own_readings
 from notchflex.sensing.readings import Readings, SensorNoise, merged, readings_of
-from notchflex.sensing.search import Candidate
 from notchflex.sensing.sensed import LeftOpen, SensedForce
-from notchflex.solver.newton import DEFAULT
 from notchflex.support import ExternalLoad, check_is_robot, check_number
 
 Stage = Callable[[str, int, int], None]
@@ -88,7 +86,7 @@ def sense(
     given = readings_of(robot, tensions, strokes, tip, angles, sensors)
     readings, group = merged(given)
     unknown = unknown_force(robot, components, place, known)
-    model = SensingModel(robot, readings, unknown, _largest(robot, readings, largest), DEFAULT)
+    model = SensingModel(robot, readings, unknown, _largest(robot, readings, largest))
     places: dict[int | None, float] = {}
     if place == "search":
         model, places = _best_place(model, progress)
@@ -126,20 +124,20 @@ def _best_place(
     report = _stage(progress, "trying places")
     misfits: dict[int | None, float] = {}
     for number, body in enumerate(bodies, 1):
-        candidates = estimate(replace(model, unknown=model.unknown.on(body))).best
+        candidates = estimate(replace(model, unknown=replace(model.unknown, body=body))).best
         whole = len(candidates) == len(model.readings)
-        misfits[body] = sum(one.misfit for one in candidates) if whole else np.inf
+        misfits[body] = sum(point.merit() for point in candidates) if whole else np.inf
         if report is not None:
             report(number, len(bodies))
     # Of places that fit as well the tip is taken: it is where robots touch.
     least = min(misfits.values())
     body = None if misfits[None] <= least + 1e-6 else min(misfits, key=lambda one: misfits[one])
-    return replace(model, unknown=model.unknown.on(body)), misfits
+    return replace(model, unknown=replace(model.unknown, body=body)), misfits
 
 
 def _result(
     model: SensingModel,
-    candidates: list[Candidate],
+    candidates: list[SearchPoint],
     ends: Bounds,
     left_open: list[LeftOpen],
     places: dict[int | None, float],
@@ -160,7 +158,7 @@ def _result(
         high=_filled(ends.high, (count, size)),
         limited=np.concatenate([ends.limited, np.zeros((rest, size), bool)]),
         stuck=stuck,
-        misfit=_filled([one.misfit for one in candidates], (means,))[group],
+        misfit=_filled([point.merit() for point in candidates], (means,))[group],
         read=entries[group],
         no_force=_filled(ends.no_force, (count,)),
         hidden=tuple(hidden),
@@ -169,7 +167,9 @@ def _result(
         places=places,
         level=LEVEL,
         largest=model.largest,
-        path=model.follow(np.array([one.force for one in candidates])) if candidates else None,
+        path=model.follow(np.array([point.variables for point in candidates]))
+        if candidates
+        else None,
         reason=_reason(model, candidates, group),
     )
 
@@ -182,14 +182,16 @@ def _filled(rows: object, shape: tuple[int, ...]) -> np.ndarray:
     return values
 
 
-def _reason(model: SensingModel, candidates: list[Candidate], group: Int[np.ndarray, " s"]) -> str:
+def _reason(
+    model: SensingModel, candidates: list[SearchPoint], group: Int[np.ndarray, " s"]
+) -> str:
     """Return why the history ended before its last reading."""
     if len(candidates) == len(model.readings):
         return ""
     number = len(candidates)
-    state, force = (
-        (candidates[-1].state, candidates[-1].force) if candidates else (None, np.zeros(model.size))
-    )
+    state, force = None, np.zeros(model.size)
+    if candidates:
+        state, force = state_after(candidates[-1]), candidates[-1].variables
     path = model.solve(state, number, force[None])
     reading = int(np.argmax(group == number)) + 1
     return f"reading {reading} of {len(group)}: {path.reason[0]}"

@@ -12,9 +12,8 @@ from scipy.stats import chi2
 
 from notchflex import ConvergenceError, EquilibriumPath, Robot
 from notchflex.sensing.bounds import Bounds
-from notchflex.sensing.history import LINEAR
+from notchflex.sensing.history import LINEAR, OwnReading
 from notchflex.sensing.model import SensingModel
-from notchflex.sensing.own_reading import OwnReading
 from notchflex.sensing.search import BAD_FIT
 from notchflex.support import Displayed, Summary
 

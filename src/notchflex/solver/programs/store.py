@@ -40,7 +40,7 @@ SHIPPED = PACKAGE / "shipped_programs"
 _PREFIX = "program-"
 # Folders of notchflex that define programs, or what programs are made of. Programs depend on all of
 # `lanewise`, too.
-_COMPILED = {"robot", "mechanics", "loads", "solver", "results", "analysis", "control"}
+_COMPILED = {"robot", "mechanics", "loads", "solver", "results", "analysis"}
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 _POSIX = hasattr(os, "geteuid") and os.open in os.supports_dir_fd

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from notchflex.control.search.iterative_search import least_step
+from notchflex.search.least_squares import bounded_step
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -19,7 +19,7 @@ def test_step_is_the_constrained_minimum(seed):
     def objective(step):
         return 0.5 * step @ hessian @ step + gradient @ step
 
-    step = least_step(hessian, gradient, low, high, limits, room)
+    step = bounded_step(hessian, gradient, low, high, limits, room)
     bounds = list(zip(low, high, strict=True))
     cones = [{"type": "ineq", "fun": lambda d: room - limits @ d}] if len(room) else []
     best = minimize(objective, np.zeros(size), bounds=bounds, constraints=cones, tol=1e-12)
@@ -32,6 +32,6 @@ def test_step_is_the_constrained_minimum(seed):
 def test_limits_that_contradict_give_a_finite_step_within_the_box():
     limits, room = np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([-1.0, -1.0])
     low, high = np.full(2, -0.5), np.full(2, 0.5)
-    step = least_step(np.eye(2), np.ones(2), low, high, limits, room)
+    step = bounded_step(np.eye(2), np.ones(2), low, high, limits, room)
     assert np.isfinite(step).all()
     assert (np.abs(step) <= 0.5).all()

@@ -1,0 +1,244 @@
+"""The problem of a search for drives: robot, limits and targets from the arguments of a user."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple, get_args
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from notchflex import Failure, InputError, Load, Robot, State, Step, Stepper
+from notchflex.control.limits import Bound, Drive, Limits, bounds_of_robot
+from notchflex.control.targets import Aim, Targets, aim_at
+from notchflex.support import check_integer, check_number, load_path, short_repr
+
+# Default limit of drives, as a multiple of about the closing value of a notch.
+_MAX_FACTOR = {"tension": 4.0, "stroke": 2.0}
+# A program is compiled for every set of quantities; those of a group cost little beside each other.
+_ASKED_TOGETHER = (
+    ("tip_position", "tip_rotation", "total_angle"),
+    ("tension", "stroke", "peak_strain", "gap"),
+)
+# Limits smaller than this (N, mm, or a strain) are kept within parts of it.
+_MIN_LIMIT = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class TargetSearch:
+    """Tolerance and budget of a search for a target.
+
+    Attributes:
+        tolerance: Weighted error (mm, N, rad) at which the search ends.
+        near: Distance from lengths of a target at which it counts as met, mm.
+        near_angle: Angle from angles of a target at which it counts as met, rad.
+        solves: Largest number of solves for one target.
+
+    Raises:
+        InputError: A number that is not positive.
+    """
+
+    tolerance: float = 1e-7
+    near: float = 0.05
+    near_angle: float = math.radians(0.2)
+    solves: int = 80
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        check_integer(self.solves, "the number of solves of a search")
+        for name, value in vars(self).items():
+            if not check_number(value, f"{name} of a search") > 0.0:
+                raise InputError.OUT_OF_RANGE(
+                    f"{name} of a search must be greater than 0; got {value!r}"
+                )
+
+
+class ProblemOptions(NamedTuple):
+    """Arguments common to `reach`, `follow` and `Controller`."""
+
+    state: State | None
+    load: Load | None
+    drive: Drive
+    limits: Limits | None
+    weights: Mapping[str, float] | None
+    search: TargetSearch | None
+
+    def check(self) -> None:
+        """Check all but the weights.
+
+        Raises:
+            InputError: Anything of another type.
+        """
+        if self.drive not in get_args(Drive):
+            raise InputError.UNKNOWN_NAME(
+                f'drive is "tension" or "stroke"; got {short_repr(self.drive)}'
+            )
+        for name, kind in _KINDS.items():
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, kind):
+                raise InputError.WRONG_TYPE(f"{name} cannot be {short_repr(value)}; see its help")
+
+
+_KINDS = {"load": Load, "limits": Limits, "search": TargetSearch, "state": State}
+
+
+class Response(NamedTuple):
+    """A solved step of the drives.
+
+    Attributes:
+        step: The step.
+        sliding: Slopes of all quantities by the drives, of tendons that stick as they last slid.
+        stuck: Which tendons stick, or may.
+    """
+
+    step: Step
+    sliding: Float[np.ndarray, "m t"]
+    stuck: Bool[np.ndarray, " t"]
+
+
+class Problem(NamedTuple):
+    """What does not change from target to target.
+
+    Attributes:
+        stepper: The robot.
+        entries: Entries of a step's values that have a target.
+        weights: What an error of one unit counts.
+        driven: Which tendons are driven; the others keep what the load commands.
+        low: Lowest drive of every tendon, N or mm.
+        high: Highest drive.
+        widest: Lowest and highest drive without the limits of the user.
+        rate: Largest change of a drive from target to target, N or mm.
+        bounds: Limits on other quantities.
+        unit: Drive that about closes a notch, N or mm.
+        by_tension: Whether drives are tensions; otherwise they are strokes.
+        search: Tolerance and budget.
+    """
+
+    stepper: Stepper
+    entries: np.ndarray
+    weights: np.ndarray
+    driven: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    widest: tuple[np.ndarray, np.ndarray]
+    rate: float
+    bounds: tuple[Bound, ...]
+    unit: float
+    by_tension: bool
+    search: TargetSearch
+
+    def present(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
+        """Return the drives of a state; of held tendons what they are held at."""
+        return np.where(self.driven, self.stepper.drives_of(state), self.low)
+
+    def near(self, present: Float[np.ndarray, " t"]) -> Problem:
+        """Return the problem with drives no farther from the present ones than the rate."""
+        if not np.isfinite(self.rate):
+            return self
+        low, high = (
+            np.where(self.driven, np.clip(present + rate, self.low, self.high), self.low)
+            for rate in (-self.rate, self.rate)
+        )
+        return self._replace(low=low, high=high)
+
+    def limited(
+        self, values: Float[np.ndarray, " m"], slopes: Float[np.ndarray, "m t"]
+    ) -> tuple[Float[np.ndarray, "c t"], Float[np.ndarray, " c"]]:
+        """Return slopes of limited quantities and their distances from the limits, relative."""
+        rows, room = [slopes[:0]], [values[:0]]
+        for bound in self.bounds:
+            place, _ = self.stepper.places[bound.quantity]
+            left = bound.side * (bound.limit - values[place])
+            limited = np.isfinite(left)
+            scale = np.maximum(np.abs(bound.limit), _MIN_LIMIT)[limited]
+            # At a kink some have no slopes.
+            rows.append(bound.side * np.nan_to_num(slopes[place][limited]) / scale[:, None])
+            room.append(left[limited] / scale)
+        return np.concatenate(rows), np.concatenate(room)
+
+
+class Attempt(NamedTuple):
+    """Result of a search.
+
+    Attributes:
+        response: The solved step.
+        error: Weighted distance from the target.
+        excess: Largest violation of a limit, as a part of it; 0 where all are kept.
+        solves: How many loads were solved.
+        failure: Why the target is not met; None where it is.
+    """
+
+    response: Response
+    error: float
+    excess: float
+    solves: int
+    failure: Failure | None
+
+    @property
+    def drives(self) -> Float[np.ndarray, " t"]:
+        """Drives of all tendons, N or mm."""
+        return self.response.step.drives
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is an equilibrium."""
+        return bool(self.response.step.converged)
+
+
+def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tuple[Problem, Aim]:
+    """Return what a search needs of robot and limits, and the targets as numbers.
+
+    Raises:
+        InputError: Anything that cannot be used.
+    """
+    options.check()
+    tendons, limits, drive = robot.number_of_tendons, options.limits or Limits(), options.drive
+    commands = load_path(options.load or Load(), tendons)
+    tension, stroke = commands.tension[0], commands.stroke[0]
+    held = ~np.isnan(tension) | ~np.isnan(stroke)
+    if held.all():
+        raise InputError.CONFLICT(
+            "the load commands every tendon, so that none is left to be driven; "
+            "leave the tension of those to be driven out"
+        )
+    bounds = tuple(bounds_of_robot(limits, drive, tendons, robot.number_of_notches))
+    outputs = {*targets.outputs, *(bound.quantity for bound in bounds)}
+    words = np.where(held, np.where(np.isnan(stroke), "tension", "stroke"), drive).tolist()
+    stepper = _stepper(robot, outputs, words, options)
+    chain = stepper.prepared.chain
+    by_tension = drive == "tension"
+    unit = float(chain.closing_force if by_tension else np.asarray(chain.rods.length).sum())
+    most = _MAX_FACTOR[drive] * unit
+    least = 0.0 if by_tension else -most
+    low, high = limits.bounds(drive, tendons)
+    low = np.maximum(low, least)
+    high = np.maximum(np.minimum(high, most), low)
+    fixed = np.where(np.isnan(stroke), tension, stroke)
+    low, high, least, most = (np.where(held, fixed, end) for end in (low, high, least, most))
+    places = {name: place for name, (place, _) in stepper.places.items()}
+    aim = aim_at(targets, places, options.weights)
+    rate = np.inf if limits.rate is None else limits.rate
+    search = options.search or TargetSearch()
+    return Problem(
+        stepper, aim.entries, aim.weights, ~held, low, high, (least, most), rate, bounds, unit,
+        by_tension, search,
+    ), aim  # fmt: skip
+
+
+def _stepper(
+    robot: Robot, outputs: set[str], drives: list[Drive], options: ProblemOptions
+) -> Stepper:
+    """The robot under the loads of the user."""
+    # With those usually asked beside them: fewer programs.
+    usual = [name for group in _ASKED_TOGETHER if outputs & {*group} for name in group]
+    return Stepper(
+        robot,
+        tuple(dict.fromkeys([*usual, *sorted(outputs)])),
+        drives=drives,
+        jacobian=True,
+        loads=replace(options.load or Load(), tension=None, stroke=None),
+        from_state=options.state,
+        refinement=0 if options.state is None else options.state.refinement,
+    )

@@ -1,1 +1,0 @@
-"""One compiled program that solves loads for drives, and how it is called."""

@@ -1,0 +1,316 @@
+"""The search for drives that meet one target, from one state.
+
+The tip follows the drives smoothly but for kinks: where a tendon turns round its contacts stick
+first, and a notch closes. Between turning round and the first slip a tendon moves nothing: there a
+search takes the slopes with which it last slid, and leaps over the dead band.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from notchflex import Failure
+from notchflex.control.problem import Attempt, Problem, Response
+from notchflex.search.least_squares import BoundedLeastSquares, SearchEnd, SearchPoint
+
+# Smallest reach of a search, as a part of what about closes a notch.
+_FIRST_PART = 0.05
+# A tendon sticks where its slopes, squared, are this part of those with which it last slid; or,
+# where these are not known, below this size (mm, N or rad per N or mm, squared).
+_NO_SLOPE, _STUCK = 1e-12, 1e-18
+# It slides just beyond its dead band, by this part of the drive.
+_BEYOND = 1e-6
+# Beyond the dead band a notch that is pressed together may hold on: the way so far tells how far it
+# can be.
+_ONWARD = 0.5
+# Drives within this part of what about closes a notch of a limit, or of an edge, are at it.
+_AT_LIMIT = 1e-10
+# Beside others a tendon stays in its dead band if it must slide by less than this part of it.
+_SMALL_LEAP = 1e-3
+# Beyond the dead band slopes show the way back if the error has grown by less than this factor.
+_ACROSS = 100.0
+# A tendon that was slack is pulled above this part of what about closes a notch.
+_PULLED = 1e-6
+# Steps whose slopes promise less than this part of the squared error bring nothing.
+_FLAT = 1e-6
+# Notches hold on where the target changes by less than this (mm, N or rad, by weights) for a change
+# of the tension by about the closing tension of a notch.
+_HOLDS = 0.1
+# Relative accuracy of the lower end of a range of tensions; an edge of a dead band is passed by the
+# second part of it.
+_EXACT, _PASSED = 5e-7, 1e-9
+
+KEPT = 1e-6
+"""Relative tolerance of limits."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveSearch:
+    """A target that is searched from a state.
+
+    Attributes:
+        problem: Target quantities and limits.
+        before: The state before.
+        goal: The target; NaN where an entry is free.
+    """
+
+    problem: Problem
+    before: Float[np.ndarray, " state"]
+    goal: Float[np.ndarray, " m"]
+
+    @cached_property
+    def least_squares(self) -> BoundedLeastSquares:
+        """The problem for drives."""
+        problem = self.problem
+        return BoundedLeastSquares(
+            self.move,
+            problem.low,
+            problem.high,
+            problem.search.tolerance,
+            reach=_FIRST_PART * problem.unit,
+            small=int(problem.driven.sum()) > len(self._rows),
+        )
+
+    @cached_property
+    def _rows(self) -> Int[np.ndarray, " k"]:
+        return np.flatnonzero(self.goal == self.goal)
+
+    @cached_property
+    def _entries(self) -> Int[np.ndarray, " k"]:
+        return self.problem.entries[self._rows]
+
+    @cached_property
+    def _weights(self) -> Float[np.ndarray, " k"]:
+        return self.problem.weights[self._rows]
+
+    def present(self) -> tuple[Response, int]:
+        """Solve the present drives, and others beyond dead bands for slopes; count the solves."""
+        problem, present = self.problem, self.problem.present(self.before)
+        response, solves = self.solve(present), 1
+        if response is None:
+            step = problem.stepper.step(self.before, present)
+            return Response(step, step.flat_jacobian, problem.driven), solves
+        low, high = problem.stepper.dead_band(self.before).T
+        for edges in ((1.0 + _BEYOND) * high, (1.0 - _BEYOND) * low):
+            stuck = response.stuck
+            if not stuck.any():
+                break
+            beyond, solves = self.solve(np.where(stuck, edges, present)), solves + 1
+            if beyond is not None:
+                sliding = np.where(stuck, beyond.sliding, response.sliding)
+                response = Response(response.step, sliding, stuck & beyond.stuck)
+        return response, solves
+
+    def solve(
+        self, drives: Float[np.ndarray, " t"], like: Response | None = None
+    ) -> Response | None:
+        """Solve some drives; slopes of tendons that stick are those of another solution."""
+        step = self.problem.stepper.step(self.before, drives)
+        if not step.converged:
+            return None
+        slopes = step.flat_jacobian
+        size = self._size(slopes)
+        if like is None:
+            return Response(step, np.nan_to_num(slopes), self.problem.driven & (size <= _STUCK))
+        stuck = size <= _NO_SLOPE * self._size(like.sliding)
+        # After a step in parts slopes are not known: those of the other one are corrected.
+        unknown = stuck | ~np.isfinite(size)
+        if unknown.any():
+            slopes = np.where(unknown, like.sliding, slopes)
+        return Response(step, slopes, stuck)
+
+    def _size(self, slopes: Float[np.ndarray, "m t"]) -> Float[np.ndarray, " t"]:
+        """Squares of the slopes of the target by every drive."""
+        return np.square(slopes[self._entries]).sum(axis=0)
+
+    def point(self, response: Response, across: float = 0.0) -> SearchPoint:
+        """Return a solution as a point of the search."""
+        values, sliding = response.step.flat_values, response.sliding
+        if not self.problem.driven.all():
+            sliding = sliding * self.problem.driven
+        residuals = self._weights * (values[self._entries] - self.goal[self._rows])
+        slopes = self._weights[:, None] * sliding[self._entries]
+        limits, room = self.problem.limited(values, sliding)
+        return SearchPoint(response.step.drives, residuals, slopes, limits, room, response, across)
+
+    def move(self, point: SearchPoint, step: Float[np.ndarray, " t"]) -> SearchPoint | None:
+        """Return the point after a step, over the dead bands of tendons that stick."""
+        problem, response, drives = self.problem, point.solution, point.variables
+        ahead, leapt = drives + step, []
+        if response.stuck.any():
+            leapt = self._leap(response, step, ahead)
+        near = ahead <= problem.low + _AT_LIMIT * problem.unit
+        ahead = np.where(near, problem.low, np.minimum(ahead, problem.high))
+        if (ahead == drives).all():
+            return point
+        solved = self.solve(ahead, response)
+        if solved is None:
+            return None
+        across = 0.0
+        if leapt:
+            across = 1.0 + 1e-9 if solved.stuck[leapt].any() else _ACROSS
+        return self.point(solved, across)
+
+    def _leap(
+        self, response: Response, step: Float[np.ndarray, " t"], ahead: Float[np.ndarray, " t"]
+    ) -> list[int]:
+        """Move drives of tendons that stick on to the end of the dead band; return which."""
+        problem, drives, leapt = self.problem, response.step.drives, []
+        band = problem.stepper.dead_band(response.step.state).tolist()
+        several = np.count_nonzero(problem.driven) > 1
+        for tendon in np.flatnonzero(response.stuck).tolist():
+            change = float(step[tendon])
+            leap = band[tendon][int(change > 0.0)] - float(drives[tendon])
+            if abs(leap) <= _AT_LIMIT * problem.unit:
+                way = float(drives[tendon] - problem.present(self.before)[tendon])
+                leap = math.copysign(_ONWARD * way, change)
+            if several and abs(change) <= _SMALL_LEAP * abs(leap):
+                ahead[tendon] = drives[tendon]
+            elif change != 0.0 and leap != 0.0:
+                ahead[tendon] += leap
+                leapt.append(tendon)
+        return leapt
+
+    def moving(self, moved: Bool[np.ndarray, " t"], drives: Float[np.ndarray, " t"]) -> DriveSearch:
+        """Return the search in which only some tendons move."""
+        problem = self.problem
+        if moved is problem.driven:
+            return self
+        low, high = (np.where(moved, end, drives) for end in (problem.low, problem.high))
+        return replace(self, problem=problem._replace(driven=moved, low=low, high=high))
+
+    def attempt(self, end: SearchEnd, solves: int) -> Attempt:
+        """Return the end of a search, with why the target is not met."""
+        point, failure = end.point, None
+        if not end.met:
+            failure = self._failure(point) if end.settled else Failure.SEARCH_STOPPED
+        return Attempt(point.solution, point.error, point.excess, solves, failure)
+
+    def _failure(self, point: SearchPoint) -> Failure:
+        """Why no step brings the target nearer: limits of the user, or none."""
+        low, high = self.problem.widest
+        unlimited = replace(point, limits=point.limits[:0], room=point.room[:0])
+        without = replace(self.least_squares, low=low, high=high)
+        least = (1.0 - _FLAT) * unlimited.merit()
+        stops = unlimited.merit(self.least_squares.step(point)) >= least
+        goes_on = unlimited.merit(without.step(unlimited)) < least
+        return Failure.LIMITS_PREVENT if stops and goes_on else Failure.TARGET_OUT_OF_REACH
+
+    def lowered(self, response: Response, tendon: int) -> tuple[Response, int]:
+        """Lower the tension of a tendon as far as the target stays met; count the solves."""
+        problem, solves = self.problem, 0
+        steep = self._weights * response.step.flat_jacobian[self._entries, tendon]
+        slides = not response.stuck[tendon] and float(steep @ steep) > (_HOLDS / problem.unit) ** 2
+        if slides:
+            return response, solves
+        below, top = float(problem.low[tendon]), float(response.step.drives[tendon])
+        edge = (1.0 - _PASSED) * float(response.step.dead_band[tendon, 0])
+        guess = max(below, edge)
+        while top - below > _EXACT * top:
+            drives = response.step.drives.copy()
+            drives[tendon] = guess
+            lower, solves = self.solve(drives, response), solves + 1
+            if lower is not None and self.least_squares.is_met(self.point(lower)):
+                response, top = lower, guess
+                guess = (1.0 - _EXACT) * top if guess == edge else 0.5 * (below + top)
+            else:
+                below, guess = guess, 0.5 * (guess + top)
+        return response, solves
+
+
+def find(
+    problem: Problem,
+    before: Float[np.ndarray, " state"],
+    goal: Float[np.ndarray, " m"],
+    known: Response | None = None,
+    budget: int | None = None,
+) -> Attempt:
+    """Search drives that meet a target, from the present ones and where that fails from others.
+
+    Args:
+        problem: Target quantities and limits.
+        before: The state before.
+        goal: The target; NaN where an entry is free.
+        known: Values and slopes of the state before, where they are known.
+        budget: Largest number of solves, from the present drives alone; where None other drives
+            are tried too, each with the number of solves of the problem.
+    """
+    search, solves, best = DriveSearch(problem, before, goal), 0, None
+    if known is None:
+        known, solves = search.present()
+    if not known.step.converged:
+        return Attempt(known, np.nan, np.inf, solves, Failure.NO_EQUILIBRIUM)
+    present = problem.present(before)
+    step = replace(known.step, state=before, drives=present)
+    here = Response(step, known.sliding, problem.driven)
+    slack = problem.driven & (present <= problem.low)
+    for drives, moved in _starts(problem, present, slack):
+        left = problem.search.solves if budget is None else budget - solves
+        elsewhere = bool((drives != present).any())
+        if best is not None and (left <= 0 or (elsewhere and budget is not None)):
+            break
+        part = search.moving(moved, drives)
+        start = here._replace(stuck=moved)
+        if elsewhere:
+            start, solves = part.solve(drives, here), solves + 1
+        if start is None:
+            continue
+        end = part.least_squares.search(part.point(start), left)
+        solves += end.solves
+        attempt = part.attempt(end, solves)
+        best = attempt if best is None or _quality(attempt) < _quality(best) else best
+        # Where a slack tendon was pulled the others may suffice.
+        pulls = (best.drives > problem.low + _PULLED * problem.unit)[slack].any()
+        if best.failure is None and not (pulls and moved is problem.driven):
+            break
+    assert best is not None
+    return best._replace(solves=solves)
+
+
+def _starts(
+    problem: Problem, present: Float[np.ndarray, " t"], slack: Bool[np.ndarray, " t"]
+) -> Iterator[tuple[Float[np.ndarray, " t"], Bool[np.ndarray, " t"]]]:
+    """Yield drives to start from, and which tendons move."""
+    yield present, problem.driven
+    taut = problem.driven & ~slack
+    if slack.any() and taut.any():
+        yield present, taut
+    rest = np.where(problem.driven, 0.0, present)
+    alone = 0.15 * problem.unit * np.eye(len(present))[problem.driven]
+    for drives in (0.5 * (present + rest), rest, *(rest + alone)):
+        drives = np.clip(drives, problem.low, problem.high)
+        if (drives != present).any():
+            yield drives, problem.driven
+
+
+def _quality(attempt: Attempt) -> tuple[bool, bool, float]:
+    failed = attempt.failure is not None
+    size = attempt.error if failed else float(np.linalg.norm(attempt.drives))
+    return failed, attempt.excess > KEPT, float(f"{size:.9g}")
+
+
+def smallest_tensions(
+    problem: Problem,
+    before: Float[np.ndarray, " state"],
+    goal: Float[np.ndarray, " m"],
+    attempt: Attempt,
+) -> Attempt:
+    """Return the smallest tensions that meet a target as those that were found do.
+
+    Friction lets a range of tensions hold one shape: between turning round and the first slip of a
+    contact nothing moves, nor do notches that are pressed together. The search stops at any.
+    """
+    if attempt.failure is not None or not problem.by_tension:
+        return attempt
+    search, response, solves = DriveSearch(problem, before, goal), attempt.response, attempt.solves
+    for tendon in np.flatnonzero(problem.driven & (attempt.drives > problem.low)):
+        response, more = search.lowered(response, int(tendon))
+        solves += more
+    point = search.point(response)
+    return Attempt(response, point.error, point.excess, solves, None)
