@@ -20,8 +20,8 @@ from notchflex.fit import (
     write_fitted,
 )
 from notchflex.fit.documents import calibration_document
-from notchflex.fit.estimation.problem import FitProblem
-from notchflex.fit.model.samples import Samples
+from notchflex.fit.search import FitProblem
+from notchflex.fit.residuals import Samples
 from notchflex.plotting.fits.calibration import data_panel, residual_panel
 from notchflex.plotting.sheet import Curve
 from refusals import refused

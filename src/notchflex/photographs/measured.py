@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex import Robot
-from notchflex.fit.measurements.columns import measured_columns
+from notchflex.fit import MEASURED, deviation_header, headers
 from notchflex.support import write_columns
 
 PHOTOGRAPH = "photograph"
@@ -103,13 +103,10 @@ class MeasuredPhotographs:
         table: dict[str, list[Any]] = {PHOTOGRAPH: [one.source for one in self.measured]}
         for name, texts in self.loads.items():
             table[name] = [texts[row] for row in rows]
-        notches, tendons = self.robot.number_of_notches, self.robot.number_of_tendons
-        for column in measured_columns(notches, tendons, ()):
-            if column.quantity != "notch_angle":
-                continue
-            (notch,) = column.index
-            table[column.name] = [math.degrees(one.notch_angle[notch]) for one in self.measured]
-            table[column.deviation] = [
+        notches = (self.robot.number_of_notches,)
+        for (notch,), header in headers(MEASURED["notch_angle"].columns, notches).items():
+            table[header] = [math.degrees(one.notch_angle[notch]) for one in self.measured]
+            table[deviation_header(header)] = [
                 math.degrees(one.notch_angle_deviation[notch]) for one in self.measured
             ]
         return table

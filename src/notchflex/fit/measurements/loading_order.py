@@ -93,20 +93,19 @@ def loading_order(commands: Sequence[Command], pull: Sequence[str] | None, rows:
         False
     """
     labels = ("1",) * rows if pull is None else tuple(pull)
-    begins: set[int] = set()
+    begins = np.zeros(rows, int)
     falling = ""
     for name, values in commands:
         for fall in _falls(values, labels):
             if fall.kind == "unloading":
                 falling = falling or name
             elif fall.kind == "restart":
-                begins.add(fall.start)
+                begins[fall.start] = 1
             elif fall.kind == "unclear":
                 unclear = fall.start, name, float(values[fall.top]), float(values[fall.start])
                 return Order(True, labels, unclear)
     if pull is None:
-        number = np.cumsum([row in begins for row in range(rows)]) + 1
-        labels = tuple(str(one) for one in number)
+        labels = tuple(map(str, np.cumsum(begins) + 1))
     count = len(set(labels))
     words = ""
     if falling:
@@ -116,9 +115,9 @@ def loading_order(commands: Sequence[Command], pull: Sequence[str] | None, rows:
             "path, in their order, with friction history; give --from-rest if every row was "
             "loaded from rest"
         )
-    elif begins and pull is None:
+    elif count > 1 and pull is None:
         words = (
-            f"the {commands[0][0]} begins again {len(begins)} time{'s' * (len(begins) > 1)}, so "
+            f"the {commands[0][0]} begins again {count - 1} time{'s' * (count > 2)}, so "
             f"the rows are taken as {count} pulls, each row loaded from rest; give --path if they "
             "are one loading path"
         )

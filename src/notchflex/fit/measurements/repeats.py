@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.fit.measurements.loading_order import TURN, turning_points
-from notchflex.fit.measurements.measurements import Measurements
+from notchflex.fit.measurements.measurements import Measurements, Numbers
 
 # Resolution of a sensor if unknown, as a part of the range of a command.
 _STEP = 1e-3
 
-Numbers = NDArray[np.float64]
 Curve = tuple[Numbers, list[int]]
 """Loads of a pull, rising, and its rows."""
 
@@ -127,25 +126,21 @@ def _histories(measurements: Measurements, commands: Numbers) -> list[Hashable]:
                 rises = values[ends[branch + 1]] >= values[ends[branch]]
                 turned[row] += [(column, values[point]) for point in points[:branch]]
                 turned[row].append((column, np.inf if rises else -np.inf))
-    histories: list[Hashable] = []
     known: list[list[tuple[int, float]]] = []
+    numbers: list[Hashable] = []
     for history in turned:
         equal = (n for n, other in enumerate(known) if _are_equal(history, other, TURN * span))
-        number = next(equal, len(known))
-        if number == len(known):
-            known.append(history)
-        histories.append(number)
-    return histories
+        numbers.append(next(equal, len(known)))
+        known.append(history)
+    return numbers
 
 
 def _are_equal(
     first: list[tuple[int, float]], second: list[tuple[int, float]], near: Numbers
 ) -> bool:
-    if [column for column, _ in first] != [column for column, _ in second]:
-        return False
-    return all(
-        mine == its or abs(mine - its) <= near[column]
-        for (column, mine), (_, its) in zip(first, second, strict=True)
+    return len(first) == len(second) and all(
+        column == other and (value == turned or abs(value - turned) <= near[column])
+        for (column, value), (other, turned) in zip(first, second, strict=True)
     )
 
 

@@ -48,7 +48,7 @@ _KINDS = dict.fromkeys((*_NOTCHES, "total_angle", "total_edge_angle", "tip_rotat
 
 def data_panels(fit: Calibration, label: str) -> Iterator[Panel]:
     """Yield the panels of a robot: some notches, and every other measured number."""
-    from notchflex.fit.measurements.measurements import OBSERVED
+    from notchflex.fit import OBSERVED
 
     for quantity in OBSERVED:
         if quantity == "axis_points":  # thirty points and more: only their residuals
@@ -63,7 +63,7 @@ def data_panels(fit: Calibration, label: str) -> Iterator[Panel]:
 
 def data_panel(fit: Calibration, label: str, quantity: str, component: int) -> Panel:
     """Return one number over the load: measured, model, and the band of the model."""
-    from notchflex.fit.assessment.errors_of_parts import edge, part_title
+    from notchflex.fit import edge, part_title
 
     residuals = fit.residuals
     name, unit, scale = edge(quantity)
@@ -145,7 +145,7 @@ def _titled(fit: Calibration, label: str, title: str) -> str:
 
 def _rows_of(fit: Calibration, label: str, *quantities: str) -> NDArray[np.bool_]:
     """Return which residuals belong to a robot, and to some of its quantities."""
-    from notchflex.fit.measurements.measurements import OBSERVED
+    from notchflex.fit import OBSERVED
 
     of_robot = fit.residuals.robot == list(fit.given).index(label)
     if not quantities:

@@ -1,23 +1,69 @@
-"""Objectives of a fit: squares over the noise, or the sums of norms of the papers."""
+"""Objectives of a fit: squares over the noise, or the sums of norms of the papers; the noise."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.stats import norm
 
 from notchflex import InputError
-from notchflex.fit.estimation.intervals import Cost
-from notchflex.fit.measurements.measurements import OBSERVED
+from notchflex.fit.measurements.measurements import MEASURED, OBSERVED, Numbers
 from notchflex.fit.measurements.repeats import repeats
-from notchflex.fit.model.residuals import ANGLES, LENGTHS, Residuals
-from notchflex.fit.model.samples import Samples
+from notchflex.fit.residuals import Residuals, Samples
 
+Vector = Float[np.ndarray, " k"]
+
+# Standard deviations to begin with if nothing is known, rad, mm and N by unit.
+_FIRST_NOISE = {"deg": float(np.radians(1.0)), "mm": 0.1, "N": 0.01}
+# Nothing is measured better than this part of that; else an exact fit would have no noise at all.
+_LEAST_NOISE = 1e-9
 # How often outliers are weighed anew while deviations from the drawing are found.
 _REWEIGHTED = 100
+
+
+class Cost(NamedTuple):
+    """An objective at some values.
+
+    Attributes:
+        value: Its value, 0 or more.
+        gradient: Its derivatives.
+        curvature: Approximate second derivatives, positive semidefinite.
+        residuals: The residuals it is made of, less what deviations from the drawing explain.
+        contributions: What each residual adds to the gradient; the deviations from the drawing
+            make the best of it.
+        deviations: The deviations, in standard deviations, less their means, (m,).
+        scatter: Covariance of the gradient that priors stand for.
+        hessian: Second derivatives, if they are known better than `curvature`.
+    """
+
+    value: float
+    gradient: Vector
+    curvature: Float[np.ndarray, "k k"]
+    residuals: Any = None
+    contributions: Float[np.ndarray, "r k"] = np.zeros((0, 0))
+    deviations: Float[np.ndarray, " m"] = np.zeros(0)
+    scatter: Any = 0.0
+    hessian: Any = None
+
+    @property
+    def second_derivatives(self) -> Float[np.ndarray, "k k"]:
+        """The second derivatives, as well as they are known."""
+        return self.curvature if self.hessian is None else self.hessian
+
+    def with_prior(self, number: int, off: float, deviation: float, weight: float) -> Cost:
+        """Add the square of a constant's distance from its mean, as one more measurement."""
+        unit = np.eye(len(self.gradient))[number]
+        more = weight / deviation**2 * np.outer(unit, unit)
+        return self._replace(
+            value=self.value + 0.5 * weight * (off / deviation) ** 2,
+            gradient=self.gradient + more[number] * off,
+            curvature=self.curvature + more,
+            scatter=self.scatter + weight * more,
+            hessian=None if self.hessian is None else self.hessian + more,
+        )
 
 
 class FitObjective(Protocol):
@@ -75,34 +121,44 @@ class LeastSquares:
         """Return half the sum of squares, or of Huber's function."""
         slopes, spread = (one / noise[:, None] for one in (residuals.slopes, residuals.spread))
         expected = (residuals.values + residuals.expected) / noise
-        most = np.inf if self.huber is None else self.huber
+        most = self.huber or np.inf
         deviations, scaled = np.zeros(spread.shape[1]), expected
         for _ in range(_REWEIGHTED):  # least squares, reweighted (Holland and Welsch 1977)
-            weight = np.minimum(1.0, most / np.maximum(np.abs(scaled), 1e-300))
-            present, deviations = deviations, -_best(spread, weight, expected)
+            before, deviations = deviations, -_best(spread, _weight(scaled, most), expected)
             scaled = expected + spread @ deviations
-            if self.huber is None or np.allclose(present, deviations, rtol=0.0, atol=1e-10):
+            if self.huber is None or np.allclose(before, deviations, rtol=0.0, atol=1e-10):
                 break
         clipped = np.clip(scaled, -most, most)
-        size = np.abs(clipped)
-        misfit = float(np.sum(size * (np.abs(scaled) - 0.5 * size)))
-        weight = np.minimum(1.0, most / np.maximum(np.abs(scaled), 1e-300))
+        misfit = np.sum(np.abs(clipped) * (np.abs(scaled) - 0.5 * np.abs(clipped)))
         left = residuals.values + residuals.expected + residuals.spread @ deviations
         # The deviations follow the constants: what remains of the slopes, and of the curvature.
-        follow = _best(spread, weight, slopes)
-        remaining = slopes - spread @ follow
+        weight = _weight(scaled, most)
+        follow = slopes - spread @ _best(spread, weight, slopes)
         quadratic = (np.abs(scaled) <= most).astype(float)
         turned = _best(spread, quadratic, slopes)
+        remaining = slopes - spread @ turned
         return Cost(
-            misfit + 0.5 * float(deviations @ deviations),
+            float(misfit + 0.5 * deviations @ deviations),
             slopes.T @ clipped,
-            (slopes * weight[:, None]).T @ remaining,
+            (slopes * weight[:, None]).T @ follow,
             replace(residuals, values=left),
-            (slopes - spread @ turned) * clipped[:, None],
+            remaining * clipped[:, None],
             deviations,
             turned.T @ turned,
-            (slopes * quadratic[:, None]).T @ (slopes - spread @ turned),
+            (slopes * quadratic[:, None]).T @ remaining,
         )
+
+
+def _weight(scaled: Numbers, most: float) -> Numbers:
+    """Weights with which squares are Huber's function."""
+    return np.minimum(1.0, most / np.maximum(np.abs(scaled), 1e-300))
+
+
+def _best(spread: Float[np.ndarray, "r m"], weight: Numbers, values: Numbers) -> Numbers:
+    """Deviations of unit variance that explain values best, by weighted least squares."""
+    root = np.sqrt(weight)
+    axes, sizes, turn = np.linalg.svd(spread * root[:, None], full_matrices=False)
+    return turn.T @ ((axes * sizes / (1.0 + sizes**2)).T @ (root * values.T).T)
 
 
 @dataclass(frozen=True)
@@ -124,16 +180,17 @@ class SumOfRobotErrors:
 
     def check(self, quantities: tuple[str, ...]) -> None:
         """Raise InputError unless all quantities are angles."""
-        _check(quantities, ANGLES, "SumOfRobotErrors adds angles")
+        angles = [name for name in MEASURED if name.endswith("angle")]
+        _check(quantities, angles, "SumOfRobotErrors adds angles")
 
     def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
         """Return the mean over the robots where residuals are as large as the noise, deg."""
-        is_known, size = np.isfinite(noise), int(residuals.robot.max()) + 1
-        robot = residuals.robot[is_known]
-        count = np.bincount(robot, minlength=size)
-        noise = np.sqrt(np.bincount(robot, noise[is_known] ** 2, size) / count)
-        rows = np.array([residuals.rows[residuals.robot == one][0] for one in range(size)])
-        return float(np.degrees(np.mean(noise / np.sqrt(rows * count))))
+        weights: list[float] = []
+        for robot in np.unique(residuals.robot):
+            counted = (residuals.robot == robot) & np.isfinite(noise)
+            size = np.sqrt(np.mean(noise[counted] ** 2))
+            weights.append(size / np.sqrt(residuals.rows[counted][0] * counted.sum()))
+        return float(np.degrees(np.mean(weights)))
 
     def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
         """Return the sum of norms, a group per robot, each over the root of its number of rows."""
@@ -155,7 +212,8 @@ class SumOfDistances:
 
     def check(self, quantities: tuple[str, ...]) -> None:
         """Raise InputError unless all quantities are points."""
-        _check(quantities, LENGTHS, "SumOfDistances adds distances of points")
+        points = [name for name, one in MEASURED.items() if one.unit == "mm"]
+        _check(quantities, points, "SumOfDistances adds distances of points")
 
     def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
         """Return 0: it takes no priors."""
@@ -166,49 +224,30 @@ class SumOfDistances:
         return _sum_of_norms(residuals, residuals.point, np.ones(len(residuals)))
 
 
-def _best(
-    spread: Float[np.ndarray, "r m"], weight: Float[np.ndarray, " r"], values: np.ndarray
-) -> np.ndarray:
-    """Deviations of unit variance that explain values best, by weighted least squares."""
-    root = np.sqrt(weight).reshape(-1, *(1,) * (values.ndim - 1))
-    axes, sizes, turn = np.linalg.svd(spread * np.sqrt(weight)[:, None], full_matrices=False)
-    shrunk = sizes / (1.0 + sizes**2)
-    return turn.T @ ((axes * shrunk).T @ (root * values))
+def _check(quantities: tuple[str, ...], allowed: list[str], what: str) -> None:
+    for name in quantities:
+        if name not in allowed:
+            raise InputError.UNSUPPORTED(
+                f"{what}; {name} was measured too. Leave it out of the file, or use LeastSquares()"
+            )
 
 
-def _check(quantities: tuple[str, ...], allowed: tuple[str, ...], what: str) -> None:
-    wrong = [name for name in quantities if name not in allowed]
-    if wrong:
-        raise InputError.UNSUPPORTED(
-            f"{what}; {wrong[0]} was measured too. Leave it out of the file, or use LeastSquares()"
-        )
-
-
-def _sum_of_norms(
-    residuals: Residuals, group: Int[np.ndarray, " r"], factor: Float[np.ndarray, " r"]
-) -> Cost:
+def _sum_of_norms(residuals: Residuals, group: Int[np.ndarray, " r"], factor: Numbers) -> Cost:
     """The sum over groups of the norm of their residuals.
 
     The curvature is that of linear residuals: of a norm n = |r| it is J^T (1 - r r^T / n^2) J / n,
     positive semidefinite.
     """
     values, slopes = residuals.values * factor, residuals.slopes * factor[:, None]
-    groups = int(group.max()) + 1
-    norm = np.sqrt(np.bincount(group, values**2, groups))
-    divisor = np.maximum(norm, 1e-12)
+    norms = np.sqrt(np.bincount(group, values**2))
+    divisor = np.maximum(norms, 1e-12)
     weighted = slopes / divisor[group][:, None]
     contributions = weighted * values[:, None]
-    along = np.stack([np.bincount(group, one, groups) for one in contributions.T], axis=1)
+    along = np.zeros((len(norms), slopes.shape[1]))
+    np.add.at(along, group, contributions)
     curvature = weighted.T @ slopes - (along / divisor[:, None]).T @ along
     gradient = contributions.sum(axis=0)
-    return Cost(float(norm.sum()), gradient, curvature, residuals, contributions)
-
-
-# Standard deviations to begin with if nothing is known: 1 deg, 0.1 mm, 0.01 N.
-_FIRST: dict[str, float] = {"tip_tension": 0.01, "tip_position": 0.1, "axis_points": 0.1}
-_FIRST_ANGLE = float(np.radians(1.0))
-# Nothing is measured better than this part of that; else an exact fit would have no noise at all.
-_MIN_NOISE = 1e-9
+    return Cost(float(norms.sum()), gradient, curvature, residuals, contributions)
 
 
 @dataclass(frozen=True)
@@ -235,33 +274,28 @@ class Noise:
     @property
     def is_known(self) -> bool:
         """Whether none of them is estimated from the residuals."""
-        return not bool(self.estimated.any())
+        return not self.estimated.any()
 
 
 def first_noise(samples: Samples, residuals: Residuals) -> Noise:
     """Return standard deviations as given, or of repeats; a first guess if there are neither."""
-    deviation = residuals.given.copy()
-    estimated = np.zeros(len(deviation), bool)
-    source: dict[tuple[int, str], str] = {}
+    noise = Noise(residuals.given.copy(), np.zeros(len(residuals), bool), {})
     for number, sample in enumerate(samples.every):
-        of_repeats = repeats(sample.measured)
-        for name in sample.measured.observed:
+        for name, between_repeats in repeats(sample.measured).items():
             mine = residuals.of(number, name)
-            missing = mine & ~(deviation > 0.0)
-            key = (number, name)
+            missing = mine & ~(noise.deviation > 0.0)
             if sample.measured.is_sum(name):
-                deviation[mine] = np.inf
-                source[key] = "sum of the notches"
+                source, missing, size = "sum of the notches", mine, np.inf
             elif not missing.any():
-                source[key] = "given"
-            elif 0.0 < of_repeats[name] < np.inf:
-                deviation[missing] = of_repeats[name]
-                source[key] = "repeats"
+                source, size = "given", np.nan
+            elif 0.0 < between_repeats < np.inf:
+                source, size = "repeats", between_repeats
             else:
-                deviation[missing] = _FIRST.get(name, _FIRST_ANGLE)
-                estimated |= missing
-                source[key] = "fit"
-    return Noise(deviation, estimated, source)
+                source, size = "fit", _FIRST_NOISE[MEASURED[name].unit]
+                noise.estimated[missing] = True
+            noise.deviation[missing] = size
+            noise.source[number, name] = source
+    return noise
 
 
 def noise_left(noise: Noise, residuals: Residuals, constants: int, *, robust: bool) -> Noise:
@@ -275,8 +309,8 @@ def noise_left(noise: Noise, residuals: Residuals, constants: int, *, robust: bo
     share = max(1.0 - constants / counted, 1.0 / counted)
     for quantity in np.unique(residuals.quantity[noise.estimated]):
         mine = noise.estimated & (residuals.quantity == quantity)
-        least = _MIN_NOISE * _FIRST.get(OBSERVED[quantity], _FIRST_ANGLE)
+        least = _LEAST_NOISE * _FIRST_NOISE[MEASURED[OBSERVED[quantity]].unit]
         size = np.abs(residuals.values[mine])
         mean = (np.median(size) / norm.ppf(0.75)) ** 2 if robust else np.mean(size**2)
         deviation[mine] = max(np.sqrt(mean / share), least)
-    return Noise(deviation, noise.estimated, noise.source)
+    return replace(noise, deviation=deviation)
