@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.fit import LeastSquares, Measurements, calibrate, diagnose, simulate_measurements
-from notchflex.fit import diagnosis
-from notchflex.fit.documents import calibration_document
+from notchflex.fit import (
+    LeastSquares,
+    Measurements,
+    calibrate,
+    calibration_document,
+    diagnose,
+    diagnosis,
+    simulate_measurements,
+)
 from notchflex.fit.search import minimise
 
 WRIST = nf.load_robot("pacheco2021-a")

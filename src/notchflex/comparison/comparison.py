@@ -48,16 +48,16 @@ class Comparison:
 
     robot: Robot
     measured: Measurements
-    tension: Float[np.ndarray, "p t"]
-    stroke: Float[np.ndarray, "p t"]
-    notch_angle: Float[np.ndarray, "p n"]
-    total_angle: Float[np.ndarray, " p"]
-    tip: Float[np.ndarray, "p 3"]
+    tension: Numbers
+    stroke: Numbers
+    notch_angle: Numbers
+    total_angle: Numbers
+    tip: Numbers
     converged: Bool[np.ndarray, " p"]
     reason: tuple[str, ...]
     others: dict[str, float] = field(default_factory=dict[str, float])
-    stroke_lost: Float[np.ndarray, " p"] | None = None
-    beyond_faces: Float[np.ndarray, "p n"] | float = 0.0
+    stroke_lost: Numbers | None = None
+    beyond_faces: Numbers | float = 0.0
 
     @property
     def angle(self) -> str:
@@ -65,13 +65,13 @@ class Comparison:
         return angle_of(self.measured)
 
     @cached_property
-    def measured_notch_angle(self) -> Float[np.ndarray, "p n"]:
+    def measured_notch_angle(self) -> Numbers:
         """Measured angle of every notch [rad], (P, n); NaN where it was not measured."""
         nothing = np.full(self.notch_angle.shape, np.nan)
         return self.measured.observed.get(self.angle, nothing)
 
     @cached_property
-    def measured_total_angle(self) -> Float[np.ndarray, " p"]:
+    def measured_total_angle(self) -> Numbers:
         """Measured total angle [rad], (P,): its own column, or else the sum of all notches."""
         added = np.sum(self.measured_notch_angle, axis=1)
         observed = self.measured.observed
@@ -79,7 +79,7 @@ class Comparison:
         return added if total is None else np.where(np.isnan(total), added, total)
 
     @cached_property
-    def measured_tip(self) -> Float[np.ndarray, "p 3"]:
+    def measured_tip(self) -> Numbers:
         """Measured tip in the world [mm], (P, 3); NaN for unknown coordinates.
 
         As measured, or else that of the model, moved as arcs of the measured notch angles lie from
@@ -102,7 +102,7 @@ class Comparison:
         return int(self.converged.sum())
 
     @property
-    def rmse_notches(self) -> Float[np.ndarray, " n"]:
+    def rmse_notches(self) -> Numbers:
         """Root-mean-square error of every notch angle [rad], (n,)."""
         return self._rms(self.notch_angle - self.measured_notch_angle)
 
@@ -112,7 +112,7 @@ class Comparison:
         return float(self._rms(self.total_angle - self.measured_total_angle))
 
     @property
-    def tip_error(self) -> Float[np.ndarray, " p"]:
+    def tip_error(self) -> Numbers:
         """Distance of the tip from the measured tip [mm], (P,), over its measured coordinates."""
         off = self.tip - self.measured_tip
         return np.where(np.isnan(off).all(axis=1), np.nan, np.sqrt(np.nansum(off**2, axis=1)))

@@ -52,8 +52,8 @@ def calibrate(
         priors: Whether what is not fitted may deviate from the robot files within their
             tolerances, or those that `uncertain` assumes (linearised; of `LeastSquares` only, and
             not if robots have constants of their own, `each:`).
-        starts: Number of starting points; the first is the robots as they are. With two or more,
-            every search looks again from points near its end.
+        starts: Number of starting points; the first is the robots as they are. The misfit has
+            kinks where notches close and laws of materials begin, and so shallow minima.
         seed: Seed of the starting points.
         intervals: Whether to find 95 % intervals too (profile likelihood; of `LeastSquares` only).
         settings: Settings of the solver.

@@ -20,11 +20,11 @@ from jaxtyping import Bool, Float, Int
 from scipy.stats import chi2, t
 
 from notchflex import InputError, Robot, Settings
-from notchflex.fit.constants import Unknown
+from notchflex.fit.constants import Unknown, values_set, with_numbers
 from notchflex.fit.objective import Cost, Noise, Vector
-from notchflex.fit.residuals import Residuals, deviated
+from notchflex.fit.residuals import Residuals
 from notchflex.fit.search import FitProblem, Minimum, unit_free
-from notchflex.support import Displayed, Summary, frame, short
+from notchflex.support import frame
 
 if TYPE_CHECKING:
     from notchflex.fit.residual_tests import ResidualTests
@@ -63,7 +63,7 @@ class Interval:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Profile(Displayed):
+class Profile:
     """The misfit about its minimum, as a function of one constant.
 
     Attributes:
@@ -76,24 +76,6 @@ class Profile(Displayed):
     best: Minimum
     number: int
 
-    @property
-    def _limits(self) -> tuple[float, float]:
-        problem = self.problem
-        return float(problem.lower[self.number]), float(problem.upper[self.number])
-
-    @property
-    def _estimate(self) -> float:
-        return float(self.best.values[self.number])
-
-    def _summary(self) -> Summary:
-        rows = [
-            ("at the minimum", short(self._estimate)),
-            ("limits", " to ".join(map(short, self._limits))),
-            ("misfit there", short(reached(self.best).value)),
-        ]
-        title = f"Misfit as a function of constant {self.number + 1} of {len(self.best.values)}"
-        return Summary(title, rows, ".interval(rise=..., scale=...) finds where it has risen")
-
     def held(self, value: float, start: Vector) -> Minimum:
         """Return the minimum with the constant held at a value, searched from a start."""
         return self.problem.held(self.number, value, start)
@@ -103,25 +85,27 @@ class Profile(Displayed):
 
         `scale` is a typical size of the constant's changes, if its curvature gives none.
         """
-        points = {self._estimate: 0.0}
+        points = {float(self.best.values[self.number]): 0.0}
         ends: list[float | None] = []
         reasons: dict[str, None] = {}
-        for side, word, limit in zip((-1.0, 1.0), ("below", "above"), self._limits, strict=True):
-            end, reason = self._end(side, limit, rise, scale, points)
+        for side, limits in (("below", self.problem.lower), ("above", self.problem.upper)):
+            limit = float(limits[self.number])
+            end, reason = self._end(limit, side, rise, scale, points)
             ends.append(end)
             if end is None:
                 at = f" (limit {limit:.6g})" if np.isfinite(limit) else ""
-                reasons[reason or f"nothing in the data holds it from {word}{at}"] = None
+                reasons[reason or f"nothing in the data holds it from {side}{at}"] = None
         return Interval(ends[0], ends[1], np.array(sorted(points.items())), "; ".join(reasons))
 
     def _end(
-        self, side: float, limit: float, rise: float, scale: float, points: dict[float, float]
+        self, limit: float, side: str, rise: float, scale: float, points: dict[float, float]
     ) -> tuple[float | None, str]:
         """One end of the interval: where the root of the rise, nearly linear, meets its target."""
-        sizes, plain = unit_free(reached(self.best).curvature)
+        best, estimate = reached(self.best), float(self.best.values[self.number])
+        sizes, plain = unit_free(best.curvature)
         inverse = np.linalg.pinv(plain, rcond=1e-10, hermitian=True)
         variance = max(inverse[self.number, self.number], 1e-12)
-        target, most = np.sqrt(rise), abs(limit - self._estimate)
+        target, most, sign = np.sqrt(rise), abs(limit - estimate), 1.0 if side == "above" else -1.0
         guess = min(target * np.sqrt(variance) / sizes[self.number], _MAX_HALF_WIDTHS * scale)
         inner, outer = (0.0, 0.0), (np.inf, np.inf)
         reach, start = guess, self.best.values
@@ -129,31 +113,32 @@ class Profile(Displayed):
             at_limit, reach = reach >= most, min(reach, most)
             if reach == 0.0:
                 return None, ""
-            value = limit if at_limit else float(self._estimate + side * reach)
+            value = limit if at_limit else float(estimate + sign * reach)
             minimum = self.held(value, start)
             root = np.inf  # without a robot, or a solution, that far the end must be nearer
             if minimum.cost is not None:
                 start = minimum.values
-                rises = 2.0 * (minimum.cost.value - reached(self.best).value)
-                points[value] = max(rises, 0.0)
+                points[value] = max(2.0 * (minimum.cost.value - best.value), 0.0)
                 root = np.sqrt(points[value])
             if abs(root - target) < _CLOSE * target:
                 return value, ""
             if root > target:
                 outer = (reach, root)
-            elif at_limit or (np.isinf(outer[0]) and reach >= _MAX_HALF_WIDTHS * max(scale, guess)):
+            elif at_limit:
                 return None, ""
             else:
                 inner = (reach, root)
-            if np.isinf(outer[0]):
-                reach *= min(max(1.1 * target / max(root, 1e-300), 1.2), 4.0)
-            else:
+            if np.isfinite(outer[0]):
                 share = (target - inner[1]) / (outer[1] - inner[1])
-                share = 0.5 if np.isinf(outer[1]) else min(max(share, 0.05), 0.95)
+                share = min(max(share, 0.05), 0.95) if np.isfinite(outer[1]) else 0.5
                 reach = inner[0] + share * (outer[0] - inner[0])
+            elif reach >= _MAX_HALF_WIDTHS * max(scale, guess):
+                return None, ""
+            else:
+                reach *= min(max(1.1 * target / max(root, 1e-300), 1.2), 4.0)
         if np.isinf(outer[1]):
             return None, NO_SOLUTION
-        return float(self._estimate + side * reach), ""
+        return float(estimate + sign * reach), ""
 
 
 class ByPulls(NamedTuple):
@@ -234,17 +219,20 @@ class Calibration:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the constants."""
-        return tuple(one.name for one in self.problem.unknowns)
+        return tuple(unknown.name for unknown in self.problem.unknowns)
 
     @property
     def values(self) -> dict[str, float]:
         """Fitted values, in the units of the robot file."""
-        return dict(zip(self.names, self.best.values.tolist(), strict=True))
+        return self._by_name(self.best.values)
+
+    def _by_name(self, values: Vector) -> dict[str, float]:
+        return dict(zip(self.names, values.tolist(), strict=True))
 
     @property
     def units(self) -> dict[str, str]:
         """Units of the values, "" for a pure number."""
-        return {one.name: one.unit for one in self.problem.unknowns}
+        return {unknown.name: unknown.unit for unknown in self.problem.unknowns}
 
     @property
     def converged(self) -> bool:
@@ -285,9 +273,11 @@ class Calibration:
     @cached_property
     def robots(self) -> dict[str, Robot]:
         """The robots with the fitted constants."""
+        constants = (*self.problem.unknowns, *self.drawing)
+        values = [*self.best.values, *self.deviations_of_drawing.values()]
         return {
-            one.label: deviated(one.robot_with(self.best.values), one.label, self.drawing)
-            for one in self.problem.samples.every
+            label: with_numbers(robot, values_set(label, constants, values))
+            for label, robot in self.problem.samples.robots.items()
         }
 
     @property
@@ -300,7 +290,7 @@ class Calibration:
     @property
     def deviations_of_drawing(self) -> dict[str, float]:
         """Deviations from the drawing that the data tell, in standard deviations by name."""
-        return {one.name: one.start for one in self.drawing}
+        return {deviation.name: deviation.start for deviation in self.drawing}
 
     @cached_property
     def tests(self) -> ResidualTests | None:
@@ -349,17 +339,16 @@ class Calibration:
         Of numbers whose noise is known independently of the fit, with what deviates from the
         drawing; NaN if there are none.
         """
-        is_known, left = self._known
-        if left <= 0:
-            return float("nan")
+        is_known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
         scaled = self.residuals.values[is_known] / self.noise.deviation[is_known]
-        return float(np.sum(scaled**2) + np.sum(self.reached.deviations**2)) / left
+        squares = np.sum(scaled**2) + np.sum(self.reached.deviations**2)
+        return float(squares) / self._left if self._left > 0 else float("nan")
 
     @property
-    def _known(self) -> tuple[Bool[np.ndarray, " r"], int]:
-        """Numbers with noise known independently of the fit; how many more than constants."""
+    def _left(self) -> int:
+        """Numbers whose noise is known independently of the fit, less the constants."""
         is_known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
-        return is_known, int(is_known.sum()) - len(self.names)
+        return int(is_known.sum()) - len(self.names)
 
     @cached_property
     def log_likelihood(self) -> float:
@@ -403,7 +392,7 @@ class Calibration:
     @property
     def misses(self) -> bool:
         """Whether the model misses the measurements by more than noise can explain."""
-        value, (_, left) = self.reduced_chi_squared, self._known
+        value, left = self.reduced_chi_squared, self._left
         return bool(value > 1.0 and not self.huber and chi2.sf(value * left, left) < _UNLIKELY)
 
     @property
@@ -550,7 +539,7 @@ class Calibration:
     @property
     def deviations(self) -> dict[str, float]:
         """Standard deviations of the constants, with the model linearised."""
-        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+        return self._by_name(np.sqrt(np.diag(self.covariance)))
 
     @property
     def correlation(self) -> Matrix:

@@ -285,7 +285,8 @@ def _described(
         raise InputError.MISSING_VALUE(f"the mean of `{read}` is 0; give limits")
     per = f"{unit}/{described_at(robot, read).unit}".removesuffix("/")
     unit = "" if rule == "factor" else per
-    return unit, -math.inf, math.inf, mean / size, *sorted((first / size, last / size))
+    low, high = sorted((first / size, last / size))
+    return unit, -math.inf, math.inf, mean / size, low, high
 
 
 def _range(path: str, unit: str, value: float) -> tuple[float, float]:
@@ -312,7 +313,9 @@ def deviations_of(robots: Mapping[str, Robot], constants: Sequence[Unknown]) -> 
     deviations: dict[str, Unknown] = {}
     for label, robot in robots.items():
         exact = robot.replace(tolerance=None)
-        tolerances = [one for one in tolerances_of(robot)[0] if one.value != _IN_THE_MODULI]
+        tolerances = [
+            tolerance for tolerance in tolerances_of(robot)[0] if tolerance.value != _IN_THE_MODULI
+        ]
         for source in sources_of(exact, tolerances):
             sets: list[RobotNumber] = []
             means: list[float] = []

@@ -107,11 +107,9 @@ def _branches(calibration: Calibration, number: int, measured: Measurements) -> 
     for name in ("total_angle", "notch_angle"):
         mine = residuals.of(number, name)
         if mine.any():
-            off = np.full((len(measured), int(residuals.part[mine].max()) + 1), np.nan)
-            off[residuals.row[mine], residuals.part[mine]] = -residuals.values[mine]
-            count = np.isfinite(off).sum(axis=1)
-            total = np.nansum(off, axis=1)
-            mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+            row, size = residuals.row[mine], len(measured)
+            total, count = (np.bincount(row, one, size) for one in (-residuals.values[mine], None))
+            mean = np.divide(total, count, out=np.full(size, np.nan), where=count > 0)
             return branch_words(mean, name, measured)
     return ()
 

@@ -245,7 +245,7 @@ def posterior_document(drawn: Posterior, *, draws: bool = False) -> dict[str, An
 
 def data_of(calibration: Calibration, label: str) -> list[str]:
     """Return the sources of the measurements of a robot."""
-    sources = (one.source for one in calibration.problem.samples.of_robot(label))
+    sources = (table.source for table in calibration.problem.samples.of_robot(label))
     return list(dict.fromkeys(sources))
 
 

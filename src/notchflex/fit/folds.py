@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -14,8 +14,8 @@ from notchflex import InputError, Robot
 from notchflex.fit.calibrate import by_label, check_search, fitted
 from notchflex.fit.calibration import Calibration
 from notchflex.fit.constants import Constant, RobotNumber, Unknown, unknowns
-from notchflex.fit.measurements.measurements import OBSERVED, Measurements
-from notchflex.fit.objective import LeastSquares, Vector
+from notchflex.fit.measurements.measurements import OBSERVED, Measurements, Numbers
+from notchflex.fit.objective import LeastSquares
 from notchflex.fit.residuals import Residuals, Samples, deviated
 from notchflex.fit.search import FitProblem, Progress
 
@@ -85,12 +85,9 @@ def update_specimen(
         raise InputError.WRONG_TYPE(
             "a photograph is Measurements of one row or more; `measurements.taken([row])` takes one"
         )
-    priors = {one.path: one.prior for one in reversed(found.problem.unknowns)}
+    priors = {unknown.path: unknown.prior for unknown in reversed(found.problem.unknowns)}
     own = [
-        replace(
-            one,
-            prior=prior_of(one if one.prior else replace(one, prior=priors.get(one.path)), found),
-        )
+        replace(one, prior=prior_of(replace(one, prior=one.prior or priors.get(one.path)), found))
         for one in unknowns({label: robot}, constants)
     ]
     return updated(found, label, robot, measured, own)
@@ -292,9 +289,10 @@ def leave_out(
     folds: list[Fold] = []
     for number, (name, label, part, rest) in enumerate(parts, start=1):
         again, own = _without(found, rest, starts, seed)
-        fold = _blind(name, again, found, label, part, own)
+        blind = _Blind(again, own, found.given[label], label, part)
+        fold = blind.fold(name, found)
         if photograph is not None and own:
-            fold = _with_photograph(fold, found, label, part, own, photograph)
+            fold = blind.with_photograph(fold, photograph)
         folds.append(fold)
         if progress is not None:
             progress("leaving out", number, len(parts))
@@ -306,7 +304,7 @@ def _check_photograph(calibration: Calibration, by: str, photograph: float) -> N
         raise InputError.OUT_OF_RANGE(
             f"a photograph is at a part of the largest load, above 0 and up to 1; got {photograph}"
         )
-    if by != "robot" or not any(one.each for one in calibration.problem.unknowns):
+    if by != "robot" or not any(unknown.each for unknown in calibration.problem.unknowns):
         raise InputError.CONFLICT(
             "one photograph updates constants that each robot has of its own, of a robot that was "
             'left out: leave out by "robot", and fit one, such as each:sensor.force_factor with a '
@@ -342,7 +340,7 @@ def _without(
                 "nothing to find it from. Give a prior (--prior), or measure more robots"
             )
     constants, drawing = (
-        tuple(of_rest for one in every if (of_rest := one.only_of(kept)).sets)
+        tuple(of_rest for constant in every if (of_rest := constant.only_of(kept)).sets)
         for every in (whole.problem.unknowns, whole.problem.drawing)
     )
     samples = Samples.of(kept, rest, constants, whole.settings)
@@ -351,65 +349,53 @@ def _without(
     return again, [replace(one, prior=prior_of(one, again)) for one in lost]
 
 
-def _blind(
-    name: str,
-    fit: Calibration,
-    whole: Calibration,
-    label: str,
-    part: Sequence[Measurements],
-    own: Sequence[Unknown],
-) -> Fold:
-    """Predict a part from a fit to the rest; constants of its robot alone by what is known."""
-    before = {one.name: one.prior for one in own if one.prior is not None}
-    means, sizes = np.reshape([*before.values()], (-1, 2)).T
-    values = np.append(fit.best.values, means)
-    residuals = _residuals(fit, whole, label, part, [*fit.problem.unknowns, *own], values)
-    of_all = _residuals(whole, whole, label, part, whole.problem.unknowns, whole.best.values)
-    errors, errors_of_all = (
-        {} if one is None else one.root_mean_squares() for one in (residuals, of_all)
-    )
-    deviation = np.zeros(0)
-    if residuals is not None:
-        missed = fit.residuals.root_mean_squares()
+class _Blind(NamedTuple):
+    """Measurements of a robot, and a fit that never saw them, with the constants that it lacks."""
+
+    fit: Calibration
+    own: Sequence[Unknown]
+    robot: Robot
+    label: str
+    part: Sequence[Measurements]
+
+    def residuals(self, part: Sequence[Measurements], own: Numbers) -> Residuals | None:
+        """Residuals of a part at values of the own constants; None if a row has no solution."""
+        robot = deviated(self.robot, self.label, self.fit.drawing)
+        constants = [
+            unknown.of(self.label, robot) for unknown in (*self.fit.problem.unknowns, *self.own)
+        ]
+        samples = Samples.of(
+            {self.label: robot}, {self.label: part}, tuple(constants), self.fit.settings
+        )
+        return samples.residuals(np.append(self.fit.best.values, own))
+
+    def fold(self, name: str, whole: Calibration) -> Fold:
+        """Predict the part; constants of its robot alone by what is known of them."""
+        before = {unknown.name: unknown.prior for unknown in self.own if unknown.prior is not None}
+        means, sizes = np.reshape([*before.values()], (-1, 2)).T
+        residuals = self.residuals(self.part, means)
+        of_all = self._replace(fit=whole, own=()).residuals(self.part, np.zeros(0))
+        errors, errors_of_all = (
+            {} if one is None else one.root_mean_squares() for one in (residuals, of_all)
+        )
+        fold = Fold(name, self.fit, errors, errors_of_all, residuals is not None, before=before)
+        if residuals is None:
+            return fold
+        missed = self.fit.residuals.root_mean_squares()
         noise = [missed.get(OBSERVED[one], np.nan) for one in residuals.quantity]
         depends = residuals.slopes.any(axis=0)
         slopes = residuals.slopes[:, depends]
-        covariance = block_diag(fit.covariance, np.diag(sizes**2))[np.ix_(depends, depends)]
-        spread = np.sum(slopes @ covariance * slopes, axis=1)
+        covariance = np.asarray(block_diag(self.fit.covariance, np.diag(sizes**2)))
+        spread = np.sum(slopes @ covariance[np.ix_(depends, depends)] * slopes, axis=1)
         deviation = np.sqrt(np.maximum(spread, 0.0) + np.square(noise))
-    return Fold(
-        name, fit, errors, errors_of_all, residuals is not None, residuals, deviation, before
-    )
+        return replace(fold, residuals=residuals, deviation=deviation)
 
-
-def _with_photograph(
-    fold: Fold,
-    whole: Calibration,
-    label: str,
-    part: Sequence[Measurements],
-    own: Sequence[Unknown],
-    share: float,
-) -> Fold:
-    """Update constants of the robot left out by one row, and try them on the others."""
-    first, fit = part[0], fold.found
-    row = int(np.argmin(np.abs(first.command - share * first.command.max())))
-    specimen = updated(fit, label, whole.given[label], first.taken([row]), own)
-    others = [first.taken(np.arange(len(first)) != row), *part[1:]]
-    values = np.append(fit.best.values, specimen.found.best.values)
-    residuals = _residuals(fit, whole, label, others, [*fit.problem.unknowns, *own], values)
-    errors = {} if residuals is None else residuals.root_mean_squares()
-    return replace(fold, specimen=specimen, row=row, errors_updated=errors)
-
-
-def _residuals(
-    fit: Calibration,
-    whole: Calibration,
-    label: str,
-    part: Sequence[Measurements],
-    constants: Sequence[Unknown],
-    values: Vector,
-) -> Residuals | None:
-    """Residuals of a part at values of constants; None if one of its rows has no solution."""
-    robot = deviated(whole.given[label], label, fit.drawing)
-    of_robot = tuple(one.of(label, robot) for one in constants)
-    return Samples.of({label: robot}, {label: part}, of_robot, whole.settings).residuals(values)
+    def with_photograph(self, fold: Fold, share: float) -> Fold:
+        """Update constants of the robot left out by one row, and try them on the others."""
+        first = self.part[0]
+        row = int(np.argmin(np.abs(first.command - share * first.command.max())))
+        specimen = updated(self.fit, self.label, self.robot, first.taken([row]), self.own)
+        others = [first.taken(np.arange(len(first)) != row), *self.part[1:]]
+        residuals = self.residuals(others, specimen.found.best.values)
+        errors = {} if residuals is None else residuals.root_mean_squares()
+        return replace(fold, specimen=specimen, row=row, errors_updated=errors)

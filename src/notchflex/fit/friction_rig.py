@@ -83,7 +83,7 @@ def coefficient_from_weights(
         [0.0916, 0.0]
     """
     values = _floats(weight_1, weight_2, turn_1, turn_2)
-    if (wrong := impossible(*map(np.ravel, values), law)) is not None:
+    if (wrong := impossible(np.stack([np.ravel(one) for one in values]), law)) is not None:
         raise InputError.OUT_OF_RANGE(f"reading {wrong[0] + 1}: {wrong[1]}")
     return _coefficient(values, law)
 
@@ -147,17 +147,15 @@ def _floats(*values: ArrayLike) -> tuple[Numbers, ...]:
     return np.broadcast_arrays(*(np.asarray(value, float) for value in values))
 
 
-def impossible(
-    m1: Numbers, m2: Numbers, a1: Numbers, a2: Numbers, law: Law
-) -> tuple[int, str] | None:
+def impossible(values: Numbers, law: Law) -> tuple[int, str] | None:
     """Return number (from 0) and reason of the first impossible reading; None if there is none."""
     most, limit = (np.inf, "or more") if law == "capstan" else (np.pi, "to less than 180 deg")
-    turns = np.stack([a1, a2])
+    m1, m2, a1, a2 = values
     straight = "the string does not turn (0 deg over both edges), so"
     checks = {
         "both weights must be above 0.": ~((m1 > 0.0) & (m2 > 0.0)),
         f"a string turns over an edge by 0 {limit} (friction law: {law}).": ~(
-            (turns >= 0.0) & (turns < most)
+            (values[2:] >= 0.0) & (values[2:] < most)
         ).all(axis=0),
         "weight 2 is larger than weight 1, which it cannot be while weight 1 pulls; swap them if "
         "the other one did.": m2 > m1,
@@ -228,7 +226,7 @@ class FrictionReadings:
             raise InputError.NOT_FINITE(
                 "readings must be finite, their standard deviations above 0 or NaN where not known"
             )
-        if (wrong := impossible(*self.values, self.law)) is not None:
+        if (wrong := impossible(self.values, self.law)) is not None:
             raise InputError.OUT_OF_RANGE(f"{self.at(wrong[0])}: {wrong[1]}")
 
     def __len__(self) -> int:

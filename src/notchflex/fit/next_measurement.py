@@ -156,14 +156,16 @@ def _solved(
 ) -> tuple[Residuals, list[int]]:
     """Residuals of the candidates that have a solution, one row each, and their numbers."""
     samples = calibration.problem.samples
-    points = [one.axis_at for one in samples.of_robot(label) if len(one.axis_at)]
+    points = [table.axis_at for table in samples.of_robot(label) if len(table.axis_at)]
     axis_at = points[0] if points and "axis_points" in observed else np.zeros(0)
     model = solve_each(calibration.robots[label], loads)
     steps = np.flatnonzero(model.converged).tolist()
     if steps:
         values = {name: modelled(model, name, axis_at)[steps] for name in observed}
         labels = tuple(map(str, steps))
-        rows = Measurements("candidates", loads[np.array(steps)], labels, True, values, axis_at=axis_at)
+        rows = Measurements(
+            "candidates", loads[np.array(steps)], labels, True, values, axis_at=axis_at
+        )
         robots = {label: calibration.given[label]}
         candidates = Samples.of(robots, {label: [rows]}, calibration.problem.unknowns)
         if (residuals := candidates.residuals(calibration.best.values)) is not None:

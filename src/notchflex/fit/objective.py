@@ -6,11 +6,17 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 from scipy.stats import norm
 
 from notchflex import InputError
-from notchflex.fit.measurements.measurements import MEASURED, OBSERVED, Numbers
+from notchflex.fit.measurements.measurements import (
+    MEASURED,
+    OBSERVED,
+    Flags,
+    Integers,
+    Numbers,
+)
 from notchflex.fit.measurements.repeats import repeats
 from notchflex.fit.residuals import Residuals, Samples
 
@@ -43,8 +49,8 @@ class Cost(NamedTuple):
     gradient: Vector
     curvature: Float[np.ndarray, "k k"]
     residuals: Any = None
-    contributions: Float[np.ndarray, "r k"] = np.zeros((0, 0))
-    deviations: Float[np.ndarray, " m"] = np.zeros(0)
+    contributions: Numbers = np.zeros((0, 0))
+    deviations: Numbers = np.zeros(0)
     scatter: Any = 0.0
     hessian: Any = None
 
@@ -79,11 +85,11 @@ class FitObjective(Protocol):
     takes_priors: ClassVar[bool]
     """Whether a prior may be added to it."""
 
-    def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
+    def weight_of_one(self, residuals: Residuals, noise: Numbers) -> float:
         """Return what half the square of a residual over its noise adds to the value."""
         ...
 
-    def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
+    def cost(self, residuals: Residuals, noise: Numbers) -> Cost:
         """Return value, gradient and curvature."""
         ...
 
@@ -113,11 +119,11 @@ class LeastSquares:
     def check(self, quantities: tuple[str, ...]) -> None:
         """Accept every quantity."""
 
-    def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
+    def weight_of_one(self, residuals: Residuals, noise: Numbers) -> float:
         """Return 1: it is a sum of such halves."""
         return 1.0
 
-    def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
+    def cost(self, residuals: Residuals, noise: Numbers) -> Cost:
         """Return half the sum of squares, or of Huber's function."""
         slopes, spread = (one / noise[:, None] for one in (residuals.slopes, residuals.spread))
         expected = (residuals.values + residuals.expected) / noise
@@ -154,15 +160,32 @@ def _weight(scaled: Numbers, most: float) -> Numbers:
     return np.minimum(1.0, most / np.maximum(np.abs(scaled), 1e-300))
 
 
-def _best(spread: Float[np.ndarray, "r m"], weight: Numbers, values: Numbers) -> Numbers:
+def _best(spread: Numbers, weight: Numbers, values: Numbers) -> Numbers:
     """Deviations of unit variance that explain values best, by weighted least squares."""
     root = np.sqrt(weight)
     axes, sizes, turn = np.linalg.svd(spread * root[:, None], full_matrices=False)
     return turn.T @ ((axes * sizes / (1.0 + sizes**2)).T @ (root * values.T).T)
 
 
+class _SumOfNorms:
+    """The sum over groups of the norm of their residuals, in a unit."""
+
+    is_likelihood: ClassVar[bool] = False
+    _unit: ClassVar[str]
+
+    def check(self, quantities: tuple[str, ...]) -> None:
+        """Raise InputError unless all quantities have the unit, and are no vectors of angles."""
+        for name in quantities:
+            if MEASURED[name].unit != self._unit or name == "tip_rotation":
+                what = "angles" if self._unit == "deg" else "distances of points"
+                raise InputError.UNSUPPORTED(
+                    f"{type(self).__name__} adds {what}; {name} was measured too. Leave it out of "
+                    "the file, or use LeastSquares()"
+                )
+
+
 @dataclass(frozen=True)
-class SumOfRobotErrors:
+class SumOfRobotErrors(_SumOfNorms):
     """Sum over all robots of the norm of their root-mean-square errors, deg (Pacheco 2021, eq. 17).
 
     Each robot adds the 2-norm of the vector of errors of its notches and of its total angle. A
@@ -175,15 +198,10 @@ class SumOfRobotErrors:
         False
     """
 
-    is_likelihood: ClassVar[bool] = False
     takes_priors: ClassVar[bool] = True
+    _unit: ClassVar[str] = "deg"
 
-    def check(self, quantities: tuple[str, ...]) -> None:
-        """Raise InputError unless all quantities are angles."""
-        angles = [name for name in MEASURED if name.endswith("angle")]
-        _check(quantities, angles, "SumOfRobotErrors adds angles")
-
-    def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
+    def weight_of_one(self, residuals: Residuals, noise: Numbers) -> float:
         """Return the mean over the robots where residuals are as large as the noise, deg."""
         weights: list[float] = []
         for robot in np.unique(residuals.robot):
@@ -192,14 +210,14 @@ class SumOfRobotErrors:
             weights.append(size / np.sqrt(residuals.rows[counted][0] * counted.sum()))
         return float(np.degrees(np.mean(weights)))
 
-    def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
+    def cost(self, residuals: Residuals, noise: Numbers) -> Cost:
         """Return the sum of norms, a group per robot, each over the root of its number of rows."""
         factor = np.degrees(1.0) / np.sqrt(residuals.rows)
         return _sum_of_norms(residuals, residuals.robot, factor)
 
 
 @dataclass(frozen=True)
-class SumOfDistances:
+class SumOfDistances(_SumOfNorms):
     """Sum of distances between measured and modelled points, mm (Gao 2017, eq. 27).
 
     Example:
@@ -207,32 +225,19 @@ class SumOfDistances:
         False
     """
 
-    is_likelihood: ClassVar[bool] = False
     takes_priors: ClassVar[bool] = False
+    _unit: ClassVar[str] = "mm"
 
-    def check(self, quantities: tuple[str, ...]) -> None:
-        """Raise InputError unless all quantities are points."""
-        points = [name for name, one in MEASURED.items() if one.unit == "mm"]
-        _check(quantities, points, "SumOfDistances adds distances of points")
-
-    def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
+    def weight_of_one(self, residuals: Residuals, noise: Numbers) -> float:
         """Return 0: it takes no priors."""
         return 0.0
 
-    def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
+    def cost(self, residuals: Residuals, noise: Numbers) -> Cost:
         """Return the sum of norms, a group per point."""
         return _sum_of_norms(residuals, residuals.point, np.ones(len(residuals)))
 
 
-def _check(quantities: tuple[str, ...], allowed: list[str], what: str) -> None:
-    for name in quantities:
-        if name not in allowed:
-            raise InputError.UNSUPPORTED(
-                f"{what}; {name} was measured too. Leave it out of the file, or use LeastSquares()"
-            )
-
-
-def _sum_of_norms(residuals: Residuals, group: Int[np.ndarray, " r"], factor: Numbers) -> Cost:
+def _sum_of_norms(residuals: Residuals, group: Integers, factor: Numbers) -> Cost:
     """The sum over groups of the norm of their residuals.
 
     The curvature is that of linear residuals: of a norm n = |r| it is J^T (1 - r r^T / n^2) J / n,
@@ -262,8 +267,8 @@ class Noise:
             infinite.
     """
 
-    deviation: Float[np.ndarray, " r"]
-    estimated: Bool[np.ndarray, " r"]
+    deviation: Numbers
+    estimated: Flags
     source: dict[tuple[int, str], str]
 
     @property

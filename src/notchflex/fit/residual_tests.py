@@ -198,7 +198,9 @@ def _load(calibration: Calibration) -> Float[np.ndarray, " r"]:
 def _neighbours(calibration: Calibration) -> tuple[np.ndarray, np.ndarray]:
     """Numbers whose loads follow each other in a pull: in its rows, or by load if from rest."""
     residuals = calibration.residuals
-    from_rest = np.array([one.measured.from_rest for one in calibration.problem.samples.every])
+    from_rest = np.array(
+        [sample.measured.from_rest for sample in calibration.problem.samples.every]
+    )
     along = np.where(from_rest[residuals.sample], _load(calibration), residuals.row)
     series = (residuals.sample, residuals.quantity, residuals.part, residuals.pull)
     order = np.lexsort((along, *series))

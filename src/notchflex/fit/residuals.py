@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from notchflex import EquilibriumPath, InputError, LoadPath, Robot, Settings
@@ -19,6 +18,8 @@ from notchflex.fit.constants import SENSOR, Unknown, values_set, with_numbers
 from notchflex.fit.measurements.measurements import (
     MEASURED,
     OBSERVED,
+    Flags,
+    Integers,
     MeasuredRows,
     Measurements,
     Numbers,
@@ -28,17 +29,6 @@ from notchflex.mechanics.motion import left_slope
 from notchflex.support import Change, changes, derivatives, load_change
 
 _BODIES = ("body_position", "body_rotation")
-
-
-class Predicted(NamedTuple):
-    """Outputs of the model at every row, in the world, by name of what is measured.
-
-    `slopes` are derivatives by the constants that set something, in front of the rows.
-    """
-
-    values: dict[str, Numbers]
-    slopes: dict[str, Numbers]
-    converged: Bool[np.ndarray, " p"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,69 +62,47 @@ class Sample:
             self.robot, measured.load, measured.pull, measured.from_rest, self.settings
         )
 
-    def robot_with(self, values: Float[np.ndarray, " k"]) -> Robot:
-        """Return the robot with other values of all constants.
+    def misfits(self, values: Numbers) -> tuple[Flags, dict[str, tuple[Numbers, Numbers]]]:
+        """Return which rows were solved, and by quantity model less measurement with derivatives.
+
+        These are by the constants of `own_unknowns`, as by `misfit`.
 
         Raises:
-            InputError: The robot cannot have them.
-        """
-        return with_numbers(self.robot, values_set(self.label, self.unknowns, values))
-
-    def predict(self, values: Float[np.ndarray, " k"]) -> Predicted:
-        """Return outputs at every row for values of all constants.
-
-        Raises:
-            InputError: The robot cannot have them.
+            InputError: The robot cannot have such values of all constants.
         """
         numbers = values_set(self.label, self.unknowns, values)
-        load = self._load(numbers)
+        load, observed = self._load(numbers), self.measured.observed
         path = self._rows.model.solve(with_numbers(self.robot, numbers), load)
-        needed = [
-            _BODIES if name == "axis_points" else (MEASURED[name].output,)
-            for name in self.measured.observed
-        ]
-        solved = tuple(dict.fromkeys(name for names in needed for name in names))
-        outputs = {name: np.asarray(path.quantity(name)) for name in solved}
-        slopes = {name: np.zeros((0, *one.shape)) for name, one in outputs.items()}
-        if self.own_unknowns and path.converged.all():
-            slopes = derivatives(path, self._changes(path, load, numbers), solved)
-        if "axis_points" in self.measured.observed:
-            places = axis_places(self.robot, self.measured.axis_at)
-            bodies, moves = ([arrays[name] for name in _BODIES] for arrays in (outputs, slopes))
-            outputs["axis_points"] = np.asarray(points_on_axis(places, *map(constant, bodies)))
-            slopes["axis_points"] = axis_point_changes(places, bodies, moves)
         rows = self._rows.sorted_back
-        names = {name: MEASURED[name].output for name in self.measured.observed}
-        return Predicted(
-            {name: rows(outputs[output]) for name, output in names.items()},
-            {name: rows(slopes[output], axis=1) for name, output in names.items()},
-            rows(path.converged),
-        )
+        if not path.converged.all():
+            return rows(path.converged), {}
+        outputs = {name: MEASURED[name].output for name in observed if name != "axis_points"}
+        bodies = _BODIES if "axis_points" in observed else ()
+        solved = tuple(dict.fromkeys((*outputs.values(), *bodies)))
+        modelled = {name: np.asarray(path.quantity(name)) for name in solved}
+        slopes = {name: np.zeros((0, *one.shape)) for name, one in modelled.items()}
+        if self.own_unknowns:
+            slopes = derivatives(path, self._changes(path, load, numbers), solved)
+        if bodies:
+            places = axis_places(self.robot, self.measured.axis_at)
+            poses, moves = ([arrays[name] for name in bodies] for arrays in (modelled, slopes))
+            modelled["axis_points"] = np.asarray(points_on_axis(places, *map(constant, poses)))
+            slopes["axis_points"] = axis_point_changes(places, poses, moves)
+        return rows(path.converged), {
+            name: misfit(name, one, rows(modelled[output]), rows(slopes[output], axis=1))
+            for name, one in observed.items()
+            for output in [MEASURED[name].output]
+        }
 
     def _load(self, numbers: Mapping[str, float]) -> LoadPath:
         """The loads of the robot: the measured ones, corrected for the sensor."""
-        load = self._rows.model.load
+        load, order = self._rows.model.load, self._rows.order
         if not SENSOR.keys() & numbers.keys():
             return load
-        acting = self._acting(numbers)
-        return replace(
-            load,
-            **{
-                command: np.where(
-                    np.isnan(getattr(load, command)), np.nan, np.maximum(acting[command], 0.0)
-                )
-                for command in acting
-            },
-        )
-
-    def _acting(self, numbers: Mapping[str, float]) -> dict[str, Numbers]:
-        """Tensions and strokes that act, by what was measured."""
         offset, factor, slack = (numbers.get(name, row.neutral) for name, row in SENSOR.items())
-        order = self._rows.order
-        return {
-            "tension": factor * (self.measured.measured_tension[order] - offset),
-            "stroke": self.measured.load.stroke[order] - slack,
-        }
+        tension = factor * (self.measured.measured_tension[order] - offset)
+        stroke = self.measured.load.stroke[order] - slack
+        return replace(load, tension=np.maximum(tension, 0.0), stroke=np.maximum(stroke, 0.0))
 
     def _changes(
         self, path: EquilibriumPath, load: LoadPath, numbers: Mapping[str, float]
@@ -158,12 +126,11 @@ class Sample:
     ) -> Numbers:
         """Change of the packed loads, linear in tension and stroke, per unit of `name`."""
         command = SENSOR[name].command
-        value, factor = getattr(load, command), numbers.get("sensor.force_factor", 1.0)
-        if name == "sensor.force_factor":
-            return load_change(path, replace(load, tension=value + value / factor))
-        # Below 0 N the robot has no tension, whatever the offset.
-        less = np.where(value > 0.0, factor if command == "tension" else 1.0, 0.0)
-        return -load_change(path, replace(load, **{command: value + less}))
+        value, step = getattr(load, command), 1.0 if name == "sensor.force_factor" else -1.0
+        moved = getattr(self._load({**numbers, name: numbers[name] + step}), command)
+        # Below 0 N the robot has no tension, whatever the sensor shows.
+        moved = np.where(value > 0.0, moved, value)
+        return step * load_change(path, replace(load, **{command: moved}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,29 +154,29 @@ class Residuals:
         expected: The mean of these deviations times `spread`, (R,) or 0.
     """
 
-    values: Float[np.ndarray, " r"]
-    slopes: Float[np.ndarray, "r k"]
-    sample: Int[np.ndarray, " r"]
-    robot: Int[np.ndarray, " r"]
-    row: Int[np.ndarray, " r"]
-    quantity: Int[np.ndarray, " r"]
-    part: Int[np.ndarray, " r"]
-    pull: Int[np.ndarray, " r"]
-    point: Int[np.ndarray, " r"]
-    rows: Int[np.ndarray, " r"]
-    given: Float[np.ndarray, " r"]
-    spread: Float[np.ndarray, "r m"]
-    expected: Float[np.ndarray, " r"] | float = 0.0
+    values: Numbers
+    slopes: Numbers
+    sample: Integers
+    robot: Integers
+    row: Integers
+    quantity: Integers
+    part: Integers
+    pull: Integers
+    point: Integers
+    rows: Integers
+    given: Numbers
+    spread: Numbers
+    expected: Numbers | float = 0.0
 
     def __len__(self) -> int:
         """Number of measured numbers."""
         return len(self.values)
 
-    def of(self, sample: int, quantity: str) -> Bool[np.ndarray, " r"]:
+    def of(self, sample: int, quantity: str) -> Flags:
         """Return whether each number belongs to a quantity of some measurements, (R,)."""
         return (self.sample == sample) & self.are(quantity)
 
-    def are(self, *quantities: str) -> Bool[np.ndarray, " r"]:
+    def are(self, *quantities: str) -> Flags:
         """Return whether each number belongs to one of some quantities, (R,)."""
         return np.isin(self.quantity, [OBSERVED.index(name) for name in quantities])
 
@@ -286,27 +253,26 @@ class Samples:
     @property
     def quantities(self) -> tuple[str, ...]:
         """The measured quantities."""
-        return tuple(dict.fromkeys(name for one in self.every for name in one.measured.observed))
+        return tuple(
+            dict.fromkeys(name for sample in self.every for name in sample.measured.observed)
+        )
 
-    def residuals(self, values: Float[np.ndarray, " k"]) -> Residuals | None:
+    def residuals(self, values: Numbers) -> Residuals | None:
         """Return model less measurement; None if no robot has the values, or a row is unsolved."""
         self.failed, self.refused = [], ""
         residuals: list[Numbers] = []
         slopes: list[Numbers] = []
         for sample in self.every:
             try:
-                predicted = sample.predict(np.asarray(values, float))
+                converged, misfits = sample.misfits(np.asarray(values, float))
             except InputError as problem:
                 self.refused = str(problem)
                 return None
-            self.solves += len(sample.measured)
-            unsolved = np.flatnonzero(~predicted.converged).tolist()
+            self.solves += len(converged)
+            unsolved = np.flatnonzero(~converged).tolist()
             self.failed += [(sample.measured.source, row) for row in unsolved]
-            if self.failed:
-                continue
-            for name, observed in sample.measured.observed.items():
-                off, by_own = misfit(name, observed, predicted.values[name], predicted.slopes[name])
-                is_known = np.isfinite(observed).reshape(off.shape)
+            for name, (off, by_own) in misfits.items():
+                is_known = np.isfinite(sample.measured.observed[name]).reshape(off.shape)
                 by_all = np.zeros((int(is_known.sum()), len(self.unknowns)))
                 by_all[:, [*sample.own_unknowns]] = by_own[:, is_known].T
                 residuals.append(off[is_known])
@@ -327,9 +293,7 @@ class Samples:
         every = tuple(replace(sample, robot=robots[sample.label]) for sample in self.every)
         return replace(self, every=every)
 
-    def slopes_of(
-        self, more: Unknown, values: Float[np.ndarray, " k"]
-    ) -> Float[np.ndarray, " r"] | None:
+    def slopes_of(self, more: Unknown, values: Numbers) -> Numbers | None:
         """Return derivatives by one more constant at values of the others; None without any."""
         both = (*self.unknowns, more)
         every = tuple(replace(sample, unknowns=both) for sample in self.every)

@@ -11,7 +11,6 @@ import pickle
 from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import replace
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,9 +35,6 @@ _EVALUATIONS = 200
 # Part of the objective that a full step may still promise to gain at the end: at a kink, such as
 # where a notch closes, no step gains what the curvature promises.
 _KINK = 1e-3
-# How often a search hops from where it ended, by how much (of the objective) the hop goes up, and
-# what is a gain worth hopping on from.
-_HOPS, _HOP, _SETTLED = 3, 3e-3, 1e-6
 # Number of candidates for each start, some of which have no solution.
 _CANDIDATES = 8
 
@@ -91,7 +87,7 @@ def minimise(
     size[size == 0.0] = 1.0
     scale = np.divide(1.0, np.sqrt(curvature), out=size, where=curvature > 0.0)
     least, most = ((limit - start)[free] / scale for limit in (lower, upper))
-    tried = {np.zeros(len(free)).tobytes(): first}
+    tried: dict[bytes, Cost | None] = {np.zeros(len(free)).tobytes(): first}
 
     def values_at(step: Vector) -> Vector:
         values, moved = start.copy(), start[free] + scale * step
@@ -116,6 +112,7 @@ def minimise(
         max_nfev=_EVALUATIONS,
     )
     cost = tried[result.x.tobytes()]
+    assert cost is not None
     # How much lower a full step of the values that are not at a limit should be.
     residual, slopes = as_squares(cost, free, scale)
     slopes = slopes[:, result.active_mask == 0]
@@ -167,7 +164,7 @@ class FitProblem:
         self, samples: Samples, objective: FitObjective, drawing: tuple[Unknown, ...] = ()
     ) -> None:
         objective.check(samples.quantities)
-        if not objective.takes_priors and any(one.prior for one in samples.unknowns):
+        if not objective.takes_priors and any(unknown.prior for unknown in samples.unknowns):
             raise InputError.UNSUPPORTED(
                 "a prior needs LeastSquares() or SumOfRobotErrors(); other objectives take none"
             )
@@ -175,7 +172,9 @@ class FitProblem:
         self.drawing = drawing
         self.noise: Noise | None = None
         self._linearised: dict[str, np.ndarray] = {}
-        self.lower, self.upper = np.array([(one.lower, one.upper) for one in self.unknowns]).T
+        self.lower, self.upper = np.array(
+            [(unknown.lower, unknown.upper) for unknown in self.unknowns]
+        ).T
 
     def __call__(self, values: Vector) -> Cost | None:
         """Return the objective; None if the model has no solution, or no finite derivatives."""
@@ -214,14 +213,16 @@ class FitProblem:
         other.drawing = tuple(known)
         if known:
             spread = np.array([*known.values()]).T
-            expected = spread @ (other.means - [one.start for one in known])
+            expected = spread @ (other.means - [unknown.start for unknown in known])
             other._linearised = {"spread": spread, "expected": expected}
         return other
 
     @property
     def means(self) -> Float[np.ndarray, " m"]:
         """Means of the deviations from the drawings, in standard deviations."""
-        return np.array([one.prior[0] for one in self.drawing if one.prior is not None])
+        return np.array(
+            [deviation.prior[0] for deviation in self.drawing if deviation.prior is not None]
+        )
 
     def minimum(self, start: Vector) -> Minimum:
         """Return the minimum that a search from a start ends at."""
@@ -259,7 +260,7 @@ class SearchTask:
         self.problem, self.starts, self.seed = problem, starts, seed
         self.points = starting_points(problem, starts, seed)
 
-    @cached_property
+    @property
     def manifest(self) -> Manifest:
         """What the searches follow from."""
         samples = self.problem.samples
@@ -268,7 +269,7 @@ class SearchTask:
             len(self.points),
             1,
             robots={label: to_table(robot) for label, robot in samples.robots.items()},
-            measurements=[[one.label, plain(one.measured)] for one in samples.every],
+            measurements=[[sample.label, plain(sample.measured)] for sample in samples.every],
             constants=plain(samples.unknowns),
             objective=plain(self.problem.objective),
             settings=plain(samples.every[0].settings),
@@ -295,8 +296,7 @@ class SearchTask:
 
     def search(self, number: int) -> Minimum:
         """Search from one starting point."""
-        hops = _HOPS if self.starts > 1 else 0
-        return _lowest_nearby(self.problem, self.points[number], hops, self.seed + number)
+        return self.problem.minimum(self.points[number])
 
     def piece(self, number: int) -> Piece:
         """Search from one starting point, for the folder."""
@@ -365,39 +365,14 @@ def search(
 
 def starting_points(problem: FitProblem, starts: int, seed: int) -> Float[np.ndarray, "s k"]:
     """Return the robots as they are and, for several starts, candidates of Sobol's sequence."""
-    start, first, last = np.array([(one.start, one.first, one.last) for one in problem.unknowns]).T
+    start, first, last = np.array(
+        [(unknown.start, unknown.first, unknown.last) for unknown in problem.unknowns]
+    ).T
     if starts <= 1:
         return start[None]
     sobol = qmc.Sobol(len(first), rng=np.random.default_rng(seed))
     parts = sobol.random_base2(int(np.ceil(np.log2((starts - 1) * _CANDIDATES))))
     return np.concatenate([start[None], first + parts * (last - first)])
-
-
-def _lowest_nearby(problem: FitProblem, start: Vector, hops: int, seed: int) -> Minimum:
-    """Search from a start, and again from points near the minimum.
-
-    The objective has kinks where notches close and branches of the material begin, and so shallow
-    minima beside each other. A hop leads where a parabola would be a little higher.
-    """
-    best = problem.minimum(start)
-    random = np.random.default_rng(seed)
-    tries = 0
-    while best.cost is not None and tries < hops:
-        tries += 1
-        sizes, curvature = unit_free(best.cost.curvature)
-        stiffness, axes = np.linalg.eigh(curvature)
-        along = random.standard_normal(len(stiffness))
-        along *= np.sqrt(2.0 * _HOP * abs(best.cost.value)) / np.linalg.norm(along)
-        is_known = stiffness > 1e-9
-        step = axes[:, is_known] @ (along[is_known] / np.sqrt(stiffness[is_known])) / sizes
-        other = problem.minimum(best.values + step)
-        calls = best.calls + other.calls
-        gain = np.inf if other.cost is None else other.cost.value - best.cost.value
-        if gain < -1e-9 * abs(best.cost.value):
-            tries = tries if gain > -_SETTLED * abs(best.cost.value) else 0
-            best = other
-        best = best._replace(calls=calls)
-    return best
 
 
 def unit_free(curvature: Float[np.ndarray, "k k"]) -> tuple[Vector, Float[np.ndarray, "k k"]]:

@@ -61,12 +61,12 @@ def headers(pattern: str, shape: Sequence[int], points: Sequence[str] = ()) -> C
         >>> headers("notch_{notch}_deg", (2,))
         {(0,): 'notch_1_deg', (1,): 'notch_2_deg'}
     """
-    names = fields_in(pattern)
-    tendons = [f"_{number}" for number in range(1, 1 + max(shape, default=0))]
+    names, bodies = fields_in(pattern), range(max(shape, default=0))
+    numbers = [number + 1 for number in bodies]
     labels: dict[str, Sequence[object]] = {
-        "notch": range(1, 1 + max(shape, default=0)),
-        "body": range(max(shape, default=0)),
-        "tendon": tendons if shape[:1] != (1,) else [""],
+        "notch": numbers,
+        "body": bodies,
+        "tendon": [f"_{number}" for number in numbers] if shape != (1,) else [""],
         "point": points,
         "axis": AXES,
     }
@@ -178,12 +178,14 @@ class MeasurementReader:
     def same_in_all(self, pattern: str, what: str, remedy: str) -> Any:
         """Return the first row of what must be the same in all; None if no column is there."""
         values = self.array(pattern)
-        for row, value in enumerate(() if values is None else values):
+        if values is None:
+            return None
+        for row, value in enumerate(values):
             if np.any(value != values[0]):
                 raise InputError.UNSUPPORTED(
                     f"{self.table.place_of(row)}: {what} differs from the row before it; {remedy}."
                 )
-        return None if values is None else values[0]
+        return values[0]
 
     def commands(self) -> tuple[Numbers, Numbers]:
         """Return measured tensions and strokes, rows by tendons; NaN where the other is given."""
@@ -219,15 +221,14 @@ class MeasurementReader:
             for patterns in (_LOADS, _ON_BODIES)
         )
         on_bodies.setdefault("force", np.zeros((len(self.table), self.sizes["body"], 3)))
-        acts = sum(
-            on_bodies[name].any(axis=-1) for name in ("force", "moment") if name in on_bodies
-        )
+        acting = [on_bodies[name].any(axis=-1) for name in ("force", "moment") if name in on_bodies]
+        acts = np.any(acting, axis=0)
         loads: list[ExternalLoad] = []
         for row in range(len(self.table)):
             place = self.table.place_of(row)
             forces = [
                 BodyForce(body, **{name: values[row, body] for name, values in on_bodies.items()})
-                for body in np.flatnonzero(acts[row])
+                for body in np.flatnonzero(acts[row]).tolist()
             ]
             try:
                 tip = {name: values[row] for name, values in arrays.items()}
@@ -471,7 +472,8 @@ def _nan_for_zeros(values: Numbers) -> Numbers:
 def _on_bodies(loads: Sequence[ExternalLoad]) -> dict[str, Numbers]:
     """Forces on bodies as arrays, rows and bodies as leading axes."""
     bodies = 1 + max((force.body for load in loads for force in load.body_forces), default=0)
-    arrays = {name: np.zeros((len(loads), bodies, 3)) for name in ("force", "moment", "point")}
+    shape = (len(loads), bodies, 3)
+    arrays: dict[str, Any] = {name: np.zeros(shape) for name in ("force", "moment", "point")}
     arrays["following"] = np.zeros((len(loads), bodies))
     for row, load in enumerate(loads):
         for force in load.body_forces:

@@ -165,39 +165,35 @@ def _falls(values: Float[np.ndarray, " p"], pull: Sequence[str]) -> Iterator[Fal
     """Yield every fall of a command in the pulls in which it is commanded."""
     is_known = np.isfinite(values)
     span = float(np.ptp(values[is_known])) if is_known.any() else 0.0
-    if span == 0.0:
-        return
-    labels = np.array(pull)
-    for label in dict.fromkeys(pull):
-        rows = np.flatnonzero(is_known & (labels == label))
-        for top, start, bottom, kind in _falls_of_pull(values[rows], span):
-            yield Fall(int(rows[top]), int(rows[start]), rows[top + 1 : bottom + 1], kind)
+    for label in dict.fromkeys(pull) if span else ():
+        rows = np.flatnonzero(is_known & (np.array(pull) == label))
+        yield from _falls_of_pull(values[rows], rows, span)
 
 
 def _falls_of_pull(
-    values: Float[np.ndarray, " n"], span: float
-) -> Iterator[tuple[int, int, int, Literal["unloading", "restart", "unloaded", "unclear"]]]:
+    values: Float[np.ndarray, " n"], rows: Int[np.ndarray, " n"], span: float
+) -> Iterator[Fall]:
     points = [0, *turning_points(values, TURN * span), len(values) - 1]
     shuffled = len(points) > _BRANCHES and len(values) - 1 < _STEPS * (len(points) - 1)
     began = 0  # where the present pull began
     ends = [*points[2:], -1]  # of the next rise; none follows the last branch
     for (top, bottom), end in zip(pairwise(points), ends, strict=True):
-        depth = values[top] - values[bottom]
+        depth, branch = values[top] - values[bottom], values[top : bottom + 1]
         if depth < _FALL * span:
             continue
-        branch = values[top : bottom + 1]
         start = top + int(np.argmax(branch <= values[bottom] + _BETWEEN * depth))
+        begins_again = values[start] <= values[began] + _AGAIN * span
         if _has_between(branch):
-            yield top, start, bottom, "unclear" if shuffled else "unloading"
-        elif depth >= _JUMP * span:
-            again = values[start] <= values[began] + _AGAIN * span
-            next_rise = values[bottom : end + 1]
-            if again and _has_between(values[began : top + 1]) and _has_between(next_rise):
-                yield top, start, bottom, "restart"
-                began = start
-            else:
-                unloaded = abs(values[bottom]) <= TURN * span
-                yield top, start, bottom, "unloaded" if unloaded else "unclear"
+            kind = "unclear" if shuffled else "unloading"
+        elif depth < _JUMP * span:
+            continue
+        elif begins_again and all(
+            map(_has_between, (values[began : top + 1], values[bottom : end + 1]))
+        ):
+            kind, began = "restart", start
+        else:
+            kind = "unloaded" if abs(values[bottom]) <= TURN * span else "unclear"
+        yield Fall(int(rows[top]), int(rows[start]), rows[top + 1 : bottom + 1], kind)
 
 
 def _has_between(values: Float[np.ndarray, " n"]) -> bool:

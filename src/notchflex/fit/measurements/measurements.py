@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Int
-from numpy.typing import ArrayLike, NDArray
+from jaxtyping import Bool, Float, Int
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from notchflex import EquilibriumPath, InputError, Load, LoadPath, Robot, Settings
@@ -19,7 +19,10 @@ from notchflex.analysis.forward_model import ForwardModel
 from notchflex.fit.measurements.loading_order import branches, commands_of
 from notchflex.support import DEGREES, load_path
 
-Numbers = NDArray[np.float64]
+# Arrays of any shape, which docstrings tell.
+Numbers = Float[np.ndarray, "..."]
+Integers = Int[np.ndarray, "..."]
+Flags = Bool[np.ndarray, "..."]
 
 
 class MeasuredQuantity(NamedTuple):
@@ -203,7 +206,7 @@ class Measurements:
         return tuple(dict.fromkeys(self.pull))
 
     @property
-    def pull_number(self) -> Int[np.ndarray, " p"]:
+    def pull_number(self) -> Integers:
         """Number of the pull of every row, from 0, (P,)."""
         return np.array([self.pulls.index(label) for label in self.pull])
 
@@ -213,7 +216,7 @@ class Measurements:
         return np.nansum(np.fmax(self.measured_tension, self.load.stroke), axis=1)
 
     @property
-    def branches(self) -> Int[np.ndarray, " p"]:
+    def branches(self) -> Integers:
         """Loading rows (1) and unloading rows (-1) by the order of the rows in their pull, (P,)."""
         return branches(commands_of(self.measured_tension, self.load.stroke), self.pull)
 
@@ -299,12 +302,12 @@ class Measurements:
 
 def check_labels(labels: Iterable[object], count: int, what: str) -> tuple[str, ...]:
     """Return the labels of the pulls; raise InputError unless every row has one."""
-    labels = tuple(map(str, labels))
-    if len(labels) != count:
+    texts = tuple(map(str, labels))
+    if len(texts) != count:
         raise InputError.WRONG_SHAPE(
-            f"{count} {what} need a label of their pull each; got {len(labels)}"
+            f"{count} {what} need a label of their pull each; got {len(texts)}"
         )
-    return labels
+    return texts
 
 
 def check_quantities(names: Iterable[str]) -> None:
@@ -340,7 +343,7 @@ class MeasuredRows:
     settings: Settings = Settings()  # noqa: RUF009 - frozen
 
     @cached_property
-    def order(self) -> Int[np.ndarray, " p"]:
+    def order(self) -> Integers:
         """Rows in the order in which they are solved, pull by pull."""
         first = {label: number for number, label in reversed([*enumerate(self.pull)])}
         return np.argsort([first[label] for label in self.pull], kind="stable")
