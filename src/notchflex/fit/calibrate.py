@@ -106,7 +106,7 @@ def by_label(robots: Robot | Mapping[str, Robot]) -> dict[str, Robot]:
         InputError: They are no robots.
     """
     named = dict(robots) if isinstance(robots, Mapping) else {getattr(robots, "name", ""): robots}
-    if not all(isinstance(one, Robot) for one in named.values()):  # pyright: ignore
+    if not all(isinstance(robot, Robot) for robot in named.values()):  # pyright: ignore
         raise InputError.WRONG_TYPE(
             "calibrate needs a Robot, or robots by label; load_robot makes one"
         )
@@ -132,7 +132,7 @@ def _of_robots(
     for label in robots:
         of_robot = measurements[label]
         tables = (of_robot,) if isinstance(of_robot, Measurements) else tuple(of_robot)
-        if not tables or not all(isinstance(one, Measurements) for one in tables):  # pyright: ignore
+        if not tables or not all(isinstance(table, Measurements) for table in tables):  # pyright: ignore
             raise InputError.NO_DATA(f"{label} needs one Measurements or more")
         for number, table in enumerate(tables):
             if table in tables[:number]:
@@ -160,7 +160,7 @@ def fitted(
     """
     kept = None if folder is None else PieceFolder.of(folder)
     searches = search(problem, starts, seed, progress, kept)
-    costs = [np.inf if one.cost is None else one.cost.value for one in searches]
+    costs = [np.inf if minimum.cost is None else minimum.cost.value for minimum in searches]
     if np.isinf(costs).all():
         raise _no_start(problem.samples)
     problem, best = _with_noise(problem, searches[int(np.argmin(costs))])

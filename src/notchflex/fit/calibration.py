@@ -285,7 +285,7 @@ class Calibration:
         """What deviates from the drawings, starting at what the data tell."""
         total = (self.problem.means + self.reached.deviations).tolist()
         pairs = zip(self.problem.drawing, total, strict=True)
-        return tuple(replace(one, start=deviation) for one, deviation in pairs)
+        return tuple(replace(unknown, start=deviation) for unknown, deviation in pairs)
 
     @property
     def deviations_of_drawing(self) -> dict[str, float]:
@@ -326,6 +326,11 @@ class Calibration:
     def huber(self) -> float | None:
         """From where on residuals count less: then intervals follow from the scatter of rows."""
         return getattr(self.problem.objective, "huber", None)
+
+    @property
+    def is_robust(self) -> bool:
+        """Whether outliers count less."""
+        return self.huber is not None
 
     @property
     def tells_no_noise(self) -> bool:
@@ -408,7 +413,7 @@ class Calibration:
         """
         if name not in self.names:
             raise InputError.UNKNOWN_NAME(
-                f"{name!r} was not fitted; there are {', '.join(self.names)}"
+                f"{name} was not fitted; there are {', '.join(self.names)}"
             )
         return self.names.index(name)
 
@@ -564,8 +569,8 @@ class Calibration:
             "constant": self.names,
             "value": [*self.values.values()],
             "unit": [*self.units.values()],
-            "lower_95": np.array([one and one.lower for one in ends], float),
-            "upper_95": np.array([one and one.upper for one in ends], float),
+            "lower_95": np.array([interval and interval.lower for interval in ends], float),
+            "upper_95": np.array([interval and interval.upper for interval in ends], float),
             "deviation": [*self.deviations.values()],
         }
         return frame(columns, library)

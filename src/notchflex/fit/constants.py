@@ -280,7 +280,7 @@ def _described(
         return unit, lower, upper, mean, first, last
     if rule == "offset":
         return unit, -math.inf, math.inf, 0.0, first - mean, last - mean
-    size = math.fsum(one.slope for one in sets) / len(sets)
+    size = math.fsum(number.slope for number in sets) / len(sets)
     if not size:
         raise InputError.MISSING_VALUE(f"the mean of `{read}` is 0; give limits")
     per = f"{unit}/{described_at(robot, read).unit}".removesuffix("/")

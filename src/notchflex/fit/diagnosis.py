@@ -108,7 +108,9 @@ def _branches(calibration: Calibration, number: int, measured: Measurements) -> 
         mine = residuals.of(number, name)
         if mine.any():
             row, size = residuals.row[mine], len(measured)
-            total, count = (np.bincount(row, one, size) for one in (-residuals.values[mine], None))
+            total, count = (
+                np.bincount(row, weights, size) for weights in (-residuals.values[mine], None)
+            )
             mean = np.divide(total, count, out=np.full(size, np.nan), where=count > 0)
             return branch_words(mean, name, measured)
     return ()
@@ -136,7 +138,9 @@ def branch_difference(
     difference, both = abs(means[1] - means[0]), np.concatenate(rows)
     if difference <= _SHARE * np.sqrt(np.mean(both**2)):
         return None
-    error = np.sqrt(sum(np.mean(np.diff(one, 2) ** 2) / 6.0 / len(one) for one in rows))
+    error = np.sqrt(
+        sum(np.mean(np.diff(branch_rows, 2) ** 2) / 6.0 / len(branch_rows) for branch_rows in rows)
+    )
     if error <= _EXACT * difference:
         return means
     chance = 2.0 * student.sf(difference / error, max(0.5 * len(both) - 2.0, 1.0))
@@ -181,7 +185,7 @@ def _limits(unknown: Unknown, value: float, slope: float) -> Iterator[str]:
 def _far(unknown: Unknown, value: float) -> Iterator[str]:
     """A constant far from the robot file, or from its prior."""
     if not unknown.first <= value <= unknown.last and unknown.path not in SENSOR:
-        before, now = (with_unit(one, unknown.unit) for one in (unknown.start, value))
+        before, now = (with_unit(shown, unknown.unit) for shown in (unknown.start, value))
         yield (
             f"{unknown.name} went from {before} to {now}, much farther than such values differ: "
             "look at the units of the data, and whether they are of this robot."
@@ -327,12 +331,12 @@ def errors_of_parts(found: Calibration) -> tuple[PartError, ...]:
     )
 
 
-def _errors(found: Calibration, robot: int, label: str, quantity: str) -> Iterator[PartError]:
-    residuals, measured = found.residuals, MEASURED[quantity]
+def _errors(fit: Calibration, robot: int, label: str, quantity: str) -> Iterator[PartError]:
+    residuals, measured = fit.residuals, MEASURED[quantity]
     mine = np.flatnonzero((residuals.robot == robot) & residuals.are(quantity))
     if not len(mine):
         return
-    between = _between_repeats(found, label, quantity) * measured.scale
+    between = _between_repeats(fit, label, quantity) * measured.scale
     counted = measured.per in (("notch",), ("tendon",))
     parts = residuals.part[mine] + 1 if counted else np.zeros(len(mine), int)
     # Three components are one point, or one rotation of a row.
@@ -353,11 +357,11 @@ def _errors(found: Calibration, robot: int, label: str, quantity: str) -> Iterat
         )
 
 
-def _between_repeats(found: Calibration, label: str, quantity: str) -> Numbers:
+def _between_repeats(fit: Calibration, label: str, quantity: str) -> Numbers:
     """Standard deviation between repeats of every part, pooled over the files of a robot."""
     variances: list[Numbers] = []
     rows: list[int] = []
-    for measured in found.problem.samples.of_robot(label):
+    for measured in fit.problem.samples.of_robot(label):
         if quantity in measured.observed:
             each = repeats_of_each(measured)[quantity]
             if MEASURED[quantity].is_vector:

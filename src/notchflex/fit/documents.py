@@ -249,38 +249,36 @@ def data_of(calibration: Calibration, label: str) -> list[str]:
     return list(dict.fromkeys(sources))
 
 
-def _constants(found: Calibration) -> list[dict[str, Any]]:
+def _constants(fit: Calibration) -> list[dict[str, Any]]:
     by_pulls, by_rows = (
-        np.sqrt(np.diag(one)) for one in (found.by_pulls.covariance, found.covariance_by_rows)
+        np.sqrt(np.diag(one)) for one in (fit.by_pulls.covariance, fit.covariance_by_rows)
     )
     no_interval = Interval(None, None, np.zeros((0, 2)))
     return [
         {
             "name": name,
-            "value": found.values[name],
+            "value": fit.values[name],
             "unit": unknown.unit,
             "robots": list(dict.fromkeys(number.label for number in unknown.sets)),
-            "interval_95": [interval.lower, interval.upper] if name in found.intervals else None,
+            "interval_95": [interval.lower, interval.upper] if name in fit.intervals else None,
             "interval_reason": interval.reason,
-            "standard_deviation": found.deviations[name],
+            "standard_deviation": fit.deviations[name],
             "standard_deviation_by_pulls": by_pulls[number],
             "standard_deviation_by_rows": by_rows[number],
-            "interval_by": "pulls" if found.by_pulls.counts[number] else "rows",
-            "pulls": found.by_pulls.pulls[number],
+            "interval_by": "pulls" if fit.by_pulls.counts[number] else "rows",
+            "pulls": fit.by_pulls.pulls[number],
             "before": unknown.start,
             "limits": [unknown.lower, unknown.upper],
             "prior": unknown.prior,
         }
-        for number, (name, unknown) in enumerate(
-            zip(found.names, found.problem.unknowns, strict=True)
-        )
-        for interval in [found.intervals.get(name, no_interval)]
+        for number, (name, unknown) in enumerate(zip(fit.names, fit.problem.unknowns, strict=True))
+        for interval in [fit.intervals.get(name, no_interval)]
     ]
 
 
-def _noise(found: Calibration) -> list[dict[str, Any]]:
+def _noise(fit: Calibration) -> list[dict[str, Any]]:
     """Source and root mean square of the noise of every quantity of every file."""
-    samples, deviation = found.problem.samples.every, found.noise.deviation
+    samples, deviation = fit.problem.samples.every, fit.noise.deviation
     return [
         {
             "robot": samples[number].label,
@@ -290,30 +288,30 @@ def _noise(found: Calibration) -> list[dict[str, Any]]:
             "standard_deviation": plain(_in_unit(name, np.sqrt(np.mean(deviation[mine] ** 2)))),
             "known_from": source,
         }
-        for (number, name), source in found.noise.source.items()
-        if (mine := found.residuals.of(number, name)).any()
+        for (number, name), source in fit.noise.source.items()
+        if (mine := fit.residuals.of(number, name)).any()
     ]
 
 
-def summary(found: Calibration) -> str:
+def summary(fit: Calibration) -> str:
     """Return constants with intervals and units, root-mean-square errors and the diagnosis."""
-    state = "converged" if found.converged else f"not converged: {found.reason}"
-    state += "" if found.trusted else ", not trusted"
-    lines = [f"{', '.join(found.given)}: {found.counted} numbers measured, {state}"]
-    width = max(map(len, found.names))
-    for name, value in found.values.items():
+    state = "converged" if fit.converged else f"not converged: {fit.reason}"
+    state += "" if fit.trusted else ", not trusted"
+    lines = [f"{', '.join(fit.given)}: {fit.counted} numbers measured, {state}"]
+    width = max(map(len, fit.names))
+    for name, value in fit.values.items():
         ends = ""
-        if (interval := found.intervals.get(name)) is not None:
+        if (interval := fit.intervals.get(name)) is not None:
             both = (interval.lower, interval.upper)
             ends = " to ".join("open" if end is None else f"{end:.5g}" for end in both)
-            ends = f"  95 %: {ends} {found.units[name]}".rstrip()
-        lines.append(f"  {name:<{width}}  {with_unit(value, found.units[name])}{ends}")
+            ends = f"  95 %: {ends} {fit.units[name]}".rstrip()
+        lines.append(f"  {name:<{width}}  {with_unit(value, fit.units[name])}{ends}")
     errors = [
         f"{edge(name)[0]} {_in_unit(name, error):.3g} {edge(name)[1]}"
-        for name, error in found.residuals.root_mean_squares().items()
+        for name, error in fit.residuals.root_mean_squares().items()
     ]
     lines.append(f"  rms error: {', '.join(errors)}")
-    return "\n".join([*lines, *(diagnose(found) or (NO_PROBLEMS,))])
+    return "\n".join([*lines, *(diagnose(fit) or (NO_PROBLEMS,))])
 
 
 def write_fitted(
@@ -362,39 +360,39 @@ def write_fitted(
     return files
 
 
-def _note(found: Calibration, unknown: Unknown) -> str:
+def _note(fit: Calibration, unknown: Unknown) -> str:
     """The comment beside a fitted value: the data, and how far to trust it."""
     labels = dict.fromkeys(number.label for number in unknown.sets)
-    sources = [Path(source).name for label in labels for source in data_of(found, label)]
+    sources = [Path(source).name for label in labels for source in data_of(fit, label)]
     files = list(dict.fromkeys(" ".join(source.split()) for source in sources))
     if len(files) > _FILES:
         files = [*files[: _FILES - 1], f"{len(files) - _FILES + 1} more files"]
-    trouble = "" if found.converged else "; the search did not settle"
-    trouble += "" if found.trusted else "; not trusted"
-    if unknown in found.drawing:
+    trouble = "" if fit.converged else "; the search did not settle"
+    trouble += "" if fit.trusted else "; not trusted"
+    if unknown in fit.drawing:
         told = f"{unknown.start:+.2g} standard deviations of its tolerance"
     else:
-        told = _trust(found, unknown)
+        told = _trust(fit, unknown)
         if unknown.path != unknown.sets[0].path:
-            value = with_unit(found.values[unknown.name], unknown.unit)
+            value = with_unit(fit.values[unknown.name], unknown.unit)
             told = f"`{unknown.path}` = {value}, {told}"
     return f"{', '.join(files)}: {told}{trouble}"
 
 
-def _trust(found: Calibration, unknown: Unknown) -> str:
-    interval, unit = found.intervals.get(unknown.name), unknown.unit
+def _trust(fit: Calibration, unknown: Unknown) -> str:
+    interval, unit = fit.intervals.get(unknown.name), unknown.unit
     if interval is None:
-        size = found.deviations[unknown.name]
+        size = fit.deviations[unknown.name]
         known = math.isfinite(size)
         return f"standard deviation {size:.2g} {unit}".strip() if known else "no interval"
-    if found.tells_no_noise:
+    if fit.tells_no_noise:
         return f"no interval: {interval.reason}"
     ends = [f"{end:.5g}" for end in (interval.lower, interval.upper) if end is not None]
     if not ends:
         return "any value fits"
     word = "at most " if interval.lower is None else "at least " if interval.upper is None else ""
-    number = found.number_of(unknown.name)
-    pulls = f", by {found.by_pulls.pulls[number]} whole pulls" * int(found.by_pulls.counts[number])
+    number = fit.number_of(unknown.name)
+    pulls = f", by {fit.by_pulls.pulls[number]} whole pulls" * int(fit.by_pulls.counts[number])
     return f"{word}{' to '.join(ends)} {unit}".strip() + f" (95 %{pulls})"
 
 

@@ -87,8 +87,13 @@ def update_specimen(
         )
     priors = {unknown.path: unknown.prior for unknown in reversed(found.problem.unknowns)}
     own = [
-        replace(one, prior=prior_of(replace(one, prior=one.prior or priors.get(one.path)), found))
-        for one in unknowns({label: robot}, constants)
+        replace(
+            constant,
+            prior=prior_of(
+                replace(constant, prior=constant.prior or priors.get(constant.path)), found
+            ),
+        )
+        for constant in unknowns({label: robot}, constants)
     ]
     return updated(found, label, robot, measured, own)
 
@@ -110,7 +115,9 @@ def updated(
         if unknown.shared
         for number in unknown.of(label, robot).sets
     ]
-    twice = {one.path for one in held} & {one.path for unknown in own for one in unknown.sets}
+    twice = {number.path for number in held} & {
+        number.path for unknown in own for number in unknown.sets
+    }
     if not own or twice:
         raise InputError.CONFLICT(
             f"{min(twice, default='no constant')} is of one specimen, and all the others have it "
@@ -126,7 +133,7 @@ def updated(
     rows = replace(measured, deviation={**measured.deviation, **missed})
     samples = Samples.of({label: robot}, {label: [rows]}, constants, calibration.settings)
     again = fitted({label: robot}, FitProblem(samples, LeastSquares()), 1, 0, intervals=False)
-    before = {one.name: one.prior for one in own if one.prior is not None}
+    before = {constant.name: constant.prior for constant in own if constant.prior is not None}
     prior = np.diag([size**2 for _, size in before.values()])
     residuals = again.residuals
     angles = residuals.are(*(name for name in OBSERVED if name.endswith("angle")))
@@ -148,7 +155,9 @@ def prior_of(unknown: Unknown, calibration: Calibration) -> tuple[float, float]:
     Raises:
         InputError: There is no prior, and fewer than two fitted specimens.
     """
-    of_specimens = [one.path == unknown.path and one.each for one in calibration.problem.unknowns]
+    of_specimens = [
+        constant.path == unknown.path and constant.each for constant in calibration.problem.unknowns
+    ]
     values = calibration.best.values[of_specimens]
     if unknown.prior is not None:
         mean, size = unknown.prior
@@ -332,7 +341,7 @@ def _without(
 ) -> tuple[Calibration, list[Unknown]]:
     """Fit to the rest; return it, and what is known of constants that it does not tell."""
     kept = {label: whole.given[label] for label, tables in rest.items() if tables}
-    lost = [one for one in whole.problem.unknowns if not one.only_of(kept).sets]
+    lost = [constant for constant in whole.problem.unknowns if not constant.only_of(kept).sets]
     for unknown in lost:
         if unknown.prior is None and not (unknown.each and len(kept) > 1):
             raise InputError.TOO_FEW_DATA(
@@ -346,7 +355,7 @@ def _without(
     samples = Samples.of(kept, rest, constants, whole.settings)
     problem = FitProblem(samples, whole.problem.objective, drawing)
     again = fitted(kept, problem, starts, seed, intervals=False)
-    return again, [replace(one, prior=prior_of(one, again)) for one in lost]
+    return again, [replace(constant, prior=prior_of(constant, again)) for constant in lost]
 
 
 class _Blind(NamedTuple):
@@ -382,7 +391,7 @@ class _Blind(NamedTuple):
         if residuals is None:
             return fold
         missed = self.fit.residuals.root_mean_squares()
-        noise = [missed.get(OBSERVED[one], np.nan) for one in residuals.quantity]
+        noise = [missed.get(OBSERVED[quantity], np.nan) for quantity in residuals.quantity]
         depends = residuals.slopes.any(axis=0)
         slopes = residuals.slopes[:, depends]
         covariance = np.asarray(block_diag(self.fit.covariance, np.diag(sizes**2)))

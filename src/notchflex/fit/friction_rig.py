@@ -83,7 +83,7 @@ def coefficient_from_weights(
         [0.0916, 0.0]
     """
     values = _floats(weight_1, weight_2, turn_1, turn_2)
-    if (wrong := impossible(np.stack([np.ravel(one) for one in values]), law)) is not None:
+    if (wrong := impossible(np.stack([np.ravel(value) for value in values]), law)) is not None:
         raise InputError.OUT_OF_RANGE(f"reading {wrong[0] + 1}: {wrong[1]}")
     return _coefficient(values, law)
 
@@ -493,7 +493,7 @@ def friction_rig(readings: FrictionReadings) -> FrictionRig:
     varies = np.isfinite([test.by_turn, test.by_load]) & (test.enough is False)
     columns = np.flatnonzero([True, *varies])
     off = outliers(design_of(readings.turn, readings.weight_1)[:, columns], y, variance)
-    without = fit_line(*(np.delete(one, off, axis=0) for one in (mean, y, variance)))
+    without = fit_line(*(np.delete(array, off, axis=0) for array in (mean, y, variance)))
     alone = count == 1 and variance[0] == 0.0
     return FrictionRig(
         readings=readings,

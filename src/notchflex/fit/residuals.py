@@ -80,7 +80,7 @@ class Sample:
         bodies = _BODIES if "axis_points" in observed else ()
         solved = tuple(dict.fromkeys((*outputs.values(), *bodies)))
         modelled = {name: np.asarray(path.quantity(name)) for name in solved}
-        slopes = {name: np.zeros((0, *one.shape)) for name, one in modelled.items()}
+        slopes = {name: np.zeros((0, *array.shape)) for name, array in modelled.items()}
         if self.own_unknowns:
             slopes = derivatives(path, self._changes(path, load, numbers), solved)
         if bodies:
@@ -89,8 +89,8 @@ class Sample:
             modelled["axis_points"] = np.asarray(points_on_axis(places, *map(constant, poses)))
             slopes["axis_points"] = axis_point_changes(places, poses, moves)
         return rows(path.converged), {
-            name: misfit(name, one, rows(modelled[output]), rows(slopes[output], axis=1))
-            for name, one in observed.items()
+            name: misfit(name, array, rows(modelled[output]), rows(slopes[output], axis=1))
+            for name, array in observed.items()
             for output in [MEASURED[name].output]
         }
 
@@ -289,7 +289,7 @@ class Samples:
         Raises:
             InputError: A robot cannot.
         """
-        robots = {label: deviated(one, label, deviations) for label, one in self.robots.items()}
+        robots = {label: deviated(robot, label, deviations) for label, robot in self.robots.items()}
         every = tuple(replace(sample, robot=robots[sample.label]) for sample in self.every)
         return replace(self, every=every)
 
@@ -340,4 +340,6 @@ def deviated(robot: Robot, label: str, deviations: Sequence[Unknown]) -> Robot:
     Raises:
         InputError: The robot cannot deviate so.
     """
-    return with_numbers(robot, values_set(label, deviations, [one.start for one in deviations]))
+    return with_numbers(
+        robot, values_set(label, deviations, [deviation.start for deviation in deviations])
+    )

@@ -200,8 +200,8 @@ class FitProblem:
         Deviations by which the model cannot be varied are left out; None if no robot deviates so.
         """
         moved = [
-            replace(one, start=float(start))
-            for one, start in zip(self.drawing, deviations, strict=True)
+            replace(deviation, start=float(start))
+            for deviation, start in zip(self.drawing, deviations, strict=True)
         ]
         other = copy(self)
         try:
@@ -234,7 +234,7 @@ class FitProblem:
         Deviations from the drawing are linearised there anew: those at the estimate would put the
         ends of wide intervals too near.
         """
-        start, lower, upper = (one.copy() for one in (start, self.lower, self.upper))
+        start, lower, upper = (values.copy() for values in (start, self.lower, self.upper))
         start[number] = lower[number] = upper[number] = value
         minimum = minimise(self, start, lower, upper, tolerance=1e-7)
         if self.drawing and minimum.cost is not None:
@@ -305,7 +305,8 @@ class SearchTask:
         search = self.search(number)._asdict()
         values, cost = search.pop("values"), search.pop("cost")
         columns = {
-            one.name: [value] for one, value in zip(self.problem.unknowns, values, strict=True)
+            unknown.name: [value]
+            for unknown, value in zip(self.problem.unknowns, values, strict=True)
         }
         columns["objective"] = [np.nan if cost is None else cost.value]
         columns["converged"] = [search["converged"]]

@@ -80,8 +80,8 @@ def repeats_of_each(measurements: Measurements, *, step: float | None = None) ->
     return {
         name: np.sqrt(
             [
-                _pooled(one, same) if is_repeated else _between(one, curves)
-                for one in values.reshape(len(values), -1).T
+                _pooled(component, same) if is_repeated else _between(component, curves)
+                for component in values.reshape(len(values), -1).T
             ]
         ).reshape(values.shape[1:])
         for name, values in measurements.observed.items()
@@ -103,10 +103,16 @@ def _commands(measurements: Measurements) -> Numbers:
     """All loads, rows by numbers; 0 where nothing is commanded."""
     load = measurements.load
     external: list[list[float]] = []
-    for one in load.external:
-        gravity = one.gravity or (0.0, 0.0, 0.0)
-        row = [*one.tip_force, *one.tip_moment, *one.tip_point, *one.weight(one.tip_mass), *gravity]
-        for force in one.body_forces:
+    for external_load in load.external:
+        gravity = external_load.gravity or (0.0, 0.0, 0.0)
+        row = [
+            *external_load.tip_force,
+            *external_load.tip_moment,
+            *external_load.tip_point,
+            *external_load.weight(external_load.tip_mass),
+            *gravity,
+        ]
+        for force in external_load.body_forces:
             row += [float(force.body), *force.force, *force.moment, *force.point]
         external.append(row)
     width = max(map(len, external))
@@ -135,12 +141,13 @@ def _histories(pulls: Integers, commands: Numbers, near: Numbers) -> Integers:
             for (column, value), (other, end) in zip(first, second, strict=True)
         )
 
-    return np.array(
-        [
-            next(number for number, one in enumerate(histories) if are_equal(history, one))
-            for history in histories
-        ]
-    )
+    distinct: list[list[tuple[int, float]]] = []
+    numbers: list[int] = []
+    for history in histories:
+        equal = (number for number, other in enumerate(distinct) if are_equal(history, other))
+        numbers.append(next(equal, len(distinct)))
+        distinct += [history] * (numbers[-1] == len(distinct))
+    return np.array(numbers)
 
 
 def _pooled(values: Numbers, groups: list[Integers]) -> float:
@@ -174,17 +181,17 @@ def _between(values: Numbers, comparable: list[list[Curve]]) -> float:
     """Variance between pulls, averaged over the loads that at least two of them cover."""
     total, freedom = 0.0, 0.0
     for curves in comparable:
-        means = [one for one in (_means(values, *curve) for curve in curves) if len(one[0]) > 1]
+        means = [pull for pull in (_means(values, *curve) for curve in curves) if len(pull[0]) > 1]
         if len(means) < 2:
             continue
         knots = np.unique(np.concatenate([loads for loads, _ in means]))
         for low, high in pairwise(knots.tolist()):
-            covering = [one for one in means if one[0][0] <= low and high <= one[0][-1]]
+            covering = [pull for pull in means if pull[0][0] <= low and high <= pull[0][-1]]
             if len(covering) < 2:
                 continue
             # Between knots every pull is a straight line: Simpson's rule is exact for the squares.
             at = np.array([low, 0.5 * (low + high), high])
-            squares = np.var([np.interp(at, *one) for one in covering], axis=0) * len(covering)
+            squares = np.var([np.interp(at, *pull) for pull in covering], axis=0) * len(covering)
             total += (high - low) * float(squares @ [1.0, 4.0, 1.0]) / 6.0
             freedom += (high - low) * (len(covering) - 1)
     return total / freedom if freedom else float("nan")
