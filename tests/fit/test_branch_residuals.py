@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.fit.model.residuals import branch_difference, branch_words
+from notchflex.fit import branch_words
+from notchflex.fit.diagnosis import branch_difference
 
 BRANCH = np.repeat([1, -1], 10)
 

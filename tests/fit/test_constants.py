@@ -6,8 +6,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.fit import Constant
-from notchflex.fit.model.constants import unknowns
-from notchflex.fit.model.drawing import deviations_of
+from notchflex.fit.constants import deviations_of, unknowns
 from refusals import refused
 
 TWO = {"A": nf.load_robot("pacheco2021-a"), "B": nf.load_robot("pacheco2021-b")}

@@ -10,7 +10,9 @@ from notchflex.fit import (
     Constant,
     LeastSquares,
     Measurements,
+    SumOfRobotErrors,
     calibrate,
+    calibration_document,
     diagnose,
     leave_out,
     next_measurement,
@@ -19,9 +21,8 @@ from notchflex.fit import (
     simulate_measurements,
     write_fitted,
 )
-from notchflex.fit.documents import calibration_document
-from notchflex.fit.estimation.problem import FitProblem
-from notchflex.fit.model.samples import Samples
+from notchflex.fit.residuals import Samples
+from notchflex.fit.search import FitProblem
 from notchflex.plotting import Curve, calibration_picture
 from refusals import refused
 
@@ -225,6 +226,16 @@ def test_spread_of_pulls_is_that_of_fits_to_each(uneven):
     ]
     spread = np.std([one[MODULUS] for one in each], ddof=1) / np.sqrt(3.0)
     assert np.sqrt(uneven.by_pulls.covariance[0, 0]) == pytest.approx(spread, rel=0.1)
+
+
+def test_sums_of_norms_without_priors_have_deviations_by_pulls():
+    found = calibrate(
+        WRIST, measured(), NAMES, objective=SumOfRobotErrors(), starts=1, priors=False
+    )
+    deviations = np.array([*found.deviations.values()])
+    assert ((deviations > 0.0) & (deviations < np.inf)).all()
+    rows = calibration_document(found)["constants"]
+    assert [row["standard_deviation_by_pulls"] for row in rows] == deviations.tolist()
 
 
 def test_totals_that_are_sums_are_not_counted(capsys):

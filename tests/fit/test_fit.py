@@ -21,9 +21,9 @@ from notchflex.fit import (
     read_measurements,
     simulate_measurements,
 )
-from notchflex.fit.estimation.problem import FitProblem
-from notchflex.fit.model.constants import unknowns
-from notchflex.fit.model.samples import Samples
+from notchflex.fit.constants import unknowns
+from notchflex.fit.residuals import Samples
+from notchflex.fit.search import FitProblem
 from notchflex.robot.value_names import number_at
 from notchflex.solver.programs.compiled import Native
 from refusals import refused

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from notchflex.fit.estimation.intervals import Cost, minimise
+from notchflex.fit import Cost
+from notchflex.fit.search import minimise
 
 WIDE = (np.full(2, -np.inf), np.full(2, np.inf))
 

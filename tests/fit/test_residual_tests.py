@@ -8,9 +8,16 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.fit import LeastSquares, Measurements, calibrate, diagnose, simulate_measurements
-from notchflex.fit.assessment import diagnosis
-from notchflex.fit.documents import calibration_document
+from notchflex.fit import (
+    LeastSquares,
+    Measurements,
+    calibrate,
+    calibration_document,
+    diagnose,
+    diagnosis,
+    simulate_measurements,
+)
+from notchflex.fit.search import minimise
 
 WRIST = nf.load_robot("pacheco2021-a")
 MODULUS, FRICTION = NAMES = ("material.elastic_modulus", "friction.coefficient")
@@ -133,6 +140,6 @@ def test_intervals_linearise_deviations_from_the_drawing_where_they_end():
     lower, upper = (np.array([value, limit[1]]) for limit in (problem.lower, problem.upper))
     for _ in range(4):
         linearised = problem.linearised(settled.values, problem.means + settled.cost.deviations)
-        settled = linearised.held(settled.values, lower, upper)
+        settled = minimise(linearised, settled.values, lower, upper)
     rise = [2.0 * (one.cost.value - found.cost) for one in (once, settled)]
     assert rise[0] == pytest.approx(rise[1], rel=0.05)

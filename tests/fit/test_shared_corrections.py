@@ -5,8 +5,8 @@ import pytest
 
 import notchflex as nf
 from notchflex.fit import Constant, calibrate, simulate_measurements, write_fitted
-from notchflex.fit.model.constants import unknowns
-from notchflex.fit.model.samples import Samples
+from notchflex.fit.constants import unknowns
+from notchflex.fit.residuals import Samples
 from refusals import refused
 
 # Its notches are cut to unlike depths.

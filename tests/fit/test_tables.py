@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fitted import NAMES, fitted
-from notchflex.fit.assessment.posterior import Posterior
+from notchflex.fit import Posterior
 from refusals import refused
 
 DRAWN = Posterior(NAMES, np.arange(12.0).reshape(2, 3, 2), {}, {}, 1)

@@ -1,7 +1,14 @@
 """The model beside measurements: solved at every measured row, root-mean-square errors."""
 
-from notchflex.comparison.comparison import Comparison, compare, compare_kinematics
-from notchflex.comparison.tables import comparison_columns, comparison_document, errors_document
+from notchflex.comparison.comparison import (
+    Comparison,
+    compare,
+    compare_kinematics,
+    comparison_columns,
+    comparison_document,
+    errors_document,
+    takes_stroke_of_model,
+)
 
 __all__ = [
     "Comparison",
@@ -10,4 +17,5 @@ __all__ = [
     "comparison_columns",
     "comparison_document",
     "errors_document",
+    "takes_stroke_of_model",
 ]

@@ -1,29 +1,24 @@
-"""The model at every measured row, and its errors."""
+"""The model at every measured row, and its errors; as JSON and as columns of a CSV."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from html import escape
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
-from numpy.typing import NDArray
 
 from notchflex import InputError, Robot, equal_stroke, tip_from_angles
 from notchflex.analysis import axis_points
-from notchflex.fit.measurements.measurements import Measurements
-from notchflex.fit.measurements.simulated import solved_rows
-from notchflex.fit.model.residuals import OUTPUTS, Predicted, branch_words, misfit
-from notchflex.support import QUANTITIES
+from notchflex.fit import MEASURED, MeasuredRows, Measurements, branch_words, edge, headers, misfit
+from notchflex.support import DEGREES, QUANTITIES, document_head
 
-if TYPE_CHECKING:
-    from notchflex import EquilibriumPath
+Numbers = Float[np.ndarray, "..."]
 
-_COLUMNS = ("tension", "stroke", "notch_angle", "total_angle", "tip_position", "converged")
 # Quantities without a column of their own in a comparison: only their errors are kept.
 _OTHERS = ("edge_angle", "tip_rotation", "tip_tension", "axis_points")
-_POINTS = ("tip_rotation", "axis_points")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,30 +48,30 @@ class Comparison:
 
     robot: Robot
     measured: Measurements
-    tension: Float[np.ndarray, "p t"]
-    stroke: Float[np.ndarray, "p t"]
-    notch_angle: Float[np.ndarray, "p n"]
-    total_angle: Float[np.ndarray, " p"]
-    tip: Float[np.ndarray, "p 3"]
+    tension: Numbers
+    stroke: Numbers
+    notch_angle: Numbers
+    total_angle: Numbers
+    tip: Numbers
     converged: Bool[np.ndarray, " p"]
     reason: tuple[str, ...]
     others: dict[str, float] = field(default_factory=dict[str, float])
-    stroke_lost: Float[np.ndarray, " p"] | None = None
-    beyond_faces: Float[np.ndarray, "p n"] | float = 0.0
+    stroke_lost: Numbers | None = None
+    beyond_faces: Numbers | float = 0.0
 
     @property
     def angle(self) -> str:
         """The measured angle of notches, by its name: "notch_angle" or "edge_angle"."""
-        return _angle(self.measured)
+        return angle_of(self.measured)
 
     @cached_property
-    def measured_notch_angle(self) -> Float[np.ndarray, "p n"]:
+    def measured_notch_angle(self) -> Numbers:
         """Measured angle of every notch [rad], (P, n); NaN where it was not measured."""
         nothing = np.full(self.notch_angle.shape, np.nan)
         return self.measured.observed.get(self.angle, nothing)
 
     @cached_property
-    def measured_total_angle(self) -> Float[np.ndarray, " p"]:
+    def measured_total_angle(self) -> Numbers:
         """Measured total angle [rad], (P,): its own column, or else the sum of all notches."""
         added = np.sum(self.measured_notch_angle, axis=1)
         observed = self.measured.observed
@@ -84,25 +79,21 @@ class Comparison:
         return added if total is None else np.where(np.isnan(total), added, total)
 
     @cached_property
-    def measured_tip(self) -> Float[np.ndarray, "p 3"]:
+    def measured_tip(self) -> Numbers:
         """Measured tip in the world [mm], (P, 3); NaN for unknown coordinates.
 
         As measured, or else that of the model, moved as arcs of the measured notch angles lie from
         arcs of the model's: strips and U-links are no arcs, but bend nearly as the model's do.
         """
-        angles = self.measured_notch_angle + self.beyond_faces
-        complete = np.isfinite(angles).all(axis=1)
         tip = np.full(self.tip.shape, np.nan)
+        complete = np.isfinite(self.measured_notch_angle).all(axis=1)
         if complete.any():
-            of_model = self.notch_angle + self.beyond_faces
             measured, modelled = (
-                _tip_in_world(self.robot, self.measured, one[complete])
-                for one in (angles, of_model)
+                _tip_in_world(self.robot, self.measured, (angles + self.beyond_faces)[complete])
+                for angles in (self.measured_notch_angle, self.notch_angle)
             )
             tip[complete] = self.tip[complete] + measured - modelled
-        measured = self.measured.observed.get("tip_position")
-        if measured is None:
-            return tip
+        measured = self.measured.observed.get("tip_position", tip)
         return np.where(np.isfinite(measured).any(axis=1, keepdims=True), measured, tip)
 
     @property
@@ -111,7 +102,7 @@ class Comparison:
         return int(self.converged.sum())
 
     @property
-    def rmse_notches(self) -> Float[np.ndarray, " n"]:
+    def rmse_notches(self) -> Numbers:
         """Root-mean-square error of every notch angle [rad], (n,)."""
         return self._rms(self.notch_angle - self.measured_notch_angle)
 
@@ -121,7 +112,7 @@ class Comparison:
         return float(self._rms(self.total_angle - self.measured_total_angle))
 
     @property
-    def tip_error(self) -> Float[np.ndarray, " p"]:
+    def tip_error(self) -> Numbers:
         """Distance of the tip from the measured tip [mm], (P,), over its measured coordinates."""
         off = self.tip - self.measured_tip
         return np.where(np.isnan(off).all(axis=1), np.nan, np.sqrt(np.nansum(off**2, axis=1)))
@@ -137,23 +128,40 @@ class Comparison:
         off = np.where(self.converged, self.measured_total_angle - self.total_angle, np.nan)
         return branch_words(off, "total_angle", self.measured)
 
-    def _rms(self, errors: NDArray[np.float64]) -> NDArray[np.float64]:
-        is_known = np.isfinite(errors) & self.converged.reshape(-1, *(1,) * (errors.ndim - 1))
-        count = is_known.sum(axis=0)
-        total = np.sum(np.where(is_known, errors, 0.0) ** 2, axis=0)
-        return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+    def _rms(self, errors: Numbers) -> Numbers:
+        return root_mean_square(errors[self.converged])
 
     def __repr__(self) -> str:
         """Return the errors on a few lines."""
-        from notchflex.comparison.tables import summary
-
-        return summary(self)
+        measured = self.measured
+        way = "each from rest" if measured.from_rest else "each pull one path"
+        lines = [
+            f"{self.robot.name} beside {measured.source}",
+            f"{self.points} of {len(measured)} rows solved, {way}",
+            "root-mean-square errors:",
+            f"  notches      {', '.join(map(_number, self.rmse_notches * DEGREES))} deg",
+            f"  total angle  {_number(self.rmse_total * DEGREES)} deg",
+            f"  tip          {_number(self.rmse_tip)} mm",
+        ]
+        for name, value in self.others.items():
+            title, unit, scale = edge(name)
+            lines.append(f"  {title}  {_number(value * scale)} {unit}")
+        return "\n".join([*lines, *self.diagnosis])
 
     def _repr_html_(self) -> str:
         """Return the same for a notebook."""
-        from html import escape
-
         return f"<pre>{escape(repr(self))}</pre>"
+
+
+def root_mean_square(errors: Numbers) -> Numbers:
+    """Return the root mean square over the rows; NaN without any."""
+    count = np.isfinite(errors).sum(axis=0)
+    total = np.nansum(errors**2, axis=0)
+    return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else "-"
 
 
 def compare(robot: Robot, measurements: Measurements) -> Comparison:
@@ -179,37 +187,35 @@ def compare(robot: Robot, measurements: Measurements) -> Comparison:
         0.54
     """
     _check(robot, measurements)
-    others = [name for name in _OTHERS if name in measurements.observed]
-    at_faces = _angle(measurements) == "edge_angle"
+    rows = MeasuredRows(robot, measurements.load, measurements.pull, measurements.from_rest)
+    path = rows.solve()
 
-    def read(path: EquilibriumPath) -> dict[str, Any]:
-        names = [*_COLUMNS, *(OUTPUTS.get(name, name) for name in others if name != "axis_points")]
-        columns = {name: np.asarray(getattr(path, name)) for name in names}
-        columns["reason"] = np.array(path.reason, object)
-        if "axis_points" in others:
-            columns["axis_points"] = np.asarray(axis_points(path, measurements.axis_at))
-        return columns
+    def of_model(name: str) -> Any:
+        if name == "axis_points":
+            return rows.sorted_back(axis_points(path, measurements.axis_at))
+        return rows.sorted_back(np.asarray(getattr(path, name)))
 
-    model = solved_rows(robot, measurements.load, measurements.pull, measurements.from_rest, read)
-    angle, total = model[_angle(measurements)], model["total_angle"]
-    if at_faces and "total_angle" not in measurements.observed:
+    angle_name, converged = angle_of(measurements), of_model("converged")
+    angle, total = of_model(angle_name), of_model("total_angle")
+    if angle_name == "edge_angle" and "total_angle" not in measurements.observed:
         total = angle.sum(axis=1)
+    others: dict[str, float] = {}
+    for name in _OTHERS:
+        if name in measurements.observed and name != angle_name:
+            values = of_model(MEASURED[name].output)
+            others[name] = _error(name, measurements.observed[name], values, converged)
     return Comparison(
         robot=robot,
         measured=measurements,
-        tension=model["tension"],
-        stroke=model["stroke"],
+        tension=of_model("tension"),
+        stroke=of_model("stroke"),
         notch_angle=angle,
         total_angle=total,
-        beyond_faces=model["notch_angle"] - angle if at_faces else 0.0,
-        tip=model["tip_position"],
-        converged=model["converged"],
-        reason=tuple(str(one) for one in model["reason"]),
-        others={
-            name: _error(name, measurements, model)
-            for name in others
-            if not (at_faces and name == "edge_angle")
-        },
+        beyond_faces=of_model("notch_angle") - angle,
+        tip=of_model("tip_position"),
+        converged=converged,
+        reason=tuple(map(str, rows.sorted_back(np.array(path.reason, object)))),
+        others=others,
     )
 
 
@@ -256,13 +262,10 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
     )
 
 
-def _angle(measured: Measurements) -> str:
-    observed = measured.observed
-    return (
-        "edge_angle"
-        if "edge_angle" in observed and "notch_angle" not in observed
-        else "notch_angle"
-    )
+def angle_of(measured: Measurements) -> str:
+    """Return the name of the angles of notches that were measured."""
+    only_edges = "edge_angle" in measured.observed and "notch_angle" not in measured.observed
+    return "edge_angle" if only_edges else "notch_angle"
 
 
 def _check(robot: Robot, measurements: Measurements) -> None:
@@ -271,7 +274,7 @@ def _check(robot: Robot, measurements: Measurements) -> None:
             "compare needs Measurements; read_measurements reads them from a CSV, and "
             f"simulate_measurements makes them; got {type(measurements).__name__}"
         )
-    notches = measurements.observed.get(_angle(measurements))
+    notches = measurements.observed.get(angle_of(measurements))
     if notches is not None and notches.shape[1] != robot.number_of_notches:
         raise InputError.WRONG_SHAPE(
             f"{measurements.source} has angles of {notches.shape[1]} notches, but {robot.name} has "
@@ -279,22 +282,115 @@ def _check(robot: Robot, measurements: Measurements) -> None:
         )
 
 
-def _tip_in_world(
-    robot: Robot, measured: Measurements, angles: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _tip_in_world(robot: Robot, measured: Measurements, angles: Numbers) -> Numbers:
     """Forward kinematics of notch angles, with the base rotation."""
     tip, _ = tip_from_angles(robot, angles)
     return QUANTITIES["tip_position"].turned(np.asarray(tip), measured.load.base_to_world)
 
 
-def _error(name: str, measured: Measurements, model: dict[str, Any]) -> float:
+def _error(name: str, observed: Numbers, values: Numbers, converged: Numbers) -> float:
     """Root-mean-square error of a quantity over the solved rows; of points that of distances."""
-    rows = np.flatnonzero(model["converged"])
-    if not len(rows) or not np.isfinite(measured.observed[name][rows]).any():
+    if not np.isfinite(observed[converged]).any():
         return float("nan")
-    output = OUTPUTS.get(name, name)
-    predicted = Predicted({output: model[output][rows]}, np.ones(len(rows), bool), {})
-    off, _ = misfit(name, measured.taken(rows), predicted)
-    squares = off.reshape(len(rows), -1, 3 if name in _POINTS else 1) ** 2
-    is_known = np.isfinite(squares).any(axis=2)
-    return float(np.sqrt(np.nansum(squares) / is_known.sum()))
+    none = np.zeros((0, *values[converged].shape))
+    off, _ = misfit(name, observed[converged], values[converged], none)
+    squares = off.reshape(-1, 3 if MEASURED[name].is_vector else 1) ** 2
+    return float(np.sqrt(np.nansum(squares) / np.isfinite(squares).any(axis=1).sum()))
+
+
+def _pairs(comparison: Comparison) -> dict[str, tuple[Numbers, Numbers]]:
+    """Measured and modelled numbers by quantity, rows as leading axis, in deg, mm and N."""
+    measured = comparison.measured
+    pairs = {
+        "tension": (measured.measured_tension, comparison.tension),
+        "stroke": (measured.load.stroke, comparison.stroke),
+        comparison.angle: (comparison.measured_notch_angle, comparison.notch_angle),
+        "total_angle": (comparison.measured_total_angle, comparison.total_angle),
+        "tip_position": (comparison.measured_tip, comparison.tip),
+    }
+    return {
+        name: (first * QUANTITIES[name].scale, second * QUANTITIES[name].scale)
+        for name, (first, second) in pairs.items()
+    }
+
+
+def comparison_document(comparison: Comparison) -> dict[str, Any]:
+    """Return a comparison as a document for `notchflex.support.write_json`.
+
+    Args:
+        comparison: The comparison.
+
+    Returns:
+        `rmse_deg.notches`, `rmse_deg.total`, `tip_rmse_mm`, `points`, `negative_forces`,
+        `from_rest` with `order` (how the order of the rows was understood), `diagnosis`, the
+        columns that were ignored, and every row, measured beside modelled. None marks what
+        was not measured.
+    """
+    measured = comparison.measured
+    pairs = {QUANTITIES[name].key: pair for name, pair in _pairs(comparison).items()}
+    rows: list[dict[str, Any]] = []
+    for row, pull in enumerate(measured.pull):
+        seen, model = ({key: pair[side][row] for key, pair in pairs.items()} for side in (0, 1))
+        model |= {"converged": comparison.converged[row], "reason": comparison.reason[row]}
+        rows.append({"trial": pull, "measured": seen, "model": model})
+    reason = next(filter(None, comparison.reason), "")
+    return {
+        **document_head(comparison.robot),
+        "data": measured.source,
+        "from_rest": measured.from_rest,
+        "order": measured.order,
+        **errors_document(comparison),
+        "negative_forces": measured.negative_forces,
+        "diagnosis": list(comparison.diagnosis),
+        "ignored_columns": measured.ignored,
+        "converged": not reason,
+        "reason": reason,
+        "rows": rows,
+    }
+
+
+def errors_document(comparison: Comparison) -> dict[str, Any]:
+    """Return the errors of a comparison: `rmse_deg`, `tip_rmse_mm` and the number of `points`.
+
+    `rmse_others` holds those of the tip's rotation, of tensions at the tip and of points on the
+    axis, if they were measured. For the kinematic model also `stroke_from` ("measurement", or
+    "model" if some row has only forces) and `stroke_lost_mm`, which closed notches could not take,
+    by row.
+    """
+    lost: dict[str, Any] = {}
+    if comparison.stroke_lost is not None:
+        source = "model" if takes_stroke_of_model(comparison) else "measurement"
+        lost = {"stroke_from": source, "stroke_lost_mm": comparison.stroke_lost}
+    measured = comparison.angle in comparison.measured.observed
+    return {
+        "rmse_deg": {
+            "notches": comparison.rmse_notches * DEGREES if measured else None,
+            "total": comparison.rmse_total * DEGREES,
+        },
+        "tip_rmse_mm": comparison.rmse_tip,
+        "rmse_others": {
+            f"{name}_{edge(name)[1]}": value * edge(name)[2]
+            for name, value in comparison.others.items()
+        },
+        "points": comparison.points,
+        **lost,
+    }
+
+
+def comparison_columns(comparison: Comparison) -> dict[str, Any]:
+    """Return a comparison as columns for a CSV: header to P values, in deg, mm and N."""
+    columns: dict[str, Any] = {"trial": comparison.measured.pull}
+    for name, (values, model) in _pairs(comparison).items():
+        for index, header in headers(QUANTITIES[name].column, model.shape[1:]).items():
+            if not np.isnan(values[:, *index]).all():
+                columns[header] = values[:, *index]
+            columns[f"{header}_model"] = model[:, *index]
+    columns["tip_error_mm"] = comparison.tip_error
+    columns["converged"] = comparison.converged
+    columns["reason"] = comparison.reason
+    return columns
+
+
+def takes_stroke_of_model(kinematics: Comparison) -> bool:
+    """Return whether the kinematic model takes the stroke of the full model in some row."""
+    return bool(np.isnan(kinematics.measured.load.stroke[:, 0]).any())

@@ -8,26 +8,22 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable
-from math import isfinite
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from notchflex import InputError, __version__
-from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose, with_unit
-from notchflex.fit.assessment.errors_of_parts import edge, errors_of_parts
-from notchflex.fit.assessment.folds import Fold, LeftOut
-from notchflex.fit.assessment.next_measurement import NextMeasurement
-from notchflex.fit.assessment.posterior import Posterior
-from notchflex.fit.estimation.calibration import Calibration
-from notchflex.fit.estimation.intervals import Interval
-from notchflex.fit.estimation.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
-from notchflex.fit.model.constants import Unknown
-from notchflex.fit.model.residuals import SENSOR
+from notchflex.fit.calibration import Calibration, Interval
+from notchflex.fit.constants import SENSOR, Unknown
+from notchflex.fit.diagnosis import NO_PROBLEMS, diagnose, edge, errors_of_parts, with_unit
+from notchflex.fit.folds import LeftOut
+from notchflex.fit.next_measurement import NextMeasurement
+from notchflex.fit.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
+from notchflex.fit.posterior import Posterior
 from notchflex.support import (
-    QUANTITIES,
     check_folder,
     plain,
     robot_text,
@@ -37,9 +33,24 @@ from notchflex.support import (
     write_text,
 )
 
-HEAD = {"program": "notchflex", "version": __version__}
 # An objective's value is a sum of these; half a chi squared has no unit.
 _UNIT_OF_COST: dict[type, str] = {SumOfRobotErrors: "deg", SumOfDistances: "mm"}
+# More files than that are not named, but counted.
+_FILES = 3
+
+
+def _document(content: Mapping[str, Any]) -> dict[str, Any]:
+    """A document with its head, of plain values; None instead of NaN and infinity."""
+    return {"program": "notchflex", "version": __version__, **_finite(content)}
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    value = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def calibration_document(found: Calibration) -> dict[str, Any]:
@@ -59,45 +70,52 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         mean squares of every notch, beside the repeats), `searches`, `solves` (number of rows
         solved) and `robots` (their data, and their descriptions with the fitted constants).
     """
-    objective = found.problem.objective
+    objective, tests = found.problem.objective, found.tests
     huber = {"huber": objective.huber} if isinstance(objective, LeastSquares) else {}
-    return {
-        **HEAD,
-        "converged": found.converged,
-        "reason": found.reason,
-        "objective": {"name": type(objective).__name__, **huber},
-        "cost": found.cost,
-        "cost_unit": _UNIT_OF_COST.get(type(objective), ""),
-        "numbers_measured": len(found.residuals),
-        "numbers_counted": found.counted,
-        "degrees_of_freedom": found.freedom,
-        "reduced_chi_squared": _finite(found.reduced_chi_squared),
-        "log_likelihood": _finite(found.log_likelihood),
-        "aic": _finite(found.aic),
-        "bic": _finite(found.bic),
-        "intervals_widened_by": found.widened,
-        "constants": _constants(found),
-        "correlation": [[_finite(one) for one in row] for row in found.correlation],
-        "verdict": list(diagnose(found)),
-        "trusted": found.trusted,
-        "tests": _tests(found),
-        "deviations_of_drawing": found.deviations_of_drawing,
-        "noise": _noise(found),
-        "errors": _errors(found),
-        "searches": [
-            {
-                **one._asdict(),
-                "values": dict(zip(found.names, one.values.tolist(), strict=True)),
-                "cost": None if one.cost is None else one.cost.value,
-            }
-            for one in found.searches
-        ],
-        "solves": found.solves,
-        "robots": {
-            label: {"data": data_of(found, label), "robot": plain(to_table(robot))}
-            for label, robot in found.robots.items()
-        },
-    }
+    same = ("converged", "reason", "cost", "reduced_chi_squared", "log_likelihood", "aic", "bic")
+    same += ("correlation", "trusted", "deviations_of_drawing", "solves")
+    return _document(
+        {
+            **{name: getattr(found, name) for name in same},
+            "objective": {"name": type(objective).__name__, **huber},
+            "cost_unit": _UNIT_OF_COST.get(type(objective), ""),
+            "numbers_measured": len(found.residuals),
+            "numbers_counted": found.counted,
+            "degrees_of_freedom": found.freedom,
+            "intervals_widened_by": found.widened,
+            "constants": _constants(found),
+            "verdict": diagnose(found),
+            "tests": tests
+            and {
+                **{name: getattr(tests, name) for name in ("runs", "notches", "rejected")},
+                "missing": [test._asdict() for test in tests.missing],
+            },
+            "noise": _noise(found),
+            "errors": [
+                {
+                    **{name: value for name, value in asdict(one).items() if name not in _NOT_TOLD},
+                    "part": one.part or None,
+                    "rmse": one.error,
+                }
+                for one in errors_of_parts(found)
+            ],
+            "searches": [
+                {
+                    **search._asdict(),
+                    "values": dict(zip(found.names, search.values, strict=True)),
+                    "cost": search.cost and search.cost.value,
+                }
+                for search in found.searches
+            ],
+            "robots": {
+                label: {"data": data_of(found, label), "robot": plain(to_table(robot))}
+                for label, robot in found.robots.items()
+            },
+        }
+    )
+
+
+_NOT_TOLD = ("title", "error")
 
 
 def left_out_document(left_out: LeftOut) -> dict[str, Any]:
@@ -114,45 +132,47 @@ def left_out_document(left_out: LeftOut) -> dict[str, Any]:
         is known of constants that the robot left out has of its own (mean, standard deviation),
         and of its `photograph`: row, values, gain and errors.
     """
-    return {
-        **HEAD,
-        "by": left_out.by,
-        "constants": left_out.whole.values,
-        "folds": [
-            {
-                "left_out": fold.label,
-                "solved": fold.converged,
-                "search_converged": fold.found.converged,
-                "constants": fold.found.values,
-                "errors": [
-                    {
-                        "quantity": name,
-                        "unit": edge(name)[1],
-                        "error": error * edge(name)[2],
-                        "error_of_all": fold.errors_of_all.get(name, math.nan) * edge(name)[2],
-                        "inside_90": fold.share_inside().get(name),
-                    }
-                    for name, error in fold.errors.items()
-                ],
-                "before": {name: list(sizes) for name, sizes in fold.before.items()},
-                "photograph": _photograph(fold),
-            }
-            for fold in left_out.folds
-        ],
-    }
+    return _document(
+        {
+            "by": left_out.by,
+            "constants": left_out.whole.values,
+            "folds": [
+                {
+                    "left_out": fold.label,
+                    "solved": fold.converged,
+                    "search_converged": fold.found.converged,
+                    "constants": fold.found.values,
+                    "errors": [
+                        {
+                            **error,
+                            "error_of_all": _in_unit(name, fold.errors_of_all.get(name, math.nan)),
+                            "inside_90": fold.share_inside().get(name),
+                        }
+                        for name, error in _errors(fold.errors).items()
+                    ],
+                    "before": fold.before,
+                    "photograph": fold.specimen
+                    and {
+                        "row": fold.row + 1,
+                        "values": fold.specimen.values,
+                        "gain": fold.specimen.gain,
+                        "errors": [*_errors(fold.errors_updated).values()],
+                    },
+                }
+                for fold in left_out.folds
+            ],
+        }
+    )
 
 
-def _photograph(fold: Fold) -> dict[str, Any] | None:
-    if fold.specimen is None:
-        return None
+def _in_unit(quantity: str, value: float) -> float:
+    return value * edge(quantity)[2]
+
+
+def _errors(errors: Mapping[str, float]) -> dict[str, dict[str, Any]]:
     return {
-        "row": fold.row + 1,
-        "values": fold.specimen.values,
-        "gain": fold.specimen.gain,
-        "errors": [
-            {"quantity": name, "unit": edge(name)[1], "error": error * edge(name)[2]}
-            for name, error in fold.errors_updated.items()
-        ],
+        name: {"quantity": name, "unit": edge(name)[1], "error": _in_unit(name, error)}
+        for name, error in errors.items()
     }
 
 
@@ -168,27 +188,25 @@ def next_measurement_document(ranked: NextMeasurement) -> dict[str, Any]:
         interval after it over that before), `volume` (of all together) and `gain` (of what is
         wanted), None if a candidate has no solution.
     """
-    keys = [QUANTITIES[f"commanded_{name}"].key for name in ("tension", "stroke")]
-    tension, stroke = (key.rpartition(".")[2] for key in keys)
-    return {
-        **HEAD,
-        "robot": ranked.label,
-        "wanted": list(ranked.wanted),
-        "best": ranked.best + 1,
-        "candidates": [
-            {
-                "load": {
-                    tension: ranked.loads.tension[number],
-                    stroke: ranked.loads.stroke[number],
-                },
-                "converged": bool(ranked.converged[number]),
-                "narrower": dict(zip(ranked.names, narrower.tolist(), strict=True)),
-                "volume": ranked.volume[number],
-                "gain": ranked.gain[number],
-            }
-            for number, narrower in enumerate(ranked.narrower)
-        ],
-    }
+    return _document(
+        {
+            "robot": ranked.label,
+            "wanted": ranked.wanted,
+            "best": ranked.best + 1,
+            "candidates": [
+                {
+                    "load": {"tension_N": tension, "stroke_mm": stroke},
+                    "converged": ranked.converged[number],
+                    "narrower": dict(zip(ranked.names, ranked.narrower[number], strict=True)),
+                    "volume": ranked.volume[number],
+                    "gain": ranked.gain[number],
+                }
+                for number, (tension, stroke) in enumerate(
+                    zip(ranked.loads.tension, ranked.loads.stroke, strict=True)
+                )
+            ],
+        }
+    )
 
 
 def posterior_document(drawn: Posterior, *, draws: bool = False) -> dict[str, Any]:
@@ -203,140 +221,97 @@ def posterior_document(drawn: Posterior, *, draws: bool = False) -> dict[str, An
         R-hat), `chains`, `draws_per_chain`, `divergent`, and `draws` if wanted: by constant,
         chains by draws.
     """
-    chains, count, _ = drawn.draws.shape
-    every = {name: drawn.draws[..., number] for number, name in enumerate(drawn.names)}
-    return {
-        **HEAD,
-        "chains": chains,
-        "draws_per_chain": count,
-        "divergent": drawn.divergent,
-        "constants": [
-            {
-                "name": name,
-                "mean": drawn.means[name],
-                "standard_deviation": drawn.deviations[name],
-                "interval_95": list(drawn.intervals[name]),
-                "effective_draws": _finite(drawn.effective[name]),
-                "split_r_hat": _finite(drawn.r_hat[name]),
-            }
-            for name in drawn.names
-        ],
-        **({"draws": every} if draws else {}),
-    }
+    values = {name: drawn.draws[..., number] for number, name in enumerate(drawn.names)}
+    return _document(
+        {
+            "chains": drawn.draws.shape[0],
+            "draws_per_chain": drawn.draws.shape[1],
+            "divergent": drawn.divergent,
+            "constants": [
+                {
+                    "name": name,
+                    "mean": drawn.means[name],
+                    "standard_deviation": drawn.deviations[name],
+                    "interval_95": drawn.intervals[name],
+                    "effective_draws": drawn.effective[name],
+                    "split_r_hat": drawn.r_hat[name],
+                }
+                for name in drawn.names
+            ],
+            **({"draws": values} if draws else {}),
+        }
+    )
 
 
 def data_of(calibration: Calibration, label: str) -> list[str]:
     """Return the sources of the measurements of a robot."""
-    sources = (one.source for one in calibration.problem.samples.of_robot(label))
+    sources = (table.source for table in calibration.problem.samples.of_robot(label))
     return list(dict.fromkeys(sources))
 
 
-def _constants(calibration: Calibration) -> list[dict[str, Any]]:
-    by_pulls = np.sqrt(np.diag(calibration.by_pulls.covariance))
-    by_rows = np.sqrt(np.diag(calibration.covariance_by_rows))
-    rows: list[dict[str, Any]] = []
-    for number, unknown in enumerate(calibration.problem.unknowns):
-        interval = calibration.intervals.get(unknown.name)
-        rows.append(
-            {
-                "name": unknown.name,
-                "value": calibration.values[unknown.name],
-                "unit": unknown.unit,
-                "robots": list(dict.fromkeys(one.label for one in unknown.sets)),
-                "interval_95": None if interval is None else [interval.lower, interval.upper],
-                "interval_reason": "" if interval is None else interval.reason,
-                "standard_deviation": _finite(calibration.deviations[unknown.name]),
-                "standard_deviation_by_pulls": _finite(by_pulls[number]),
-                "standard_deviation_by_rows": _finite(by_rows[number]),
-                "interval_by": "pulls" if calibration.by_pulls.counts[number] else "rows",
-                "pulls": int(calibration.by_pulls.pulls[number]),
-                "before": unknown.start,
-                "limits": [_finite(unknown.lower), _finite(unknown.upper)],
-                "prior": None if unknown.prior is None else list(unknown.prior),
-            }
-        )
-    return rows
-
-
-def _tests(calibration: Calibration) -> dict[str, Any] | None:
-    tests = calibration.tests
-    if tests is None:
-        return None
-    return {
-        "runs": _finite(tests.runs),
-        "notches": _finite(tests.notches),
-        "rejected": list(tests.rejected),
-        "missing": [one._asdict() for one in tests.missing],
-    }
-
-
-def _noise(calibration: Calibration) -> list[dict[str, Any]]:
-    """Source and root mean square of the noise of every quantity of every file."""
-    rows: list[dict[str, Any]] = []
-    for number, sample in enumerate(calibration.problem.samples.every):
-        for name in sample.measured.observed:
-            deviation = calibration.noise.deviation[calibration.residuals.of(number, name)]
-            if not len(deviation):
-                continue
-            _, unit, scale = edge(name)
-            rows.append(
-                {
-                    "robot": sample.label,
-                    "data": sample.measured.source,
-                    "quantity": name,
-                    "unit": unit,
-                    "standard_deviation": float(np.sqrt(np.mean(deviation**2))) * scale,
-                    "known_from": calibration.noise.source[number, name],
-                }
-            )
-    return rows
-
-
-def _errors(calibration: Calibration) -> list[dict[str, Any]]:
+def _constants(fit: Calibration) -> list[dict[str, Any]]:
+    by_pulls, by_rows = (
+        np.sqrt(np.diag(one)) for one in (fit.by_pulls.covariance, fit.covariance_by_rows)
+    )
+    no_interval = Interval(None, None, np.zeros((0, 2)))
     return [
         {
-            "robot": one.robot,
-            "quantity": one.quantity,
-            "part": one.part or None,
-            "unit": one.unit,
-            "rmse": one.error,
-            "repeats": _finite(one.repeats),
-            "count": one.count,
+            "name": name,
+            "value": fit.values[name],
+            "unit": unknown.unit,
+            "robots": list(dict.fromkeys(number.label for number in unknown.sets)),
+            "interval_95": [interval.lower, interval.upper] if name in fit.intervals else None,
+            "interval_reason": interval.reason,
+            "standard_deviation": fit.deviations[name],
+            "standard_deviation_by_pulls": by_pulls[number],
+            "standard_deviation_by_rows": by_rows[number],
+            "interval_by": "pulls" if fit.by_pulls.counts[number] else "rows",
+            "pulls": fit.by_pulls.pulls[number],
+            "before": unknown.start,
+            "limits": [unknown.lower, unknown.upper],
+            "prior": unknown.prior,
         }
-        for one in errors_of_parts(calibration)
+        for number, (name, unknown) in enumerate(zip(fit.names, fit.problem.unknowns, strict=True))
+        for interval in [fit.intervals.get(name, no_interval)]
     ]
 
 
-def _finite(value: float) -> float | None:
-    """A number; None instead of NaN and infinity."""
-    return float(value) if math.isfinite(value) else None
+def _noise(fit: Calibration) -> list[dict[str, Any]]:
+    """Source and root mean square of the noise of every quantity of every file."""
+    samples, deviation = fit.problem.samples.every, fit.noise.deviation
+    return [
+        {
+            "robot": samples[number].label,
+            "data": samples[number].measured.source,
+            "quantity": name,
+            "unit": edge(name)[1],
+            "standard_deviation": plain(_in_unit(name, np.sqrt(np.mean(deviation[mine] ** 2)))),
+            "known_from": source,
+        }
+        for (number, name), source in fit.noise.source.items()
+        if (mine := fit.residuals.of(number, name)).any()
+    ]
 
 
-def summary(calibration: Calibration) -> str:
+def summary(fit: Calibration) -> str:
     """Return constants with intervals and units, root-mean-square errors and the diagnosis."""
-    state = "converged" if calibration.converged else f"not converged: {calibration.reason}"
-    state += "" if calibration.trusted else ", not trusted"
-    lines = [f"{', '.join(calibration.given)}: {calibration.counted} numbers measured, {state}"]
-    width = max(map(len, calibration.names))
-    for name, value in calibration.values.items():
-        unit, interval = calibration.units[name], calibration.intervals.get(name)
-        ends = "" if interval is None else f"  95 %: {_ends(interval, unit)}"
-        lines.append(f"  {name:<{width}}  {with_unit(value, unit)}{ends}")
+    state = "converged" if fit.converged else f"not converged: {fit.reason}"
+    state += "" if fit.trusted else ", not trusted"
+    lines = [f"{', '.join(fit.given)}: {fit.counted} numbers measured, {state}"]
+    width = max(map(len, fit.names))
+    for name, value in fit.values.items():
+        ends = ""
+        if (interval := fit.intervals.get(name)) is not None:
+            both = (interval.lower, interval.upper)
+            ends = " to ".join("open" if end is None else f"{end:.5g}" for end in both)
+            ends = f"  95 %: {ends} {fit.units[name]}".rstrip()
+        lines.append(f"  {name:<{width}}  {with_unit(value, fit.units[name])}{ends}")
     errors = [
-        f"{edge(name)[0]} {error * edge(name)[2]:.3g} {edge(name)[1]}"
-        for name, error in calibration.residuals.root_mean_squares().items()
+        f"{edge(name)[0]} {_in_unit(name, error):.3g} {edge(name)[1]}"
+        for name, error in fit.residuals.root_mean_squares().items()
     ]
     lines.append(f"  rms error: {', '.join(errors)}")
-    return "\n".join([*lines, *(diagnose(calibration) or (NO_PROBLEMS,))])
-
-
-def _ends(interval: Interval, unit: str) -> str:
-    ends = ("open" if end is None else f"{end:.5g}" for end in (interval.lower, interval.upper))
-    return f"{' to '.join(ends)} {unit}".strip()
-
-
-# More files than that are not named, but counted.
-_FILES = 3
+    return "\n".join([*lines, *(diagnose(fit) or (NO_PROBLEMS,))])
 
 
 def write_fitted(
@@ -375,57 +350,50 @@ def write_fitted(
     with unwritable(f"the folder {folder} cannot be made"):
         Path(folder).mkdir(exist_ok=True)
     for label, target in targets.items():
-        robot = found.robots[label]
         notes = {
-            one.path: _note(found, unknown)
+            number.path: _note(found, unknown)
             for unknown in (*found.problem.unknowns, *found.drawing)
-            for one in unknown.sets
-            if one.label == label and one.path not in SENSOR
+            for number in unknown.only_of([label]).sets
+            if number.path not in SENSOR
         }
-        write_text(target, robot_text(robot, fitted=notes))
+        write_text(target, robot_text(found.robots[label], fitted=notes))
     return files
 
 
-def _note(calibration: Calibration, unknown: Unknown) -> str:
+def _note(fit: Calibration, unknown: Unknown) -> str:
     """The comment beside a fitted value: the data, and how far to trust it."""
-    trouble = "" if calibration.converged else "; the search did not settle"
-    trouble += "" if calibration.trusted else "; not trusted"
-    files = _files(calibration, unknown)
-    if unknown in calibration.drawing:
-        return f"{files}: {unknown.start:+.2g} standard deviations of its tolerance{trouble}"
-    value = with_unit(calibration.values[unknown.name], unknown.unit)
-    rule = "" if unknown.path == unknown.sets[0].path else f"`{unknown.path}` = {value}, "
-    return f"{files}: {rule}{_trust(calibration, unknown)}{trouble}"
-
-
-def _files(calibration: Calibration, unknown: Unknown) -> str:
-    """Names of the files that a constant follows from."""
-    labels = dict.fromkeys(one.label for one in unknown.sets)
-    files = [Path(one).name for label in labels for one in data_of(calibration, label)]
-    files = list(dict.fromkeys(" ".join(one.split()) for one in files))
+    labels = dict.fromkeys(number.label for number in unknown.sets)
+    sources = [Path(source).name for label in labels for source in data_of(fit, label)]
+    files = list(dict.fromkeys(" ".join(source.split()) for source in sources))
     if len(files) > _FILES:
         files = [*files[: _FILES - 1], f"{len(files) - _FILES + 1} more files"]
-    return ", ".join(files)
-
-
-def _trust(calibration: Calibration, unknown: Unknown) -> str:
-    interval, unit = calibration.intervals.get(unknown.name), unknown.unit
-    if interval is None:
-        size = calibration.deviations[unknown.name]
-        return f"standard deviation {size:.2g} {unit}".strip() if isfinite(size) else "no interval"
-    low, high = interval.lower, interval.upper
-    if calibration.tells_no_noise:
-        return f"no interval: {interval.reason}"
-    if low is None and high is None:
-        return "any value fits"
-    if low is not None and high is not None:
-        ends = f"{low:.5g} to {high:.5g}"
+    trouble = "" if fit.converged else "; the search did not settle"
+    trouble += "" if fit.trusted else "; not trusted"
+    if unknown in fit.drawing:
+        told = f"{unknown.start:+.2g} standard deviations of its tolerance"
     else:
-        ends = f"at most {high:.5g}" if low is None else f"at least {low:.5g}"
-    number = calibration.names.index(unknown.name)
-    pulls = int(calibration.by_pulls.pulls[number])
-    by_pulls = f", by {pulls} whole pulls" if calibration.by_pulls.counts[number] else ""
-    return f"{ends} {unit}".strip() + f" (95 %{by_pulls})"
+        told = _trust(fit, unknown)
+        if unknown.path != unknown.sets[0].path:
+            value = with_unit(fit.values[unknown.name], unknown.unit)
+            told = f"`{unknown.path}` = {value}, {told}"
+    return f"{', '.join(files)}: {told}{trouble}"
+
+
+def _trust(fit: Calibration, unknown: Unknown) -> str:
+    interval, unit = fit.intervals.get(unknown.name), unknown.unit
+    if interval is None:
+        size = fit.deviations[unknown.name]
+        known = math.isfinite(size)
+        return f"standard deviation {size:.2g} {unit}".strip() if known else "no interval"
+    if fit.tells_no_noise:
+        return f"no interval: {interval.reason}"
+    ends = [f"{end:.5g}" for end in (interval.lower, interval.upper) if end is not None]
+    if not ends:
+        return "any value fits"
+    word = "at most " if interval.lower is None else "at least " if interval.upper is None else ""
+    number = fit.number_of(unknown.name)
+    pulls = f", by {fit.by_pulls.pulls[number]} whole pulls" * int(fit.by_pulls.counts[number])
+    return f"{word}{' to '.join(ends)} {unit}".strip() + f" (95 %{pulls})"
 
 
 def _text(target: Path) -> str | None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex import Robot
-from notchflex.fit.measurements.columns import measured_columns
+from notchflex.fit import MEASURED, deviation_header, headers
 from notchflex.support import document_head, write_columns
 
 PHOTOGRAPH = "photograph"
@@ -136,15 +136,13 @@ class MeasuredPhotographs:
         }
         for name, texts in self.loads.items():
             table[name] = list(compress(texts, is_measured))
-        notches, tendons = self.robot.number_of_notches, self.robot.number_of_tendons
-        for column in measured_columns(notches, tendons, ()):
-            if column.quantity != "notch_angle":
-                continue
+        notches = (self.robot.number_of_notches,)
+        for index, header in headers(MEASURED["notch_angle"].columns, notches).items():
             for name, field_name in (
-                (column.name, "notch_angle"),
-                (column.deviation, "notch_angle_deviation"),
+                (header, "notch_angle"),
+                (deviation_header(header), "notch_angle_deviation"),
             ):
-                values = [getattr(seen, field_name)[column.index] for seen in self.measured]
+                values = [getattr(seen, field_name)[index] for seen in self.measured]
                 table[name] = np.degrees(values).tolist()
         return table
 

@@ -223,7 +223,7 @@ def calibration_picture(fit: Calibration) -> Picture:
 
 def _data_panels(fit: Calibration, label: str) -> Iterator[Panel]:
     """Yield the panels of a robot: some notches, and every other measured number."""
-    from notchflex.fit.measurements.measurements import OBSERVED
+    from notchflex.fit import OBSERVED
 
     for quantity in OBSERVED:
         if quantity != "axis_points":  # thirty points and more: only their residuals
@@ -234,7 +234,7 @@ def _data_panels(fit: Calibration, label: str) -> Iterator[Panel]:
 
 def _data_panel(fit: Calibration, label: str, quantity: str, part: int) -> Panel:
     """Return one number over the load: measured, model, and the band of the model."""
-    from notchflex.fit.assessment.errors_of_parts import edge, part_title
+    from notchflex.fit import edge, part_title
 
     residuals, (name, unit, scale) = fit.residuals, edge(quantity)
     x, x_label = _loads(fit, label)
@@ -304,7 +304,7 @@ def _titled(fit: Calibration, label: str, title: str) -> str:
 
 def _rows_of(fit: Calibration, label: str, *quantities: str) -> Any:
     """Return which residuals belong to a robot, and to some of its quantities."""
-    from notchflex.fit.measurements.measurements import OBSERVED
+    from notchflex.fit import OBSERVED
 
     of_robot = fit.residuals.robot == list(fit.given).index(label)
     numbers = [OBSERVED.index(quantity) for quantity in quantities or OBSERVED]

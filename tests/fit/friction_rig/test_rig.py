@@ -10,7 +10,7 @@ from scipy import stats
 
 import notchflex as nf
 from notchflex.fit import constancy, weight_held
-from notchflex.fit.friction_rig.scattered import fit_line, mean_interval, outliers
+from notchflex.fit.scattered import fit_line, mean_interval, outliers
 from refusals import refused
 
 MU = 0.15

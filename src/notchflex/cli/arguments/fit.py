@@ -16,7 +16,7 @@ from notchflex.cli.arguments.loads import tendon_command
 from notchflex.support import TendonCommand, need, parse_number, parse_whole
 
 if TYPE_CHECKING:
-    from notchflex.fit.estimation.objective import FitObjective
+    from notchflex.fit import FitObjective
 from notchflex.cli.arguments.data_sources import DataSources
 
 BEYOND = Group("Beyond the fit", sort_key=8)

@@ -205,7 +205,7 @@ def read_data(
         measured_as: The value of `--measured`.
         columns: The values of `--column`.
     """
-    from notchflex.fit.measurements.csv import read_measurements
+    from notchflex.fit import read_measurements
 
     rest = None if path is None else not path
     measured = read_measurements(

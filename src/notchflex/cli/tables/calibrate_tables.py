@@ -20,8 +20,7 @@ _ROWS = 16
 
 def print_calibration(fit: Calibration) -> None:
     """Print constants, their intervals, problems found, and the errors of every part."""
-    from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose
-    from notchflex.fit.documents import data_of
+    from notchflex.fit import NO_PROBLEMS, data_of, diagnose
 
     console = terminal.output()
     for label in fit.given:
@@ -46,7 +45,7 @@ def print_calibration(fit: Calibration) -> None:
 
 def print_left_out(left_out: LeftOut) -> None:
     """Print how well constants fitted without a part predict it."""
-    from notchflex.fit.assessment.errors_of_parts import edge
+    from notchflex.fit import edge
 
     rows: list[list[str]] = []
     for fold in left_out.folds:
@@ -65,7 +64,7 @@ def print_left_out(left_out: LeftOut) -> None:
 
 def _print_specimens(left_out: LeftOut) -> None:
     """Print what is known of constants that robots have of their own, before and after a row."""
-    from notchflex.fit.assessment.errors_of_parts import edge
+    from notchflex.fit import edge
 
     console = terminal.output()
     constants: list[list[str]] = []
@@ -147,7 +146,7 @@ def _print_constants(console: Console, fit: Calibration) -> None:
 
 
 def _print_errors(console: Console, fit: Calibration) -> None:
-    from notchflex.fit.assessment.errors_of_parts import errors_of_parts
+    from notchflex.fit import errors_of_parts
 
     heads = ["robot", "measured", ">rms error", ">between repeats", "unit"]
     rows = [

@@ -8,7 +8,7 @@ import numpy as np
 
 from notchflex.cli import terminal
 from notchflex.cli.tables.notch_tables import shown_numbers
-from notchflex.fit.assessment.errors_of_parts import edge
+from notchflex.fit import edge
 from notchflex.support import DEGREES
 
 if TYPE_CHECKING:

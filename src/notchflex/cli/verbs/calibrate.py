@@ -82,9 +82,7 @@ def calibrate(
         )
         analyses, problems = _analyse(fit, beyond, candidates, search.seed, progress)
     if output is not None:
-        from notchflex.fit.documents import write_fitted
-
-        files = write_fitted(fit, output, inputs=sources.files)
+        files = fitting.write_fitted(fit, output, inputs=sources.files)
         terminal.note(f"written: {', '.join(map(str, files))}.")
     _write(fit, analyses, outputs)
     for problem in problems:
@@ -96,7 +94,7 @@ def calibrate(
 
 def _check_sensor(constants: Sequence[ParameterSpec]) -> None:
     """Refuse an unknown constant of the measurement, which is in no robot file."""
-    from notchflex.fit.model.residuals import SENSOR
+    from notchflex.fit import SENSOR
 
     for name, *_ in constants:
         path = name.rpartition(":")[2]
@@ -167,8 +165,8 @@ def _analyse(
 
 
 def _write(fit: Calibration, analyses: dict[str, Any], outputs: Outputs) -> None:
+    import notchflex.fit as documents
     from notchflex.cli.tables import calibrate_tables as tables
-    from notchflex.fit import documents
 
     formats: dict[str, tuple[str, Callable[[Any], Any], Callable[[Any], None]]] = {
         "--leave-out": ("left_out", documents.left_out_document, tables.print_left_out),

@@ -115,7 +115,7 @@ def _write(comparison: Comparison, others: dict[str, Comparison], outputs: Outpu
 
 def _report(comparison: Comparison, others: dict[str, Comparison]) -> int:
     """Write notes and failures; return the exit code."""
-    from notchflex.comparison.tables import takes_stroke_of_model
+    from notchflex.comparison import takes_stroke_of_model
 
     kinematics = next((one for one in others.values() if one.stroke_lost is not None), None)
     if kinematics is not None and takes_stroke_of_model(kinematics):

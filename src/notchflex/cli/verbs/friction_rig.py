@@ -39,9 +39,8 @@ def friction_rig(
     """
     outputs = Outputs([data], json=json, plot=plot)
 
-    from notchflex.fit.friction_rig.readings import read_friction_rig
-    from notchflex.fit.friction_rig.rig import friction_document
-    from notchflex.fit.friction_rig.rig import friction_rig as estimate
+    from notchflex.fit import friction_document, read_friction_rig
+    from notchflex.fit import friction_rig as estimate
 
     rig = estimate(read_friction_rig(data, law, named_columns(column)))
 

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from notchflex import BodyForce, InputError, LoadPath, Robot
 from notchflex.analysis import axis_places
-from notchflex.fit.measurements import columns
-from notchflex.fit.measurements import columns as layout
 from notchflex.fit.measurements.loading_order import Order, commands_of, loading_order
-from notchflex.fit.measurements.measurements import Measurements
+from notchflex.fit.measurements.measurements import MEASURED, Measurements, Numbers, fields_in
 from notchflex.support import (
     AXES,
     QUANTITIES,
@@ -27,13 +25,66 @@ from notchflex.support import (
     check_pulls,
     no_tendon_column,
     read_data_table,
-    tendon_columns,
     write_columns,
 )
 
-_YES_OR_NO = {"0": False, "1": True, "false": False, "true": True}
+_COMMANDS = {name: QUANTITIES[name].column for name in ("tension", "stroke")}
+# Columns of the arguments of an external load, and of a force on a body.
+_LOADS = {
+    "tip_force": "tip_force_{axis}_N",
+    "tip_moment": "tip_moment_{axis}_Nmm",
+    "tip_point": "tip_point_{axis}_mm",
+    "following": "following",
+    "tip_mass": "tip_mass_g",
+    "gravity": "gravity_{axis}_m_s2",
+}
+_ON_BODIES = {
+    "force": "body_{body}_force_{axis}_N",
+    "moment": "body_{body}_moment_{axis}_Nmm",
+    "point": "body_{body}_point_{axis}_mm",
+    "following": "body_{body}_following",
+}
+_BASE_ROTATION = "base_r{axis}_deg"
+_DIRECTIONS = {"loading": 1, "load": 1, "up": 1, "unloading": -1, "unload": -1, "down": -1}
 
-Numbers = NDArray[np.float64]
+_NUMBERED = re.compile(r"(notch|tendon|body)_(\d+)_(\w+_)?(deg|N|mm|Nmm|following)")
+_ON_AXIS = re.compile(r"axis_(\d+(?:\.\d+)?)_[xyz]_(?:sd_)?mm")
+
+Columns = dict[tuple[int, ...], str]
+"""Headers of columns by the index of their numbers in an array."""
+
+
+def headers(pattern: str, shape: Sequence[int], points: Sequence[str] = ()) -> Columns:
+    """Return the columns of an array; a single tendon has no number.
+
+    Example:
+        >>> headers("notch_{notch}_deg", (2,))
+        {(0,): 'notch_1_deg', (1,): 'notch_2_deg'}
+    """
+    names, bodies = fields_in(pattern), range(max(shape, default=0))
+    numbers = [number + 1 for number in bodies]
+    labels: dict[str, Sequence[object]] = {
+        "notch": numbers,
+        "body": bodies,
+        "tendon": [f"_{number}" for number in numbers] if shape != (1,) else [""],
+        "point": points,
+        "axis": AXES,
+    }
+    return {
+        index: pattern.format(**{n: labels[n][i] for n, i in zip(names, index, strict=True)})
+        for index in np.ndindex(*shape)
+    }
+
+
+def deviation_header(header: str) -> str:
+    """Return the header of the standard deviation of a column.
+
+    Example:
+        >>> deviation_header("notch_1_deg")
+        'notch_1_sd_deg'
+    """
+    head, _, unit = header.rpartition("_")
+    return f"{head}_sd_{unit}"
 
 
 @dataclass
@@ -44,164 +95,201 @@ class MeasurementReader:
     robot: Robot
     used: set[str] = field(default_factory=set[str])
 
-    def texts(self, name: str) -> tuple[str, ...]:
-        """Return a column of texts."""
-        self.used.add(name)
-        return self.table.texts(name)
-
-    def numbers(self, name: str, *, may_miss: bool = False, is_load: bool = False) -> Numbers:
-        """Return a column of numbers, of which some may be missing (NaN)."""
-        self.used.add(name)
-        return self.table.numbers(name, may_miss=may_miss, is_load=is_load)
-
-    def vectors(self, patterns: dict[str, str], **number: object) -> dict[str, Numbers]:
-        """Return vectors, (P, 3), for each argument that has a column; axes without one are 0."""
-        values: dict[str, Numbers] = {}
-        for argument, pattern in patterns.items():
-            for axis, letter in enumerate(AXES):
-                name = pattern.format(a=letter, **number)
-                if name in self.table.header:
-                    rows = values.setdefault(argument, np.zeros((len(self.table), 3)))
-                    rows[:, axis] = self.numbers(name)
-        return values
-
-    def flags(self, name: str) -> list[bool] | None:
-        """Return a column of 0 and 1; None if it is missing."""
-        if name not in self.table.header:
-            return None
-        texts = self.texts(name)
-        for row, text in enumerate(texts):
-            if text.lower() not in _YES_OR_NO:
-                raise InputError.NOT_A_NUMBER(
-                    f"{self.table.place_of(row)}: {name} is {text or 'nothing'!r}; give 0 or 1."
-                )
-        return [_YES_OR_NO[text.lower()] for text in texts]
-
-    def directions(self) -> list[int]:
-        """Return 1 for rows of loading, -1 for rows of unloading."""
-        words = {"loading": 1, "load": 1, "up": 1, "unloading": -1, "unload": -1, "down": -1}
-        texts = self.texts(columns.DIRECTION)
-        for row, text in enumerate(texts):
-            if text.lower() not in words:
+    @cached_property
+    def points(self) -> dict[str, float]:
+        """The points on the axis, rising: as the columns write them, and as numbers, mm."""
+        points: dict[float, str] = {}
+        for name in self.table.header:
+            if (match := _ON_AXIS.fullmatch(name)) is None:
+                continue
+            text, distance = match[1], float(match[1])
+            try:
+                axis_places(self.robot, distance)
+            except InputError as problem:
+                message = f"{self.table.name}: column {name}: {problem}."
+                raise InputError.TABLE_COLUMNS(message) from None
+            if points.setdefault(distance, text) != text:
                 raise InputError.TABLE_COLUMNS(
-                    f"{self.table.place_of(row)}: {columns.DIRECTION} is {text or 'nothing'!r}; "
-                    "give loading or unloading."
+                    f"{self.table.name}: the columns axis_{points[distance]}_... and "
+                    f"axis_{text}_... are of one point; keep one of them."
                 )
-        return [words[text.lower()] for text in texts]
+        return {points[distance]: distance for distance in sorted(points)}
+
+    @cached_property
+    def sizes(self) -> dict[str, int]:
+        """How many of each the robot has that columns are counted by."""
+        notches, tendons = self.robot.number_of_notches, self.robot.number_of_tendons
+        sizes = {"notch": notches, "tendon": tendons, "body": notches + 1}
+        return sizes | {"point": len(self.points), "axis": len(AXES)}
 
     def check_numbers(self) -> None:
         """Refuse columns of notches, tendons or bodies that the robot does not have."""
-        robot, table = self.robot, self.table
-        limits = {
-            "notch": (1, robot.number_of_notches),
-            "tendon": (1, robot.number_of_tendons),
-            "body": (0, robot.number_of_notches),
-        }
-        for name in table.header:
-            part, number = columns.numbered(name) or ("body", 0)  # the base, which every robot has
-            first, last = limits[part]
-            if not first <= number <= last:
-                has = f"{part} {first}" if first == last else f"{part} {first} to {last}"
+        for name in self.table.header:
+            if (match := _NUMBERED.fullmatch(name)) is None:
+                continue
+            part, first = match[1], int(match[1] != "body")
+            last = self.sizes[part] + first - 1
+            if not first <= int(match[2]) <= last:
+                has = f"{part} {first}" + f" to {last}" * (last > first)
                 raise InputError.TABLE_COLUMNS(
-                    f"{table.name}: there is a column {name}, but {robot.name} has {has}; choose "
-                    "the robot that was measured."
+                    f"{self.table.name}: there is a column {name}, but {self.robot.name} has "
+                    f"{has}; choose the robot that was measured."
                 )
 
-    def from_rest(self) -> bool | None:
-        """Return whether all rows were loaded from rest; None if the file does not say."""
-        flags = self.flags(columns.FROM_REST)
-        if flags is None:
-            return None
-        if len(set(flags)) > 1:
-            row = flags.index(not flags[0])
-            raise InputError.UNSUPPORTED(
-                f"{self.table.place_of(row)}: {columns.FROM_REST} differs from the rows before; it "
-                "is the same for all."
-            )
-        return flags[0]
+    def texts(self, *names: str) -> tuple[str, ...] | None:
+        """Return the first of some columns that is there, as texts; None if none is."""
+        for name in names:
+            if name in self.table.header:
+                self.used.add(name)
+                return self.table.texts(name)
+        return None
 
-    def base_rotation(self) -> Numbers:
-        """Return the rotation vector of the base, rad, the same in all rows."""
-        turned = self.vectors({"base": columns.BASE_TURN}).get("base", np.zeros((1, 3)))
-        differs = np.flatnonzero((turned != turned[0]).any(axis=1))
-        if len(differs):
-            raise InputError.UNSUPPORTED(
-                f"{self.table.place_of(differs[0])}: the base rotation differs from the row before "
-                "it; write a file for each way that it is turned."
-            )
-        return np.radians(turned[0])
+    def numbers(self, name: str, *, may_miss: bool = False, is_load: bool = False) -> Numbers:
+        """Return a column of numbers, of which some may be missing (NaN); angles in rad."""
+        self.used.add(name)
+        values = self.table.numbers(name, may_miss=may_miss, is_load=is_load)
+        wrong = ~np.isin(values, (0.0, 1.0))
+        if name.endswith(("following", "from_rest")) and wrong.any():
+            place = self.table.place_of(int(np.argmax(wrong)))
+            raise InputError.NOT_A_NUMBER(f"{place}: {name} is neither 0 nor 1.")
+        return np.radians(values) if name.endswith("_deg") else values
+
+    def columns(self, pattern: str) -> Columns:
+        """Return the columns of an array; the only tendon may have a number in the file."""
+        shape = tuple(self.sizes[name] for name in fields_in(pattern))
+        columns = headers(pattern, shape, [*self.points])
+        if self.sizes["tendon"] == 1:
+            for index, name in columns.items():
+                numbered = name.replace("tendon_", "tendon_1_", 1)
+                if name not in self.table.header and numbered in self.table.header:
+                    columns[index] = numbered
+        return columns
+
+    def array(self, pattern: str, empty: float = 0.0, **options: bool) -> Any:
+        """Return the numbers of columns, rows as leading axis; None if no column is there."""
+        shape = (self.sizes[name] for name in fields_in(pattern))
+        values = np.full((len(self.table), *shape), empty)
+        columns = self.columns(pattern)
+        for index, name in columns.items():
+            if name in self.table.header:
+                values[:, *index] = self.numbers(name, **options)
+        return values if self.used & {*columns.values()} else None
+
+    def same_in_all(self, pattern: str, what: str, remedy: str) -> Any:
+        """Return the first row of what must be the same in all; None if no column is there."""
+        values = self.array(pattern)
+        if values is None:
+            return None
+        for row, value in enumerate(values):
+            if np.any(value != values[0]):
+                raise InputError.UNSUPPORTED(
+                    f"{self.table.place_of(row)}: {what} differs from the row before it; {remedy}."
+                )
+        return values[0]
 
     def commands(self) -> tuple[Numbers, Numbers]:
         """Return measured tensions and strokes, rows by tendons; NaN where the other is given."""
-        table, tendons = self.table, self.robot.number_of_tendons
-        tension, stroke = (np.full((len(table), tendons), np.nan) for _ in range(2))
-        by_force = tendon_columns(table.header, "tension", tendons)
-        by_stroke = tendon_columns(table.header, "stroke", tendons)
-        if not by_force and not by_stroke and not self.used:  # nor any external load
+        table, tendons = self.table, self.sizes["tendon"]
+        both = [self.columns(pattern) for pattern in _COMMANDS.values()]
+        if not self.used and not {*both[0].values(), *both[1].values()} & {*table.header}:
             raise no_tendon_column(table, tendons)
-        for tendon in sorted({*by_force, *by_stroke}):
-            names: list[str] = []
-            if tendon in by_force:
-                names.append(by_force[tendon])
-                tension[:, tendon] = self.numbers(names[-1], may_miss=True, is_load=True)
-            if tendon in by_stroke:
-                names.append(by_stroke[tendon])
-                values = table.numbers(names[-1], may_miss=True, is_load=True)
-                stroke[:, tendon] = np.where(np.isnan(tension[:, tendon]), values, np.nan)
-                if not np.isnan(stroke[:, tendon]).all():
-                    self.used.add(names[-1])
-            missing = np.flatnonzero(np.isnan(tension[:, tendon]) & np.isnan(stroke[:, tendon]))
-            if len(missing):
+        commands = np.full((2, len(table), tendons), np.nan)
+        for tendon in range(tendons):
+            names = [columns[tendon,] for columns in both if columns[tendon,] in table.header]
+            missing = np.ones(len(table), bool)
+            for values, columns in zip(commands, both, strict=True):
+                if columns[tendon,] in names and missing.any():
+                    read = self.numbers(columns[tendon,], may_miss=True, is_load=True)
+                    values[missing, tendon] = read[missing]
+                    missing &= np.isnan(read)
+            if names and missing.any():
                 raise InputError.MISSING_VALUE(
-                    f"{table.place_of(missing[0])}: {' and '.join(names)} "
+                    f"{table.place_of(int(np.argmax(missing)))}: {' and '.join(names)} "
                     f"{'are' if len(names) > 1 else 'is'} nothing; say what was done to the "
                     "tendon, 0 N where it was slack."
                 )
-        return tension, stroke
+        return commands[0], commands[1]
 
     def external(self) -> tuple[ExternalLoad, ...]:
         """Return the external loads, row by row."""
-        at_tip, following = self.vectors(columns.TIP_VECTORS), self.flags(columns.FOLLOWING)
-        mass = self.numbers(columns.TIP_MASS) if columns.TIP_MASS in self.table.header else None
-        on_bodies = self._body_forces()
+        arrays, on_bodies = (
+            {
+                name: values.astype(bool) if name == "following" else values
+                for name, pattern in patterns.items()
+                if (values := self.array(pattern)) is not None
+            }
+            for patterns in (_LOADS, _ON_BODIES)
+        )
+        on_bodies.setdefault("force", np.zeros((len(self.table), self.sizes["body"], 3)))
+        acting = [on_bodies[name].any(axis=-1) for name in ("force", "moment") if name in on_bodies]
+        acts = np.any(acting, axis=0)
         loads: list[ExternalLoad] = []
         for row in range(len(self.table)):
-            load: dict[str, Any] = {name: values[row].tolist() for name, values in at_tip.items()}
-            load["body_forces"] = [
-                one[row] for one in on_bodies if any((*one[row].force, *one[row].moment))
+            place = self.table.place_of(row)
+            forces = [
+                BodyForce(body, **{name: values[row, body] for name, values in on_bodies.items()})
+                for body in np.flatnonzero(acts[row]).tolist()
             ]
-            if following is not None:
-                load["following"] = following[row]
-            if mass is not None:
-                load["tip_mass"] = float(mass[row])
             try:
-                loads.append(ExternalLoad(**load))
+                tip = {name: values[row] for name, values in arrays.items()}
+                load = ExternalLoad(**tip, body_forces=forces)
             except InputError as problem:
-                raise InputError(f"{self.table.place_of(row)}: {problem}.", problem.code) from None
-            has_mass = self.robot.material.density is not None or load.get("tip_mass")
-            if any(load.get("gravity", ())) and not has_mass:
+                raise InputError(f"{place}: {problem}.", problem.code) from None
+            has_mass = self.robot.material.density is not None or load.tip_mass
+            if any(load.gravity or ()) and not has_mass:
                 raise InputError.UNSUPPORTED(
-                    f"{self.table.place_of(row)}: gravity has nothing to act on, because the "
-                    f"density of {self.robot.name} is not known; give material.density, or a "
-                    f"{columns.TIP_MASS}."
+                    f"{place}: gravity has nothing to act on, because the density of "
+                    f"{self.robot.name} is not known; give material.density, or a tip_mass_g."
                 )
+            loads.append(load)
         return tuple(loads)
 
-    def _body_forces(self) -> list[list[BodyForce]]:
-        """Forces on every body that has columns, row by row."""
-        forces: list[list[BodyForce]] = []
-        rows = range(len(self.table))
-        for body in range(self.robot.number_of_notches + 1):
-            vectors = self.vectors(columns.BODY_VECTORS, b=body)
-            follows = self.flags(columns.BODY_FOLLOWING.format(b=body)) or [False for _ in rows]
-            if vectors:
-                vectors = {"force": np.zeros((len(self.table), 3))} | vectors
-                lists = {name: values.tolist() for name, values in vectors.items()}
-                of_rows = [{name: values[row] for name, values in lists.items()} for row in rows]
-                forces.append(
-                    [BodyForce(body, **of_rows[row], following=follows[row]) for row in rows]
+    def observed(self) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
+        """Return measured quantities and their standard deviations."""
+        table = self.table
+        observed: dict[str, Numbers] = {}
+        deviation: dict[str, Numbers] = {}
+        for name, quantity in MEASURED.items():
+            values = self.array(quantity.columns, np.nan, may_miss=True)
+            spread = self._deviation(quantity.columns)
+            if values is not None and not np.isnan(values).all():
+                observed[name] = values
+                if not np.isnan(spread).all():
+                    deviation[name] = spread
+        if not observed:
+            raise InputError.NO_DATA(
+                f"{table.name}: nothing is measured; no column has a number, such as "
+                f"notch_1_deg, total_deg, tip_x_mm or axis_5_x_mm; {table.columns}."
+            )
+        return observed, deviation
+
+    def _deviation(self, pattern: str) -> Numbers:
+        """Standard deviations of what some columns hold; NaN where unknown."""
+        table, columns = self.table, self.columns(pattern)
+        values = np.full((len(table), *(self.sizes[name] for name in fields_in(pattern))), np.nan)
+        for index, measured in columns.items():
+            name = deviation_header(measured)
+            if name not in table.header:
+                continue
+            if measured not in table.header:
+                raise InputError.TABLE_COLUMNS(
+                    f"{table.name}: there is a column {name}, but none of what it is the "
+                    f"standard deviation of; add {measured}."
                 )
-        return forces
+            values[:, *index] = spread = self.numbers(name, may_miss=True)
+            check_deviation(table, name, spread)
+        return values
+
+    def directions(self) -> list[int]:
+        """Return 1 for rows of loading, -1 for rows of unloading; nothing without a column."""
+        texts = self.texts("direction") or ()
+        for row, text in enumerate(texts):
+            if text.lower() not in _DIRECTIONS:
+                raise InputError.TABLE_COLUMNS(
+                    f"{self.table.place_of(row)}: direction is {text or 'nothing'!r}; give loading "
+                    "or unloading."
+                )
+        return [_DIRECTIONS[text.lower()] for text in texts]
 
 
 def read_measurements(
@@ -255,25 +343,27 @@ def read_measurements(
     external = reader.external()
     tension, stroke = reader.commands()
     check_pulls(tension, source=table.name)
-    observed, deviation, axis_at = _observed(reader)
-    base_rotation = reader.base_rotation()
-    labels = next((reader.texts(name) for name in layout.PULL if name in table.header), None)
-    in_file = reader.from_rest()
-    if layout.DIRECTION in table.header and in_file is None:
-        directions = reader.directions()
-        if -1 in directions:  # unloading follows loading, and the next pull follows unloading
-            in_file = False
-            starts = np.diff(directions, prepend=1) > 0
-            labels = labels or tuple(map(str, 1 + np.cumsum(starts)))
-    order = _order(table, tension, stroke, labels, in_file if from_rest is None else from_rest)
+    observed, deviation = reader.observed()
+    remedy = "write a file for each way that it is turned"
+    rotation = reader.same_in_all(_BASE_ROTATION, "the base rotation", remedy)
+    in_file = reader.same_in_all("from_rest", "from_rest", "it is the same for all")
+    labels = reader.texts("pull", "trial")
+    if in_file is None and -1 in (directions := reader.directions()):
+        in_file = False  # unloading follows loading, and the next pull follows unloading
+        starts = np.diff(directions, prepend=1) > 0
+        labels = labels or tuple(map(str, 1 + np.cumsum(starts)))
+    if from_rest is None and in_file is not None:
+        from_rest = bool(in_file)
+    order = _order(table, tension, stroke, labels, from_rest)
+    rotation = np.zeros(3) if rotation is None else rotation
     measurements = Measurements(
         source=table.name,
-        load=LoadPath(np.maximum(tension, 0.0), stroke, base_rotation, external),
+        load=LoadPath(np.maximum(tension, 0.0), stroke, rotation, external),
         pull=order.pull,
         from_rest=order.from_rest,
         observed=observed,
         deviation=deviation,
-        axis_at=axis_at,
+        axis_at=np.array([*reader.points.values()] if "axis_points" in observed else [], float),
         measured_tension=tension,
         ignored=table.unused(reader.used),
         order=order.words,
@@ -291,7 +381,7 @@ def _order(
 ) -> Order:
     """Pull of every row, and whether the rows were loaded from rest."""
     if from_rest is False:
-        return Order(False, ("1",) * len(table) if labels is None else labels)
+        return Order(False, labels or ("1",) * len(table))
     order = loading_order(commands_of(tension, stroke), labels, len(table))
     if from_rest:
         return Order(True, order.pull)
@@ -305,82 +395,6 @@ def _order(
         "of 1) if every row was loaded from rest, --path (0) if the rows of each pull are one "
         "loading path; a column trial separates pulls."
     )
-
-
-def _observed(
-    reader: MeasurementReader,
-) -> tuple[dict[str, Numbers], dict[str, Numbers], Numbers]:
-    """Measured quantities, their standard deviations, and the points on the axis, mm."""
-    table, robot = reader.table, reader.robot
-    written = _points_on_axis(table, robot)
-    axis_at = np.array(list(written.values()))
-    notches, tendons = robot.number_of_notches, robot.number_of_tendons
-    shapes = {
-        "notch_angle": (notches,),
-        "total_angle": (),
-        "edge_angle": (notches,),
-        "total_edge_angle": (),
-        "tip_position": (3,),
-        "tip_rotation": (3,),
-        "tip_tension": (tendons,),
-        "axis_points": (len(axis_at), 3),
-    }
-    observed: dict[str, Numbers] = {}
-    deviation: dict[str, Numbers] = {}
-    for column in layout.measured_columns(notches, tendons, axis_at.tolist()):
-        name, spread = _names(table, column, list(written))
-        if spread in table.header and name not in table.header:
-            raise InputError.TABLE_COLUMNS(
-                f"{table.name}: there is a column {spread}, but none of what it is the "
-                f"standard deviation of; add {name}."
-            )
-        for tables, header in ((observed, name), (deviation, spread)):
-            if header not in table.header:
-                continue
-            values = reader.numbers(header, may_miss=True)
-            if tables is deviation:
-                check_deviation(table, header, values)
-            if np.isnan(values).all():
-                continue
-            empty = np.full((len(table), *shapes[column.quantity]), np.nan)
-            components = tables.setdefault(column.quantity, empty)
-            components[:, *column.index] = np.radians(values) if column.in_degrees else values
-    if not observed:
-        raise InputError.NO_DATA(
-            f"{table.name}: nothing is measured; no column has a number, such as "
-            f"notch_1_deg, total_deg, tip_x_mm or axis_5_x_mm; {table.columns}."
-        )
-    deviation = {name: values for name, values in deviation.items() if name in observed}
-    return observed, deviation, axis_at if "axis_points" in observed else np.zeros(0)
-
-
-def _points_on_axis(table: Table, robot: Robot) -> dict[str, float]:
-    """The points on the axis, as the columns write them and as numbers, mm."""
-    points = layout.places_on_axis(table.header)
-    for written, distance in points.items():
-        try:
-            axis_places(robot, distance)
-        except InputError as problem:
-            name = next(name for name in table.header if name.startswith(f"axis_{written}_"))
-            raise InputError.TABLE_COLUMNS(f"{table.name}: column {name}: {problem}.") from None
-    for (first, distance), (second, other) in pairwise(points.items()):
-        if distance == other:
-            raise InputError.TABLE_COLUMNS(
-                f"{table.name}: the columns axis_{first}_... and axis_{second}_... are of one "
-                "point; keep one of them."
-            )
-    return points
-
-
-def _names(table: Table, column: layout.MeasuredColumn, points: list[str]) -> tuple[str, ...]:
-    """Names that the file may use for a column and for that of its standard deviation."""
-    names = column.name, column.deviation
-    if column.quantity == "axis_points":
-        written = points[column.index[0]]
-        return tuple(f"axis_{written}_{name.split('_', 2)[2]}" for name in names)
-    if column.quantity == "tip_tension" and column.name not in table.header:
-        return tuple(name.replace("tendon_tip", "tendon_1_tip") for name in names)
-    return names
 
 
 def check_deviation(table: Table, column: str, values: Numbers) -> None:
@@ -407,13 +421,72 @@ def write_measurements(measurements: Measurements, target: str | Path) -> None:
         InputError: The file cannot be written, or a table cannot hold the loads: several forces on
             one body, gravity or a commanded tendon in some rows only.
     """
-    table = {columns.PULL[0]: list(measurements.pull)} | _commands(measurements)
-    table |= _external(measurements) | _observed_columns(measurements)
-    table[columns.FROM_REST] = [measurements.from_rest] * len(measurements)
+    load, loads = measurements.load, measurements.load.external
+    given = ~np.isnan(load.tension) | ~np.isnan(load.stroke)
+    for tendon in np.flatnonzero(given.any(axis=0) & ~given.all(axis=0)):
+        raise InputError.UNSUPPORTED(
+            f"tendon {tendon + 1} is commanded in some rows only; give 0 N where it is slack"
+        )
+    if len({load.gravity is None for load in loads}) > 1:
+        raise InputError.UNSUPPORTED(
+            "gravity is given in some rows only; give it in all or in none"
+        )
+    table: dict[str, Any] = {"pull": measurements.pull}
+    table |= _filled(_COMMANDS["tension"], measurements.measured_tension)
+    table |= _filled(_COMMANDS["stroke"], load.stroke)
+    for name, pattern in _LOADS.items():
+        values = np.array([getattr(load, name) for load in loads], float)
+        # Gravity of 0 differs from no gravity given, with which a mass hangs.
+        table |= _filled(pattern, values if name == "gravity" else _nan_for_zeros(values))
+    for name, values in _on_bodies(loads).items():
+        table |= _filled(_ON_BODIES[name], _nan_for_zeros(values))
+    table |= _filled(_BASE_ROTATION, _nan_for_zeros(np.tile(load.base_rotation, (len(loads), 1))))
+    points = [np.format_float_positional(place, trim="-") for place in measurements.axis_at]
+    for name, values in measurements.observed.items():
+        pattern = MEASURED[name].columns
+        spread = measurements.deviation.get(name, np.full_like(values, np.nan))
+        deviations = _filled(pattern, spread, points)
+        for header, column in _filled(pattern, values, points).items():
+            table[header] = column
+            if header in deviations:
+                table[deviation_header(header)] = deviations[header]
+    table["from_rest"] = [measurements.from_rest] * len(measurements)
     write_columns(target, table)
 
 
-def exactly_in_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+def _filled(pattern: str, values: Numbers, points: Sequence[str] = ()) -> dict[str, Numbers]:
+    """Columns of an array, (P, ...), that are not all NaN."""
+    if np.isnan(values).all():
+        return {}
+    values = exactly_in_degrees(values) if pattern.endswith("_deg") else values
+    columns = headers(pattern, values.shape[1:], points).items()
+    return {
+        header: values[:, *index] for index, header in columns if ~np.isnan(values[:, *index]).all()
+    }
+
+
+def _nan_for_zeros(values: Numbers) -> Numbers:
+    return np.where(values.any(axis=0), values, np.nan)
+
+
+def _on_bodies(loads: Sequence[ExternalLoad]) -> dict[str, Numbers]:
+    """Forces on bodies as arrays, rows and bodies as leading axes."""
+    bodies = 1 + max((force.body for load in loads for force in load.body_forces), default=0)
+    shape = (len(loads), bodies, 3)
+    arrays: dict[str, Any] = {name: np.zeros(shape) for name in ("force", "moment", "point")}
+    arrays["following"] = np.zeros((len(loads), bodies))
+    for row, load in enumerate(loads):
+        for force in load.body_forces:
+            if sum(force.body == other.body for other in load.body_forces) > 1:
+                raise InputError.UNSUPPORTED(
+                    f"several forces act on body {force.body}; a table has room for one"
+                )
+            for name, values in arrays.items():
+                values[row, force.body] = getattr(force, name)
+    return arrays
+
+
+def exactly_in_degrees(angle: Numbers) -> Numbers:
     """Return degrees that `numpy.radians` turns into exactly these angles, where there are such.
 
     Example:
@@ -429,79 +502,3 @@ def exactly_in_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
             better = (np.radians(degrees) != angle) & (np.radians(near) == angle)
             degrees = np.where(better, near, degrees)
     return degrees
-
-
-def _commands(measurements: Measurements) -> dict[str, Any]:
-    tension, stroke = measurements.measured_tension, measurements.load.stroke
-    tendons = tension.shape[1]
-    table: dict[str, Any] = {}
-    for tendon in range(tendons):
-        commanded = ~np.isnan(tension[:, tendon]) | ~np.isnan(stroke[:, tendon])
-        if commanded.any() and not commanded.all():
-            raise InputError.UNSUPPORTED(
-                f"tendon {tendon + 1} is commanded in some rows only; give 0 N where it is slack"
-            )
-        for name, values in (("tension", tension), ("stroke", stroke)):
-            if not np.isnan(values[:, tendon]).all():
-                header = QUANTITIES[name].header(tendon="" if tendons == 1 else tendon + 1)
-                table[header] = values[:, tendon]
-    return table
-
-
-def _observed_columns(measurements: Measurements) -> dict[str, Any]:
-    observed, deviation = measurements.observed, measurements.deviation
-    angles = [observed[name] for name in ("notch_angle", "edge_angle") if name in observed]
-    notches = angles[0].shape[1] if angles else 0
-    tendons = measurements.measured_tension.shape[1]
-    table: dict[str, Any] = {}
-    for column in columns.measured_columns(notches, tendons, measurements.axis_at.tolist()):
-        for tables, name in ((observed, column.name), (deviation, column.deviation)):
-            if column.quantity not in tables:
-                continue
-            values, measured = (
-                one[column.quantity][:, *column.index] for one in (tables, observed)
-            )
-            # The deviation of what was never measured would not be read back.
-            if not (np.isnan(values).all() or np.isnan(measured).all()):
-                table[name] = exactly_in_degrees(values) if column.in_degrees else values
-    return table
-
-
-def _external(measurements: Measurements) -> dict[str, Any]:
-    loads = measurements.load.external
-    table: dict[str, Any] = {}
-    if len({one.gravity is None for one in loads}) > 1:
-        raise InputError.UNSUPPORTED(
-            "gravity is given in some rows only; give it in all or in none"
-        )
-    for name, pattern in columns.TIP_VECTORS.items():
-        rows = [getattr(one, name) for one in loads]
-        # Gravity of 0 differs from no gravity given, with which a mass hangs.
-        if rows[0] is not None and (name == "gravity" or np.any(rows)):
-            table |= _vector(pattern, rows)
-    if any(one.following for one in loads):
-        table[columns.FOLLOWING] = [one.following for one in loads]
-    if any(one.tip_mass for one in loads):
-        table[columns.TIP_MASS] = [one.tip_mass for one in loads]
-    for body in sorted({force.body for one in loads for force in one.body_forces}):
-        of_body = [[force for force in one.body_forces if force.body == body] for one in loads]
-        if max(map(len, of_body)) > 1:
-            raise InputError.UNSUPPORTED(
-                f"several forces act on body {body}; a table has room for one"
-            )
-        forces = [one[0] if one else BodyForce(body, (0.0, 0.0, 0.0)) for one in of_body]
-        for name, pattern in columns.BODY_VECTORS.items():
-            rows = [getattr(force, name) for force in forces]
-            if np.any(rows):
-                table |= _vector(pattern, rows, b=body)
-        if any(force.following for force in forces):
-            table[columns.BODY_FOLLOWING.format(b=body)] = [force.following for force in forces]
-    turn = measurements.load.base_rotation
-    if turn.any():
-        table |= _vector(columns.BASE_TURN, [exactly_in_degrees(turn)] * len(loads))
-    return table
-
-
-def _vector(pattern: str, rows: Sequence[Any], **number: object) -> dict[str, Any]:
-    coordinates = zip(AXES, zip(*rows, strict=True), strict=True)
-    return {pattern.format(a=axis, **number): values for axis, values in coordinates}

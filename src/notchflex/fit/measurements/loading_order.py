@@ -93,20 +93,19 @@ def loading_order(commands: Sequence[Command], pull: Sequence[str] | None, rows:
         False
     """
     labels = ("1",) * rows if pull is None else tuple(pull)
-    begins: set[int] = set()
+    begins = np.zeros(rows, int)
     falling = ""
     for name, values in commands:
         for fall in _falls(values, labels):
             if fall.kind == "unloading":
                 falling = falling or name
             elif fall.kind == "restart":
-                begins.add(fall.start)
+                begins[fall.start] = 1
             elif fall.kind == "unclear":
                 unclear = fall.start, name, float(values[fall.top]), float(values[fall.start])
                 return Order(True, labels, unclear)
     if pull is None:
-        number = np.cumsum([row in begins for row in range(rows)]) + 1
-        labels = tuple(str(one) for one in number)
+        labels = tuple(map(str, np.cumsum(begins) + 1))
     count = len(set(labels))
     words = ""
     if falling:
@@ -116,9 +115,9 @@ def loading_order(commands: Sequence[Command], pull: Sequence[str] | None, rows:
             "path, in their order, with friction history; give --from-rest if every row was "
             "loaded from rest"
         )
-    elif begins and pull is None:
+    elif count > 1 and pull is None:
         words = (
-            f"the {commands[0][0]} begins again {len(begins)} time{'s' * (len(begins) > 1)}, so "
+            f"the {commands[0][0]} begins again {count - 1} time{'s' * (count > 2)}, so "
             f"the rows are taken as {count} pulls, each row loaded from rest; give --path if they "
             "are one loading path"
         )
@@ -166,39 +165,35 @@ def _falls(values: Float[np.ndarray, " p"], pull: Sequence[str]) -> Iterator[Fal
     """Yield every fall of a command in the pulls in which it is commanded."""
     is_known = np.isfinite(values)
     span = float(np.ptp(values[is_known])) if is_known.any() else 0.0
-    if span == 0.0:
-        return
-    labels = np.array(pull)
-    for label in dict.fromkeys(pull):
-        rows = np.flatnonzero(is_known & (labels == label))
-        for top, start, bottom, kind in _falls_of_pull(values[rows], span):
-            yield Fall(int(rows[top]), int(rows[start]), rows[top + 1 : bottom + 1], kind)
+    for label in dict.fromkeys(pull) if span else ():
+        rows = np.flatnonzero(is_known & (np.array(pull) == label))
+        yield from _falls_of_pull(values[rows], rows, span)
 
 
 def _falls_of_pull(
-    values: Float[np.ndarray, " n"], span: float
-) -> Iterator[tuple[int, int, int, Literal["unloading", "restart", "unloaded", "unclear"]]]:
+    values: Float[np.ndarray, " n"], rows: Int[np.ndarray, " n"], span: float
+) -> Iterator[Fall]:
     points = [0, *turning_points(values, TURN * span), len(values) - 1]
     shuffled = len(points) > _BRANCHES and len(values) - 1 < _STEPS * (len(points) - 1)
     began = 0  # where the present pull began
     ends = [*points[2:], -1]  # of the next rise; none follows the last branch
     for (top, bottom), end in zip(pairwise(points), ends, strict=True):
-        depth = values[top] - values[bottom]
+        depth, branch = values[top] - values[bottom], values[top : bottom + 1]
         if depth < _FALL * span:
             continue
-        branch = values[top : bottom + 1]
         start = top + int(np.argmax(branch <= values[bottom] + _BETWEEN * depth))
+        begins_again = values[start] <= values[began] + _AGAIN * span
         if _has_between(branch):
-            yield top, start, bottom, "unclear" if shuffled else "unloading"
-        elif depth >= _JUMP * span:
-            again = values[start] <= values[began] + _AGAIN * span
-            next_rise = values[bottom : end + 1]
-            if again and _has_between(values[began : top + 1]) and _has_between(next_rise):
-                yield top, start, bottom, "restart"
-                began = start
-            else:
-                unloaded = abs(values[bottom]) <= TURN * span
-                yield top, start, bottom, "unloaded" if unloaded else "unclear"
+            kind = "unclear" if shuffled else "unloading"
+        elif depth < _JUMP * span:
+            continue
+        elif begins_again and all(
+            map(_has_between, (values[began : top + 1], values[bottom : end + 1]))
+        ):
+            kind, began = "restart", start
+        else:
+            kind = "unloaded" if abs(values[bottom]) <= TURN * span else "unclear"
+        yield Fall(int(rows[top]), int(rows[start]), rows[top + 1 : bottom + 1], kind)
 
 
 def _has_between(values: Float[np.ndarray, " n"]) -> bool:

@@ -7,16 +7,14 @@ from collections.abc import Hashable
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from notchflex.fit.measurements.loading_order import TURN, turning_points
-from notchflex.fit.measurements.measurements import Measurements
+from notchflex.fit.measurements.measurements import Integers, Measurements, Numbers
 
 # Resolution of a sensor if unknown, as a part of the range of a command.
 _STEP = 1e-3
 
-Numbers = NDArray[np.float64]
-Curve = tuple[Numbers, list[int]]
+Curve = tuple[Numbers, Integers]
 """Loads of a pull, rising, and its rows."""
 
 
@@ -65,22 +63,35 @@ def repeats_of_each(measurements: Measurements, *, step: float | None = None) ->
     Arguments are those of `repeats`; the arrays have the shape of a row of the quantity.
     """
     commands = _commands(measurements)
-    histories = _histories(measurements, commands)
-    rounded = _rounded(commands, step)
-    groups: dict[Hashable, list[int]] = {}
-    for row, history in enumerate(histories):
-        groups.setdefault((history, rounded[row].tobytes()), []).append(row)
-    same = [rows for rows in groups.values() if _independent(rows, measurements)]
+    span, pulls = np.ptp(commands, axis=0), measurements.pull_number
+    steps = np.where(span > 0.0, _STEP * span if step is None else step, 1.0)
+    rounded = np.round((commands - commands[0]) / steps).astype(int)
+    histories = np.zeros(len(pulls), int)
+    if not measurements.from_rest:
+        histories = _histories(pulls, commands, TURN * span)
+    # On paths only rows of different pulls repeat each other.
+    same = [
+        rows
+        for rows in _groups(np.column_stack([histories, rounded]))
+        if len(rows if measurements.from_rest else np.unique(pulls[rows])) == len(rows) > 1
+    ]
     is_repeated = 2 * sum(map(len, same)) >= len(measurements)
-    curves = [] if is_repeated else _comparable_curves(measurements, commands, rounded, histories)
-    deviations: dict[str, Numbers] = {}
-    for name, values in measurements.observed.items():
-        components = values.reshape(len(values), -1).T
-        variances = [
-            _pooled(one, same) if is_repeated else _between(one, curves) for one in components
-        ]
-        deviations[name] = np.sqrt(np.array(variances)).reshape(values.shape[1:])
-    return deviations
+    curves = [] if is_repeated else _comparable_curves(pulls, histories, commands, rounded)
+    return {
+        name: np.sqrt(
+            [
+                _pooled(component, same) if is_repeated else _between(component, curves)
+                for component in values.reshape(len(values), -1).T
+            ]
+        ).reshape(values.shape[1:])
+        for name, values in measurements.observed.items()
+    }
+
+
+def _groups(labels: Integers) -> list[Integers]:
+    """Rows with equal labels."""
+    number = np.unique(labels, axis=0, return_inverse=True)[1].ravel()
+    return np.split(np.argsort(number, kind="stable"), np.cumsum(np.bincount(number))[:-1])
 
 
 def _root_mean_square(values: Numbers) -> float:
@@ -92,10 +103,16 @@ def _commands(measurements: Measurements) -> Numbers:
     """All loads, rows by numbers; 0 where nothing is commanded."""
     load = measurements.load
     external: list[list[float]] = []
-    for one in load.external:
-        gravity = one.gravity or (0.0, 0.0, 0.0)
-        row = [*one.tip_force, *one.tip_moment, *one.tip_point, *one.weight(one.tip_mass), *gravity]
-        for force in one.body_forces:
+    for external_load in load.external:
+        gravity = external_load.gravity or (0.0, 0.0, 0.0)
+        row = [
+            *external_load.tip_force,
+            *external_load.tip_moment,
+            *external_load.tip_point,
+            *external_load.weight(external_load.tip_mass),
+            *gravity,
+        ]
+        for force in external_load.body_forces:
             row += [float(force.body), *force.force, *force.moment, *force.point]
         external.append(row)
     width = max(map(len, external))
@@ -104,58 +121,36 @@ def _commands(measurements: Measurements) -> Numbers:
     return np.hstack([np.nan_to_num(load.tension), np.nan_to_num(load.stroke), by_stroke, padded])
 
 
-def _rounded(commands: Numbers, step: float | None) -> NDArray[np.int64]:
-    span = np.ptp(commands, axis=0)
-    steps = np.where(span > 0.0, _STEP * span if step is None else step, 1.0)
-    return np.round((commands - commands[0]) / steps).astype(np.int64)
-
-
-def _histories(measurements: Measurements, commands: Numbers) -> list[Hashable]:
+def _histories(pulls: Integers, commands: Numbers, near: Numbers) -> Integers:
     """Number the histories of the rows, by the turning points of all commands before them."""
-    if measurements.from_rest:
-        return [()] * len(measurements)
-    span = np.ptp(commands, axis=0)
-    turned: list[list[tuple[int, float]]] = [[] for _ in range(len(measurements))]
-    for column in np.flatnonzero(span > 0.0).tolist():
-        for label in measurements.pulls:
-            rows = [row for row, pull in enumerate(measurements.pull) if pull == label]
+    histories: list[list[tuple[int, float]]] = [[] for _ in pulls]
+    for column in np.flatnonzero(near > 0.0).tolist():
+        for pull in np.unique(pulls):
+            rows = np.flatnonzero(pulls == pull)
             values = commands[rows, column]
-            points = turning_points(values, TURN * span[column])
-            ends = [0, *points, len(values) - 1]
+            points = turning_points(values, near[column])
+            ends = values[[0, *points, len(values) - 1]]
             for position, row in enumerate(rows):
                 branch = bisect_left(points, position)
-                rises = values[ends[branch + 1]] >= values[ends[branch]]
-                turned[row] += [(column, values[point]) for point in points[:branch]]
-                turned[row].append((column, np.inf if rises else -np.inf))
-    histories: list[Hashable] = []
-    known: list[list[tuple[int, float]]] = []
-    for history in turned:
-        equal = (n for n, other in enumerate(known) if _are_equal(history, other, TURN * span))
-        number = next(equal, len(known))
-        if number == len(known):
-            known.append(history)
-        histories.append(number)
-    return histories
+                way = np.inf if ends[branch + 1] >= ends[branch] else -np.inf
+                histories[row] += [(column, end) for end in (*ends[1 : branch + 1], way)]
+
+    def are_equal(first: list[tuple[int, float]], second: list[tuple[int, float]]) -> bool:
+        return len(first) == len(second) and all(
+            column == other and (value == end or abs(value - end) <= near[column])
+            for (column, value), (other, end) in zip(first, second, strict=True)
+        )
+
+    distinct: list[list[tuple[int, float]]] = []
+    numbers: list[int] = []
+    for history in histories:
+        equal = (number for number, other in enumerate(distinct) if are_equal(history, other))
+        numbers.append(next(equal, len(distinct)))
+        distinct += [history] * (numbers[-1] == len(distinct))
+    return np.array(numbers)
 
 
-def _are_equal(
-    first: list[tuple[int, float]], second: list[tuple[int, float]], near: Numbers
-) -> bool:
-    if [column for column, _ in first] != [column for column, _ in second]:
-        return False
-    return all(
-        mine == its or abs(mine - its) <= near[column]
-        for (column, mine), (_, its) in zip(first, second, strict=True)
-    )
-
-
-def _independent(rows: list[int], measurements: Measurements) -> bool:
-    """Whether rows repeat each other: on paths only those of different pulls do."""
-    pulls = rows if measurements.from_rest else {measurements.pull[row] for row in rows}
-    return len(pulls) == len(rows) > 1
-
-
-def _pooled(values: Numbers, groups: list[list[int]]) -> float:
+def _pooled(values: Numbers, groups: list[Integers]) -> float:
     """Variance within groups of rows."""
     total, freedom = 0.0, 0
     for rows in groups:
@@ -168,26 +163,17 @@ def _pooled(values: Numbers, groups: list[list[int]]) -> float:
 
 
 def _comparable_curves(
-    measurements: Measurements,
-    commands: Numbers,
-    rounded: NDArray[np.int64],
-    histories: list[Hashable],
+    pulls: Integers, histories: Integers, commands: Numbers, rounded: Integers
 ) -> list[list[Curve]]:
     """Groups of pulls in which the same single command varies, after the same history."""
     together: dict[Hashable, list[Curve]] = {}
-    of_pulls: dict[tuple[str, Hashable], list[int]] = {}
-    for row, history in enumerate(histories):
-        of_pulls.setdefault((measurements.pull[row], history), []).append(row)
-    for (_, history), rows in of_pulls.items():
-        varying = np.flatnonzero(np.ptp(rounded[rows], axis=0))
-        if len(varying) != 1:
-            continue
-        command = int(varying[0])
-        rest = np.delete(rounded[rows[0]], command).tobytes()
-        order = np.argsort(commands[rows, command], kind="stable")
-        ordered = [rows[number] for number in order]
-        curve = commands[ordered, command], ordered
-        together.setdefault((history, command, rest), []).append(curve)
+    for rows in _groups(np.column_stack([pulls, histories])):
+        varying = np.flatnonzero(np.ptp(rounded[rows], axis=0)).tolist()
+        if len(varying) == 1:
+            rest = np.delete(rounded[rows[0]], varying).tobytes()
+            rows = rows[np.argsort(commands[rows, varying[0]], kind="stable")]
+            curve = commands[rows, varying[0]], rows
+            together.setdefault((histories[rows[0]], *varying, rest), []).append(curve)
     return [curves for curves in together.values() if len(curves) > 1]
 
 
@@ -195,23 +181,23 @@ def _between(values: Numbers, comparable: list[list[Curve]]) -> float:
     """Variance between pulls, averaged over the loads that at least two of them cover."""
     total, freedom = 0.0, 0.0
     for curves in comparable:
-        means = [one for one in (_means(values, *curve) for curve in curves) if len(one[0]) > 1]
+        means = [pull for pull in (_means(values, *curve) for curve in curves) if len(pull[0]) > 1]
         if len(means) < 2:
             continue
         knots = np.unique(np.concatenate([loads for loads, _ in means]))
         for low, high in pairwise(knots.tolist()):
-            covering = [one for one in means if one[0][0] <= low and high <= one[0][-1]]
+            covering = [pull for pull in means if pull[0][0] <= low and high <= pull[0][-1]]
             if len(covering) < 2:
                 continue
             # Between knots every pull is a straight line: Simpson's rule is exact for the squares.
             at = np.array([low, 0.5 * (low + high), high])
-            squares = np.var([np.interp(at, *one) for one in covering], axis=0) * len(covering)
+            squares = np.var([np.interp(at, *pull) for pull in covering], axis=0) * len(covering)
             total += (high - low) * float(squares @ [1.0, 4.0, 1.0]) / 6.0
             freedom += (high - low) * (len(covering) - 1)
     return total / freedom if freedom else float("nan")
 
 
-def _means(values: Numbers, load: Numbers, rows: list[int]) -> tuple[Numbers, Numbers]:
+def _means(values: Numbers, load: Numbers, rows: Integers) -> tuple[Numbers, Numbers]:
     """Loads, each once, and means of what was measured there."""
     is_known = ~np.isnan(values[rows])
     loads, number = np.unique(load[is_known], return_inverse=True)

@@ -14,14 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import orth
 from scipy.stats import f, norm
 
 from notchflex import InputError
-from notchflex.fit.estimation.calibration import Calibration
-from notchflex.fit.measurements.measurements import OBSERVED
-from notchflex.fit.model.constants import Unknown, unknowns
-from notchflex.fit.model.drawing import numbers_set
-from notchflex.fit.model.residuals import SENSOR
+from notchflex.fit.calibration import Calibration
+from notchflex.fit.constants import SENSOR, Unknown, numbers_set, unknowns
+from notchflex.fit.measurements.measurements import NOTCH_ANGLES
 from notchflex.robot.part import unit_of
 from notchflex.support import fields_of
 
@@ -31,7 +30,11 @@ _UNLIKELY = 0.01
 _ROUNDING = 1e-4
 # With fewer degrees of freedom nothing is tested.
 _FEWEST = 5
-_OF_NOTCHES = [OBSERVED.index(name) for name in ("notch_angle", "edge_angle")]
+# Of no effect on what is measured, or none before a notch is destroyed.
+_NO_CANDIDATES = (
+    "direction_deg", "uncut_length", "poisson_ratio", "density", "allowed_strain",
+    "plastic_modulus", "plastic_strain", "plastic_exponent",
+)  # fmt: skip
 
 
 class Missing(NamedTuple):
@@ -87,22 +90,22 @@ def residual_tests(found: Calibration) -> ResidualTests | None:
     regression = _Regression.of(found)
     if regression.freedom < _FEWEST:
         return None
-    residuals = found.residuals
-    part = np.where(np.isin(residuals.quantity, _OF_NOTCHES), residuals.part, 0)
+    residuals, noise = found.residuals, found.noise.deviation[:, None]
+    of_notches = residuals.are(*NOTCH_ANGLES)
+    part = np.where(of_notches, residuals.part, 0)
     notches = float("nan")
     if len(np.unique(part)) > 2:
-        centred = np.where(np.isin(residuals.quantity, _OF_NOTCHES), part - 0.5 * part.max(), 0.0)
-        trend = np.stack([centred, centred * _load(found)], axis=1) / found.noise.deviation[:, None]
-        notches = regression.chance(trend)[-1]
+        centred = np.where(of_notches, part - 0.5 * part.max(), 0.0)
+        trend = np.stack([centred, centred * _load(found)], axis=1)
+        notches = regression.chance(trend / noise)[-1]
     tests = [
-        Missing(one.name, *regression.chance(slopes[:, None] / found.noise.deviation[:, None]))
+        Missing(one.name, *regression.chance(slopes[:, None] / noise))
         for one in _candidates(found)
         if (slopes := found.problem.samples.slopes_of(one, found.best.values)) is not None
     ]
-    known = [one for one in tests if np.isfinite(one.chance)]
-    return ResidualTests(
-        regression.runs(_neighbours(found)), notches, tuple(sorted(known, key=lambda one: one[3]))
-    )
+    known = [test for test in tests if np.isfinite(test.chance)]
+    known.sort(key=lambda test: test.chance)
+    return ResidualTests(regression.runs(*_neighbours(found)), notches, tuple(known))
 
 
 class _Regression(NamedTuple):
@@ -113,42 +116,44 @@ class _Regression(NamedTuple):
 
     @classmethod
     def of(cls, calibration: Calibration) -> _Regression:
-        residuals, reached = calibration.residuals, calibration.reached
-        noise, unknown = calibration.noise.deviation, calibration.problem.unknowns
-        most = getattr(calibration.problem.objective, "huber", None) or np.inf
-        counted = np.isfinite(noise)
-        own = [(n, c.prior) for n, c in enumerate(unknown) if c.prior is not None]
-        priors = np.zeros((len(own), len(unknown)))
-        off = np.zeros(len(own))
-        for row, (number, (mean, deviation)) in enumerate(own):
-            priors[row, number] = 1.0 / deviation
-            off[row] = (calibration.best.values[number] - mean) / deviation
-        pulls, shift = np.unique(residuals.pull, return_inverse=True)
-        groups = np.stack([shift, residuals.quantity], axis=1)
-        _, group = np.unique(groups, axis=0, return_inverse=True)
-        shifts = np.eye(group.max() + 1)[group] if len(pulls) > 1 else np.zeros((len(group), 0))
-        spread = residuals.spread
+        residuals, noise = calibration.residuals, calibration.noise.deviation
+        priors = [
+            (number, value - one.prior[0], one.prior[1])
+            for number, (one, value) in enumerate(
+                zip(calibration.problem.unknowns, calibration.best.values, strict=True)
+            )
+            if one.prior is not None
+        ]
+        constants, off, sizes = np.reshape(priors, (-1, 3)).T
+        groups = np.stack([residuals.pull, residuals.quantity])
+        group = np.unique(groups, axis=1, return_inverse=True)[1].ravel()
+        several = len(np.unique(residuals.pull)) > 1
+        shifts = np.eye(group.max() + 1)[group] if several else np.zeros((len(group), 0))
+        spread, count = residuals.spread, residuals.slopes.shape[1]
         columns = np.concatenate([residuals.slopes, spread, shifts], axis=1) / noise[:, None]
-        deviations = np.eye(spread.shape[1], columns.shape[1], residuals.slopes.shape[1])
-        below = np.pad(priors, ((0, 0), (0, columns.shape[1] - len(unknown))))
-        left = np.where(counted, np.clip(residuals.values / noise, -most, most), 0.0)
+        unit = np.eye(columns.shape[1])
+        deviations = unit[count : count + spread.shape[1]]
+        below = unit[constants.astype(int)] / sizes[:, None]
+        most = calibration.huber or np.inf
+        scaled = np.clip(residuals.values / noise, -most, most)
+        rows = [np.where(np.isfinite(noise), scaled, 0.0), calibration.reached.deviations]
         basis = _orthonormal(np.concatenate([columns, deviations, below]))
-        every = np.concatenate([left, reached.deviations, off])
-        return cls(every - basis @ (basis.T @ every), basis)
+        left = np.concatenate([*rows, off / sizes])
+        return cls(left - basis @ (basis.T @ left), basis)
 
     @property
     def freedom(self) -> int:
-        rows = np.abs(self.basis).any(axis=1) | (self.left != 0.0)
+        rows = self.basis.any(axis=1) | (self.left != 0.0)
         return int(rows.sum()) - self.basis.shape[1]
 
     def chance(self, columns: Float[np.ndarray, "r c"]) -> tuple[float, float, float]:
         """Gain of more columns, as a part of all too, and its probability by chance (F test)."""
         more = np.pad(columns, ((0, len(self.left) - len(columns)), (0, 0)))
+        rest = more
+        for _ in range(2):  # once more for what rounding left
+            rest = rest - self.basis @ (self.basis.T @ rest)
         size = np.linalg.norm(more, axis=0)
-        rest = more - self.basis @ (self.basis.T @ more)
-        rest -= self.basis @ (self.basis.T @ rest)
-        rest = rest[:, np.linalg.norm(rest, axis=0) > _ROUNDING * size]
-        basis = _orthonormal(rest)
+        basis = _orthonormal(rest[:, np.linalg.norm(rest, axis=0) > _ROUNDING * size])
         count, all_left = basis.shape[1], float(self.left @ self.left)
         if not count or not all_left:
             return 0.0, 0.0, float("nan")
@@ -157,9 +162,8 @@ class _Regression(NamedTuple):
         ratio = (gain / count) / (max(all_left - gain, 1e-300) / freedom)
         return gain, gain / all_left, float(f.sf(ratio, count, freedom))
 
-    def runs(self, pairs: tuple[np.ndarray, np.ndarray]) -> float:
+    def runs(self, first: np.ndarray, second: np.ndarray) -> float:
         """Probability that neighbours are as alike by chance."""
-        first, second = pairs
         freedom, basis = self.freedom, self.basis
         if len(first) < _FEWEST or not self.left.any():
             return float("nan")
@@ -170,32 +174,33 @@ class _Regression(NamedTuple):
         within = basis.T @ beside
         trace = -float(np.trace(within))
         squares = 0.5 * len(first) - 2.0 * float(np.sum(beside**2)) + float(np.sum(within**2))
-        mean = trace / freedom
         variance = 2.0 * (freedom * squares - trace**2) / (freedom**2 * (freedom + 2.0))
-        return float(norm.sf((alike - mean) / np.sqrt(variance)))
+        return float(norm.sf((alike - trace / freedom) / np.sqrt(variance)))
 
 
 def _orthonormal(columns: Float[np.ndarray, "n c"]) -> Float[np.ndarray, "n q"]:
     """Basis of what columns span."""
     size = np.linalg.norm(columns, axis=0)
-    left, sizes, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
-    return left[:, sizes > 1e-9 * sizes.max(initial=0.0)]
+    used = columns[:, size > 0.0] / size[size > 0.0]
+    return orth(used, rcond=1e-9) if used.size else used
 
 
 def _load(calibration: Calibration) -> Float[np.ndarray, " r"]:
     """The command of every measured number, 1 at the largest."""
     residuals, load = calibration.residuals, np.zeros(len(calibration.residuals))
     for number, sample in enumerate(calibration.problem.samples.every):
-        measured, mine = sample.measured, residuals.sample == number
-        command = np.nansum(np.fmax(measured.measured_tension, measured.load.stroke), axis=1)
-        load[mine] = (command / max(np.abs(command).max(), 1e-300))[residuals.row[mine]]
+        command, of_sample = sample.measured.command, residuals.sample == number
+        command = command / max(np.abs(command).max(), 1e-300)
+        load[of_sample] = command[residuals.row[of_sample]]
     return load
 
 
 def _neighbours(calibration: Calibration) -> tuple[np.ndarray, np.ndarray]:
     """Numbers whose loads follow each other in a pull: in its rows, or by load if from rest."""
     residuals = calibration.residuals
-    from_rest = np.array([one.measured.from_rest for one in calibration.problem.samples.every])
+    from_rest = np.array(
+        [sample.measured.from_rest for sample in calibration.problem.samples.every]
+    )
     along = np.where(from_rest[residuals.sample], _load(calibration), residuals.row)
     series = (residuals.sample, residuals.quantity, residuals.part, residuals.pull)
     order = np.lexsort((along, *series))
@@ -207,35 +212,24 @@ def _neighbours(calibration: Calibration) -> tuple[np.ndarray, np.ndarray]:
 
 def _candidates(calibration: Calibration) -> list[Unknown]:
     """All constants that could be fitted besides."""
-    fitted = calibration.problem.unknowns
-    robots = {one.label: one.robot for one in calibration.problem.samples.every}
-    names = [f"tube.{name}" for name in ("inner_diameter",)]
+    robots = calibration.problem.samples.robots
+    names = ["tube.inner_diameter"]
     for robot in robots.values():
-        for section, rule, units in (
-            ("notch", "offset:", ("mm", "deg")),
-            ("material", "", ("MPa", "")),
-            ("friction", "", ("",)),
+        for part, prefix, units in (
+            *((notch, "offset:notch", ("mm", "deg")) for notch in robot.notch),
+            (robot.material, "material", ("MPa", "")),
+            (robot.friction, "friction", ("",)),
         ):
-            parts = robot.notch if section == "notch" else [getattr(robot, section)]
-            for part in parts:
-                for name, field in fields_of(type(part)).items():
-                    unit = unit_of(field)
-                    if unit in units and name not in _LEFT_OUT:
-                        names.append(f"{rule}{section}.{name}")
-    taken = numbers_set(robots, fitted)
+            for name, field in fields_of(type(part)).items():
+                if unit_of(field) in units and name not in _NO_CANDIDATES:
+                    names.append(f"{prefix}.{name}")
+    fitted = numbers_set(robots, calibration.problem.unknowns)
     candidates: list[Unknown] = []
     for name in dict.fromkeys([*names, *SENSOR]):
         try:
-            (one,) = unknowns(robots, name)
-            if not taken & numbers_set(robots, (one,)):
-                candidates.append(one)
+            constant = unknowns(robots, name)
+            if not fitted & numbers_set(robots, constant):
+                candidates += constant
         except (InputError, ValueError):  # no number, 0, or not in all robots
             continue
     return candidates
-
-
-# Of no effect on what is measured, or none before a notch is destroyed.
-_LEFT_OUT = (
-    "direction_deg", "uncut_length", "poisson_ratio", "density", "allowed_strain",
-    "plastic_modulus", "plastic_strain", "plastic_exponent",
-)  # fmt: skip

@@ -1,6 +1,6 @@
 """Maximum likelihood of linear models with more scatter than errors; whether friction is constant.
 
-y_i is Gaussian about x_i @ b with the variance s_i^2 + t: s_i is known of each (0 if unknown), the
+y_i is Gaussian about x_i @ b with the variance s_i^2 + t: s_i is known of all (or 0 of all), the
 variance t of the rest is found together with b. If no s_i is known this is the usual least-squares
 fit.
 """
@@ -12,16 +12,18 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import NDArray
-from scipy.optimize import root_scalar
+from scipy.optimize import minimize_scalar, root_scalar
 from scipy.stats import chi2, norm
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
-from notchflex.fit.friction_rig.readings import FrictionReadings
-
 # Numbers that the model meets to this part of their size do not scatter: rounding.
 _EXACT = 1e-13
+# A turn (rad) or the logarithm of a load that varies by less than this is constant.
+_VARIES = 1e-6
+
+LEVEL = 0.05
+"""Probability below which a constant coefficient is not enough."""
 
 Vector = Float[np.ndarray, " n"]
 Design = Float[np.ndarray, "n k"]
@@ -51,26 +53,47 @@ class ScatterFit:
 def fit_line(x: Design, y: Vector, known: Vector) -> ScatterFit:
     """Fit by maximum likelihood numbers y with known variances to columns x of full rank."""
     count, columns = x.shape
-    plain = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
-    largest = float(np.max(plain**2))
-    exact = np.sqrt(largest) <= _EXACT * float(np.max(np.abs(y)) or 1.0)
-    if exact and ((known == 0.0).all() or (known > 0.0).all()):
-        rest = 0.0
-    elif (known == 0.0).all():
-        rest = float(np.mean(plain**2))
-    else:
-        rest = _rest(x, y, known, max(largest, float(known.max())))
-    likely = known + rest
-    weighted = x.T if (likely == 0.0).any() else x.T / likely
-    values = np.linalg.solve(weighted @ x, weighted @ y)
+    values = np.linalg.lstsq(x, y)[0]
     residual = y - x @ values
-    variance = known + rest * count / max(count - columns, 1)
-    if (variance == 0.0).any():
+    largest = np.max(np.abs(residual))
+    if known.any():
+        rest = _rest(x, y, known)
+    elif largest <= _EXACT * (np.max(np.abs(y)) or 1.0):
         zero = np.zeros((columns, columns))
-        return ScatterFit(values, zero, rest, variance, residual, float("inf"))
+        return ScatterFit(values, zero, 0.0, known, residual, float("inf"))
+    else:
+        rest = float(np.mean(residual**2))
+    values, likelihood = _weighted(x, y, known + rest)
+    variance = known + rest * count / max(count - columns, 1)
     covariance = np.linalg.inv(x.T @ (x / variance[:, None]))
-    likelihood = float(_log_likelihood(x, y, likely[None])[0])
-    return ScatterFit(values, covariance, rest, variance, residual, likelihood)
+    return ScatterFit(values, covariance, rest, variance, y - x @ values, likelihood)
+
+
+def _weighted(x: Design, y: Vector, variance: Vector) -> tuple[Vector, float]:
+    """Values of the largest likelihood under variances, and its logarithm."""
+    weighted = x.T / variance
+    values = np.linalg.solve(weighted @ x, weighted @ y)
+    squares = (y - x @ values) ** 2 / variance
+    return values, float(-0.5 * np.sum(squares + np.log(2.0 * np.pi * variance)))
+
+
+def _rest(x: Design, y: Vector, known: Vector) -> float:
+    """Likeliest variance of the rest, 0 if known errors explain everything."""
+
+    def misfit(rest: float) -> float:
+        return -_weighted(x, y, known + rest)[1]
+
+    # The likelihood may have several peaks, rarely: a grid finds the highest.
+    plain = y - x @ np.linalg.lstsq(x, y)[0]
+    largest = max(float(np.max(plain**2)), float(known.max()))
+    grid = np.array([0.0, *largest * np.geomspace(1e-6, 4.0, 25)])
+    best = int(np.argmin([misfit(rest) for rest in grid]))
+    if best == 0 and misfit(0.0) <= misfit(1e-4 * grid[1]):
+        return 0.0
+    low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    options = {"xatol": 1e-9 * high}
+    peak: Any = minimize_scalar(misfit, bounds=(low, high), method="bounded", options=options)
+    return float(peak.x)
 
 
 def mean_interval(y: Vector, variance: Vector, level: float = 0.95) -> tuple[float, float]:
@@ -118,53 +141,18 @@ def outliers(x: Design, y: Vector, variance: Vector, level: float = 0.05) -> tup
     count = 0
     for _ in range(len(y) // 4 if len(y) >= 15 else 1):
         freedom = len(left) - x.shape[1] - 1
-        fitted = fit_line(x[left], y[left], variance[left])
-        if freedom < 1 or (fitted.variance == 0.0).any():
+        line = fit_line(x[left], y[left], variance[left])
+        if freedom < 1 or np.isinf(line.log_likelihood):
             break
-        distance = np.abs(fitted.residual) / np.sqrt(fitted.variance)
+        distance = np.abs(line.residual) / np.sqrt(line.variance)
         farthest = int(np.argmax(distance))
-        quantile = float(student.ppf(1.0 - 0.5 * level / len(left), freedom))
+        quantile = student.ppf(1.0 - 0.5 * level / len(left), freedom)
         bound = quantile * (freedom + 1) / np.sqrt((freedom + quantile**2) * len(left))
         removed.append(int(left[farthest]))
         if distance[farthest] > bound:
             count = len(removed)
         left = np.delete(left, farthest)
     return tuple(sorted(removed[:count]))
-
-
-def _log_likelihood(
-    x: Design, y: Vector, variance: Float[np.ndarray, "many n"]
-) -> Float[np.ndarray, " many"]:
-    """Largest likelihood under each of many variances."""
-    weighted = x.T / variance[:, None]
-    values = np.linalg.solve(weighted @ x, (weighted @ y)[..., None])[..., 0]
-    residual = y - values @ x.T
-    return -0.5 * np.sum(residual**2 / variance + np.log(2.0 * np.pi * variance), axis=-1)
-
-
-def _rest(x: Design, y: Vector, variance: Vector, largest: float) -> float:
-    """Likeliest variance of the rest, 0 if known errors explain everything."""
-    least = 0.0 if (variance > 0.0).all() else 1e-12 * largest
-    # The likelihood may have several peaks in the variance, rarely; a grid finds the highest, and
-    # finer ones about it the place to 1e-6 of the variance.
-    grid = np.concatenate([[least], largest * np.geomspace(1e-6, 4.0, 25)])
-    for _ in range(6):
-        best = int(np.argmax(_log_likelihood(x, y, variance + grid[:, None])))
-        if best == 0 and grid[0] == least:
-            near = np.array([[least], [least + 1e-4 * (grid[1] - least)]])
-            first, second = _log_likelihood(x, y, variance + near)
-            if first >= second:  # the likelihood falls from the least variance on
-                return least
-        low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-        grid = np.linspace(low, high, 21)
-    return float(grid[10])
-
-
-LEVEL = 0.05
-"""Probability below which a constant coefficient is not enough."""
-
-# A turn (rad) or the logarithm of a load that varies by less than this is constant.
-_VARIES = 1e-6
 
 
 @dataclass(frozen=True)
@@ -200,83 +188,47 @@ class Constancy:
         return None if np.isnan(self.p_value) else self.p_value >= LEVEL
 
 
-def constancy(readings: FrictionReadings) -> Constancy:
-    """Test whether a constant coefficient of friction is enough (Liu 2022, fig. 8).
+def design_of(turn: Vector, load: Vector) -> Design:
+    """Return columns of 1, turn and logarithm of the load, the latter two less their means."""
+    columns = np.stack([turn, np.log(load)], axis=1)
+    return np.column_stack([np.ones(len(turn)), columns - columns.mean(axis=0)])
 
-    The statistic is compared with Fisher's F, which makes the test exact if no standard deviations
-    are given, and with chi-square if those given explain the scatter.
 
-    Args:
-        readings: N readings.
-
-    Example:
-        >>> from notchflex.fit import weight_held
-        >>> load = np.repeat([50.0, 100.0, 200.0, 400.0], 5)
-        >>> turn = np.tile(np.radians([60.0, 75.0, 90.0, 105.0, 120.0]), 4)
-        >>> mu = 0.15 - 0.01 * np.log(load / 150.0) + 0.002 * np.cos(np.arange(20.0) ** 2)
-        >>> falling = FrictionReadings(load, weight_held(load, mu, turn, turn), turn, turn)
-        >>> test = constancy(falling)
-        >>> test.enough, round(test.by_load, 3)
-        (False, -0.01)
-    """
-    x = design(readings)
+def constancy_of(x: Design, y: Vector, variance: Vector) -> Constancy:
+    """Test whether numbers depend on the columns of `design_of` besides the first."""
     used = [0, *np.flatnonzero(np.ptp(x, axis=0) > _VARIES).tolist()]
     if len(used) == 3 and np.linalg.matrix_rank(x, tol=_VARIES * np.sqrt(len(x))) < 3:
         # Turn and load go together: what depends on both shows in one of them.
         used = [0, 1]
-    freedom = len(used) - 1
-    y, variance = readings.coefficient, known_variance(readings)
+    freedom, count = len(used) - 1, len(y)
     plain = fit_line(x[:, :1], y, variance)
     if not freedom:
         words = "All readings have one load and one turn, so that constancy cannot be tested."
-    elif len(readings) < len(used) + 2:
+    elif count < len(used) + 2:
         words = (
-            f"{len(readings)} readings are too few to test whether mu is constant; take "
+            f"{count} readings are too few to test whether mu is constant; take "
             f"{len(used) + 2} or more at different loads and turns."
         )
     elif np.isinf(plain.log_likelihood):
         words = "The readings agree to rounding: a constant mu is enough."
     else:
-        other = fit_line(x[:, used], y, variance)
-        statistic = max(2.0 * (other.log_likelihood - plain.log_likelihood), 0.0)
-        p_value = _probability(statistic, freedom, len(y), len(used), other)
-        slopes = np.full((2, 2), np.nan)
-        errors = np.sqrt(np.diag(other.covariance))
-        slopes[np.array(used[1:]) - 1] = np.stack([other.values, errors], axis=1)[1:]
-        words = _words(p_value, slopes)
-        return Constancy(statistic, freedom, p_value, *slopes.ravel().tolist(), words=words)
+        line = fit_line(x[:, used], y, variance)
+        statistic = max(2.0 * (line.log_likelihood - plain.log_likelihood), 0.0)
+        # Where the variance is found from the readings, statistic = n ln(1 + f F / (n - k)).
+        ratio = np.expm1(statistic / count) * (count - len(used)) / freedom
+        p_value = float(
+            fisher.sf(ratio, freedom, count - len(used))
+            if line.rest
+            else chi2.sf(statistic, freedom)
+        )
+        slopes = np.full((3, 2), np.nan)
+        slopes[used] = np.stack([line.values, np.sqrt(np.diag(line.covariance))], axis=1)
+        words = _words(p_value, slopes[1:])
+        return Constancy(statistic, freedom, p_value, *slopes[1:].ravel().tolist(), words=words)
     return Constancy(np.nan, freedom, *(np.nan,) * 5, words=words)
 
 
-def design(readings: FrictionReadings) -> NDArray[np.float64]:
-    """Return columns of 1, turn and logarithm of the load, the latter two less their means."""
-    turn, load = readings.turn, np.log(readings.weight_1)
-    return np.stack([np.ones(len(readings)), turn - turn.mean(), load - load.mean()], axis=1)
-
-
-def known_variance(readings: FrictionReadings) -> NDArray[np.float64]:
-    """Return the variance of every coefficient from the standard deviations of its reading.
-
-    A reading without any is taken to be as accurate as the others in the mean; 0 if none has any.
-    """
-    variance = readings.coefficient_deviation**2
-    is_known = np.isfinite(variance)
-    return np.where(is_known, variance, np.mean(variance[is_known]) if is_known.any() else 0.0)
-
-
-def _probability(
-    statistic: float, freedom: int, count: int, columns: int, other: ScatterFit
-) -> float:
-    if np.isinf(statistic):
-        return 0.0
-    if other.rest == 0.0:
-        return float(chi2.sf(statistic, freedom))
-    # Where the variance is found from the readings, statistic = n ln(1 + f F / (n - k)).
-    value = np.expm1(statistic / count) * (count - columns) / freedom
-    return float(fisher.sf(value, freedom, count - columns))
-
-
-def _words(p_value: float, slopes: NDArray[np.float64]) -> str:
+def _words(p_value: float, slopes: Float[np.ndarray, "2 2"]) -> str:
     if p_value >= LEVEL:
         return (
             f"A constant mu is enough for these readings (p = {p_value:.2g}): turn and load "

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.stats import norm
 
 from notchflex import InputError, Robot
-from notchflex.fit.estimation.calibration import Calibration
-from notchflex.fit.estimation.fit import by_label, check_search, fitted
-from notchflex.fit.estimation.objective import LeastSquares
-from notchflex.fit.estimation.problem import FitProblem, Progress
-from notchflex.fit.measurements.measurements import OBSERVED, Measurements
-from notchflex.fit.model.constants import Constant, RobotNumber, Unknown, unknowns
-from notchflex.fit.model.drawing import deviated
-from notchflex.fit.model.residuals import ANGLES, Residuals
-from notchflex.fit.model.samples import Samples
-
-_ANGLES = [OBSERVED.index(name) for name in ANGLES]
+from notchflex.fit.calibrate import by_label, check_search, fitted
+from notchflex.fit.calibration import Calibration
+from notchflex.fit.constants import Constant, RobotNumber, Unknown, unknowns
+from notchflex.fit.measurements.measurements import OBSERVED, Measurements, Numbers
+from notchflex.fit.objective import LeastSquares
+from notchflex.fit.residuals import Residuals, Samples, deviated
+from notchflex.fit.search import FitProblem, Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,19 +85,17 @@ def update_specimen(
         raise InputError.WRONG_TYPE(
             "a photograph is Measurements of one row or more; `measurements.taken([row])` takes one"
         )
-    names = (constants,) if isinstance(constants, str | Constant) else constants
-    given = [one if isinstance(one, Constant) else Constant(one) for one in names]
+    priors = {unknown.path: unknown.prior for unknown in reversed(found.problem.unknowns)}
     own = [
-        replace(one, prior=prior_of(one, found))
-        for one in unknowns({label: robot}, [_with_prior(one, found) for one in given])
+        replace(
+            constant,
+            prior=prior_of(
+                replace(constant, prior=constant.prior or priors.get(constant.path)), found
+            ),
+        )
+        for constant in unknowns({label: robot}, constants)
     ]
     return updated(found, label, robot, measured, own)
-
-
-def _with_prior(constant: Constant, calibration: Calibration) -> Constant:
-    """The constant with the prior that the fit has for it, if it has none itself."""
-    priors = (one.prior for one in calibration.problem.unknowns if one.path == constant.name)
-    return constant if constant.prior else replace(constant, prior=next(priors, None))
 
 
 def updated(
@@ -112,50 +106,43 @@ def updated(
     own: Sequence[Unknown],
 ) -> Specimen:
     """Fit constants of a specimen, which have priors, to rows; the shared ones stay as found."""
-    shared = [(one.of(label, robot), value) for one, value in _values(calibration) if one.shared]
     # A shared constant sets numbers that those of the specimen leave as they are.
     held = [
-        RobotNumber(one.label, one.path, one.base + one.slope * value, 0.0)
-        for unknown, value in shared
-        for one in unknown.sets
+        RobotNumber(label, number.path, number.base + number.slope * value, 0.0)
+        for unknown, value in zip(
+            calibration.problem.unknowns, calibration.best.values.tolist(), strict=True
+        )
+        if unknown.shared
+        for number in unknown.of(label, robot).sets
     ]
-    twice = {one[:2] for one in held} & {one[:2] for each in own for one in each.sets}
+    twice = {number.path for number in held} & {
+        number.path for unknown in own for number in unknown.sets
+    }
     if not own or twice:
         raise InputError.CONFLICT(
-            f"{sorted(twice)[0][1] if twice else 'no constant'} is of one specimen, and all the "
-            "others have it in common; name constants such as sensor.force_factor"
+            f"{min(twice, default='no constant')} is of one specimen, and all the others have it "
+            "in common; name constants such as sensor.force_factor"
         )
     constants = (replace(own[0], sets=(*own[0].sets, *held)), *own[1:])
-    rows = replace(measured, deviation=_missed(calibration, measured))
+    sizes = calibration.residuals.root_mean_squares()
+    missed = {
+        name: np.full(values.shape, sizes[name])
+        for name, values in measured.observed.items()
+        if name in sizes
+    }
+    rows = replace(measured, deviation={**measured.deviation, **missed})
     samples = Samples.of({label: robot}, {label: [rows]}, constants, calibration.settings)
     again = fitted({label: robot}, FitProblem(samples, LeastSquares()), 1, 0, intervals=False)
-    before = {one.name: one.prior for one in own if one.prior is not None}
+    before = {constant.name: constant.prior for constant in own if constant.prior is not None}
     prior = np.diag([size**2 for _, size in before.values()])
-    total = np.isin(again.residuals.quantity, _ANGLES)
-    slopes = np.stack(
-        [
-            again.residuals.slopes[total & (again.residuals.row == row)].sum(axis=0)
-            for row in range(len(measured))
-        ]
-    )
+    residuals = again.residuals
+    angles = residuals.are(*(name for name in OBSERVED if name.endswith("angle")))
+    slopes = np.zeros((len(measured), len(own)))
+    np.add.at(slopes, residuals.row[angles], residuals.slopes[angles])
     after, earlier = (
         np.sqrt(np.einsum("ri,ij,rj->", slopes, one, slopes)) for one in (again.covariance, prior)
     )
     return Specimen(again, before, float(after / earlier) if earlier else 1.0)
-
-
-def _missed(calibration: Calibration, measured: Measurements) -> dict[str, np.ndarray]:
-    """Residuals of a fit by quantity (root mean square), as deviations for another robot."""
-    sizes = calibration.residuals.root_mean_squares()
-    return {
-        name: np.full(values.shape, sizes[name])
-        for name, values in measured.observed.items()
-        if name in sizes
-    } | {name: values for name, values in measured.deviation.items() if name not in sizes}
-
-
-def _values(calibration: Calibration) -> list[tuple[Unknown, float]]:
-    return list(zip(calibration.problem.unknowns, calibration.best.values.tolist(), strict=True))
 
 
 def prior_of(unknown: Unknown, calibration: Calibration) -> tuple[float, float]:
@@ -168,13 +155,13 @@ def prior_of(unknown: Unknown, calibration: Calibration) -> tuple[float, float]:
     Raises:
         InputError: There is no prior, and fewer than two fitted specimens.
     """
-    of_specimens = [one.path == unknown.path and one.each for one in calibration.problem.unknowns]
-    values, variance = (
-        calibration.best.values[of_specimens],
-        np.diag(calibration.covariance)[of_specimens],
-    )
+    of_specimens = [
+        constant.path == unknown.path and constant.each for constant in calibration.problem.unknowns
+    ]
+    values = calibration.best.values[of_specimens]
     if unknown.prior is not None:
         mean, size = unknown.prior
+        variance = np.diag(calibration.covariance)[of_specimens]
         squares = (values - mean) ** 2 + np.where(np.isfinite(variance), variance, size**2)
         return mean, float(np.sqrt(np.mean(np.append(squares, size**2))))
     if len(values) < 2:
@@ -233,9 +220,8 @@ class Fold:
         if self.residuals is None:
             return {}
         inside = np.abs(self.residuals.values) <= norm.ppf(0.5 + 0.5 * level) * self.deviation
-        numbers = np.unique(self.residuals.quantity)
-        of = self.residuals.quantity
-        return {OBSERVED[one]: float(np.mean(inside[of == one])) for one in numbers}
+        names = self.residuals.root_mean_squares()
+        return {name: float(np.mean(inside[self.residuals.are(name)])) for name in names}
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,31 +297,15 @@ def leave_out(
         _check_photograph(found, by, photograph)
     folds: list[Fold] = []
     for number, (name, label, part, rest) in enumerate(parts, start=1):
-        kept = {label: found.given[label] for label, every in rest.items() if every}
-        every = [(one, one.among(kept)) for one in found.problem.unknowns]
-        constants = tuple(one for _, one in every if one is not None)
-        samples = Samples.of(kept, rest, constants, found.settings)
-        again = fitted(kept, _problem(samples, found, kept), starts, seed, intervals=False)
-        own = [
-            replace(one, prior=prior_of(one, again)) for one, remains in every if remains is None
-        ]
-        fold = _blind(name, again, found, label, part, own)
+        again, own = _without(found, rest, starts, seed)
+        blind = _Blind(again, own, found.given[label], label, part)
+        fold = blind.fold(name, found)
         if photograph is not None and own:
-            fold = _with_photograph(fold, found, label, part, own, photograph)
+            fold = blind.with_photograph(fold, photograph)
         folds.append(fold)
         if progress is not None:
             progress("leaving out", number, len(parts))
     return LeftOut(by, found, tuple(folds))
-
-
-def _problem(samples: Samples, whole: Calibration, kept: Collection[str]) -> FitProblem:
-    """The problem of the rest, with what may deviate from the drawings of its robots."""
-    of_rest = (
-        replace(one, sets=tuple(number for number in one.sets if number.label in kept))
-        for one in whole.problem.drawing
-    )
-    drawing = tuple(one for one in of_rest if one.sets)
-    return FitProblem(samples, whole.problem.objective, drawing)
 
 
 def _check_photograph(calibration: Calibration, by: str, photograph: float) -> None:
@@ -343,7 +313,7 @@ def _check_photograph(calibration: Calibration, by: str, photograph: float) -> N
         raise InputError.OUT_OF_RANGE(
             f"a photograph is at a part of the largest load, above 0 and up to 1; got {photograph}"
         )
-    if by != "robot" or not any(one.each for one in calibration.problem.unknowns):
+    if by != "robot" or not any(unknown.each for unknown in calibration.problem.unknowns):
         raise InputError.CONFLICT(
             "one photograph updates constants that each robot has of its own, of a robot that was "
             'left out: leave out by "robot", and fit one, such as each:sensor.force_factor with a '
@@ -351,84 +321,90 @@ def _check_photograph(calibration: Calibration, by: str, photograph: float) -> N
         )
 
 
-def _parts(data: Data, by: str) -> Iterator[tuple[str, str, Sequence[Measurements], Data]]:
+def _parts(data: Data, by: str) -> Iterator[tuple[str, str, list[Measurements], Data]]:
     """Yield name, robot and measurements of every part, and all the other measurements."""
-    for label, every in data.items():
+    for label, tables in data.items():
         if by == "robot":
-            yield label, label, every, data | {label: ()}
+            yield label, label, [*tables], data | {label: ()}
             continue
-        for number, measured in enumerate(every):
-            source = f", {measured.source}" if len(every) > 1 else ""
+        for number, measured in enumerate(tables):
+            source = f", {measured.source}" if len(tables) > 1 else ""
             for pull in measured.pulls:
-                others = [one for one in measured.pulls if one != pull]
+                others = [other for other in measured.pulls if other != pull]
                 rest = (measured.of_pulls(others),) if others else ()
-                kept = every[:number] + rest + every[number + 1 :]
-                part = [measured.of_pulls([pull])]
-                yield f"{label}{source}, pull {pull}", label, part, data | {label: kept}
+                kept = data | {label: tables[:number] + rest + tables[number + 1 :]}
+                yield f"{label}{source}, pull {pull}", label, [measured.of_pulls([pull])], kept
 
 
-def _blind(
-    name: str,
-    fit: Calibration,
-    whole: Calibration,
-    label: str,
-    part: Sequence[Measurements],
-    own: Sequence[Unknown],
-) -> Fold:
-    """Predict a part from a fit to the rest; constants of its robot alone by what is known."""
-    before = {one.name: one.prior for one in own if one.prior is not None}
-    constants = [*fit.problem.unknowns, *own]
-    values = np.append(fit.best.values, [mean for mean, _ in before.values()])
-    residuals = _residuals(fit, whole, label, part, constants, values)
-    of_all = _residuals(whole, whole, label, part, whole.problem.unknowns, whole.best.values)
-    errors, errors_of_all = (
-        {} if one is None else one.root_mean_squares() for one in (residuals, of_all)
+def _without(
+    whole: Calibration, rest: Data, starts: int, seed: int
+) -> tuple[Calibration, list[Unknown]]:
+    """Fit to the rest; return it, and what is known of constants that it does not tell."""
+    kept = {label: whole.given[label] for label, tables in rest.items() if tables}
+    lost = [constant for constant in whole.problem.unknowns if not constant.only_of(kept).sets]
+    for unknown in lost:
+        if unknown.prior is None and not (unknown.each and len(kept) > 1):
+            raise InputError.TOO_FEW_DATA(
+                f"`{unknown.name}` belongs to {unknown.sets[0].label} alone; without it there is "
+                "nothing to find it from. Give a prior (--prior), or measure more robots"
+            )
+    constants, drawing = (
+        tuple(of_rest for constant in every if (of_rest := constant.only_of(kept)).sets)
+        for every in (whole.problem.unknowns, whole.problem.drawing)
     )
-    deviation = np.zeros(0)
-    if residuals is not None:
-        missed = fit.residuals.root_mean_squares()
-        noise = [missed.get(OBSERVED[one], np.nan) for one in residuals.quantity]
-        sizes = [size**2 for _, size in before.values()]
-        covariance = np.asarray(block_diag(fit.covariance, np.diag(sizes)))
-        depends = np.flatnonzero(residuals.slopes.any(axis=0))
-        slopes, covariance = residuals.slopes[:, depends], covariance[np.ix_(depends, depends)]
-        spread = np.sum(slopes @ covariance * slopes, axis=1)
+    samples = Samples.of(kept, rest, constants, whole.settings)
+    problem = FitProblem(samples, whole.problem.objective, drawing)
+    again = fitted(kept, problem, starts, seed, intervals=False)
+    return again, [replace(constant, prior=prior_of(constant, again)) for constant in lost]
+
+
+class _Blind(NamedTuple):
+    """Measurements of a robot, and a fit that never saw them, with the constants that it lacks."""
+
+    fit: Calibration
+    own: Sequence[Unknown]
+    robot: Robot
+    label: str
+    part: Sequence[Measurements]
+
+    def residuals(self, part: Sequence[Measurements], own: Numbers) -> Residuals | None:
+        """Residuals of a part at values of the own constants; None if a row has no solution."""
+        robot = deviated(self.robot, self.label, self.fit.drawing)
+        constants = [
+            unknown.of(self.label, robot) for unknown in (*self.fit.problem.unknowns, *self.own)
+        ]
+        samples = Samples.of(
+            {self.label: robot}, {self.label: part}, tuple(constants), self.fit.settings
+        )
+        return samples.residuals(np.append(self.fit.best.values, own))
+
+    def fold(self, name: str, whole: Calibration) -> Fold:
+        """Predict the part; constants of its robot alone by what is known of them."""
+        before = {unknown.name: unknown.prior for unknown in self.own if unknown.prior is not None}
+        means, sizes = np.reshape([*before.values()], (-1, 2)).T
+        residuals = self.residuals(self.part, means)
+        of_all = self._replace(fit=whole, own=()).residuals(self.part, np.zeros(0))
+        errors, errors_of_all = (
+            {} if one is None else one.root_mean_squares() for one in (residuals, of_all)
+        )
+        fold = Fold(name, self.fit, errors, errors_of_all, residuals is not None, before=before)
+        if residuals is None:
+            return fold
+        missed = self.fit.residuals.root_mean_squares()
+        noise = [missed.get(OBSERVED[quantity], np.nan) for quantity in residuals.quantity]
+        depends = residuals.slopes.any(axis=0)
+        slopes = residuals.slopes[:, depends]
+        covariance = np.asarray(block_diag(self.fit.covariance, np.diag(sizes**2)))
+        spread = np.sum(slopes @ covariance[np.ix_(depends, depends)] * slopes, axis=1)
         deviation = np.sqrt(np.maximum(spread, 0.0) + np.square(noise))
-    return Fold(
-        name, fit, errors, errors_of_all, residuals is not None, residuals, deviation, before
-    )
+        return replace(fold, residuals=residuals, deviation=deviation)
 
-
-def _with_photograph(
-    fold: Fold,
-    whole: Calibration,
-    label: str,
-    part: Sequence[Measurements],
-    own: Sequence[Unknown],
-    share: float,
-) -> Fold:
-    """Update constants of the robot left out by one row, and try them on the others."""
-    first, robot = part[0], whole.given[label]
-    command = np.nansum(np.fmax(first.measured_tension, first.load.stroke), axis=1)
-    row = int(np.argmin(np.abs(command - share * command.max())))
-    specimen = updated(fold.found, label, robot, first.taken([row]), own)
-    others = [first.taken(np.arange(len(first)) != row), *part[1:]]
-    constants = [*fold.found.problem.unknowns, *own]
-    values = np.append(fold.found.best.values, specimen.found.best.values)
-    residuals = _residuals(fold.found, whole, label, others, constants, values)
-    errors = {} if residuals is None else residuals.root_mean_squares()
-    return replace(fold, specimen=specimen, row=row, errors_updated=errors)
-
-
-def _residuals(
-    fit: Calibration,
-    whole: Calibration,
-    label: str,
-    part: Sequence[Measurements],
-    constants: Sequence[Unknown],
-    values: np.ndarray,
-) -> Residuals | None:
-    """Residuals of a part at values of constants; None if one of its rows has no solution."""
-    robot = deviated(whole.given[label], label, fit.drawing)
-    mine = tuple(one.of(label, robot) for one in constants)
-    return Samples.of({label: robot}, {label: part}, mine, whole.settings).residuals(values)
+    def with_photograph(self, fold: Fold, share: float) -> Fold:
+        """Update constants of the robot left out by one row, and try them on the others."""
+        first = self.part[0]
+        row = int(np.argmin(np.abs(first.command - share * first.command.max())))
+        specimen = updated(self.fit, self.label, self.robot, first.taken([row]), self.own)
+        others = [first.taken(np.arange(len(first)) != row), *self.part[1:]]
+        residuals = self.residuals(others, specimen.found.best.values)
+        errors = {} if residuals is None else residuals.root_mean_squares()
+        return replace(fold, specimen=specimen, row=row, errors_updated=errors)

@@ -1,5 +1,9 @@
 """The result of a fit: constants, robots, and how far to trust them.
 
+Intervals are by profile likelihood (Venzon and Moolgavkar 1988): their ends are where the least
+misfit with one constant held has risen by as much as chance allows. No linear estimate is shown as
+an interval.
+
 Model errors, and how a robot was held and photographed, stay much the same through a pull. Rows of
 a pull are then not worth as much as their number (Huber 1967; Liang and Zeger 1986).
 """
@@ -9,35 +13,135 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.stats import chi2, t
 
 from notchflex import InputError, Robot, Settings
-from notchflex.fit.estimation.intervals import (
-    LEVEL,
-    Cost,
-    Interval,
-    Minimum,
-    Profile,
-    allowed_rise,
-    unit_free,
-)
-from notchflex.fit.estimation.objective import Noise
-from notchflex.fit.estimation.problem import FitProblem
-from notchflex.fit.model.constants import Unknown
-from notchflex.fit.model.drawing import deviated
-from notchflex.fit.model.residuals import Residuals
+from notchflex.fit.constants import Unknown, values_set, with_numbers
+from notchflex.fit.objective import Cost, Noise, Vector
+from notchflex.fit.residuals import Residuals
+from notchflex.fit.search import FitProblem, Minimum, unit_free
 from notchflex.support import frame
 
 if TYPE_CHECKING:
-    from notchflex.fit.assessment.residual_tests import ResidualTests
+    from notchflex.fit.residual_tests import ResidualTests
+
+Matrix = Float[np.ndarray, "k k"]
+
+LEVEL = 0.95
+"""Probability of intervals."""
+NO_SOLUTION = "the model has no solution that far"
+"""Why an end is open that the data may well set."""
+
+# How near the root of the rise must be to its target (of about 2), and how many tries to get there.
+_CLOSE, _TRIES = 0.005, 12
+# So many estimated half-widths away the data still set no end.
+_MAX_HALF_WIDTHS = 50.0
+# Probability below which noise does not explain the misfit: the model misses something.
+_UNLIKELY = 0.01
 
 
-@dataclass(frozen=True, eq=False)
-class ByPulls:
+@dataclass(frozen=True)
+class Interval:
+    """Interval of a constant.
+
+    Attributes:
+        lower: Lower end; None if the data set none.
+        upper: Upper end; None if the data set none.
+        profile: Values of the constant and the rise of twice the misfit there, as tried, in
+            the order of the values, with the estimate, (m, 2).
+        reason: Why an end is open, "" if none is.
+    """
+
+    lower: float | None
+    upper: float | None
+    profile: Float[np.ndarray, "m 2"]
+    reason: str = ""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Profile:
+    """The misfit about its minimum, as a function of one constant.
+
+    Attributes:
+        problem: The misfit as a function of all constants.
+        best: Its minimum.
+        number: Number of the constant.
+    """
+
+    problem: FitProblem
+    best: Minimum
+    number: int
+
+    def held(self, value: float, start: Vector) -> Minimum:
+        """Return the minimum with the constant held at a value, searched from a start."""
+        return self.problem.held(self.number, value, start)
+
+    def interval(self, *, rise: float, scale: float) -> Interval:
+        """Return the interval for an allowed rise of twice the misfit.
+
+        `scale` is a typical size of the constant's changes, if its curvature gives none.
+        """
+        points = {float(self.best.values[self.number]): 0.0}
+        ends: list[float | None] = []
+        reasons: dict[str, None] = {}
+        for side, limits in (("below", self.problem.lower), ("above", self.problem.upper)):
+            limit = float(limits[self.number])
+            end, reason = self._end(limit, side, rise, scale, points)
+            ends.append(end)
+            if end is None:
+                at = f" (limit {limit:.6g})" if np.isfinite(limit) else ""
+                reasons[reason or f"nothing in the data holds it from {side}{at}"] = None
+        return Interval(ends[0], ends[1], np.array(sorted(points.items())), "; ".join(reasons))
+
+    def _end(
+        self, limit: float, side: str, rise: float, scale: float, points: dict[float, float]
+    ) -> tuple[float | None, str]:
+        """One end of the interval: where the root of the rise, nearly linear, meets its target."""
+        best, estimate = reached(self.best), float(self.best.values[self.number])
+        sizes, plain = unit_free(best.curvature)
+        inverse = np.linalg.pinv(plain, rcond=1e-10, hermitian=True)
+        variance = max(inverse[self.number, self.number], 1e-12)
+        target, most, sign = np.sqrt(rise), abs(limit - estimate), 1.0 if side == "above" else -1.0
+        guess = min(target * np.sqrt(variance) / sizes[self.number], _MAX_HALF_WIDTHS * scale)
+        inner, outer = (0.0, 0.0), (np.inf, np.inf)
+        reach, start = guess, self.best.values
+        for _ in range(_TRIES):
+            at_limit, reach = reach >= most, min(reach, most)
+            if reach == 0.0:
+                return None, ""
+            value = limit if at_limit else float(estimate + sign * reach)
+            minimum = self.held(value, start)
+            root = np.inf  # without a robot, or a solution, that far the end must be nearer
+            if minimum.cost is not None:
+                start = minimum.values
+                points[value] = max(2.0 * (minimum.cost.value - best.value), 0.0)
+                root = np.sqrt(points[value])
+            if abs(root - target) < _CLOSE * target:
+                return value, ""
+            if root > target:
+                outer = (reach, root)
+            elif at_limit:
+                return None, ""
+            else:
+                inner = (reach, root)
+            if np.isfinite(outer[0]):
+                share = (target - inner[1]) / (outer[1] - inner[1])
+                share = min(max(share, 0.05), 0.95) if np.isfinite(outer[1]) else 0.5
+                reach = inner[0] + share * (outer[0] - inner[0])
+            elif reach >= _MAX_HALF_WIDTHS * max(scale, guess):
+                return None, ""
+            else:
+                reach *= min(max(1.1 * target / max(root, 1e-300), 1.2), 4.0)
+        if np.isinf(outer[1]):
+            return None, NO_SOLUTION
+        return float(estimate + sign * reach), ""
+
+
+class ByPulls(NamedTuple):
     """Uncertainty of k constants from the scatter between whole pulls.
 
     Attributes:
@@ -48,82 +152,44 @@ class ByPulls:
         wider: Standard deviation of each constant over that by rows where it counts; else 1, (k,).
     """
 
-    covariance: Float[np.ndarray, "k k"]
+    covariance: Matrix
     pulls: Int[np.ndarray, " k"]
-    freedom: Float[np.ndarray, " k"]
+    freedom: Vector
     counts: Bool[np.ndarray, " k"]
-    wider: Float[np.ndarray, " k"]
+    wider: Vector
 
 
-def by_pulls(
-    cost: Cost,
-    pull: Int[np.ndarray, " r"],
-    by_rows: Float[np.ndarray, "k k"],
-    freedom_of_rows: float,
-) -> ByPulls:
-    """Estimate the uncertainty of constants at a minimum from the scatter between pulls.
-
-    With the usual factor for few pulls (Cameron and Miller 2015, eq. 12) and Student's t with one
-    degree of freedom less than there are pulls; more where priors, which do not scatter, tell much
-    (Satterthwaite 1946). `by_rows` is the covariance if all rows were independent.
-    """
-    labels, which = np.unique(pull, return_inverse=True)
-    size = len(by_rows)
-    gradients, depends = np.zeros((len(labels), size)), np.zeros((len(labels), size), bool)
-    np.add.at(gradients, which, cost.contributions)
-    np.logical_or.at(depends, which, cost.residuals.slopes != 0.0)
-    pulls = depends.sum(axis=0)
-    if len(labels) < 2:
-        none = np.zeros(size, bool)
-        return ByPulls(np.full((size, size), np.nan), pulls, np.ones(size), none, np.ones(size))
-    # Only priors keep the gradients of the pulls from adding up to zero. The same share of each
-    # leaves what no pull tells, such as forces and moduli that grow together, out of the scatter.
-    gradients -= gradients.mean(axis=0)
-    rows = int(cost.contributions.any(axis=1).sum())
-    few = np.sqrt(np.maximum(pulls, 1) / np.maximum(pulls - 1, 1))
-    few *= np.sqrt(max(rows - 1, 1) / max(rows - size, 1))
-    hessian = hessian_of(cost)
-    of_pulls = sandwich(hessian, gradients.T @ gradients) * np.outer(few, few)
-    covariance = of_pulls + sandwich(hessian, cost.scatter)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.diag(covariance) / np.diag(of_pulls)
-        freedom = np.nan_to_num(np.maximum(pulls - 1, 1) * share**2, nan=1.0)
-        ratio = np.sqrt(np.diag(covariance) / np.diag(by_rows))
-        half = t.ppf(0.5 + 0.5 * LEVEL, freedom) / t.ppf(0.5 + 0.5 * LEVEL, freedom_of_rows)
-        counts = (pulls > 1) & np.isfinite(ratio) & (half * ratio > 1.0)
-    return ByPulls(covariance, pulls, freedom, counts, np.where(counts, ratio, 1.0))
+def reached(minimum: Minimum) -> Cost:
+    """Return the objective at a minimum that was found."""
+    assert minimum.cost is not None
+    return minimum.cost
 
 
-def hessian_of(cost: Cost) -> Float[np.ndarray, "k k"]:
-    """Return the second derivatives of an objective."""
-    return cost.curvature if cost.hessian is None else cost.hessian
-
-
-def sandwich(
-    hessian: Float[np.ndarray, "k k"], scatter: Float[np.ndarray, "k k"]
-) -> Float[np.ndarray, "k k"]:
+def sandwich(hessian: Matrix, scatter: Matrix | float) -> Matrix:
     """Return the covariance where a gradient of this covariance is zero (Huber 1967)."""
     covariance = inverse_of(hessian)
     is_known = np.isfinite(np.diag(covariance))
     known = np.ix_(is_known, is_known)
+    scatter = np.broadcast_to(scatter, hessian.shape)
     covariance[known] = covariance[known] @ scatter[known] @ covariance[known]
     return covariance
 
 
-def inverse_of(curvature: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
+def inverse_of(curvature: Matrix) -> Matrix:
     """Return the inverse of a curvature; infinite for constants without any."""
     is_known = np.diag(curvature) > 0.0
+    known = np.ix_(is_known, is_known)
     inverse = np.diag(np.where(is_known, 0.0, np.inf))
-    sizes, plain = unit_free(curvature[np.ix_(is_known, is_known)])
+    sizes, plain = unit_free(curvature[known])
     values, vectors = np.linalg.eigh(plain)
     # A curvature of 0 that rounding made small gives a wide interval, not a narrow one.
-    part = (vectors / np.maximum(values, 1e-15)) @ vectors.T
-    inverse[np.ix_(is_known, is_known)] = part / np.outer(sizes, sizes)
+    inverse[known] = (vectors / np.maximum(values, 1e-15)) @ vectors.T / np.outer(sizes, sizes)
     return inverse
 
 
-# Probability below which noise does not explain the misfit: the model misses something.
-_UNLIKELY = 0.01
+def quantile(freedom: Any) -> Any:
+    """Return half an interval in standard deviations (Student's t)."""
+    return t.ppf(0.5 + 0.5 * LEVEL, freedom)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,7 +200,6 @@ class Calibration:
         given: The robots as they were, by label.
         problem: The measurements, the constants and the objective.
         best: Where the best search ended.
-        reached: The objective there.
         searches: Where every search ended, the first from the robots as they were.
         intervals: 95 % intervals by constant, of `LeastSquares` only; by whole pulls where two or
             more were measured, but never narrower than by independent rows.
@@ -143,24 +208,31 @@ class Calibration:
     given: Mapping[str, Robot]
     problem: FitProblem
     best: Minimum
-    reached: Cost
     searches: tuple[Minimum, ...]
     intervals: dict[str, Interval]
 
     @property
+    def reached(self) -> Cost:
+        """The objective at the best values."""
+        return reached(self.best)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the constants."""
-        return tuple(one.name for one in self.problem.unknowns)
+        return tuple(unknown.name for unknown in self.problem.unknowns)
 
     @property
     def values(self) -> dict[str, float]:
         """Fitted values, in the units of the robot file."""
-        return dict(zip(self.names, self.best.values.tolist(), strict=True))
+        return self._by_name(self.best.values)
+
+    def _by_name(self, values: Vector) -> dict[str, float]:
+        return dict(zip(self.names, values.tolist(), strict=True))
 
     @property
     def units(self) -> dict[str, str]:
         """Units of the values, "" for a pure number."""
-        return {one.name: one.unit for one in self.problem.unknowns}
+        return {unknown.name: unknown.unit for unknown in self.problem.unknowns}
 
     @property
     def converged(self) -> bool:
@@ -201,10 +273,11 @@ class Calibration:
     @cached_property
     def robots(self) -> dict[str, Robot]:
         """The robots with the fitted constants."""
-        samples = {one.label: one for one in self.problem.samples.every}
+        constants = (*self.problem.unknowns, *self.drawing)
+        values = [*self.best.values, *self.deviations_of_drawing.values()]
         return {
-            label: deviated(samples[label].robot_with(self.best.values), label, self.drawing)
-            for label in self.given
+            label: with_numbers(robot, values_set(label, constants, values))
+            for label, robot in self.problem.samples.robots.items()
         }
 
     @property
@@ -212,17 +285,17 @@ class Calibration:
         """What deviates from the drawings, starting at what the data tell."""
         total = (self.problem.means + self.reached.deviations).tolist()
         pairs = zip(self.problem.drawing, total, strict=True)
-        return tuple(replace(one, start=deviation) for one, deviation in pairs)
+        return tuple(replace(unknown, start=deviation) for unknown, deviation in pairs)
 
     @property
     def deviations_of_drawing(self) -> dict[str, float]:
         """Deviations from the drawing that the data tell, in standard deviations by name."""
-        return {one.name: one.start for one in self.drawing}
+        return {deviation.name: deviation.start for deviation in self.drawing}
 
     @cached_property
     def tests(self) -> ResidualTests | None:
         """Tests of the residuals; None if there are too few, or it is no likelihood."""
-        from notchflex.fit.assessment.residual_tests import residual_tests
+        from notchflex.fit.residual_tests import residual_tests
 
         return residual_tests(self)
 
@@ -250,9 +323,14 @@ class Calibration:
         return self.problem.objective.is_likelihood
 
     @property
+    def huber(self) -> float | None:
+        """From where on residuals count less: then intervals follow from the scatter of rows."""
+        return getattr(self.problem.objective, "huber", None)
+
+    @property
     def is_robust(self) -> bool:
-        """Whether outliers count less: then intervals follow from the scatter of the rows."""
-        return getattr(self.problem.objective, "huber", None) is not None
+        """Whether outliers count less."""
+        return self.huber is not None
 
     @property
     def tells_no_noise(self) -> bool:
@@ -266,17 +344,16 @@ class Calibration:
         Of numbers whose noise is known independently of the fit, with what deviates from the
         drawing; NaN if there are none.
         """
-        is_known, left = self._known
-        if left <= 0:
-            return float("nan")
+        is_known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
         scaled = self.residuals.values[is_known] / self.noise.deviation[is_known]
-        return float(np.sum(scaled**2) + np.sum(self.reached.deviations**2)) / left
+        squares = np.sum(scaled**2) + np.sum(self.reached.deviations**2)
+        return float(squares) / self._left if self._left > 0 else float("nan")
 
     @property
-    def _known(self) -> tuple[Bool[np.ndarray, " r"], int]:
-        """Numbers with noise known independently of the fit; how many more than constants."""
+    def _left(self) -> int:
+        """Numbers whose noise is known independently of the fit, less the constants."""
         is_known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
-        return is_known, int(is_known.sum()) - len(self.names)
+        return int(is_known.sum()) - len(self.names)
 
     @cached_property
     def log_likelihood(self) -> float:
@@ -285,7 +362,7 @@ class Calibration:
         Of `LeastSquares()` without `huber`. What deviates from the drawing is integrated out, with
         the model linearised; noise that is estimated is the most likely one.
         """
-        if not self.is_likelihood or self.is_robust or self.tells_no_noise:
+        if not self.is_likelihood or self.huber or self.tells_no_noise:
             return float("nan")
         counts = np.isfinite(self.noise.deviation)
         share = np.where(self.noise.estimated, self.freedom / self.counted, 1.0)
@@ -296,8 +373,8 @@ class Calibration:
         inner = np.eye(spread.shape[1]) + spread.T @ spread
         along = spread.T @ scaled
         squares = scaled @ scaled - along @ np.linalg.solve(inner, along)
-        sizes = 2.0 * np.log(noise).sum() + np.linalg.slogdet(inner)[1]
-        return float(-0.5 * (squares + sizes + len(noise) * np.log(2.0 * np.pi)))
+        sizes = np.log(2.0 * np.pi * noise**2).sum() + np.linalg.slogdet(inner)[1]
+        return float(-0.5 * (squares + sizes))
 
     @property
     def _parameters(self) -> int:
@@ -320,13 +397,25 @@ class Calibration:
     @property
     def misses(self) -> bool:
         """Whether the model misses the measurements by more than noise can explain."""
-        value, (_, left) = self.reduced_chi_squared, self._known
-        return bool(value > 1.0 and not self.is_robust and chi2.sf(value * left, left) < _UNLIKELY)
+        value, left = self.reduced_chi_squared, self._left
+        return bool(value > 1.0 and not self.huber and chi2.sf(value * left, left) < _UNLIKELY)
 
     @property
     def widened(self) -> float:
         """Factor by which intervals are wider than by noise alone, if the model misses more."""
         return float(np.sqrt(self.reduced_chi_squared)) if self.misses else 1.0
+
+    def number_of(self, name: str) -> int:
+        """Return the number of a constant.
+
+        Raises:
+            InputError: There is no such constant.
+        """
+        if name not in self.names:
+            raise InputError.UNKNOWN_NAME(
+                f"{name} was not fitted; there are {', '.join(self.names)}"
+            )
+        return self.names.index(name)
 
     def allowed_rise(self, name: str) -> float:
         """Return the rise of twice the misfit at the ends of the 95 % interval of a constant.
@@ -336,13 +425,12 @@ class Calibration:
         """
         if self.tells_no_noise:
             return float("inf")
-        number = self.names.index(name)
-        inverse = inverse_of(hessian_of(self.reached))[number, number]
+        number = self.number_of(name)
+        inverse = inverse_of(self.reached.second_derivatives)[number, number]
         if np.isfinite(inverse):
-            freedom = self._freedom_of_intervals[number]
-            half = t.ppf(0.5 + 0.5 * LEVEL, freedom) * self.deviations[name]
+            half = quantile(self._freedom_of_intervals[number]) * self.deviations[name]
             return float(half**2 / inverse)
-        return allowed_rise(None) * self.widened**2
+        return float(chi2.ppf(LEVEL, 1)) * self.widened**2
 
     def allows(self, name: str, value: float) -> bool:
         """Return whether the 95 % interval of a constant holds a value.
@@ -356,30 +444,22 @@ class Calibration:
         Raises:
             InputError: There is no such constant, or the objective is not a likelihood.
         """
-        if name not in self.names:
-            raise InputError.UNKNOWN_NAME(
-                f"{name!r} was not fitted; there are {', '.join(self.names)}"
-            )
+        number = self.number_of(name)
         if not self.is_likelihood:
             raise InputError.UNSUPPORTED(
                 "an interval needs LeastSquares(); other objectives are not likelihoods"
             )
-        number = self.names.index(name)
         if not self.problem.lower[number] <= value <= self.problem.upper[number]:
             return False
-        minimum = self.profile(name).held(value, self.best.values)
-        if minimum.cost is None:
-            return False
-        return 2.0 * (minimum.cost.value - self.cost) <= self.allowed_rise(name)
+        cost = self.profile(name).held(value, self.best.values).cost
+        return cost is not None and 2.0 * (cost.value - self.cost) <= self.allowed_rise(name)
 
     def profile(self, name: str) -> Profile:
         """Return the misfit as a function of one constant."""
-        problem, number = self.problem, self.names.index(name)
-        values = self.best.values
-        return Profile(problem.held, values, self.reached, number, problem.lower, problem.upper)
+        return Profile(self.problem, self.best, self.number_of(name))
 
     @cached_property
-    def covariance(self) -> Float[np.ndarray, "k k"]:
+    def covariance(self) -> Matrix:
         """Covariance of the constants, with the model linearised.
 
         By rows, or by whole pulls where they count (`by_pulls`). By pulls alone (Huber's sandwich)
@@ -392,15 +472,15 @@ class Calibration:
         return self.covariance_by_rows * np.outer(wider, wider)
 
     @cached_property
-    def covariance_by_rows(self) -> Float[np.ndarray, "k k"]:
+    def covariance_by_rows(self) -> Matrix:
         """Covariance of the constants if all rows were independent."""
         if self.is_likelihood and self.tells_no_noise:
             return np.diag(np.full(len(self.names), np.inf))
-        if self.is_robust:
+        if self.huber:
             contributions = self.reached.contributions
             factor = self.noise.counted / max(self.freedom, 1)
             scatter = factor * contributions.T @ contributions + self.reached.scatter
-            return sandwich(hessian_of(self.reached), scatter)
+            return sandwich(self.reached.second_derivatives, scatter)
         return inverse_of(self.reached.curvature) * self.widened**2
 
     @cached_property
@@ -408,17 +488,44 @@ class Calibration:
         """Uncertainty of the constants from the scatter between whole pulls.
 
         Model errors correlate strongly within a pull: rows are not worth as much as their number.
+        With the usual factor for few pulls (Cameron and Miller 2015, eq. 12) and Student's t with
+        one degree of freedom less than there are pulls; more where priors, which do not scatter,
+        tell much (Satterthwaite 1946).
         """
-        rows = self.covariance_by_rows
-        return by_pulls(self.reached, self.residuals.pull, rows, self._freedom_of_rows)
+        cost, size = self.reached, len(self.names)
+        labels, pull = np.unique(self.residuals.pull, return_inverse=True)
+        gradients, depends = np.zeros((2, len(labels), size))
+        np.add.at(gradients, pull, cost.contributions)
+        np.logical_or.at(depends, pull, self.residuals.slopes != 0.0)
+        pulls = depends.sum(axis=0).astype(int)
+        if len(labels) < 2:
+            ones = np.ones(size)
+            return ByPulls(np.full((size, size), np.nan), pulls, ones, np.zeros(size, bool), ones)
+        # Only priors keep the gradients of the pulls from adding up to zero. The same share of each
+        # leaves what no pull tells, such as forces and moduli that grow together, out of the
+        # scatter.
+        gradients -= gradients.mean(axis=0)
+        rows = int(cost.contributions.any(axis=1).sum())
+        few = np.sqrt(np.maximum(pulls, 1) / np.maximum(pulls - 1, 1))
+        few *= np.sqrt(max(rows - 1, 1) / max(rows - size, 1))
+        hessian = cost.second_derivatives
+        of_pulls = sandwich(hessian, gradients.T @ gradients) * np.outer(few, few)
+        covariance = of_pulls + sandwich(hessian, cost.scatter)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = np.diag(covariance) / np.diag(of_pulls)
+            freedom = np.nan_to_num(np.maximum(pulls - 1, 1) * share**2, nan=1.0)
+            ratio = np.sqrt(np.diag(covariance) / np.diag(self.covariance_by_rows))
+            wider = quantile(freedom) / quantile(self._freedom_of_rows) * ratio
+            counts = (pulls > 1) & np.isfinite(ratio) & (wider > 1.0)
+        return ByPulls(covariance, pulls, freedom, counts, np.where(counts, ratio, 1.0))
 
     @property
     def _freedom_of_rows(self) -> float:
-        by_noise = self.noise.is_known and not self.is_robust
+        by_noise = self.noise.is_known and not self.huber
         return float("inf") if by_noise else max(self.freedom, 1)
 
     @property
-    def _freedom_of_intervals(self) -> Float[np.ndarray, " k"]:
+    def _freedom_of_intervals(self) -> Vector:
         return np.where(self.by_pulls.counts, self.by_pulls.freedom, self._freedom_of_rows)
 
     def half_width(self, slopes: Float[np.ndarray, "r k"]) -> Float[np.ndarray, " r"]:
@@ -427,7 +534,7 @@ class Calibration:
         With the model linearised; NaN if it has no end.
         """
         is_known = np.isfinite(np.diag(self.covariance))
-        times = t.ppf(0.5 + 0.5 * LEVEL, self._freedom_of_intervals)[is_known]
+        times = quantile(self._freedom_of_intervals)[is_known]
         covariance = self.covariance[np.ix_(is_known, is_known)] * np.outer(times, times)
         variance = np.einsum("ri,ij,rj->r", slopes[:, is_known], covariance, slopes[:, is_known])
         # An unknown constant only matters to numbers that depend on it.
@@ -437,10 +544,10 @@ class Calibration:
     @property
     def deviations(self) -> dict[str, float]:
         """Standard deviations of the constants, with the model linearised."""
-        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+        return self._by_name(np.sqrt(np.diag(self.covariance)))
 
     @property
-    def correlation(self) -> Float[np.ndarray, "k k"]:
+    def correlation(self) -> Matrix:
         """Correlations of the constants; NaN for one that nothing depends on."""
         size = np.sqrt(np.diag(self.covariance))
         size = np.where(np.isfinite(size), size, np.nan)
@@ -462,8 +569,8 @@ class Calibration:
             "constant": self.names,
             "value": [*self.values.values()],
             "unit": [*self.units.values()],
-            "lower_95": np.array([None if one is None else one.lower for one in ends], float),
-            "upper_95": np.array([None if one is None else one.upper for one in ends], float),
+            "lower_95": np.array([interval and interval.lower for interval in ends], float),
+            "upper_95": np.array([interval and interval.upper for interval in ends], float),
             "deviation": [*self.deviations.values()],
         }
         return frame(columns, library)

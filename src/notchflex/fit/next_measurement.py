@@ -13,11 +13,15 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from notchflex import InputError, Load, LoadPath, solve_each
-from notchflex.fit.estimation.calibration import Calibration
-from notchflex.fit.measurements.measurements import OBSERVED, Measurements, check_quantities
-from notchflex.fit.measurements.simulated import modelled
-from notchflex.fit.model.residuals import Residuals
-from notchflex.fit.model.samples import Samples
+from notchflex.fit.calibration import Calibration
+from notchflex.fit.measurements.measurements import (
+    OBSERVED,
+    Measurements,
+    check_quantities,
+    modelled,
+)
+from notchflex.fit.objective import Vector
+from notchflex.fit.residuals import Residuals, Samples
 from notchflex.support import load_path
 
 
@@ -94,27 +98,32 @@ def next_measurement(
         5
     """
     label = robot or next(iter(found.given))
-    _check(found, label, narrow, deviation or {})
+    noise = dict(deviation or {})
+    _check(found, label, narrow, noise)
     path = load_path(candidates, found.robots[label].number_of_tendons)
+    measured = found.problem.samples.of_robot(label)
     if observed is None:
-        measured = found.problem.samples.of_robot(label)
         observed = tuple(dict.fromkeys(name for one in measured for name in one.observed))
-    noise = {name: _noise(found, name, deviation or {}) for name in observed}
+    for name in observed:
+        noise.setdefault(name, _noise_so_far(found, name))
+        if np.isnan(noise[name]):
+            raise InputError.MISSING_VALUE(
+                f"{name} was not measured so far; give its standard deviation"
+            )
+    residuals, steps = _solved(found, label, path, observed)
+    sizes = np.array([noise[OBSERVED[quantity]] for quantity in residuals.quantity])
+    scaled = residuals.slopes / sizes[:, None]
     narrower = np.full((len(path), len(found.names)), np.nan)
     volume = np.full(len(path), np.nan)
     before = found.reached.curvature / found.widened**2
     width, size = _widths(before)
-    solved, residuals = _solved(found, label, path, observed)
-    if residuals is None:
-        raise InputError.NOT_CONVERGED("none of the candidates has a solution; give smaller loads")
-    sizes = np.array([noise[OBSERVED[quantity]] for quantity in residuals.quantity])
-    scaled = residuals.slopes / sizes[:, None]
-    for row, step in enumerate(solved):
+    for row, step in enumerate(steps):
         slopes = scaled[residuals.row == row]
         width_after, size_after = _widths(before + slopes.T @ slopes)
         narrower[step], volume[step] = width_after / width, np.exp(size_after - size)
-    names, able = tuple(narrow), np.isfinite(volume)
-    return NextMeasurement(label, path, narrower, volume, found.names, names, able)
+    return NextMeasurement(
+        label, path, narrower, volume, found.names, tuple(narrow), np.isfinite(volume)
+    )
 
 
 def _check(
@@ -124,11 +133,8 @@ def _check(
         raise InputError.UNKNOWN_NAME(
             f"no robot of this fit is called {label}; there are {', '.join(calibration.given)}"
         )
-    missing = [name for name in narrow if name not in calibration.names]
-    if missing:
-        raise InputError.UNKNOWN_NAME(
-            f"{missing[0]} was not fitted; narrow some of {', '.join(calibration.names)}"
-        )
+    for name in narrow:
+        calibration.number_of(name)
     if calibration.tells_no_noise:
         raise InputError.TOO_FEW_DATA(
             "the noise is unknown, so that the gain of another measurement is unknown; "
@@ -138,52 +144,42 @@ def _check(
         raise InputError.OUT_OF_RANGE("a deviation of the next measurement must be above 0")
 
 
-def _noise(calibration: Calibration, name: str, deviation: Mapping[str, float]) -> float:
-    if name in deviation:
-        return float(deviation[name])
+def _noise_so_far(calibration: Calibration, name: str) -> float:
+    """Root mean square of the noise of a quantity; NaN if it was not measured."""
     check_quantities([name])
-    mine = calibration.residuals.quantity == OBSERVED.index(name)
-    if not mine.any():
-        raise InputError.MISSING_VALUE(
-            f"{name} was not measured so far; give its standard deviation"
-        )
-    return float(np.sqrt(np.mean(calibration.noise.deviation[mine] ** 2)))
+    deviation = calibration.noise.deviation[calibration.residuals.are(name)]
+    return float(np.sqrt(np.mean(deviation**2))) if len(deviation) else float("nan")
 
 
 def _solved(
     calibration: Calibration, label: str, loads: LoadPath, observed: Sequence[str]
-) -> tuple[list[int], Residuals | None]:
-    """Candidates that have a solution, and residuals with one row each; None if there are none."""
-    axis_at = np.zeros(0)
-    if "axis_points" in observed:
-        measured = calibration.problem.samples.of_robot(label)
-        axis_at = next((one.axis_at for one in measured if len(one.axis_at)), axis_at)
+) -> tuple[Residuals, list[int]]:
+    """Residuals of the candidates that have a solution, one row each, and their numbers."""
+    samples = calibration.problem.samples
+    points = [table.axis_at for table in samples.of_robot(label) if len(table.axis_at)]
+    axis_at = points[0] if points and "axis_points" in observed else np.zeros(0)
     model = solve_each(calibration.robots[label], loads)
     steps = np.flatnonzero(model.converged).tolist()
-    if not steps:
-        return steps, None
-    rows = Measurements(
-        source="candidates",
-        load=loads[np.asarray(steps)],
-        pull=tuple(map(str, steps)),
-        from_rest=True,
-        observed={name: one[steps] for name, one in modelled(model, observed, axis_at).items()},
-        axis_at=axis_at,
-    )
-    samples = Samples.of(
-        {label: calibration.given[label]}, {label: [rows]}, calibration.problem.unknowns
-    )
-    return steps, samples.residuals(calibration.best.values)
+    if steps:
+        values = {name: modelled(model, name, axis_at)[steps] for name in observed}
+        labels = tuple(map(str, steps))
+        rows = Measurements(
+            "candidates", loads[np.array(steps)], labels, True, values, axis_at=axis_at
+        )
+        robots = {label: calibration.given[label]}
+        candidates = Samples.of(robots, {label: [rows]}, calibration.problem.unknowns)
+        if (residuals := candidates.residuals(calibration.best.values)) is not None:
+            return residuals, steps
+    raise InputError.NOT_CONVERGED("none of the candidates has a solution; give smaller loads")
 
 
-def _widths(information: Float[np.ndarray, "k k"]) -> tuple[Float[np.ndarray, " k"], float]:
+def _widths(information: Float[np.ndarray, "k k"]) -> tuple[Vector, float]:
     """Widths of the constants, and the logarithm of the k-th root of the volume of their region.
 
     A constant without information is very wide.
     """
     size = np.sqrt(np.maximum(np.diag(information), 1e-12))
     values, vectors = np.linalg.eigh(information / np.outer(size, size))
-    inverse = (vectors / np.maximum(values, 1e-12)) @ vectors.T
-    _, logarithm = np.linalg.slogdet(inverse)
-    volume = (0.5 * logarithm - np.sum(np.log(size))) / len(size)
-    return np.sqrt(np.diag(inverse)) / size, float(volume)
+    values = np.maximum(values, 1e-12)
+    width = np.sqrt(np.sum(vectors**2 / values, axis=1)) / size
+    return width, float(-np.mean(0.5 * np.log(values) + np.log(size)))

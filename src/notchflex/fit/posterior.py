@@ -15,9 +15,8 @@ from jaxtyping import Float
 
 from notchflex import InputError
 from notchflex._jax import jax, jnp
-from notchflex.fit.estimation.calibration import Calibration
-from notchflex.fit.estimation.intervals import LEVEL
-from notchflex.fit.estimation.problem import Progress
+from notchflex.fit.calibration import LEVEL, Calibration
+from notchflex.fit.search import Progress
 from notchflex.support import Displayed, Summary, frame, need, short
 
 if TYPE_CHECKING:
@@ -68,9 +67,8 @@ class Posterior(Displayed):
     def intervals(self) -> dict[str, tuple[float, float]]:
         """Interval of the middle 95 % of the draws of every constant."""
         tail = 50.0 * (1.0 - LEVEL)
-        ends = np.percentile(self.draws, [tail, 100.0 - tail], axis=(0, 1))
-        every = zip(self.names, *ends.tolist(), strict=True)
-        return {name: (lower, upper) for name, lower, upper in every}
+        lower, upper = np.percentile(self.draws, [tail, 100.0 - tail], axis=(0, 1)).tolist()
+        return dict(zip(self.names, zip(lower, upper, strict=True), strict=True))
 
     def to_xarray(self) -> Dataset:
         """Return the draws with the axes `chain` and `draw`, as ArviZ takes them.
@@ -149,7 +147,7 @@ def sample_posterior(
         adapt_mass_matrix=False,
         max_tree_depth=4,
     )
-    every: list[np.ndarray] = []
+    positions: list[np.ndarray] = []
     divergent = 0
     for chain in range(chains):
         sampler = infer.MCMC(
@@ -158,15 +156,19 @@ def sample_posterior(
         key = jax.random.PRNGKey(seed + chain)
         start = 0.5 * jax.random.normal(key, (len(found.names),))
         sampler.run(key, init_params=start, extra_fields=("diverging",))
-        every.append(_constants(found, np.asarray(sampler.get_samples())))
+        positions.append(np.asarray(sampler.get_samples()))
         divergent += int(np.sum(sampler.get_extra_fields()["diverging"]))
         if progress is not None:
             progress("drawing", chain + 1, chains)
-    drawn = np.stack(every)
-    by_name = list(zip(found.names, np.moveaxis(drawn, -1, 0), strict=True))
-    effective = {name: float(diagnostics.effective_sample_size(one)) for name, one in by_name}
-    r_hat = {name: float(diagnostics.split_gelman_rubin(one)) for name, one in by_name}
-    return Posterior(found.names, drawn, effective, r_hat, divergent)
+    # Farther from the fit if whole pulls differ.
+    spread = np.linalg.cholesky(found.covariance_by_rows)
+    values = found.best.values + found.by_pulls.wider * (np.stack(positions) @ spread.T)
+    values = np.clip(values, found.problem.lower, found.problem.upper)
+    effective, r_hat = (
+        {name: float(of(values[..., number])) for number, name in enumerate(found.names)}
+        for of in (diagnostics.effective_sample_size, diagnostics.split_gelman_rubin)
+    )
+    return Posterior(found.names, values, effective, r_hat, divergent)
 
 
 def _check(calibration: Calibration) -> None:
@@ -209,12 +211,3 @@ def _potential(calibration: Calibration) -> Callable[[jax.Array], jax.Array]:
     potential = jax.custom_vjp(lambda position: forward(position)[0])
     potential.defvjp(forward, backward)
     return potential
-
-
-def _constants(
-    calibration: Calibration, positions: Float[np.ndarray, "d k"]
-) -> Float[np.ndarray, "d k"]:
-    """Constants of draws, farther from the fit if whole pulls differ."""
-    spread = np.linalg.cholesky(calibration.covariance_by_rows)
-    values = calibration.best.values + calibration.by_pulls.wider * (positions @ spread.T)
-    return np.clip(values, calibration.problem.lower, calibration.problem.upper)

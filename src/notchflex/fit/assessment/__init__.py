@@ -1,1 +1,0 @@
-"""Assessment of a calibration, and the next measurement."""

@@ -1,1 +1,0 @@
-"""The friction rig: a coefficient of friction from two hanging weights."""

@@ -1,1 +1,0 @@
-"""The model at every measured row, and its residuals."""
