@@ -247,7 +247,7 @@ def test_readings():
     assert reading("−0.5", {}) == -0.5
     assert reading("3/2", {}) == 1.5
     assert reading("1,9", {}) == 1.9
-    assert value_of("1", {"type": "number"}, 3) == [1.0, 1.0, 1.0]
+    assert value_of("1", {"type": "number", "count": 3}) == [1.0, 1.0, 1.0]
     assert choice("on", ("on-axis", "off-axis")) == "on-axis"
     assert value_of("3", {"type": "integer", "ge": 1, "le": 3}) == 3
     for bad in ("", "1,2,3", "1, 2", "1/0", "True", "(", "2**3"):

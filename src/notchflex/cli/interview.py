@@ -187,21 +187,19 @@ class Interview:
 
     def _robot(self, name: str) -> Robot:
         # A kind that does not exist is refused before anything is asked.
-        for option, base in (("--kind", Notch), ("--friction-kind", Friction)):
-            self._kind(option, base, asks=option in self.answers)
-        if "--material" in self.answers:
-            self._kind("--material", Material)
-        title = self._ask("--title", {"description": "title", "type": "string"}, name)
+        for base in (Notch, Friction, Material):
+            self._kind(base, asks=False)
+        title = self._ask("--title", description="title", type="string", default=name)
         outer = self._keys("tube", Tube, "outer_diameter")
         below = {"lt": outer["outer_diameter"]}
         inner = self._keys("tube", Tube, "inner_diameter", inner_diameter=below)
         tube = Tube(**outer, **inner, **self._keys("tube", Tube, "base_length"))
         notches = self._notches(tube)
         tendons = self._tendons(tube, notches)
-        material = self._kind("--material", Material)
+        material = self._kind(Material)
         plastic = {"lt": 0.1}  # where the plastic branch begins
         values = self._keys("material", material, transition_strain=plastic)
-        friction = self._kind("--friction-kind", Friction, asks=self.person)
+        friction = self._kind(Friction, asks=self.person)
         of_friction = self._keys("friction", friction)
         # Asked last, so that pipes written before this question still fit.
         values |= self._keys("material", material, "allowed_strain")
@@ -209,19 +207,13 @@ class Interview:
 
     def _notches(self, tube: Tube) -> tuple[Notch, ...]:
         """Ask for the number of notches, and for their keys: one value, or each its own."""
-        kind = self._kind("--kind", Notch, asks=self.person)
+        kind = self._kind(Notch, asks=self.person)
         cut = self._keys("notch", kind, "cut")
-        count = self._ask(
-            "--notches",
-            {"description": "number of notches", "type": "integer", "ge": 1, "le": MOST_NOTCHES},
-        )
-        columns = self._keys(
-            "notch", kind, count=count, but=(*cut,), depth={"lt": tube.outer_diameter}
-        )
-        rows = [
-            cut | dict(zip(columns, row, strict=True))
-            for row in zip(*columns.values(), strict=True)
-        ]
+        limits: Field = {"type": "integer", "ge": 1, "le": MOST_NOTCHES}
+        count = self._ask("--notches", description="number of notches", **limits)
+        below = {"lt": tube.outer_diameter}
+        columns = self._keys("notch", kind, count=count, but=(*cut,), depth=below)
+        rows = [cut | row for row in _rows(columns)]
         runs = [list(run) for _, run in groupby(enumerate(rows), key=lambda item: item[1])]
         return tuple(kind(**kind.further_on(run[0][1], run[0][0]), repeat=len(run)) for run in runs)
 
@@ -229,14 +221,9 @@ class Interview:
         on_wall = {"default": f"{tube.inner_radius:g}", "le": tube.outer_radius}
         columns = self._keys("tendon", Tendon, "radius", count=0, radius=on_wall)
         count = len(columns["radius"])
-        columns |= self._keys(
-            "tendon", Tendon, count=count, but=("radius",),
-            direction_deg={} if count == 1 else {"default": ""},
-        )  # fmt: skip
-        tendons = [
-            Tendon(**dict(zip(columns, row, strict=True)))
-            for row in zip(*columns.values(), strict=True)
-        ]
+        side: Field = {"default": "0" if count == 1 else ""}
+        columns |= self._keys("tendon", Tendon, count=count, but=("radius",), direction_deg=side)
+        tendons = [Tendon(**row) for row in _rows(columns)]
         # Over a strip or a link there is no arc of the wall, and in finite elements the tendon of a
         # wrist spans its notches: such a tendon runs straight.
         straight = any(
@@ -247,15 +234,18 @@ class Interview:
             tendons = [replace(tendon, path="straight") for tendon in tendons]
         return tuple(tendons)
 
-    def _kind(self, option: str, base: type, *, asks: bool = True) -> type[Any]:
+    def _kind(self, base: type, *, asks: bool = True) -> type[Any]:
         """Ask for a kind of notch, material or friction; the usual one stands first.
 
         Args:
-            option: The option that answers it.
             base: What is of this kind.
-            asks: Whether it is asked; else, without an answer, it is the usual kind.
+            asks: Whether it is asked; else, without an option, it is the usual kind.
         """
         kinds, section = kinds_of(base), base.__name__.lower()
+        option, text = {
+            "notch": ("--kind", "kind of notch"),
+            "friction": ("--friction-kind", "kind of friction"),
+        }.get(section, ("--material", "material"))
         usual = [kind for kind in USUAL_KINDS if kind in kinds]
         first = usual[0]
         for kind in usual:  # an option that only one kind has tells the kind
@@ -265,9 +255,8 @@ class Interview:
         if not asks and option not in self.answers:
             return kinds[first]
         names = [first, *(name for name in kinds if name != first)]
-        text = "material" if section == "material" else f"kind of {section}"
-        field = {"description": f"{text}, {' or '.join(names)}", "enum": names}
-        return kinds[self._ask(option, field, first)]
+        text = f"{text}, {' or '.join(names)}"
+        return kinds[self._ask(option, description=text, enum=names, default=first)]
 
     def _keys(
         self,
@@ -289,58 +278,44 @@ class Interview:
             **more: By key, what else than the schema says holds for it.
         """
         values: dict[str, Any] = {}
-        for key, described in keys_of(kind).items():
+        for key, field in keys_of(kind).items():
             note, option = note_of(section, kind_of(kind), key), option_of(section, key)
-            field = described | more.get(key, {})
-            default = more.get(key, {}).get("default", note.default)
-            if default is None and "default" in field:
-                said = field["default"]
-                default = "none" if said is None else f"{said}".removesuffix(".0")
-            usual = key not in (*_UNASKED, *but) and (
-                "default" not in described
+            is_usual = key not in _UNASKED and (
+                "default" not in field
                 or not option.startswith("--set")
                 or kind_of(kind) not in ("", *USUAL_KINDS)
             )
-            is_set = option in self.answers and key not in (*but, "allowed_strain")
-            if key in keys if keys else usual or is_set:
-                name = f"{section}.{key}"
-                values[key] = self._ask(option, field, default, note.hint, name, count)
-            elif note.default and key not in (*but, "allowed_strain") and not keys:
-                values[key] = value_of(note.default, field, count)
+            default = field.get("default", "")
+            default = "none" if default is None else f"{default}".removesuffix(".0")
+            noted = {"hint": note.hint, "default": note.default or default}
+            question = {**field, **noted, "count": count, **more.get(key, {})}
+            elsewhere = key in (*but, "allowed_strain")
+            if key in keys if keys else (is_usual or option in self.answers) and not elsewhere:
+                values[key] = self._ask(option, f"{section}.{key}", **question)
+            elif note.default and not keys and not elsewhere:
+                values[key] = value_of(note.default, question)
         return values
 
-    def _ask(
-        self,
-        option: str,
-        field: Field,
-        default: str | None = None,
-        hint: str = "",
-        name: str = "",
-        count: int | None = None,
-    ) -> Any:
+    def _ask(self, option: str, name: str = "", **question: Any) -> Any:
         """Return the value of an answer; a person who errs is asked again.
 
         Args:
             option: The option that answers it.
-            field: What is asked for.
-            default: The answer taken when none is given; empty where one is needed.
-            hint: How to measure it, shown to a person.
             name: The value of the robot that is asked for.
-            count: How many values: 0 for any number, None for one that is no list.
+            **question: What the schema says of it; `count` values; the `default` answer, a text
+                that is empty where one is needed; and a `hint` how to measure it.
         """
+        default = question.get("default", "")
 
         def read(answer: str) -> Any:
             if not answer and default:
-                return value_of(default, field, count)
+                return value_of(default, question)
             try:
-                value = value_of(answer, field, count)
+                value = value_of(answer, question)
             except InputError as problem:
                 words = f"{option} {answer}: {problem}"
                 if re.search(r"\d,\d", answer) and ";" not in answer:
-                    words += (
-                        " For decimal commas, separate numbers by semicolons, or write a point: "
-                    )
-                    words += "1.9."
+                    words += _DECIMAL_COMMAS
                 raise InputError(words, problem.code) from None
             self.answered.add(name)
             return value
@@ -354,10 +329,10 @@ class Interview:
         if self._asked <= len(self._typed):
             return read(self._typed[self._asked - 1])
         if self.person:
-            for words in (HEADER if self._asked == 1 else "", hint):
+            for words in (HEADER if self._asked == 1 else "", question.get("hint", "")):
                 _show(words)
         while True:
-            answer = self._line(option, _question(field, count), default)
+            answer = self._line(option, _words(question), default)
             if self.person and answer in BACK:
                 raise _GoBack
             try:
@@ -370,7 +345,7 @@ class Interview:
             self._typed.append(answer)
             return value
 
-    def _line(self, option: str, text: str, default: str | None) -> str:
+    def _line(self, option: str, text: str, default: str) -> str:
         # A pipe needs no prompt, which would only be noise in a log.
         question = f"{text} ({default}):" if default else f"{text}:"
         *before, prompt = _lines(question) if self.person else [""]
@@ -390,13 +365,18 @@ class Interview:
             ) from None
 
 
-def _question(field: Field, count: int | None) -> str:
+def _rows(columns: dict[str, list[Any]]) -> list[dict[str, Any]]:
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _words(question: Field) -> str:
     """Return what is asked, with its unit."""
-    text = field["description"][:1].upper() + field["description"][1:]
-    text += f" [{field['unit']}]" if "unit" in field else ""
+    text, count = question["description"], question.get("count")
+    text = text[:1].upper() + text[1:]
+    text += f" [{question['unit']}]" if "unit" in question else ""
     if count == 0:
         text += "; several joined by commas"
-    elif count and count > 1 and "enum" not in field:
+    elif count and count > 1 and "enum" not in question:
         text += f"; one value, or {count} joined by commas, in their order"
     return text
 
@@ -457,12 +437,13 @@ def _lines(text: str, indent: str = "") -> list[str]:
     )
 
 
-def value_of(text: str, field: Field, count: int | None = None) -> Any:
-    """Return the value that an answer stands for, or the list of `count` values (0: any number).
+def value_of(text: str, field: Field) -> Any:
+    """Return the value that an answer stands for, or a list of `count` values (0: any number).
 
     Raises:
         InputError: The answer is not what the schema allows.
     """
+    count = field.get("count")
     if count is not None:
         parts = [text] if field.get("type") == "array" else separated(text)
         if count and len(parts) not in (1, count):
@@ -470,7 +451,8 @@ def value_of(text: str, field: Field, count: int | None = None) -> Any:
                 f"got {len(parts)} numbers; give one for all, or {count} joined by commas, in "
                 "their order."
             )
-        return [value_of(part, field) for part in parts] * (count if len(parts) == 1 < count else 1)
+        values = [value_of(part, {**field, "count": None}) for part in parts]
+        return values * count if len(parts) == 1 < count else values
     if text.lower() == "none" and "anyOf" in field:
         return None
     if "enum" in field:

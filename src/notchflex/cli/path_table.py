@@ -11,8 +11,7 @@ import numpy as np
 
 from notchflex import InputError
 from notchflex.cli import tables, terminal
-from notchflex.cli.tables import FORMS, NO_NUMBER, cell
-from notchflex.cli.tolerances import tolerance_lines
+from notchflex.cli.tables import FORMS, NO_NUMBER, cell, tolerance_lines
 from notchflex.loads.load_path import external_words
 from notchflex.support import AXES, CONTACT_STATES, QUANTITIES, holds, nearest
 

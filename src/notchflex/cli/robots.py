@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 _MAX_BESIDE = 4
 """Robots beside the first: five can be distinguished by colour."""
 
-_MAX_CHANGES = 4
-"""More values of `--set` than this are only counted in a title."""
-
 RobotName = Annotated[
     str,
     Parameter(help="A ready robot (`notchflex robots` lists them) or the path of a robot file."),
@@ -88,9 +85,6 @@ def changed_title(robot: Robot, settings: Sequence[str]) -> str:
     """
     pairs = map(parse_assignment, settings)
     changes = [f"{path} = {value}" for path, value in pairs if path != "name"]
-    more = len(changes) - _MAX_CHANGES
-    if more > 0:
-        changes = [*changes[:_MAX_CHANGES], f"{more} more"]
     return f"{robot.name} with {', '.join(changes)}" if changes else robot.name
 
 

@@ -125,7 +125,7 @@ def _print(models: dict[str, Comparison]) -> None:
     if comparison.angle == "edge_angle":
         console.print("angles between the faces of the notches (edge angles)")
     labels = [tables.shortened(label, 24) for label in models]
-    columns = _columns(models)
+    columns = tables.frame(_columns(models))
     for first in range(0, len(columns), _MOST_COLUMNS):
         heads = ("root-mean-square error\n", labels, "")
         tables.show([heads, *columns[first : first + _MOST_COLUMNS]])
@@ -136,18 +136,18 @@ def _print(models: dict[str, Comparison]) -> None:
         console.print(sentence)
 
 
-def _columns(models: dict[str, Comparison]) -> list[tuple[str, list[float], str]]:
-    """Return the columns of every notch, of the total angle and of the tip, if measured."""
+def _columns(models: dict[str, Comparison]) -> dict[str, list[float]]:
+    """Return the errors of every notch, of the total angle and of the tip, as far as measured."""
     first, every = models["model"], models.values()
-    columns = [
-        (f"n{n + 1}\ndeg", [one.rmse_notches[n] * DEGREES for one in every], ".2f")
+    columns = {
+        f"n{n + 1}_deg": [one.rmse_notches[n] * DEGREES for one in every]
         for n in range(first.robot.number_of_notches)
         if np.isfinite(first.measured_notch_angle[:, n]).any()
-    ]
+    }
     if np.isfinite(first.measured_total_angle).any():
-        columns.append(("total\ndeg", [one.rmse_total * DEGREES for one in every], ".2f"))
+        columns["total_deg"] = [one.rmse_total * DEGREES for one in every]
     if np.isfinite(first.measured_tip).any():
-        columns.append(("tip\nmm", [one.rmse_tip for one in every], ".3f"))
+        columns["tip_mm"] = [one.rmse_tip for one in every]
     return columns
 
 

@@ -82,12 +82,10 @@ def _front_document(front: DesignFront) -> dict[str, Any]:
 
 
 def _print_front(front: DesignFront) -> None:
-    numbers = range(1, 1 + len(front.points))
-    values = zip(front.titles, front.objectives.T, strict=True)
-    tables.show(
-        [("point", map(str, numbers), ""), *((title, value, ".5g") for title, value in values)],
-        gap=2,
-    )
+    columns = dict(zip(front.titles, front.objectives.T.tolist(), strict=True))
+    numbers = map(str, range(1, 1 + len(front.points)))
+    forms = dict.fromkeys(columns, ".5g")
+    tables.show(tables.frame({"point": numbers, **columns}, **forms), gap=2)
 
 
 def _print(design: Design) -> None:

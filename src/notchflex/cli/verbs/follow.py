@@ -140,22 +140,22 @@ def _print(following: Following) -> None:
     met = int(np.count_nonzero(following.reached))
     console.print(f"{following.robot.name}: {met} of {len(following)} targets met", soft_wrap=True)
     shown, stride = tables.shown_of(len(following), _MOST_ROWS)
-    columns: list[tuple[str, Any, str]] = [("target\n", np.add(shown, 1), "d")]
+    columns: dict[str, Any] = {"target": [row + 1 for row in shown]}
     for name, unit in (("tension", "N"), ("stroke", "mm")):
-        drives = getattr(following, name)[shown].T
+        drives = getattr(following, name)[shown].T.tolist()
         for tendon, drive in enumerate(drives, start=1):
-            which = "" if len(drives) == 1 else f" {tendon}"
-            columns.append((f"{name}{which}\n{unit}", drive, ".4f"))
-    for axis, tip in zip("xyz", following.tip_position[shown].T, strict=True):
-        columns.append((f"tip {axis}\nmm", tip, ".4f"))
+            columns[f"{name}_{unit}" if len(drives) == 1 else f"{name}_{tendon}_{unit}"] = drive
+    tips = following.tip_position[shown].T.tolist()
+    columns |= {f"tip_{axis}_mm": tip for axis, tip in zip("xyz", tips, strict=True)}
     angle = following.path.total_angle[following.step] * DEGREES
-    columns.append(("angle\ndeg", angle[shown], ".2f"))
-    for unit in ("mm", "deg"):
-        error = getattr(following, f"error_{unit}")
-        if error.any():
-            columns.append((f"error\n{unit}", error[shown], ".2g"))
+    columns["angle_deg"] = angle[shown].tolist()
+    for name in ("error_mm", "error_deg"):
+        if getattr(following, name).any():
+            columns[name] = getattr(following, name)[shown].tolist()
     vias = np.diff(following.step, prepend=-1) > 1
-    codes = [("overshoot " if vias[i] else "") + following.code[i] for i in shown]
-    console.print(tables.table([*columns, ("", codes, "")]))
+    columns[""] = [("overshoot " if vias[i] else "") + following.code[i] for i in shown]
+    forms = {name: ".4f" for name in columns if name.endswith(("_N", "_mm"))}
+    forms |= {"error_mm": ".2g", "error_deg": ".2g"}
+    console.print(tables.table(tables.frame(columns, **forms)))
     if stride > 1:
         terminal.note(f"every {stride}th target is shown; --csv FILE writes all.")

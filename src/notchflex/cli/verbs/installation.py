@@ -225,26 +225,22 @@ def bench(
         rows = timing.measured(only, lambda case: progress("timing", 0, 0, case))
 
     def show() -> None:
-        lines: list[tuple[str, float | None, float | None, float | None]] = []
+        lines: list[dict[str, Any]] = []
         for row in rows:
-            lines.append((row.name, row.us, row.lu135, row.target))
-            lines += [(f"  {row.note}", None, None, None)] if row.note else []
-        names, times, multiples, targets = zip(*lines, strict=True)
-        columns = [
-            ("what", names, ""),
-            ("time", map(_time, times), ">"),
-            ("LU135", map(_multiple, multiples), ">"),
-            ("target", map(_multiple, targets), ">"),
+            time = {"time": _time(row.us), "LU135": row.lu135, "target": row.target}
+            lines.append({"what": row.name, **time})
+            lines += [{"what": f"  {row.note}"}] if row.note else []
+        peers = [
+            {
+                "others": name,
+                "what": what,
+                "time": " to ".join(_time(1e3 * end) for end in dict.fromkeys(ms)),
+            }
+            for name, what, ms in timing.PEERS
         ]
-        tables.show(columns, gap=2, colour="cyan")
-        print()
-        names, what, milliseconds = zip(*timing.PEERS, strict=True)
-        ranges = [
-            " to ".join(_time(1e3 * ms) for ms in dict.fromkeys(pair)) for pair in milliseconds
-        ]
-        tables.show(
-            [("others", names, ""), ("what", what, ""), ("time", ranges, ">")], gap=2, colour="cyan"
-        )
+        for table in (lines, peers):
+            tables.show(tables.records(table, time=">"), gap=2, colour="cyan")
+            print()
         print(f"Others: {timing.MEASURED}.")
 
     outputs.write(lambda: timing.bench_document(rows), show)
@@ -257,10 +253,6 @@ def _time(us: float | None) -> str:
         if us >= size:
             return f"{us / size:.3g} {unit}"
     return f"{us:.3g} us"
-
-
-def _multiple(value: float | None) -> str:
-    return "" if value is None else f"{value:.3g}"
 
 
 def completion(

@@ -14,8 +14,7 @@ from notchflex import InputError, Robot
 from notchflex.cli import tables, terminal
 from notchflex.cli.options import OUTPUT, File, Outputs
 from notchflex.cli.robots import RobotName, Settings, changed_title, chosen_robot, robot_files
-from notchflex.cli.tables import NO_NUMBER
-from notchflex.cli.tolerances import tolerance_lines, wrapped
+from notchflex.cli.tables import NO_NUMBER, Columns, tolerance_lines, wrapped
 from notchflex.robot.part import unit_of
 from notchflex.support import DEGREES, PAPER, fields_of, is_unsaid, to_table
 
@@ -130,12 +129,12 @@ def description_tables(robot: Robot) -> list[Table]:
         of_kind.setdefault(tuple(values.items()), []).append(number)
     result: list[Table] = []
     for kind, of_kind in kinds.items():
-        columns = {f"{kind}\nnotch": [run_of(numbers) for numbers in of_kind.values()]}
+        columns = [(f"{kind}\nnotch", [run_of(numbers) for numbers in of_kind.values()], ">")]
         for cells in zip(*of_kind, strict=True):  # the same key of all different notches
             if any(value not in _USUAL and not is_unsaid(name, value) for name, value in cells):
                 name: str = cells[0][0]
                 head = _SHORTER.get(name, name).replace("_", "\n")
-                columns[head] = [_value(value) for _, value in cells]
+                columns.append((head, [_value(value) for _, value in cells], ">"))
         result.append(_spaced(columns))
     return result
 
@@ -157,29 +156,28 @@ def run_of(numbers: list[int]) -> str:
 
 def closing_table(notches: list[dict[str, Any]]) -> Table:
     """Return the sections and the closing of all notches; columns without a number are left out."""
-
-    def numbers(key: str, form: str, scale: float = 1.0) -> list[str]:
-        return [tables.cell(scale * row.get(key, math.nan), form) for row in notches]
-
     several = len(notches[0]["moment_arm_mm"]) > 1
-    tendons = [row["closing_tendon"] for row in notches]
-    arms = [row["moment_arm_mm"][row["closing_tendon"] - 1] for row in notches]
-    columns = {
-        "notch": [str(row["notch"]) for row in notches],
-        "A\nmm²": numbers("area_mm2", ".4f"),
-        "y\nmm": numbers("centroid_mm", ".4f"),
-        "I\nmm⁴": numbers("second_moment_mm4", ".4e"),
-        "tendon": [str(tendon) if several else NO_NUMBER for tendon in tendons],
-        "arm\nmm": [f"{arm:.4f}" for arm in arms],
-        "closing\ndeg": numbers("closing_angle_deg", ".2f"),
-        "tension\nN": [
-            row["closing_status"] if row["closing_status"] in _MEANINGS else tension
-            for row, tension in zip(notches, numbers("closing_tension_N", ".3f"), strict=True)
-        ],
-        "strain\n%": numbers("closing_outer_strain", ".2f", 100.0),
-        "peak\n%": numbers("closing_peak_strain", ".2f", 100.0),
-    }
-    return _spaced({head: cells for head, cells in columns.items() if {*cells} != {NO_NUMBER}})
+    rows = [
+        {
+            "notch": str(row["notch"]),
+            "A\nmm²": row["area_mm2"],
+            "y\nmm": row.get("centroid_mm"),
+            "I\nmm⁴": row["second_moment_mm4"],
+            "tendon": row["closing_tendon"] if several else None,
+            "arm\nmm": row["moment_arm_mm"][row["closing_tendon"] - 1],
+            "closing\ndeg": row["closing_angle_deg"],
+            "tension\nN": row["closing_status"]
+            if row["closing_status"] in _MEANINGS
+            else f"{row['closing_tension_N']:.3f}",
+            "strain\n%": 100.0 * row["closing_outer_strain"],
+            "peak\n%": 100.0 * row["closing_peak_strain"],
+        }
+        for row in notches
+    ]
+    forms = {"notch": ">", "tension\nN": ">", "I\nmm⁴": ".4e", "closing\ndeg": ".2f"}
+    forms |= dict.fromkeys(("A\nmm²", "y\nmm", "arm\nmm"), ".4f")
+    forms |= dict.fromkeys(("strain\n%", "peak\n%"), ".2f")
+    return _spaced(tables.records(rows, **forms))
 
 
 def closing_legend(notches: list[dict[str, Any]]) -> str:
@@ -238,11 +236,13 @@ def _value(value: Any) -> str:
     return tables.cell(value, "g")
 
 
-def _spaced(columns: dict[str, list[str]]) -> Table:
+def _spaced(columns: Columns) -> Table:
     """Make a table whose columns stand two characters apart, or one where it would be too wide."""
-    right = [(head, cells, ">") for head, cells in columns.items()]
-    wide = tables.table(right, gap=2)
-    return wide if tables.width_of(wide) <= terminal.NARROW else tables.table(right)
+    shown = [
+        one for one in columns if any(tables.cell(value, "g") != NO_NUMBER for value in one[1])
+    ]
+    wide = tables.table(shown, gap=2)
+    return wide if tables.width_of(wide) <= terminal.NARROW else tables.table(shown)
 
 
 def _summary(robot: Robot, part: str) -> str:

@@ -12,7 +12,6 @@ from notchflex import InputError
 from notchflex.cli import tables, terminal
 from notchflex.cli.options import WHOLE, InPieces, Refinement, TableOutputs, whole
 from notchflex.cli.robots import RobotName, Settings, changed_title, chosen_robot, robot_files
-from notchflex.cli.tolerances import tolerance_words
 
 if TYPE_CHECKING:
     from notchflex.tolerancing import ToleranceAnalysis
@@ -95,7 +94,7 @@ def print_tolerances(analysis: ToleranceAnalysis, title: str) -> None:
     """Print limits, yield and sources of a tolerance analysis."""
     console = terminal.output()
     console.print(f"{title}: {analysis.draws} robots within the tolerances", soft_wrap=True)
-    for line in tolerance_words(analysis.robot, analysis.tolerances, analysis.assumed):
+    for line in tables.tolerance_words(analysis.robot, analysis.tolerances, analysis.assumed):
         console.print(line)
     console.print()
     tables.show(_limits(analysis))
@@ -111,9 +110,8 @@ def print_tolerances(analysis: ToleranceAnalysis, title: str) -> None:
     console.print()
     tables.show(_sources(analysis))
     _print_more(len(analysis.sources), "deviations")
-    for text in (*_LEGEND, " ".join(advice(analysis))):
-        console.print()
-        tables.say(text)
+    console.print()
+    tables.say(*_LEGEND, " ".join(advice(analysis)))
 
 
 def _print_more(count: int, what: str) -> None:

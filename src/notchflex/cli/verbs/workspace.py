@@ -223,9 +223,12 @@ def _print(label: str, document: dict[str, Any]) -> None:
     if not extent:
         return
     spreads = {title: document[key] for key, title in _SPREADS.items()}
-    rows = {title: one.values() for title, one in spreads.items() if one["largest"] is not None}
-    columns = zip(("5 %", "50 %", "95 %", "largest"), zip(*rows.values(), strict=True), strict=True)
-    tables.show([("", rows, ""), *((head, cells, ".4g") for head, cells in columns)], gap=2)
+    rows = [
+        {"": title} | {f"{name[1:]} %" if name.startswith("p") else name: one[name] for name in one}
+        for title, one in spreads.items()
+        if one["largest"] is not None
+    ]
+    tables.show(tables.records(rows, **dict.fromkeys(rows[0].keys() - {""}, ".4g")), gap=2)
 
 
 def _print_overlap(overlap: Overlap) -> None:
