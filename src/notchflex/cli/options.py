@@ -89,7 +89,7 @@ def number(form: str, metavar: str, least: float = -math.inf) -> Parameter:
     return converted(partial(parse_number, form=form, least=least), metavar)
 
 
-def whole(low: int, high: int | None = None) -> Parameter:
+def integer(low: int, high: int | None = None) -> Parameter:
     """Return the parameter of an option with a whole number."""
     return converted(parse_whole(low, high), "N")
 
@@ -146,7 +146,7 @@ def exclude(first: str, second: str) -> InputError:
 
 Refinement = Annotated[
     int,
-    whole(0, 3),
+    integer(0, 3),
     Parameter(help="0 to 3: more strain modes and fibres, to check the accuracy."),
 ]
 
@@ -253,7 +253,7 @@ class Outputs:
         show: Callable[[], object] = lambda: None,
         *,
         columns: Callable[[], Mapping[str, Any]] | None = None,
-        drawn: Any = None,
+        picture: Any = None,
     ) -> None:
         """Write and print what was asked for.
 
@@ -261,7 +261,7 @@ class Outputs:
             document: Makes the document of `--json`.
             show: Prints tables.
             columns: Makes the columns of `--csv`.
-            drawn: The result whose usual picture is that of `--plot`, or a function that returns
+            picture: The result whose usual picture is that of `--plot`, or a function that returns
                 a picture.
         """
         from notchflex.support import write_columns, write_json
@@ -271,17 +271,17 @@ class Outputs:
             write_json(target, document())
         if columns and (target := targets.get("--csv")):
             write_columns(target, columns())
-        if drawn is not None and (target := targets.get("--plot")):
+        if picture is not None and (target := targets.get("--plot")):
             with terminal.progress(f"drawing {target}", compiles=False):
-                _picture(drawn).save(target)
+                _picture(picture).save(target)
         if self.prints_tables:
             show()
 
 
-def _picture(drawn: Any) -> Any:
+def _picture(result: Any) -> Any:
     from notchflex.plotting import picture
 
-    return drawn() if callable(drawn) else picture(drawn)
+    return result() if callable(result) else picture(result)
 
 
 @Parameter(name="*", group=OUTPUT)
@@ -424,7 +424,7 @@ class Work:
             the same folder (extra `cluster`).
     """
 
-    workers: Annotated[int | None, whole(1, 1024)] = None
+    workers: Annotated[int | None, integer(1, 1024)] = None
     scheduler: Annotated[str | None, Parameter(metavar="ADDRESS")] = None
 
     def __post_init__(self) -> None:
@@ -469,4 +469,4 @@ class InPieces(Work):
         return PieceFolder(self.folder, self.workers, self.scheduler)
 
 
-WHOLE = InPieces()
+NO_FOLDER = InPieces()

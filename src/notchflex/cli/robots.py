@@ -31,8 +31,8 @@ Settings = Annotated[
         "--set",
         "PATH=VALUE",
         help="Change a value of the robot, such as `material.elastic_modulus=9000`, "
-        "`notch[2].depth=1.3` (the second notch from the base), `notch.depth=1.38` (every notch) "
-        "or `material.kind=linear`. May be given several times, in any order.",
+        "`notch[2].depth=1.3` (the second from the base), `notch.depth=1.38` (every notch) or "
+        "`material.kind=linear`. May be given several times.",
     ),
 ]
 OnePath = Annotated[
@@ -41,16 +41,15 @@ OnePath = Annotated[
         name="--path",
         negative="--from-rest",
         help="Take the rows of each pull as one loading path with friction history, or each row as "
-        "loaded from rest. Without either the column `from_rest` of the file decides, else the "
-        "order of its rows: a force that falls step by step within a pull makes it a path.",
+        "loaded from rest. Without either the column `from_rest` decides, else the order of the "
+        "rows: a force that falls within a pull makes it a path.",
     ),
 ]
 MeasuredAs = Annotated[
     Literal["ring", "edge"],
     Parameter(
         help="What columns such as `notch_1_deg` hold: the angle between the uncut pieces beside a "
-        "notch, or between its two faces, as `notch_1_edge_deg` does. They differ with elastic "
-        "ends."
+        "notch, or between its two faces (`notch_1_edge_deg`). They differ with elastic ends."
     ),
 ]
 

@@ -16,17 +16,17 @@ from cyclopts import Group, Parameter
 from notchflex import InputError
 from notchflex.cli import tables, terminal
 from notchflex.cli.options import (
-    WHOLE,
+    NO_FOLDER,
     Columns,
     DrawnOutputs,
     Folder,
     InPieces,
     converted,
+    integer,
     low_high,
     named,
     number,
     tendon_command,
-    whole,
 )
 from notchflex.cli.robots import (
     MeasuredAs,
@@ -143,11 +143,11 @@ class FitOptions:
     """What is found, and how.
 
     Attributes:
-        fit: Constants to find, joined by commas: values of the robot file, shared by all robots;
-            `LABEL:` before one for a single robot, `each:` for one in every robot, `notch[each].`
-            for one in every notch; `offset:notch.depth` added to, `factor:notch.height` multiplying
-            every such value; `notch.precurvature_deg/height`; `sensor.force_offset`,
-            `sensor.force_factor`, `sensor.stroke_slack`.
+        fit: Constants to find, joined by commas: values of the robot file, of all robots; `LABEL:`
+            before one for a single robot, `each:` for one in every robot, `notch[each].` in every
+            notch; `offset:notch.depth` added to, `factor:notch.height` multiplying every such
+            value; `notch.precurvature_deg/height`; `sensor.force_offset`, `sensor.force_factor`,
+            `sensor.stroke_slack`.
         bounds: Limits of a constant, `NAME=LOW:HIGH`, in its unit.
         prior: Prior of a constant, `NAME=MEAN+-SD`, in its unit.
         priors: Whether what is not fitted may deviate from the file within its tolerances, or
@@ -162,19 +162,17 @@ class FitOptions:
     fit: Names
     bounds: Annotated[
         tuple[tuple[str, Bounds], ...],
-        converted(
-            partial(named, _BOUNDS, partial(low_high, _BOUNDS)), "NAME=LOW:HIGH", several=True
-        ),
+        converted(partial(named, _BOUNDS, partial(low_high, _BOUNDS)), "SPEC", several=True),
     ] = ()
     prior: Annotated[
         tuple[tuple[str, Prior], ...],
-        converted(partial(named, _PRIOR, _read_prior), "NAME=MEAN+-SD", several=True),
+        converted(partial(named, _PRIOR, _read_prior), "SPEC", several=True),
     ] = ()
     priors: Annotated[bool, Parameter(negative="--no-priors")] = True
     objective: Literal["least-squares", "robot-errors", "distances"] = "least-squares"
     huber: Annotated[float | None, number("a number of standard deviations", "SD")] = None
-    starts: Annotated[int, whole(1)] = 4
-    seed: Annotated[int, whole(0)] = 0
+    starts: Annotated[int, integer(1)] = 4
+    seed: Annotated[int, integer(0)] = 0
 
     def __post_init__(self) -> None:
         """Check that the options belong together."""
@@ -223,8 +221,8 @@ class BeyondFit:
 
     Attributes:
         leave_out: Also fit without each pull or robot, and predict what was left out.
-        photograph: With `--leave-out robot`: update the constants that each robot has of its own
-            (`each:`) by one row of the robot left out, and predict its other rows again.
+        photograph: With `--leave-out robot`: update its own constants (`each:`) by one row of the
+            robot left out, and predict its other rows again.
         next: Candidates for the next measurement: tensions [N] as in `simulate --tension`. Shows
             which narrows the intervals most.
         next_robot: Label of the robot of `--next`; the first if left out.
@@ -239,7 +237,7 @@ class BeyondFit:
     next_robot: Annotated[str | None, Parameter(metavar="LABEL")] = None
     narrow: Names = ()
     posterior: bool = False
-    draws: Annotated[int, whole(4)] = 500
+    draws: Annotated[int, integer(4)] = 500
 
     def check(self, robots: Mapping[str, str], objective: str) -> None:
         """Check what could not be done after the fit, before the time for the fit is spent."""
@@ -272,8 +270,8 @@ def calibrate(
         converted(_read_source, "[LABEL=]ROBOT=DATA.csv", hyphen=False),
         Parameter(
             help=f"{_PAIR}: a robot (ready, or a file) and its measurements (the columns of "
-            "`notchflex.read_measurements`). The same robot again adds more data; a label "
-            "distinguishes two robots of one file."
+            "`notchflex.read_measurements`). The same robot again adds data; a label "
+            "distinguishes robots of one file."
         ),
     ],
     search: FitOptions,
@@ -282,7 +280,7 @@ def calibrate(
     column: Columns = (),
     beyond: BeyondFit = BeyondFit(),
     settings: Settings = (),
-    pieces: InPieces = WHOLE,
+    pieces: InPieces = NO_FOLDER,
     output: Folder = None,
     outputs: DrawnOutputs = DrawnOutputs(),
 ) -> int:
@@ -411,7 +409,7 @@ def _write(fit: Calibration, analyses: dict[str, Any], outputs: DrawnOutputs) ->
 
         return calibration_document(fit) | analyses
 
-    outputs.write(document, show, drawn=fit)
+    outputs.write(document, show, picture=fit)
 
 
 # Tables

@@ -102,7 +102,7 @@ def _write(models: dict[str, Comparison], outputs: TableOutputs) -> None:
         document,
         lambda: _print(models),
         columns=lambda: comparison_columns(comparison),
-        drawn=picture,
+        picture=picture,
     )
 
 

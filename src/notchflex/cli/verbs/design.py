@@ -58,7 +58,7 @@ def design(
             points = designing.design_front(spec, progress=progress)
         if output is not None:
             terminal.note_written(designing.write_front(points, output, inputs=[spec]))
-        outputs.write(lambda: _front_document(points), lambda: _print_front(points), drawn=points)
+        outputs.write(lambda: _front_document(points), lambda: _print_front(points), picture=points)
         reason = points.reason
     else:
         with terminal.progress("ranking robots") as progress:
@@ -66,7 +66,7 @@ def design(
         if output is not None:
             terminal.note_written(designing.write_design(result, output, inputs=[spec]))
         outputs.write(
-            lambda: designing.design_document(result), lambda: _print(result), drawn=result
+            lambda: designing.design_document(result), lambda: _print(result), picture=result
         )
         reason = "" if result.converged else result.reason
     if reason:

@@ -128,7 +128,7 @@ def _write(following: Following, outputs: PathOutputs, title: str) -> None:
 
         return following_picture(following, title=title)
 
-    outputs.write(lambda: following_document(following), lambda: _print(following), drawn=picture)
+    outputs.write(lambda: following_document(following), lambda: _print(following), picture=picture)
     if outputs.csv:
         write_path_csv(outputs.csv, following.path, following_columns(following))
     outputs.write_state(following.state)

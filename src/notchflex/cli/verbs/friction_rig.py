@@ -37,6 +37,6 @@ def friction_rig(
         for sentence in (data, *rig.words):
             terminal.output().print(sentence, soft_wrap=sentence == data)
 
-    outputs.write(lambda: fit.friction_document(rig), show, drawn=rig)
+    outputs.write(lambda: fit.friction_document(rig), show, picture=rig)
     if rig.readings.ignored:
         terminal.note(f"ignored columns: {', '.join(rig.readings.ignored)}.")

@@ -17,9 +17,9 @@ from notchflex.cli.options import (
     Outputs,
     ShortFile,
     converted,
+    integer,
     named_columns,
     number,
-    whole,
 )
 from notchflex.cli.robots import Settings, chosen_robot, robot_files
 from notchflex.cli.terminal import DONE, INTERRUPTED, NOT_CONVERGED
@@ -79,7 +79,7 @@ def measure(
     open_browser: Annotated[bool, Parameter(name="--open")] = False,
     port: Annotated[
         int | None,
-        whole(1, 65535),
+        integer(1, 65535),
         Parameter(
             help="With `--correct`: port of the page, or the next one that is free; "
             f"{PORT} by default."

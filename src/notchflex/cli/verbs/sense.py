@@ -122,7 +122,7 @@ def _write(sensed: SensedForce, outputs: TableOutputs) -> None:
         lambda: sensed_document(sensed),
         lambda: _print(sensed),
         columns=lambda: sensed_columns(sensed),
-        drawn=sensed,
+        picture=sensed,
     )
 
 

@@ -23,9 +23,9 @@ from notchflex.cli.options import (
     StateFile,
     Strokes,
     Tensions,
+    integer,
     texts,
     vector,
-    whole,
 )
 from notchflex.cli.robots import (
     RobotName,
@@ -72,7 +72,7 @@ def simulate(
     refinement: Refinement = 0,
     settings: Settings = (),
     uncertain: bool = False,
-    draws: Annotated[int | None, whole(2, 100_000)] = None,
+    draws: Annotated[int | None, integer(2, 100_000)] = None,
     from_state: StateFile = None,
     beside: Annotated[tuple[str, ...], texts("--beside", "ROBOT")] = (),
     columns: Annotated[str | None, Parameter(group=OUTPUT, metavar="NAMES")] = None,
@@ -226,7 +226,7 @@ def _write(
         return beside_picture(paths, title="; ".join(names))
 
     moving = outputs.plot if outputs.plot and _moves(outputs.plot) else None
-    outputs.write(document, drawn=None if moving else picture)
+    outputs.write(document, picture=None if moving else picture)
     if outputs.csv:
         write_path_csv(outputs.csv, path, band_columns(bands) if bands else None)
     for target, write in ((outputs.nc, write_netcdf), (outputs.parquet, write_parquet)):

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from notchflex import InputError
 from notchflex.cli import tables, terminal
-from notchflex.cli.options import WHOLE, InPieces, Refinement, TableOutputs, whole
+from notchflex.cli.options import NO_FOLDER, InPieces, Refinement, TableOutputs, integer
 from notchflex.cli.robots import RobotName, Settings, changed_title, chosen_robot, robot_files
 
 if TYPE_CHECKING:
@@ -34,11 +34,11 @@ def tolerance(
     tolerances: Annotated[str, Parameter(metavar="TOLERANCES.toml")],
     /,
     *,
-    draws: Annotated[int, whole(50, 10_000_000_000)] = 100_000,
-    seed: Annotated[int, whole(0)] = 0,
+    draws: Annotated[int, integer(50, 10_000_000_000)] = 100_000,
+    seed: Annotated[int, integer(0)] = 0,
     refinement: Refinement = 0,
     settings: Settings = (),
-    pieces: InPieces = WHOLE,
+    pieces: InPieces = NO_FOLDER,
     outputs: TableOutputs = TableOutputs(),
 ) -> None:
     """Find out what tolerances do to a robot that must meet acceptance limits.
@@ -82,7 +82,7 @@ def tolerance(
     outputs.write(
         lambda: tolerance_document(analysis),
         columns=lambda: tolerance_columns(analysis),
-        drawn=analysis,
+        picture=analysis,
     )
     for sentence in analysis.warnings():
         terminal.warn(sentence)

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.options import whole
+from notchflex.cli.options import integer
 from notchflex.cli.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.viewer import HOST, PORT, check_host, check_installed, exposed
 
@@ -19,7 +19,7 @@ def view(
     *,
     settings: Settings = (),
     host: Annotated[str, Parameter(allow_leading_hyphen=True, metavar="ADDRESS")] = HOST,
-    port: Annotated[int, whole(1, 65535)] = PORT,
+    port: Annotated[int, integer(1, 65535)] = PORT,
     open_browser: Annotated[bool, Parameter(name="--open")] = False,
 ) -> None:
     """Show a robot in the browser, with sliders for its tendons and loads.

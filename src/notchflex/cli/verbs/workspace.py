@@ -12,19 +12,19 @@ from cyclopts import Parameter
 from notchflex import InputError
 from notchflex.cli import tables, terminal
 from notchflex.cli.options import (
+    NO_FOLDER,
     NO_LOADS,
     OUTPUT,
-    WHOLE,
     DrawnOutputs,
     ExternalLoads,
     File,
     InPieces,
     converted,
+    integer,
     low_high,
     named,
     number,
     texts,
-    whole,
 )
 from notchflex.cli.robots import (
     RobotName,
@@ -81,13 +81,13 @@ def workspace(
         ),
     ] = (),
     tension: Annotated[list[float] | None, converted(_tensions, "N[,N...]")] = None,
-    states: Annotated[int, whole(32, 20_000_000_000)] = 100_000,
+    states: Annotated[int, integer(32, 20_000_000_000)] = 100_000,
     pretension: Annotated[float, number("a tension in N, 0 or more", "N", least=0.0)] = 0.0,
-    stiffness: Annotated[int, whole(0, 5000)] = 0,
+    stiffness: Annotated[int, integer(0, 5000)] = 0,
     beside: Annotated[tuple[str, ...], texts("--beside", "ROBOT")] = (),
     external: ExternalLoads = NO_LOADS,
     settings: Settings = (),
-    pieces: InPieces = WHOLE,
+    pieces: InPieces = NO_FOLDER,
     outputs: WorkspaceOutputs = WorkspaceOutputs(),
 ) -> int:
     """Explore where the tip of a robot can go, while its tendons are pulled and let go.
@@ -180,7 +180,7 @@ def _write(explored: Mapping[str, Workspace], outputs: WorkspaceOutputs) -> None
         for overlap in compared:
             _print_overlap(overlap)
 
-    outputs.write(document, show, drawn=picture)
+    outputs.write(document, show, picture=picture)
     if outputs.nc:
         save_netcdf(explored, outputs.nc)
 
