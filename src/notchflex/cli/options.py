@@ -419,7 +419,7 @@ class Work:
     """Who works on a long computation.
 
     Attributes:
-        workers: Work in this number of processes of this machine; by default in one process.
+        workers: Work in so many processes of this machine; by default in one.
         scheduler: Work with the workers of a dask scheduler, such as tcp://10.0.0.1:8786; all see
             the same folder (extra `cluster`).
     """
@@ -439,8 +439,8 @@ class InPieces(Work):
     """A long computation that keeps finished pieces in a folder.
 
     Attributes:
-        folder: Work in pieces, and keep those that are finished in this folder (extra `data`): the
-            same call resumes where it was stopped.
+        folder: Work in pieces, and keep the finished ones in this folder (extra `data`): the same
+            call resumes where it was stopped.
     """
 
     folder: Annotated[str | None, Parameter(metavar="DIR")] = None

@@ -32,7 +32,7 @@ Settings = Annotated[
         "PATH=VALUE",
         help="Change a value of the robot, such as `material.elastic_modulus=9000`, "
         "`notch[2].depth=1.3` (the second from the base), `notch.depth=1.38` (every notch) or "
-        "`material.kind=linear`. May be given several times.",
+        "`material.kind=linear`.",
     ),
 ]
 OnePath = Annotated[

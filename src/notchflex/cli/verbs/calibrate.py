@@ -148,12 +148,12 @@ class FitOptions:
             notch; `offset:notch.depth` added to, `factor:notch.height` multiplying every such
             value; `notch.precurvature_deg/height`; `sensor.force_offset`, `sensor.force_factor`,
             `sensor.stroke_slack`.
-        bounds: Limits of a constant, `NAME=LOW:HIGH`, in its unit.
-        prior: Prior of a constant, `NAME=MEAN+-SD`, in its unit.
-        priors: Whether what is not fitted may deviate from the file within its tolerances, or
-            assumed ones. Not with `each:`, nor with other objectives.
-        objective: What is minimised: squared residuals over their noise; eq. 17 of Pacheco 2021;
-            the sum of distances of points (Gao 2017, eq. 27). Only the first gives intervals.
+        bounds: Limits in the unit, `NAME=LOW:HIGH`.
+        prior: Prior in the unit, `NAME=MEAN+-SD`.
+        priors: Whether what is not fitted may deviate within its tolerances, or assumed ones. Not
+            with `each:`, nor with other objectives.
+        objective: What is minimised: squared residuals over their noise, which alone gives
+            intervals; eq. 17 of Pacheco 2021; distances of points (Gao 2017, eq. 27).
         huber: Outliers beyond so many standard deviations count less; about 1.5.
         starts: Number of starting points.
         seed: Seed of the starting points.
