@@ -115,8 +115,10 @@ def print_path(
     left_out: list[str] = []
     for name in () if columns or bands else sorted(shown, key=USUAL.__getitem__):
         width = sum(column.width for column in shown[name])
-        left -= width if width <= left else 0
-        left_out += [name] if width > left + width else []
+        if width > left:
+            left_out.append(name)
+        else:
+            left -= width
     every = [column for name in shown if name not in left_out for column in shown[name]]
     _print_columns(path, rows, every)
     notes: list[str] = []
