@@ -33,7 +33,7 @@ USUAL_KINDS = ("arc", "nitinol", "superelastic", "linear", "capstan")
 """Kinds of which only what is needed, or has an option, is asked; the usual kind first."""
 
 
-class Note(NamedTuple):
+class KeyNote(NamedTuple):
     """What the schema does not say of a key.
 
     Attributes:
@@ -47,66 +47,68 @@ class Note(NamedTuple):
     hint: str = ""
 
 
-_CODE = Note(comment="estimate: code of Pacheco 2021, not given in the paper")
+_CODE = KeyNote(comment="estimate: code of Pacheco 2021, not given in the paper")
 _TABLE = "estimate: Pacheco 2021, Table 3, laser-cut nitinol"
 _FITTED = "10000 is the value fitted to laser-cut Nitinol wrists (Pacheco 2021)."
-_ASSUMED = Note(comment="assumed")
+_ASSUMED = KeyNote(comment="assumed")
 _CHECKED = "checked against finite elements"
 _NITINOL = "estimate: usual for superelastic nitinol"
-_STRAIN = Note(
+_STRAIN = KeyNote(
     "0.08",
     "estimate: what superelastic nitinol usually recovers",
     "Superelastic nitinol usually recovers 8 %: 0.08.",
 )
-_DENSITY = Note("6450", "estimate: usual for nitinol; only gravity needs it")
+_DENSITY = KeyNote("6450", "estimate: usual for nitinol; only gravity needs it")
 
 NOTES = {
-    "tube.inner_diameter": Note(hint="With a pin gauge, or the outer diameter less two walls."),
-    "tube.base_length": Note(comment="assumed: held at the first notch"),
-    "notch.cut": Note(hint="It changes the stiffness by a third to a half."),
-    "notch.depth": Note(
+    "tube.inner_diameter": KeyNote(hint="With a pin gauge, or the outer diameter less two walls."),
+    "tube.base_length": KeyNote(comment="assumed: held at the first notch"),
+    "notch.cut": KeyNote(hint="It changes the stiffness by a third to a half."),
+    "notch.depth": KeyNote(
         hint="If you measure what is left at the spine, type the outer diameter less that."
     ),
-    "notch.direction_deg": Note(comment="assumed: toward x"),
-    "notch.precurvature_deg": Note(comment="assumed: straight"),
-    "arc.ends": Note("shell", _CHECKED),
-    "strip.ends": Note("elastic", _CHECKED),
-    "u-link.ends": Note("elastic", _CHECKED),
+    "notch.direction_deg": KeyNote(comment="assumed: toward x"),
+    "notch.precurvature_deg": KeyNote(comment="assumed: straight"),
+    "arc.ends": KeyNote("shell", _CHECKED),
+    "strip.ends": KeyNote("elastic", _CHECKED),
+    "u-link.ends": KeyNote("elastic", _CHECKED),
     "notch.depth_at": _ASSUMED,
     "notch.closing": _ASSUMED,
-    "tendon.radius": Note(comment="assumed: the tendon lies on the inner wall"),
-    "tendon.direction_deg": Note(
+    "tendon.radius": KeyNote(comment="assumed: the tendon lies on the inner wall"),
+    "tendon.direction_deg": KeyNote(
         comment="assumed: on the side of the cuts",
         hint="0 is where notches of direction 0 bend to.",
     ),
-    "tendon.axial_stiffness": Note(comment="assumed: inextensible"),
+    "tendon.axial_stiffness": KeyNote(comment="assumed: inextensible"),
     "tendon.path": _ASSUMED,
-    "tendon.free_length": Note(comment="assumed; without effect on an inextensible tendon"),
-    "nitinol.elastic_modulus": Note(
+    "tendon.free_length": KeyNote(comment="assumed; without effect on an inextensible tendon"),
+    "nitinol.elastic_modulus": KeyNote(
         comment=f"{_NITINOL}, 30 to 65 GPa",
         hint="30000 to 57000 are usual for superelastic tubes.",
     ),
-    "nitinol.plateau_stress": Note(comment=f"{_NITINOL}, 250 to 520 MPa"),
-    "nitinol.plateau_modulus": Note(comment=f"{_NITINOL}, 2 to 9 GPa"),
-    "nitinol.compression_ratio": Note(comment="estimate: nitinol has 1 to 1.5"),
+    "nitinol.plateau_stress": KeyNote(comment=f"{_NITINOL}, 250 to 520 MPa"),
+    "nitinol.plateau_modulus": KeyNote(comment=f"{_NITINOL}, 2 to 9 GPa"),
+    "nitinol.compression_ratio": KeyNote(comment="estimate: nitinol has 1 to 1.5"),
     "nitinol.density": _DENSITY,
     "nitinol.allowed_strain": _STRAIN,
-    "superelastic.elastic_modulus": Note("10000", _TABLE, _FITTED),
-    "superelastic.superelastic_modulus": Note("3000", _TABLE),
-    "superelastic.transition_strain": Note("0.028", _TABLE),
+    "superelastic.elastic_modulus": KeyNote("10000", _TABLE, _FITTED),
+    "superelastic.superelastic_modulus": KeyNote("3000", _TABLE),
+    "superelastic.transition_strain": KeyNote("0.028", _TABLE),
     "superelastic.plastic_strain": _CODE,
     "superelastic.plastic_modulus": _CODE,
     "superelastic.plastic_exponent": _CODE,
     "superelastic.density": _DENSITY,
     "superelastic.allowed_strain": _STRAIN,
-    "linear.elastic_modulus": Note(hint=_FITTED),
-    "material.allowed_strain": Note(
+    "linear.elastic_modulus": KeyNote(hint=_FITTED),
+    "material.allowed_strain": KeyNote(
         hint="Where the material yields: yield strength over elastic modulus."
     ),
-    "material.poisson_ratio": Note(
+    "material.poisson_ratio": KeyNote(
         comment="estimate: usual for metals; without effect on bending in a plane"
     ),
-    "capstan.coefficient": Note("0.18", "estimate: nitinol tendon on nitinol tube, 0.13 to 0.19"),
+    "capstan.coefficient": KeyNote(
+        "0.18", "estimate: nitinol tendon on nitinol tube, 0.13 to 0.19"
+    ),
     "friction.wrap": _ASSUMED,
 }
 """By kind, or by section for all kinds, and key."""
@@ -131,9 +133,9 @@ def keys_of(kind: type) -> dict[str, Field]:
     }
 
 
-def note_of(section: str, kind: str, key: str) -> Note:
+def note_of(section: str, kind: str, key: str) -> KeyNote:
     """Return what is noted of a key."""
-    return NOTES.get(f"{kind}.{key}") or NOTES.get(f"{section}.{key}") or Note()
+    return NOTES.get(f"{kind}.{key}") or NOTES.get(f"{section}.{key}") or KeyNote()
 
 
 class _GoBack(Exception):  # noqa: N818
@@ -153,6 +155,7 @@ class Interview:
     """
 
     def __init__(self, answers: Mapping[str, str | None], *, accept_defaults: bool = False) -> None:
+        self._options = answers.keys()
         self.answers = {option: text for option, text in answers.items() if text is not None}
         self.accept_defaults = accept_defaults
         self.used: set[str] = set()
@@ -250,13 +253,22 @@ class Interview:
         first = usual[0]
         for kind in usual:  # an option that only one kind has tells the kind
             others = {key for other in usual if other != kind for key in keys_of(kinds[other])}
-            own = {option_of(section, key) for key in keys_of(kinds[kind]) if key not in others}
+            own = {self._option(section, key) for key in keys_of(kinds[kind]) if key not in others}
             first = kind if own & self.answers.keys() else first
         if not asks and option not in self.answers:
             return kinds[first]
         names = [first, *(name for name in kinds if name != first)]
         text = f"{text}, {' or '.join(names)}"
         return kinds[self._ask(option, description=text, enum=names, default=first)]
+
+    def _option(self, section: str, key: str) -> str:
+        """Return the option that answers for a key: one of its own, or `--set`."""
+        name = key.removesuffix("_deg").replace("_", "-")
+        if section == "tendon":
+            name = f"tendon-{name}"
+        elif (section, key) == ("friction", "coefficient"):
+            name = "friction"
+        return f"--{name}" if f"--{name}" in self._options else f"--set {section}.{key}"
 
     def _keys(
         self,
@@ -279,7 +291,7 @@ class Interview:
         """
         values: dict[str, Any] = {}
         for key, field in keys_of(kind).items():
-            note, option = note_of(section, kind_of(kind), key), option_of(section, key)
+            note, option = note_of(section, kind_of(kind), key), self._option(section, key)
             is_usual = key not in _UNASKED and (
                 "default" not in field
                 or not option.startswith("--set")
@@ -379,24 +391,6 @@ def _words(question: Field) -> str:
     elif count and count > 1 and "enum" not in question:
         text += f"; one value, or {count} joined by commas, in their order"
     return text
-
-
-def option_of(section: str, key: str) -> str:
-    """Return the option that answers for a key.
-
-    Example:
-        >>> option_of("tendon", "direction_deg"), option_of("notch", "slot_radius")
-        ('--tendon-direction', '--set notch.slot_radius')
-    """
-    from notchflex.cli.verbs.robot_files import Answers
-
-    name = key.removesuffix("_deg")
-    if section == "tendon":
-        name = f"tendon_{name}"
-    elif (section, key) == ("friction", "coefficient"):
-        name = "friction"
-    known = name in Answers.__dataclass_fields__
-    return f"--{name.replace('_', '-')}" if known else f"--set {section}.{key}"
 
 
 def commented(text: str, answered: Collection[str]) -> str:

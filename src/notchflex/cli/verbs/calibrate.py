@@ -503,14 +503,14 @@ def print_next(document: dict[str, Any]) -> None:
             f"{key.partition('_')[0]} {tendon} {key.partition('_')[2]}": value
             for key, values in candidate["load"].items()
             for tendon, value in enumerate(values, start=1)
-            if value is not None
+            if value is not None and math.isfinite(value)
         }
         gain = candidate["gain"] if candidate["converged"] else "not solved"
         best = "best" if row == document["best"] else ""
         rows.append({"candidate": row, **loads, "interval after / before": gain, " ": best})
     names = ", ".join(document["wanted"]) or "all constants together"
     terminal.output().print(f"\nNext measurement of {document['robot']}, to narrow {names}:")
-    tables.show(tables.records(rows))
+    tables.show(tables.records(rows, **{"interval after / before": ".3f"}))
 
 
 def print_posterior(document: dict[str, Any]) -> None:
