@@ -144,7 +144,6 @@ def test_64_bit_floats_are_switched_on_by_the_package():
 
 
 def test_jax_adds_up_right():
-    from notchflex.cli.verbs.installation.canary import canary
+    from notchflex.cli.verbs.installation import canary
 
-    assert canary().expected == 268_435_456.0
-    assert canary().computed == 268_435_456.0
+    assert canary() == (268_435_456.0, 268_435_456.0)

@@ -12,9 +12,14 @@ import pytest
 import notchflex as nf
 import notchflex.fit as fitting
 from fitted import NAMES, OBSERVED, ROBOT, fitted, measured
-from notchflex.cli.arguments.data_sources import DataSource, DataSources
-from notchflex.cli.arguments.fit import FitOptions
-from notchflex.cli.tables import calibrate_tables
+from notchflex.cli.verbs import calibrate as verb
+from notchflex.cli.verbs.calibrate import (
+    FitOptions,
+    changed,
+    gathered,
+    print_left_out,
+    print_posterior,
+)
 from notchflex.fit import Fold, LeftOut, Posterior
 
 FIT = ("--fit", ",".join(NAMES), "--starts", "1")
@@ -168,10 +173,10 @@ def test_other_tables_fit_80_columns(capsys):
     drawn = Posterior(
         (long,), np.arange(8.0).reshape(2, 4, 1) * 1e3, {long: 8.0}, {long: np.nan}, 0
     )
-    calibrate_tables.print_posterior(drawn)
+    print_posterior(fitting.posterior_document(drawn))
     errors = {"total_angle": 0.1, "tip_position": 0.2}
     folds = (Fold("A, pull a", found, errors, errors, True), Fold("B", found, {}, {}, False))
-    calibrate_tables.print_left_out(LeftOut("pull", found, folds))
+    print_left_out(fitting.left_out_document(LeftOut("pull", found, folds)))
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80
     assert "5.73" in out  # 0.1 rad
@@ -180,14 +185,13 @@ def test_other_tables_fit_80_columns(capsys):
 
 def test_sources_are_gathered_by_label(call, monkeypatch):
     taken = []
-    monkeypatch.setattr(DataSources, "of", lambda sources: taken.extend(sources) or 1 / 0)
+    monkeypatch.setattr(verb, "gathered", lambda sources: taken.extend(sources) or 1 / 0)
     with pytest.raises(ZeroDivisionError):
         call("calibrate", "A=w.toml=1.csv", "A=w.toml=2.csv", "x/w.toml=3.csv", "gao2017=4.csv",
              "--fit", "m")  # fmt: skip
-    monkeypatch.undo()
-    given = DataSources.of(taken)
-    assert given.robots == {"A": "w.toml", "w": "x/w.toml", "gao2017": "gao2017"}
-    assert given.data == {"A": ["1.csv", "2.csv"], "w": ["3.csv"], "gao2017": ["4.csv"]}
+    robots, data = gathered(taken)
+    assert robots == {"A": "w.toml", "w": "x/w.toml", "gao2017": "gao2017"}
+    assert data == {"A": ["1.csv", "2.csv"], "w": ["3.csv"], "gao2017": ["4.csv"]}
 
 
 def test_limits_and_priors(call, monkeypatch):
@@ -204,12 +208,13 @@ def test_limits_and_priors(call, monkeypatch):
     (one, other), (last,) = taken
     assert one == ("a.b", None, 2.0, None)
     assert other == ("A:c.d", -1.0, 1000.0, (10.0, 0.5))
-    assert last.prior == (10_000.0, 500.0)
+    assert last[3] == (10_000.0, 500.0)
 
 
 def test_values_are_set_in_all_robots_or_one():
-    given = DataSources.of([DataSource("A", ROBOT, "1.csv"), DataSource("B", ROBOT, "2.csv")])
-    robots = given.load(["friction.coefficient=0.2", "B:notch[2].depth=1.38"])
+    robots = changed(
+        {"A": ROBOT, "B": ROBOT}, ["friction.coefficient=0.2", "B:notch[2].depth=1.38"]
+    )
     assert {one.friction.coefficient for one in robots.values()} == {0.2}
     assert [one.notches[1].depth for one in robots.values()] == [1.4, 1.38]
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from notchflex.cli.verbs.installation import canary
-from notchflex.cli.verbs.installation.doctor import requirements
+from notchflex.cli.verbs import installation
+from notchflex.cli.verbs.installation import requirements
 from notchflex.solver.programs import store
 
 
@@ -44,8 +44,8 @@ def test_backend_is_shown_and_checked(call, monkeypatch):
 
 
 def test_wrong_sums_end_with_code_1(call, monkeypatch):
-    wrong = canary.Canary(268_435_456.0, 266_342_400.0)
-    monkeypatch.setattr(canary, "canary", lambda: wrong)
+    wrong = (268_435_456.0, 266_342_400.0)
+    monkeypatch.setattr(installation, "canary", lambda: wrong)
     code, out, err = call("doctor")
     assert code == 1
     assert "WRONG" in out

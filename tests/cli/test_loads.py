@@ -5,7 +5,7 @@ import pytest
 
 import notchflex as nf
 from notchflex._load_words import BodyForceOption
-from notchflex.cli.arguments.loads import ExternalLoads
+from notchflex.cli.options import ExternalLoads
 from notchflex.cli.verbs import simulate
 
 
@@ -16,7 +16,7 @@ def given(call, monkeypatch):
     def runner(*options):
         taken = []
         monkeypatch.setattr(simulate, "_solve", lambda robots, load, *_: taken.append(load) or {})
-        monkeypatch.setattr(simulate.simulate_files, "write", lambda *_: None)
+        monkeypatch.setattr(simulate, "_write", lambda *_: None)
         with pytest.raises(ValueError, match="max"):  # there is no path to report on
             call("simulate", "pacheco2021-a", *options, "--quiet")
         return taken[0]
@@ -27,7 +27,7 @@ def given(call, monkeypatch):
 def test_no_options_are_no_loads():
     assert not ExternalLoads()
     path = nf.pull(0.0, 1.0, 3)
-    assert ExternalLoads().on(path).external == path.external
+    assert path.loaded(**ExternalLoads().arguments()).external == path.external
 
 
 def test_all_options_reach_every_step(given):
@@ -65,6 +65,6 @@ def test_loads_without_tendons_are_one_step_of_slack_tendons(given):
 
 def test_following_alone_with_body_forces_leaves_the_tip_as_it_is():
     loads = ExternalLoads(body_force=(BodyForceOption(1, (0.0, 0.0, 1.0), None),), following=True)
-    external = loads.on(nf.pull(0.0, 1.0, 2)).external[0]
+    external = nf.pull(0.0, 1.0, 2).loaded(**loads.arguments()).external[0]
     assert not external.following
     assert external.body_forces == (nf.BodyForce(1, (0, 0, 1), following=True),)

@@ -7,7 +7,7 @@ import pytest
 
 from notchflex import load_robot
 from notchflex.cli import run
-from notchflex.cli.interview.ask import choice, reading, readings, whole
+from notchflex.cli.interview import choice, reading, value_of
 from notchflex.errors import InputError
 
 OPTIONS = {
@@ -212,14 +212,14 @@ def test_a_person_is_asked_again_and_told_why(monkeypatch, tmp_path, capsys):
         ({"height": "1e400"}, "finite"),
         ({"uncut_length": "-0.1"}, "at least 0"),
         ({"notches": "2.5"}, "whole number"),
-        ({"notches": "0"}, "give 1 to"),
+        ({"notches": "0"}, "at least 1"),
         ({"cut": "o"}, "give on-axis or off-axis"),
         ({"tendon_radius": "0.9"}, "at most 0.81"),
         ({"friction": "-0.1"}, "at least 0"),
         ({"depth": "__import__('os')"}, "give a number such as"),
         ({"depth": "9**9**9**9"}, "give a number such as"),
         ({"height": None}, "No answer to: Height of the notch"),
-        ({"tendon_radius": "0.7,0.7"}, "No answer to: Side on which the tendon runs"),
+        ({"tendon_radius": "0.7,0.7"}, "No answer to: Side of the tube on which the tendon runs"),
     ],
 )
 def test_bad_readings_write_nothing(monkeypatch, tmp_path, capsys, changed, words):
@@ -244,15 +244,15 @@ def test_folder_that_is_missing_is_told_before_asking(monkeypatch, capsys):
 
 
 def test_readings():
-    assert reading("−0.5") == -0.5
-    assert reading("3/2") == 1.5
-    assert reading("1,9") == 1.9
-    assert readings("1", 3) == [1.0, 1.0, 1.0]
+    assert reading("−0.5", {}) == -0.5
+    assert reading("3/2", {}) == 1.5
+    assert reading("1,9", {}) == 1.9
+    assert value_of("1", {"type": "number", "count": 3}) == [1.0, 1.0, 1.0]
     assert choice("on", ("on-axis", "off-axis")) == "on-axis"
-    assert whole("3", at_least=1, at_most=3) == 3
+    assert value_of("3", {"type": "integer", "ge": 1, "le": 3}) == 3
     for bad in ("", "1,2,3", "1, 2", "1/0", "True", "(", "2**3"):
         with pytest.raises(InputError):
-            reading(bad)
+            reading(bad, {})
 
 
 TUBE = ["--outer-diameter", "5.99", "--inner-diameter", "4"]

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 import notchflex as nf
-from notchflex.cli.tables.notch_tables import (
+from notchflex.cli.verbs.show import (
     closing_legend,
     closing_table,
     description_tables,

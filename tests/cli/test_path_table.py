@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fake_path import fake_path
-from notchflex.cli.tables.path_table import (
+from notchflex.cli.path_table import (
     MAX_ROWS,
     MEANINGS,
     parse_columns,
@@ -12,7 +12,7 @@ from notchflex.cli.tables.path_table import (
     reversals_of,
     rows_note,
     shown_rows,
-    usual_groups,
+    usual_columns,
 )
 from notchflex.errors import ErrorCode, InputError
 from notchflex.results.quantities import QUANTITIES
@@ -44,7 +44,7 @@ def test_long_paths_have_a_regular_stride_with_both_ends(steps, stride):
 def test_reversals_peaks_and_the_first_failure_are_always_shown():
     up, down = np.linspace(0.0, 3.0, 101), np.linspace(3.0, 0.7, 78)
     path = commanded(*up, *down, *np.linspace(0.7, 2.0, 66))
-    assert reversals_of(path) == {100, 101, 178, 179}
+    assert reversals_of(path.columns["tension"][:, 0]) == {100, 101, 178, 179}
     path.columns["converged"][213:] = False
     rows, stride = shown_rows(path)
     assert stride == 5
@@ -72,8 +72,9 @@ def test_every_usual_column_is_explained_with_its_unit(capsys, monkeypatch):
     out = capsys.readouterr().out.splitlines()
     assert out[0] == "a wrist"
     legend = " ".join(line for line in out if "[" in line)
-    for name, unit in (("tension", "N"), ("stroke", "mm"), ("total_angle", "deg"), ("strain", "%")):
+    for name, unit in (("tension", "N"), ("stroke", "mm"), ("total_angle", "deg")):
         assert f"{MEANINGS[name]} [{unit}]" in legend
+    assert "strain: largest strain of all notches [%]" in legend
     assert "* closed" in legend
 
 
@@ -118,7 +119,7 @@ def test_wrong_names_are_refused(text, code, wording):
 
 def test_a_step_that_failed_shows_what_was_commanded():
     path = fake_path(3, failed=1)
-    tendon = usual_groups(path, [4, 5])[0]
-    tension, stroke = tendon.columns
+    columns = usual_columns(path, [4, 5])
+    (tension,), (stroke,) = columns["tension"], columns["stroke"]
     assert tension.cells == ["1.500", "0.000"]
     assert stroke.cells[1] == "–"

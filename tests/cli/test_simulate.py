@@ -75,7 +75,7 @@ def test_named_columns(call, monkeypatch):
 def test_quiet_computes_only_what_it_warns_of(call, monkeypatch):
     made, asked = [], []
     monkeypatch.setattr(
-        "notchflex.cli.tables.path_table.print_path", lambda *_, **__: made.append("table")
+        "notchflex.cli.path_table.print_path", lambda *_, **__: made.append("table")
     )
     monkeypatch.setattr("notchflex.results.io.whole_document", lambda _: made.append("json"))
     for name in ("reason", "dissipation", "tendon_work", "front"):

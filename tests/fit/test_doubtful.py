@@ -5,7 +5,7 @@ import pytest
 
 import notchflex as nf
 from fitted import DEVIATION, NAMES, OBSERVED, ROBOT, fitted, measured
-from notchflex.cli.tables.calibrate_tables import print_calibration
+from notchflex.cli.verbs.calibrate import print_calibration
 from notchflex.fit import (
     Constant,
     LeastSquares,

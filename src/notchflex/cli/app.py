@@ -12,10 +12,15 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
-from cyclopts import App, CycloptsError, MissingArgumentError, RepeatArgumentError
+from cyclopts import (
+    App,
+    CycloptsError,
+    MissingArgumentError,
+    Parameter,
+    RepeatArgumentError,
+)
 
 from notchflex import InputError, InputWarning, __version__
 from notchflex.cli import terminal
@@ -168,10 +173,25 @@ VERBS = {
 }
 """Verb to its one-line help and its examples."""
 
+_MODULES = {
+    "robots": "robot_files",
+    "schema": "robot_files",
+    "new": "robot_files",
+    "board": "measure",
+    "bench": "installation",
+    "doctor": "installation",
+    "completion": "installation",
+}
+"""Verbs that share a file; the others have one of their own name."""
+
 _CODES: dict[type[CycloptsError], Callable[[str], InputError]] = {
     MissingArgumentError: InputError.MISSING_VALUE,
     RepeatArgumentError: InputError.CONFLICT,
 }
+
+
+def _default_of_help(value: object) -> str | None:
+    return None if value is None or value is False or value == () else str(value)
 
 
 def build() -> App:
@@ -181,6 +201,7 @@ def build() -> App:
         version=__version__,
         help=ABOUT,
         help_epilogue=EPILOGUE,
+        default_parameter=Parameter(negative=(), show_default=_default_of_help),
         help_format="rich",  # reading markdown takes a fifth of the time of `--help`
         console=terminal.output(),
         error_console=terminal.messages(),
@@ -189,14 +210,11 @@ def build() -> App:
         suppress_keyboard_interrupt=False,  # `run` reports it
         print_error=False,
     )
-    folder = Path(__file__).parent
-    files = {file.stem: file.relative_to(folder) for file in (folder / "verbs").rglob("*.py")}
     for order, (verb, (text, examples)) in enumerate(VERBS.items()):
         name = verb.replace("-", "_")
-        module = ".".join(files[name].with_suffix("").parts)
         plural = "s" if examples.count("notchflex ") > 1 else ""
         app.command(
-            f"notchflex.cli.{module}:{name}",
+            f"notchflex.cli.verbs.{_MODULES.get(verb, name)}:{name}",
             name=verb,
             help=text,
             sort_key=order,

@@ -9,23 +9,17 @@ import shutil
 import sys
 import unicodedata
 import warnings
-from collections.abc import Callable, Generator, Iterable, Sequence
-from datetime import timedelta
-from functools import partial
-from typing import TYPE_CHECKING, TextIO
+from collections.abc import Generator, Iterable
+from typing import TYPE_CHECKING, Protocol, TextIO
 
 from notchflex.support import let_go
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
 DONE, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h
 INTERRUPTED = 130  # 128 + SIGINT, as shells expect
-
-Counted = Callable[[int, int], None]
-"""Takes what is done and all there is."""
 
 NARROW = 80
 """Columns that tables of fixed shape fit; also the width of a terminal of unknown width."""
@@ -91,50 +85,15 @@ def messages() -> Console:
     return _console(sys.stderr)
 
 
-def table(
-    heads: Sequence[str], rows: Iterable[Sequence[str]] = (), *, gap: int = 1, colour: str = ""
-) -> Table:
-    """Return a table without lines.
-
-    Args:
-        heads: Heads of the columns, whose last lines (the units) stand side by side. `>` before one
-            marks numbers, which are aligned to the right and never broken; other cells are folded
-            where they are too long. No head at all is shown where all are empty.
-        rows: The cells of each row.
-        gap: Blanks between two columns.
-        colour: Of the first column, on a terminal.
-    """
-    from rich.table import Table
-
-    result = Table(
-        box=None,
-        padding=(0, gap, 0, 0),
-        header_style="bold",
-        pad_edge=False,
-        show_header=any(heads),
-    )
-    deepest = max(head.count("\n") for head in heads)
-    for number, head in enumerate(heads):
-        style = colour if number == 0 else ""
-        text = "\n" * (deepest - head.count("\n")) + head.removeprefix(">")
-        if head.startswith(">"):
-            result.add_column(text, justify="right", no_wrap=True, style=style)
-        else:
-            result.add_column(text, overflow="fold", style=style)
-    for row in rows:
-        result.add_row(*row)
-    return result
-
-
-def shortened(text: str, size: int) -> str:
-    """Return a text of at most `size` characters; a longer one ends with `…`."""
-    return text if len(text) <= size else f"{text[: size - 1]}…"
-
-
 def note(text: str) -> None:
     """Write one line of information to standard error; nothing with `--quiet`."""
-    if not _Quiet.on:
+    if not _quiet:
         _write("Note:", "cyan", text)
+
+
+def note_written(files: Iterable[object]) -> None:
+    """Write which files were written."""
+    note(f"written: {', '.join(map(str, files))}.")
 
 
 def warn(text: str) -> None:
@@ -147,94 +106,61 @@ def error(text: str) -> None:
     _write("Error:", "bold red", text)
 
 
-class _Quiet:
-    """Whether `--quiet` was given: set by `be_quiet`, once for each call."""
-
-    on = False
+_quiet: set[str] = set()
+"""Holds `--quiet` where it was given: set by `be_quiet`, once for each call."""
 
 
 def be_quiet(quiet: bool) -> None:
     """Set whether notes, tables and progress are left out."""
-    _Quiet.on = quiet
+    _quiet.clear()
+    if quiet:
+        _quiet.add("--quiet")
+
+
+class Progress(Protocol):
+    """Shows how far a stage of a computation is: what is done, and how much there is."""
+
+    def __call__(self, stage: str, done: int, total: int, status: str = "") -> None:
+        """Show what is done of a stage."""
 
 
 @contextlib.contextmanager
-def working(text: str) -> Generator[Callable[[str], None]]:
-    """Show that something is being computed, on a terminal only, and take it away afterwards.
+def progress(text: str, *, compiles: bool = True) -> Generator[Progress]:
+    """Show that something is computed, with a bar for each stage, on a terminal only.
 
-    Yields a function that shows what is being done now.
+    The bars go when the work is done; in a pipe, in a log or with `--quiet` there are none.
+
+    Args:
+        text: What is computed: the first stage, whose length is not known before it is told.
+        compiles: Whether programs of JAX may be compiled, which are kept.
+
+    Yields:
+        A function that is told how far a stage is, and what else is shown behind its bar.
     """
-    if not _is_watched():
-        yield lambda step: None
+    prepare = use_compile_cache if compiles else lambda: None
+    if _quiet or not sys.stderr.isatty():
+        prepare()
+        yield lambda stage, done, total, status="": None
         return
-    with messages().status(text) as status:
-        yield lambda step: status.update(f"{text} {step}")
-
-
-@contextlib.contextmanager
-def counting(text: str) -> Generator[Counted]:
-    """Show a bar, on a terminal only: yields a function that takes what is done and all there is.
-
-    The bar goes when the work is done; in a pipe, in a log or with `--quiet` there is none.
-    """
-    with bars(text) as show:
-        yield (lambda done, total: None) if show is None else partial(show, text)
-
-
-@contextlib.contextmanager
-def bars(first: str = "searching") -> Generator[Callable[[str, int, int], None] | None]:
-    """Show how far each stage of a long computation is, on a terminal only.
-
-    Yields a function that is called with the stage, how much of it is done, and how much there is;
-    None where nobody watches.
-    """
-    if not _is_watched():
-        yield None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, TimeElapsedColumn(), console=messages(), transient=True) as progress:
-        stages = {first: progress.add_task(first, total=None)}
-
-        def show(stage: str, done: int, total: int) -> None:
-            if stage not in stages:
-                stages[stage] = progress.add_task(stage, total=total)
-            progress.update(stages[stage], completed=done, total=total)
-
-        yield show
-
-
-@contextlib.contextmanager
-def rate(text: str) -> Generator[Callable[[int, int, int, int], None] | None]:
-    """Show rows done, their rate, the remaining time and how many have no result.
-
-    On a terminal only. Yields a function that takes rows done, rows in all, rows without a result,
-    and rows that were done before; None where nobody watches.
-    """
-    if not _is_watched():
-        yield None
-        return
-    from time import monotonic
-
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+    from rich import progress as shown
 
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TextColumn("{task.fields[status]}"),
+        shown.TextColumn("{task.description}"),
+        shown.BarColumn(),
+        shown.MofNCompleteColumn(),
+        shown.TimeElapsedColumn(),
+        shown.TimeRemainingColumn(),
+        shown.TextColumn("{task.fields[status]}"),
     )
-    start = monotonic()
-    with Progress(*columns, console=messages(), transient=True) as progress:
-        task = progress.add_task(text, total=None, status="")
+    with shown.Progress(*columns, console=messages(), transient=True) as bars:
+        stages = {text: bars.add_task(text, total=None, status="")}
 
-        def show(done: int, total: int, unsolved: int, before: int) -> None:
-            each = (monotonic() - start) / max(done - before, 1)
-            left = str(timedelta(seconds=round(each * (total - done))))
-            status = f"{1.0 / max(each, 1e-9):.3g} rows/s, {left} left, {unsolved} unsolved"
-            progress.update(task, completed=done, total=total, status=status)
+        def show(stage: str, done: int, total: int, status: str = "") -> None:
+            if stage not in stages:
+                stages[stage] = bars.add_task(stage, total=total, status="")
+            bars.update(stages[stage], completed=done, total=total, status=status)
 
+        prepare()
         yield show
 
 
@@ -256,10 +182,6 @@ def use_compile_cache() -> None:
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
-
-
-def _is_watched() -> bool:
-    return not _Quiet.on and sys.stderr.isatty()
 
 
 def _write(head: str, style: str, text: str) -> None:

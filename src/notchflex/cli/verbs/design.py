@@ -2,153 +2,121 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Annotated, Any
 
 from notchflex import InputError
-from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, flag
-from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile, Quiet
+from notchflex.cli import tables, terminal
+from notchflex.cli.options import DrawnOutputs, Folder, number
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
-from notchflex.support import check_folder, parse_number
 
 if TYPE_CHECKING:
-    from notchflex.designing import Design
+    from notchflex.designing import Design, DesignFront
 
 
 def design(
-    spec: Annotated[str, Parameter(help="Design file; `notchflex new NAME --design` writes one.")],
+    spec: str,
     /,
     *,
-    output: Annotated[
-        str | None,
-        Parameter(
-            name=("--output", "-o"),
-            group=OUTPUT,
-            metavar="FOLDER",
-            help="Write robot.toml, wishes.csv, design.json and design.svg into this folder.",
-        ),
-    ] = None,
-    front: Annotated[
-        bool,
-        flag("Find the front between two or three objectives: point_01.toml and so on, front.csv."),
-    ] = False,
-    robust: Annotated[
-        bool,
-        flag(
-            "Make the yield of robots made within the tolerances as great as possible, or what "
-            "`[robust]` and `wanted_yield` of the design file say."
-        ),
-    ] = False,
-    grid: Annotated[
-        float,
-        converted(
-            partial(parse_number, form="a step in mm, 0 or more", least=0.0),
-            "MM",
-            help="Step of all lengths that are chosen [mm], such as 0.005; the numbers are those "
-            "of the robot on this grid.",
-        ),
-    ] = 0.0,
-    json: JsonFile = None,
-    plot: PlotFile = None,
-    quiet: Quiet = False,
+    output: Folder = None,
+    front: bool = False,
+    robust: bool = False,
+    grid: Annotated[float, number("a step in mm, 0 or more", "MM", least=0.0)] = 0.0,
+    outputs: DrawnOutputs = DrawnOutputs(),
 ) -> int:
     """Choose dimensions so that a robot meets a specification.
 
     The design file names variables, loads, objectives and constraints. Prints what was asked beside
     what is achieved, which limits hold the design and what each costs. Ctrl-C keeps the best robot
     so far.
+
+    Args:
+        spec: Design file; `notchflex new NAME --design` writes one.
+        output: Write robot.toml, wishes.csv, design.json and design.svg into this folder.
+        front: Find the front between two or three objectives: point_01.toml and so on, front.csv.
+        robust: Make the yield of robots made within the tolerances as great as possible, or what
+            `[robust]` and `wanted_yield` of the design file say.
+        grid: Step of all lengths that are chosen [mm], such as 0.005; the numbers are those of the
+            robot on this grid.
     """
-    from notchflex.designing.result import file_names, write_design
+    from notchflex.designing.result import file_names
 
-    checked = () if output is None else check_folder(output, file_names(), "-o", inputs=[spec])
-    files = {f"-o ({file.name})": str(file) for file in checked}
-    outputs = Outputs([spec], quiet=quiet, files=files, json=json, plot=plot)
-    with terminal.working("loading the solver"):
-        terminal.use_compile_cache()
+    outputs.check([spec], folder=("-o", output, file_names()))
+    with terminal.progress("loading the solver"):
         import notchflex.designing as designing
-    if front and grid:
-        raise InputError.CONFLICT(
-            "--front is of robots with any length: leave out --grid, name the point that you "
-            "choose as `robot` of the design file, and run it again with --grid and without "
-            "--front."
-        )
-    if front and robust:
-        raise InputError.CONFLICT(
-            "--front is of robots as drawn: leave out --robust, name the point that you choose as "
-            "`robot` of the design file, and run it again with --robust and without --front."
-        )
+    for option, given, robots in (
+        ("--grid", grid, "with any length"),
+        ("--robust", robust, "as drawn"),
+    ):
+        if front and given:
+            raise InputError.CONFLICT(
+                f"--front is of robots {robots}: leave out {option}, name the point that you "
+                f"choose as `robot` of the design file, and run it again with {option} and without "
+                "--front."
+            )
     if front:
-        return _front(spec, output, outputs)
-    with terminal.bars("ranking robots") as progress:
-        result = designing.design(spec, robust=robust, grid=grid, progress=progress)
-    if output is not None:
-        written = write_design(result, output, inputs=[spec])
-        terminal.note(f"written: {', '.join(map(str, written))}.")
-    outputs.write_json(lambda: designing.design_document(result))
-    outputs.draw(result)
-    if outputs.prints_tables:
-        _print(result)
-    if not result.converged:
-        terminal.error(f"{result.reason}.")
-    return DONE if result.converged else NOT_CONVERGED
+        with terminal.progress("spreading over the front") as progress:
+            points = designing.design_front(spec, progress=progress)
+        if output is not None:
+            terminal.note_written(designing.write_front(points, output, inputs=[spec]))
+        outputs.write(lambda: _front_document(points), lambda: _print_front(points), picture=points)
+        reason = points.reason
+    else:
+        with terminal.progress("ranking robots") as progress:
+            result = designing.design(spec, robust=robust, grid=grid, progress=progress)
+        if output is not None:
+            terminal.note_written(designing.write_design(result, output, inputs=[spec]))
+        outputs.write(
+            lambda: designing.design_document(result), lambda: _print(result), picture=result
+        )
+        reason = "" if result.converged else result.reason
+    if reason:
+        terminal.error(f"{reason}.")
+    return NOT_CONVERGED if reason else DONE
 
 
-def _front(spec: str, output: str | None, outputs: Outputs) -> int:
-    """Find a front, write and print it."""
-    import notchflex.designing as designing
+def _front_document(front: DesignFront) -> dict[str, Any]:
+    from notchflex.designing import design_document
 
-    with terminal.bars("spreading over the front") as progress:
-        front = designing.design_front(spec, progress=progress)
-    if output is not None:
-        written = designing.write_front(front, output, inputs=[spec])
-        terminal.note(f"written: {', '.join(map(str, written))}.")
-    outputs.write_json(
-        lambda: {
-            "objectives": list(front.titles),
-            "reason": front.reason,
-            "points": [designing.design_document(point) for point in front.points],
-        }
-    )
-    outputs.draw(front)
-    if outputs.prints_tables:
-        heads = ["point", *(f">{title}" for title in front.titles)]
-        rows = [
-            (str(number), *(f"{value:.5g}" for value in values))
-            for number, values in enumerate(front.objectives.tolist(), start=1)
-        ]
-        terminal.output().print(terminal.table(heads, rows, gap=2))
-    if front.reason:
-        terminal.error(f"{front.reason}.")
-    return NOT_CONVERGED if front.reason else DONE
+    points = [design_document(point) for point in front.points]
+    return {"objectives": list(front.titles), "reason": front.reason, "points": points}
+
+
+def _print_front(front: DesignFront) -> None:
+    columns = dict(zip(front.titles, front.objectives.T.tolist(), strict=True))
+    numbers = map(str, range(1, 1 + len(front.points)))
+    forms = dict.fromkeys(columns, ".5g")
+    tables.show(tables.frame({"point": numbers, **columns}, **forms), gap=2)
 
 
 def _print(design: Design) -> None:
     from notchflex.designing.result import numbers
 
+    wishes = [
+        {
+            "asked of": wish.title,
+            "asked": wish.asked,
+            "achieved": numbers(wish.achieved),
+            "unit": wish.unit,
+            "before": numbers(wish.before),
+            "met": "" if wish.met is None else tables.cell(wish.met),
+        }
+        for wish in design.wishes
+    ]
+    variables = [
+        {
+            "variable": variable.name,
+            "value": variable.value,
+            "unit": variable.unit,
+            "before": variable.before,
+            "limits": (variable.lower, variable.upper),
+        }
+        for variable in design.variables
+    ]
     console = terminal.output()
-    heads = ("asked of", "asked", ">achieved", "unit", ">before", "met")
-    rows = [
-        (
-            one.title,
-            one.asked,
-            numbers(one.achieved),
-            one.unit,
-            numbers(one.before),
-            "" if one.met is None else "yes" if one.met else "no",
-        )
-        for one in design.wishes
-    ]
-    console.print(terminal.table(heads, rows, gap=2))
-    heads = ("\nvariable", ">\nvalue", "\nunit", ">\nbefore", ">\nlimits")
-    rows = [
-        (v.name, f"{v.value:.5g}", v.unit, f"{v.before:.5g}", f"{v.lower:g} to {v.upper:g}")
-        for v in design.variables
-    ]
-    if rows:
-        console.print(terminal.table(heads, rows, gap=2))
+    tables.show(tables.records(wishes, achieved=">", before=">"), gap=2)
+    if variables:
+        console.print()
+        tables.show(tables.records(variables, value=".5g", before=".5g", limits="g"), gap=2)
     console.print()
     for sentence in design.explanation:
         console.print(sentence)

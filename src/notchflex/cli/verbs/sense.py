@@ -2,39 +2,33 @@
 
 from __future__ import annotations
 
-from functools import partial
+import math
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
 
 from notchflex import InputError
-from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted
-from notchflex.cli.arguments.loads import ExternalLoads
-from notchflex.cli.arguments.robots import (
+from notchflex.cli import tables, terminal
+from notchflex.cli.options import (
+    NO_LOADS,
     Columns,
-    RobotName,
-    Settings,
-    chosen_robot,
+    ExternalLoads,
+    TableOutputs,
+    converted,
     named_columns,
-    robot_files,
+    number,
 )
-from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet
+from notchflex.cli.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
-from notchflex.support import parse_number
 
 if TYPE_CHECKING:
     from notchflex.sensing import SensedForce
 
 _MOST_ROWS = 60
+"""More readings than this are thinned in the table."""
 
-
-def _deviation(option: str, what: str) -> Any:
-    form = "a finite standard deviation, 0 or more"
-    return (
-        converted(partial(parse_number, form=form, least=0.0), "SD", name=option),
-        Parameter(help=f"Standard deviation of {what}."),
-    )
+Deviation = Annotated[float, number("a finite standard deviation, 0 or more", "SD", least=0.0)]
 
 
 def _beside(text: str) -> tuple[str, ...]:
@@ -50,87 +44,62 @@ def _place(text: str) -> int | str:
 
 def sense(
     robot: RobotName,
-    data: Annotated[
-        str,
-        Parameter(
-            help="CSV with `tendon_force_N` and `tendon_displacement_mm` (of several tendons "
-            "`tendon_1_force_N`, ...), one row a reading, in their order from rest."
-        ),
-    ],
+    data: str,
     /,
     *,
-    components: Annotated[
-        str | None,
-        Parameter(
-            metavar="AXES",
-            help="Axes of the world along which the force may act: `x`, `xz`, `xyz`, ...; by "
-            "default those across the straight tube in which the robot bends.",
-        ),
-    ] = None,
-    place: Annotated[
-        int | str,
-        converted(_place, "PLACE"),
-        Parameter(
-            help="Where the force acts: `tip`, the number of a body (1 is the one beyond the first "
-            "notch), or `search`."
-        ),
-    ] = "tip",
-    beside: Annotated[
-        tuple[str, ...],
-        converted(_beside, "NAMES", name="--with", show_default=False),
-        Parameter(help="Also use measured columns: `tip` (tip_x_mm, ...), `angles` (notch_1_deg)."),
-    ] = (),
-    tension_noise: Annotated[float, *_deviation("--tension-noise", "the tensions [N]")] = 0.01,
-    stroke_noise: Annotated[float, *_deviation("--stroke-noise", "the strokes [mm]")] = 0.01,
-    tip_noise: Annotated[
-        float, *_deviation("--tip-noise", "each coordinate of the tip [mm]")
-    ] = 0.1,
-    angle_noise: Annotated[float, *_deviation("--angle-noise", "the notch angles [deg]")] = 0.5,
-    largest: Annotated[
-        float | None,
-        converted(partial(parse_number, form="a force in N, above 0"), "N"),
-        Parameter(
-            help="Largest component of the force that is looked for [N]; by default three times "
-            "the force at the tip that balances the largest tension at the base."
-        ),
-    ] = None,
-    external: ExternalLoads = ExternalLoads(),  # noqa: B008 - frozen
+    components: Annotated[str | None, Parameter(metavar="AXES")] = None,
+    place: Annotated[int | str, converted(_place, "PLACE")] = "tip",
+    beside: Annotated[tuple[str, ...], converted(_beside, "NAMES", name="--with")] = (),
+    tension_noise: Deviation = 0.01,
+    stroke_noise: Deviation = 0.01,
+    tip_noise: Deviation = 0.1,
+    angle_noise: Deviation = 0.5,
+    largest: Annotated[float | None, number("a force in N, above 0", "N")] = None,
+    external: ExternalLoads = NO_LOADS,
     settings: Settings = (),
     column: Columns = (),
-    json: JsonFile = None,
-    csv: CsvFile = None,
-    plot: PlotFile = None,
-    quiet: Quiet = False,
+    outputs: TableOutputs = TableOutputs(),
 ) -> int:
     """Find the force on a robot from tensions and strokes of its tendons, reading by reading.
 
     External loads that are given are known and act in all readings, beside the unknown force. The
     interval of 95 % contains what the noise of the sensors and what stuck friction leave open.
+
+    Args:
+        data: CSV with `tendon_force_N` and `tendon_displacement_mm` (of several tendons
+            `tendon_1_force_N`, ...), one row a reading, in their order from rest.
+        components: Axes of the world along which the force may act: `x`, `xz`, `xyz`, ...; by
+            default those across the straight tube in which the robot bends.
+        place: Where the force acts: `tip`, the number of a body (1 is the one beyond the first
+            notch), or `search`.
+        beside: Also use measured columns: `tip` (tip_x_mm, ...), `angles` (notch_1_deg).
+        tension_noise: Standard deviation of the tensions [N].
+        stroke_noise: Standard deviation of the strokes [mm].
+        tip_noise: Standard deviation of each coordinate of the tip [mm].
+        angle_noise: Standard deviation of the notch angles [deg].
+        largest: Largest component of the force that is looked for [N]; by default three times the
+            force at the tip that balances the largest tension at the base.
     """
-    outputs = Outputs([*robot_files(robot), data], quiet=quiet, json=json, csv=csv, plot=plot)
+    outputs.check([*robot_files(robot), data])
     chosen = chosen_robot(robot, settings)
     from notchflex.sensing.tables import read_sensor_table
 
-    read = read_sensor_table(data, chosen, beside, named_columns(column))
-    with terminal.bars("finding the force") as show:
-        terminal.use_compile_cache()
-        import math
+    readings = read_sensor_table(data, chosen, beside, named_columns(column))
+    with terminal.progress("finding the force") as progress:
+        from notchflex import sensing
+        from notchflex.support import ExternalLoad
 
-        from notchflex import pull, sensing
-
-        known = external.on(pull(0.0, 0.0, steps=1)).external[0]
-        noise = sensing.SensorNoise(
-            tension_noise, stroke_noise, tip_noise, math.radians(angle_noise)
-        )
         sensed = sensing.sense(
             chosen,
-            **read,
-            noise=noise,
+            **readings,
+            noise=sensing.SensorNoise(
+                tension_noise, stroke_noise, tip_noise, math.radians(angle_noise)
+            ),
             components=components,
             place=place,
-            known=known,
+            known=ExternalLoad(**external.arguments()),
             largest=largest,
-            progress=show,
+            progress=progress,
         )
     _write(sensed, outputs)
     if sensed.unexplained.any():
@@ -146,46 +115,33 @@ def sense(
     return NOT_CONVERGED
 
 
-def _write(sensed: SensedForce, outputs: Outputs) -> None:
+def _write(sensed: SensedForce, outputs: TableOutputs) -> None:
     from notchflex.sensing.tables import sensed_columns, sensed_document
 
-    outputs.write_json(lambda: sensed_document(sensed))
-    outputs.write_csv(lambda: sensed_columns(sensed))
-    outputs.draw(sensed)
-    if outputs.prints_tables:
-        _print(sensed)
-
-
-def _mark(sensed: SensedForce, reading: int, which: int) -> str:
-    """Return what else than noise makes an interval as wide as it is."""
-    if sensed.limited[reading, which]:
-        return "open"
-    return "stuck" if sensed.stuck[reading, which] else ""
+    outputs.write(
+        lambda: sensed_document(sensed),
+        lambda: _print(sensed),
+        columns=lambda: sensed_columns(sensed),
+        picture=sensed,
+    )
 
 
 def _print(sensed: SensedForce) -> None:
     console = terminal.output()
     where = "the tip" if sensed.place is None else f"body {sensed.place}"
     console.print(f"Force on {where} of {sensed.robot.name}, 95 % intervals", soft_wrap=True)
-    heads = [">\nreading"]
-    for name in sensed.components:
-        heads += [f">{name}\nN", ">low\nN", ">high\nN", "\n"]
-    heads.append("\ncontact")
-    count = len(sensed)
-    step = -(-count // _MOST_ROWS)
-    shown = sorted({*range(0, count, step), count - 1})
-    rows: list[list[str]] = []
-    for number_ in shown:
-        row = [str(number_ + 1)]
-        for which in range(len(sensed.components)):
-            values = (sensed.force, sensed.low, sensed.high)
-            row += [f"{one[number_, which]:.4f}" for one in values]
-            row.append(_mark(sensed, number_, which))
-        row.append("yes" if sensed.contact[number_] else "")
-        rows.append(row)
-    console.print(terminal.table(heads, rows))
-    if step > 1:
-        console.print(f"every {step}th of {count} readings; --csv and --json have all")
+    shown, stride = tables.shown_of(len(sensed), _MOST_ROWS)
+    columns: list[tuple[str, Any, str]] = [("reading", np.add(shown, 1), "d")]
+    # What else than noise makes an interval as wide as it is.
+    marks = np.where(sensed.limited, "open", np.where(sensed.stuck, "stuck", ""))
+    for which, name in enumerate(sensed.components):
+        ends = {name: sensed.force, "low": sensed.low, "high": sensed.high}
+        columns += [(f"{head}\nN", end[shown, which], ".4f") for head, end in ends.items()]
+        columns.append(("", marks[shown, which], ""))
+    contact = np.where(sensed.contact, "yes", "")
+    console.print(tables.table([*columns, ("contact", contact[shown], "")]))
+    if stride > 1:
+        console.print(f"every {stride}th of {len(sensed)} readings; --csv and --json have all")
     if sensed.limited.any():
         terminal.note(
             f"open: the interval ends at the range of the search, {sensed.largest:.3g} N."

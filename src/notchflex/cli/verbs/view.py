@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import signal
-from types import FrameType
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, flag
-from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
-from notchflex.support import parse_whole
+from notchflex.cli.options import integer
+from notchflex.cli.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.viewer import HOST, PORT, check_host, check_installed, exposed
 
 
@@ -20,26 +18,20 @@ def view(
     /,
     *,
     settings: Settings = (),
-    host: Annotated[
-        str,
-        Parameter(
-            allow_leading_hyphen=True,
-            metavar="ADDRESS",
-            help="Address to serve on. The default can be reached from this machine only; "
-            "`0.0.0.0` from everywhere.",
-        ),
-    ] = HOST,
-    port: Annotated[
-        int,
-        converted(parse_whole(1, 65535), "N"),
-        Parameter(help="Port to serve on, or the next one that is free."),
-    ] = PORT,
-    open_browser: Annotated[bool, flag("Open a browser there.", name="--open")] = False,
+    host: Annotated[str, Parameter(allow_leading_hyphen=True, metavar="ADDRESS")] = HOST,
+    port: Annotated[int, integer(1, 65535)] = PORT,
+    open_browser: Annotated[bool, Parameter(name="--open")] = False,
 ) -> None:
     """Show a robot in the browser, with sliders for its tendons and loads.
 
     The robot stays where the sliders left it: friction is history-dependent, and the page draws the
     hysteresis loop. A robot file is read again when it is saved. Ends with Ctrl+C.
+
+    Args:
+        host: Address to serve on. The default can be reached from this machine only; `0.0.0.0` from
+            everywhere.
+        port: Port to serve on, or the next one that is free.
+        open_browser: Open a browser there.
     """
     check_installed()
     check_host(host, port)
@@ -47,10 +39,9 @@ def view(
     files = robot_files(robot)
     if warning := exposed(host):
         terminal.warn(f"{warning}.")
-    with terminal.working(f"solving {chosen.name} at rest"):
+    with terminal.progress(f"solving {chosen.name} at rest"):
         from notchflex.viewer import Viewer
 
-        terminal.use_compile_cache()
         viewer = Viewer(
             chosen,
             read=(lambda: chosen_robot(robot, settings)) if files else None,
@@ -59,12 +50,8 @@ def view(
             port=port,
         )
     terminal.output().print(f"{chosen.name}: {viewer.address} (Ctrl+C ends)", soft_wrap=True)
-
-    def end(_number: int, _frame: FrameType | None) -> None:
-        viewer.stop()
-
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, end)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: viewer.stop())
     if open_browser:
         import webbrowser
 

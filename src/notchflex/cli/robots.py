@@ -11,17 +11,15 @@ from cyclopts import Parameter
 
 from notchflex import InputError
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import named, texts
+from notchflex.cli.options import named_columns, texts
+from notchflex.support import load_changed, parse_assignment
 
 if TYPE_CHECKING:
     from notchflex import Robot
     from notchflex.fit import Measurements
 
-MAX_BESIDE = 4
+_MAX_BESIDE = 4
 """Robots beside the first: five can be distinguished by colour."""
-
-_MAX_CHANGES = 4
-"""More values of `--set` than this are only counted in a title."""
 
 RobotName = Annotated[
     str,
@@ -32,56 +30,33 @@ Settings = Annotated[
     texts(
         "--set",
         "PATH=VALUE",
-        "Change a value of the robot, such as `material.elastic_modulus=9000`, "
-        "`notch[2].depth=1.3` (the second notch from the base), `notch.depth=1.38` (every notch) "
-        "or `material.kind=linear`. May be given several times, in any order.",
+        help="Change a value of the robot, such as `material.elastic_modulus=9000`, "
+        "`notch[2].depth=1.3` (the second from the base), `notch.depth=1.38` (every notch) or "
+        "`material.kind=linear`.",
     ),
 ]
-
 OnePath = Annotated[
     bool | None,
     Parameter(
         name="--path",
         negative="--from-rest",
-        show_default=False,
         help="Take the rows of each pull as one loading path with friction history, or each row as "
-        "loaded from rest. Without either the column `from_rest` of the file decides, else the "
-        "order of its rows: a force that falls step by step within a pull makes it a path.",
+        "loaded from rest. Without either the column `from_rest` decides, else the order of the "
+        "rows: a force that falls within a pull makes it a path.",
     ),
 ]
-
 MeasuredAs = Annotated[
     Literal["ring", "edge"],
     Parameter(
         help="What columns such as `notch_1_deg` hold: the angle between the uncut pieces beside a "
-        "notch, or between its two faces, as `notch_1_edge_deg` does. They differ with elastic "
-        "ends."
+        "notch, or between its two faces (`notch_1_edge_deg`). They differ with elastic ends."
     ),
 ]
 
 
-Columns = Annotated[
-    tuple[str, ...],
-    texts(
-        "--column",
-        "NAME=HEADER",
-        'Which column of the data is what, such as `tension="Kraft [N]"`, `stroke=...`, '
-        "`total=...`, `notch_1=...` or `tip_x_mm=...`. Headers such as `Force [mN]` are "
-        "understood without it.",
-    ),
-]
-
-
-def named_columns(options: Sequence[str]) -> dict[str, str]:
-    """Read the values of `--column`."""
-    return dict(named("NAME=HEADER, such as tension=Kraft", str, text) for text in options)
-
-
-def chosen_robot(name: str, settings: Sequence[str]) -> Robot:
-    """Load a robot with the values of `--set`; note the keys that a new kind drops."""
-    from notchflex.support import load_changed, parse_assignment
-
-    robot, dropped = load_changed(name, [parse_assignment(text) for text in settings])
+def chosen_robot(name: str, settings: Sequence[str] = ()) -> Robot:
+    """Load a robot with the values of `--set`; write its warnings, and keys that a kind drops."""
+    robot, dropped = load_changed(name, list(map(parse_assignment, settings)))
     if dropped:
         terminal.note(f"the new kind has no {', '.join(dropped)}; dropped.")
     warn_unlikely(robot)
@@ -94,10 +69,9 @@ def warn_unlikely(robot: Robot) -> None:
         terminal.warn(str(warning))
 
 
-def robot_files(name: str) -> list[Path]:
-    """Return the file that a robot is read from, if it is one: outputs must not replace it."""
-    path = Path(name)
-    return [path] if path.suffix and os.path.exists(path) else []
+def robot_files(*names: str) -> list[Path]:
+    """Return the files that robots are read from: outputs must not replace them."""
+    return [Path(name) for name in names if Path(name).suffix and os.path.exists(name)]
 
 
 def changed_title(robot: Robot, settings: Sequence[str]) -> str:
@@ -108,49 +82,47 @@ def changed_title(robot: Robot, settings: Sequence[str]) -> str:
         >>> changed_title(load_robot("pacheco2021-a"), ["notch.depth=1.38"])
         'Pacheco 2021, wrist A with notch.depth = 1.38'
     """
-    from notchflex.support import parse_assignment
-
     pairs = map(parse_assignment, settings)
     changes = [f"{path} = {value}" for path, value in pairs if path != "name"]
-    more = len(changes) - _MAX_CHANGES
-    if more > 0:
-        changes = [*changes[:_MAX_CHANGES], f"{more} more"]
     return f"{robot.name} with {', '.join(changes)}" if changes else robot.name
 
 
-def variant(text: str, other: str = "") -> tuple[str, list[tuple[str, object]]]:
+def robot_label(name: str) -> str:
+    """Return the label of a robot that is given without one: the name, of a file its stem."""
+    return Path(name).stem if name.endswith(".toml") else Path(name).name
+
+
+def variant(text: str, alternatives: str = "") -> tuple[str, list[tuple[str, object]]]:
     """Read `LABEL: PATH=VALUE, PATH=VALUE` of `--beside`.
 
     Args:
         text: What was given.
-        other: What else may be given, as the message begins.
+        alternatives: What else may be given, as the message begins.
 
     Example:
         >>> variant("slick: friction.coefficient=0")
         ('slick', [('friction.coefficient', 0)])
     """
-    from notchflex.support import parse_assignment
-
     label, colon, values = text.partition(":")
     if not colon or not label.strip():
         raise InputError.BAD_SYNTAX(
-            f'--beside {text}: give {other}"LABEL: PATH=VALUE, PATH=VALUE", for example '
+            f'--beside {text}: give {alternatives}"LABEL: PATH=VALUE, PATH=VALUE", for example '
             '"linear: material.kind=linear".'
         )
-    return label.strip(), [parse_assignment(part) for part in values.split(",")]
+    return label.strip(), list(map(parse_assignment, values.split(",")))
 
 
 def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, Robot]:
-    """Return the robots of `simulate`, the first one first, each under its label.
+    """Return the robots of a call, the first one first, each under its label.
 
     Args:
         first: The robot that was named, with its `--set`.
         name: How it was named, which is its label.
         beside: The values of `--beside`: `ROBOT`, `LABEL: ROBOT` or `LABEL: PATH=VALUE, ...`.
     """
-    if len(beside) > MAX_BESIDE:
+    if len(beside) > _MAX_BESIDE:
         raise InputError.OUT_OF_RANGE(
-            f"--beside may be given {MAX_BESIDE} times at most; got {len(beside)}."
+            f"--beside may be given {_MAX_BESIDE} times at most; got {len(beside)}."
         )
     robots = {robot_label(name): first}
     for text in beside:
@@ -159,8 +131,8 @@ def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, R
             robot = first.with_values(values)
             warn_unlikely(robot)
         else:
-            label, other = _label_and_robot(text)
-            robot = chosen_robot(other, ())
+            label, named = _label_and_robot(text)
+            robot = chosen_robot(named)
         if label in robots:
             raise InputError.CONFLICT(
                 f"--beside {text}: there is already a robot called {label}; put another label "
@@ -171,22 +143,14 @@ def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, R
 
 
 def beside_files(beside: Sequence[str]) -> list[Path]:
-    """Return the robot files that `--beside` names: outputs must not replace them."""
-    names = [_label_and_robot(text)[1] for text in beside if "=" not in text]
-    return [file for name in names for file in robot_files(name)]
-
-
-def robot_label(name: str) -> str:
-    """Return the label of a robot that is given without one: the name, of a file its stem."""
-    return Path(name).stem if name.endswith(".toml") else Path(name).name
+    """Return the robot files that `--beside` names."""
+    return robot_files(*(_label_and_robot(text)[1] for text in beside if "=" not in text))
 
 
 def _label_and_robot(text: str) -> tuple[str, str]:
     """Split `LABEL: ROBOT` or `ROBOT`; a colon without a blank belongs to a path."""
-    label, colon, name = text.partition(": ")
-    if colon:
-        return label.strip(), name.strip()
-    return robot_label(text.strip()), text.strip()
+    label, _, name = (word.strip() for word in text.rpartition(": "))
+    return label or robot_label(name), name
 
 
 def read_data(
@@ -211,18 +175,17 @@ def read_data(
     measured = read_measurements(
         file, robot, from_rest=rest, measured=measured_as, columns=named_columns(columns)
     )
+    notes: list[str] = []
     if measured.renamed:
         pairs = ", ".join(f"{old} as {new}" for new, old in measured.renamed.items())
-        terminal.note(f"{measured.source}: read {pairs}.")
+        notes.append(f"read {pairs}")
     if measured.order:
-        terminal.note(f"{measured.source}: {measured.order}.")
+        notes.append(measured.order)
     if measured.ignored:
-        terminal.note(f"{measured.source}: ignored columns: {', '.join(measured.ignored)}.")
-    if measured.negative_forces:
-        count = measured.negative_forces
+        notes.append(f"ignored columns: {', '.join(measured.ignored)}")
+    if count := measured.negative_forces:
         are = "force is" if count == 1 else "forces are"
-        terminal.note(
-            f"{measured.source}: {count} measured {are} negative (sensor offset); the model "
-            "uses 0 N."
-        )
+        notes.append(f"{count} measured {are} negative (sensor offset); the model uses 0 N")
+    for note in notes:
+        terminal.note(f"{measured.source}: {note}.")
     return measured

@@ -1,0 +1,471 @@
+"""Options that several verbs have: how they are read, output files, loads, folders of pieces.
+
+What an option means stands in the docstring of its verb, or of its class, for `--help`. Whatever
+reads or checks arguments raises `InputError` for what cannot be used.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+from cyclopts import Group, Parameter, Token
+
+from notchflex import InputError
+from notchflex.cli import terminal
+from notchflex.support import (
+    BROWSER,
+    PAPER,
+    STANDARD_OUTPUT,
+    BodyForceOption,
+    TendonCommand,
+    Vector,
+    check_distinct,
+    check_folder,
+    check_output,
+    check_picture,
+    need,
+    parse_number,
+    parse_vector,
+    parse_whole,
+    read_body_force,
+    read_command,
+)
+
+if TYPE_CHECKING:
+    from notchflex.pieces import PieceFolder
+
+Values = TypeVar("Values")
+
+
+def converted(
+    read: Callable[[str], Any],
+    metavar: str,
+    *,
+    several: bool = False,
+    name: str | None = None,
+    hyphen: bool = True,
+) -> Parameter:
+    """Return the parameter of an option that a function reads.
+
+    Args:
+        read: Turns one word into a value; raises `InputError` with what is wrong and allowed. The
+            option and the word are put before it.
+        metavar: What `--help` shows for the word.
+        several: Whether the option may be given several times; its value is then a tuple.
+        name: The option, if it is not named as the parameter.
+        hyphen: Whether the word may begin with a hyphen, as negative numbers do.
+    """
+
+    def convert_one(token: Token) -> Any:
+        try:
+            return read(token.value)
+        except InputError as problem:
+            value = token.value if len(token.value) < 200 else f"{token.value[:80]}..."
+            words = [word for word in (token.keyword, value or "''") if word]
+            raise InputError(f"{' '.join(words)}: {problem}", problem.code) from None
+
+    def convert(_type: Any, tokens: Sequence[Token]) -> Any:
+        values = tuple(map(convert_one, tokens))
+        return values if several else values[0]
+
+    return Parameter(
+        converter=convert,
+        n_tokens=1,
+        accepts_keys=False,
+        metavar=f"{metavar}..." if several else metavar,
+        name=name,
+        allow_leading_hyphen=hyphen,
+    )
+
+
+def number(form: str, metavar: str, least: float = -math.inf) -> Parameter:
+    """Return the parameter of an option with a finite number."""
+    return converted(partial(parse_number, form=form, least=least), metavar)
+
+
+def integer(low: int, high: int | None = None) -> Parameter:
+    """Return the parameter of an option with a whole number."""
+    return converted(parse_whole(low, high), "N")
+
+
+def vector(what: str, metavar: str = "X,Y,Z") -> Parameter:
+    """Return the parameter of an option with three numbers."""
+    return converted(parse_vector(what), metavar)
+
+
+def texts(name: str, metavar: str, help: str | None = None) -> Parameter:
+    """Return the parameter of an option with a text that may be given several times."""
+    return Parameter(name=name, metavar=f"{metavar}...", help=help)
+
+
+def named(form: str, read: Callable[[str], Values], text: str) -> tuple[str, Values]:
+    """Read `NAME=VALUES`.
+
+    Args:
+        form: What is allowed, for the message.
+        read: Reads the values.
+        text: What was typed.
+    """
+    name, _, values = (word.strip() for word in text.partition("="))
+    if not (name and values):
+        raise InputError.BAD_SYNTAX(f"give {form}.")
+    return name, read(values)
+
+
+def low_high(
+    form: str, text: str, *, alone_is_high: bool = False
+) -> tuple[float | None, float | None]:
+    """Read `LOW:HIGH`, one of which may be left out.
+
+    Args:
+        form: What is allowed, for the message.
+        text: What was typed.
+        alone_is_high: Whether a number without a colon is the upper limit.
+    """
+    low, colon, high = text.partition(":")
+    if not colon and alone_is_high:
+        low, high = "", low
+    elif not colon:
+        raise InputError.BAD_SYNTAX(f"give {form}.")
+    if not (low.strip() or high.strip()):
+        raise InputError.BAD_SYNTAX(f"a number is missing; give {form}.")
+    lower, upper = (parse_number(word, form) if word.strip() else None for word in (low, high))
+    return lower, upper
+
+
+def exclude(first: str, second: str) -> InputError:
+    """Return the error of two options that exclude each other."""
+    return InputError.CONFLICT(f"{first} and {second} exclude each other; give one of them.")
+
+
+Refinement = Annotated[
+    int,
+    integer(0, 3),
+    Parameter(help="0 to 3: more strain modes and fibres, to check the accuracy."),
+]
+
+# Outputs
+
+OUTPUT = Group("Output", sort_key=9)
+_BINARY = {"--nc": ("xarray", "h5netcdf", "h5py"), "--parquet": ("polars",)}
+"""Options of binary files, and the packages that write these."""
+
+File = Annotated[str | None, Parameter(group=OUTPUT, allow_leading_hyphen=True, metavar="FILE")]
+"""A file to write."""
+ShortFile = Annotated[File, Parameter(name="-o")]
+Folder = Annotated[str | None, Parameter(name=("--output", "-o"), group=OUTPUT, metavar="FOLDER")]
+"""A folder to write files into."""
+StateFile = Annotated[
+    str | None,
+    Parameter(
+        metavar="FILE",
+        help="Start from a state that `--save-state` wrote, with its friction history.",
+    ),
+]
+Columns = Annotated[
+    tuple[str, ...],
+    texts(
+        "--column",
+        "NAME=HEADER",
+        help='Which column of the data is what, such as `tension="Kraft [N]"`, `stroke=...`, '
+        "`total=...`, `notch_1=...` or `tip_x_mm=...`. Headers such as `Force [mN]` are "
+        "understood without it.",
+    ),
+]
+
+
+def named_columns(options: Sequence[str]) -> dict[str, str]:
+    """Read the values of `--column`."""
+    return dict(named("NAME=HEADER, such as tension=Kraft", str, text) for text in options)
+
+
+@Parameter(name="*", group=OUTPUT)
+@dataclass(frozen=True)
+class Outputs:
+    """The results that a call asks for.
+
+    Attributes:
+        json: Write the result as JSON to this file; `-` prints it and nothing else.
+        quiet: Print no tables, notes or progress: only warnings, errors, and what `-` asks for.
+    """
+
+    json: File = None
+    quiet: bool = False
+
+    def check(
+        self,
+        inputs: Iterable[str | Path] = (),
+        *,
+        pictures: tuple[str, ...] = PAPER + BROWSER,
+        files: Mapping[str, str] | None = None,
+        folder: tuple[str, str | None, Sequence[str]] = ("", None, ()),
+    ) -> Sequence[Path]:
+        """Check all files before anything is computed.
+
+        Args:
+            inputs: Files that are read; no output may replace one of them.
+            pictures: Suffixes that `--plot` may have.
+            files: By option, further files that are written and are checked elsewhere.
+            folder: Option and name of a folder, and the files that are written into it.
+
+        Returns:
+            The files in the folder.
+        """
+        terminal.be_quiet(self.quiet)
+        inputs, targets = list(inputs), self.targets
+        option, name, names = folder
+        inside = () if name is None else check_folder(name, names, option, inputs=inputs)
+        others = {f"{option} ({file.name})": str(file) for file in inside}
+        check_distinct({**targets, **(files or {}), **others})
+        for option, target in targets.items():
+            if option == "--plot":
+                check_picture(target, option, inputs=inputs, kinds=pictures)
+            else:
+                check_output(target, option, inputs=inputs)
+            if option in _BINARY and target == STANDARD_OUTPUT:
+                raise InputError.FILE_FORMAT(
+                    f"{option} - : a binary file cannot go to standard output; name a file."
+                )
+            for module in _BINARY.get(option, ()):
+                need(module, "data", option)
+        return inside
+
+    @property
+    def targets(self) -> dict[str, str]:
+        """The files that were named, by option."""
+        files = {name: file for name, file in vars(self).items() if isinstance(file, str)}
+        return {f"--{name.replace('_', '-')}": file for name, file in files.items()}
+
+    @property
+    def prints_tables(self) -> bool:
+        """Whether standard output is for people."""
+        return not self.quiet and STANDARD_OUTPUT not in self.targets.values()
+
+    def write(
+        self,
+        document: Callable[[], Any],
+        show: Callable[[], object] = lambda: None,
+        *,
+        columns: Callable[[], Mapping[str, Any]] | None = None,
+        picture: Any = None,
+    ) -> None:
+        """Write and print what was asked for.
+
+        Args:
+            document: Makes the document of `--json`.
+            show: Prints tables.
+            columns: Makes the columns of `--csv`.
+            picture: The result whose usual picture is that of `--plot`, or a function that returns
+                a picture.
+        """
+        from notchflex.support import write_columns, write_json
+
+        targets = self.targets
+        if target := targets.get("--json"):
+            write_json(target, document())
+        if columns and (target := targets.get("--csv")):
+            write_columns(target, columns())
+        if picture is not None and (target := targets.get("--plot")):
+            with terminal.progress(f"drawing {target}", compiles=False):
+                _picture(picture).save(target)
+        if self.prints_tables:
+            show()
+
+
+def _picture(result: Any) -> Any:
+    from notchflex.plotting import picture
+
+    return result() if callable(result) else picture(result)
+
+
+@Parameter(name="*", group=OUTPUT)
+@dataclass(frozen=True)
+class DrawnOutputs(Outputs):
+    """Results that are drawn, too.
+
+    Attributes:
+        plot: Draw a picture to this .png, .svg or .pdf file, or to an interactive .html file.
+    """
+
+    plot: File = None
+
+
+@Parameter(name="*", group=OUTPUT)
+@dataclass(frozen=True)
+class TableOutputs(DrawnOutputs):
+    """Results with one row for each step.
+
+    Attributes:
+        csv: Write the result as a CSV table to this file; `-` prints it and nothing else.
+    """
+
+    csv: File = None
+
+
+@Parameter(name="*", group=OUTPUT)
+@dataclass(frozen=True)
+class PathOutputs(TableOutputs):
+    """Results that end in a state.
+
+    Attributes:
+        save_state: Write the last state to this file, for `--from-state`.
+    """
+
+    save_state: File = None
+
+    def write_state(self, state: Any) -> None:
+        """Write the last state, if it is asked for."""
+        from notchflex.support import replacing
+
+        if self.save_state is not None:
+            with replacing(self.save_state) as temporary:
+                state.save(temporary)
+
+
+# Loads
+
+LOADS = Group(
+    "External loads", sort_key=8, help="They act before the first step and stay as they are."
+)
+
+
+def tendon_command(option: str, *, negative: bool = False) -> Parameter:
+    """Return the parameter of an option `SPEC` or `TENDON=SPEC` that may be given several times."""
+    return converted(partial(read_command, option, negative), "SPEC", several=True)
+
+
+Tensions = Annotated[tuple[TendonCommand, ...], tendon_command("--tension")]
+Strokes = Annotated[tuple[TendonCommand, ...], tendon_command("--stroke", negative=True)]
+
+
+@Parameter(name="*", group=LOADS)
+@dataclass(frozen=True)
+class ExternalLoads:
+    """Loads that act on all steps, beside the tendons.
+
+    Attributes:
+        tip_force: Force X,Y,Z at the tip [N], in the world.
+        tip_moment: Moment X,Y,Z at the tip [N mm], in the world.
+        tip_point: Where the tip force acts and the tip mass hangs: X,Y,Z from the tip [mm], in the
+            frame of the tip.
+        body_force: Force on a rigid body [N]: 0 is the base, 1 the body beyond the first notch. The
+            point of application after @ [mm] is in the frame of the body; its origin if left out.
+            May be given several times.
+        tip_mass: Mass that hangs at the tip [g]; along 0,0,-9.81 without --gravity.
+        gravity: Gravity X,Y,Z in the world [m/s2]; the robot's own weight counts where
+            material.density is known.
+        following: Forces and moments turn with the body they act on, and are given in its frame.
+    """
+
+    tip_force: Annotated[Vector | None, vector("forces in N")] = None
+    tip_moment: Annotated[Vector | None, vector("moments in N mm")] = None
+    tip_point: Annotated[Vector | None, vector("coordinates in mm")] = None
+    body_force: Annotated[
+        tuple[BodyForceOption, ...],
+        converted(read_body_force, "BODY:X,Y,Z[@X,Y,Z]", several=True),
+    ] = ()
+    tip_mass: Annotated[
+        float | None, number("a finite number of grams, 0 or more", "G", least=0.0)
+    ] = None
+    gravity: Annotated[Vector | None, vector("accelerations in m/s2")] = None
+    following: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse an option that has no effect without another one."""
+        if self.following and not (self.tip_force or self.tip_moment or self.body_force):
+            raise InputError.CONFLICT(
+                "--following: nothing turns; give --tip-force, --tip-moment or --body-force."
+            )
+        if self.tip_point and self.tip_force is None and self.tip_mass is None:
+            point = ",".join(f"{value:g}" for value in self.tip_point)
+            raise InputError.CONFLICT(
+                f"--tip-point {point}: nothing acts there; give --tip-force or --tip-mass."
+            )
+
+    def __bool__(self) -> bool:
+        """Whether any option was given."""
+        return self != ExternalLoads()
+
+    def arguments(self) -> dict[str, Any]:
+        """Return these loads as arguments of `notchflex.Load` and of `LoadPath.loaded`."""
+        from notchflex import BodyForce
+
+        given = {name: value for name, value in vars(self).items() if value}
+        if forces := given.pop("body_force", ()):
+            given["body_forces"] = [
+                BodyForce(body, force, point=point or (0.0, 0.0, 0.0), following=self.following)
+                for body, force, point in forces
+            ]
+        given["following"] = self.following and bool(self.tip_force or self.tip_moment)
+        return given
+
+
+NO_LOADS = ExternalLoads()
+
+# Folders of pieces
+
+PIECES = Group("In pieces", sort_key=7)
+
+
+@Parameter(name="*", group=PIECES)
+@dataclass(frozen=True)
+class Work:
+    """Who works on a long computation.
+
+    Attributes:
+        workers: Work in so many processes of this machine; by default in one.
+        scheduler: Work with the workers of a dask scheduler, such as tcp://10.0.0.1:8786; all see
+            the same folder (extra `cluster`).
+    """
+
+    workers: Annotated[int | None, integer(1, 1024)] = None
+    scheduler: Annotated[str | None, Parameter(metavar="ADDRESS")] = None
+
+    def __post_init__(self) -> None:
+        """Refuse options that exclude each other."""
+        if self.workers is not None and self.scheduler is not None:
+            raise exclude("--workers", "--scheduler")
+
+
+@Parameter(name="*", group=PIECES)
+@dataclass(frozen=True)
+class InPieces(Work):
+    """A long computation that keeps finished pieces in a folder.
+
+    Attributes:
+        folder: Work in pieces, and keep the finished ones in this folder (extra `data`): the same
+            call resumes where it was stopped.
+    """
+
+    folder: Annotated[str | None, Parameter(metavar="DIR")] = None
+
+    def chosen(self, kind: str, inputs: Iterable[str | os.PathLike[str]]) -> PieceFolder | None:
+        """Return the folder, None if none is given; nothing is written.
+
+        Args:
+            kind: What is computed, as in the manifest.
+            inputs: Files that are read.
+
+        Raises:
+            InputError: Options that need the folder, or a folder that cannot be used.
+        """
+        if self.folder is None:
+            for name in ("workers", "scheduler"):
+                if getattr(self, name) is not None:
+                    raise InputError.MISSING_VALUE(
+                        f"--{name} needs --folder DIR, where all workers put their pieces."
+                    )
+            return None
+        from notchflex.pieces import PieceFolder, check_target
+
+        check_target(self.folder, kind, "--folder", [os.fspath(file) for file in inputs])
+        return PieceFolder(self.folder, self.workers, self.scheduler)
+
+
+NO_FOLDER = InPieces()

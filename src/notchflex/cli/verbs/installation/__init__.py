@@ -1,1 +1,0 @@
-"""Verbs about the installation: its speed, its state, completion in the shell."""

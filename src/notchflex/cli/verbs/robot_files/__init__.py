@@ -1,1 +1,0 @@
-"""Verbs about robot files: listing, showing and writing them."""
