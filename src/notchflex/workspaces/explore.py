@@ -29,7 +29,7 @@ from notchflex import (
 from notchflex.pieces import (
     Manifest,
     PieceFolder,
-    Task,
+    PieceTask,
     heads,
     piece_file,
     sobol_points,
@@ -178,7 +178,7 @@ def _under(load: ExternalLoad, tension: Float[np.ndarray, "s t"]) -> LoadPath:
 
 
 @dataclass(frozen=True, eq=False)
-class WorkspaceTask(Task):
+class WorkspaceTask(PieceTask):
     """States of a robot along rays of tension, in pieces; arguments as for `workspace`.
 
     Attributes:

@@ -24,7 +24,7 @@ from notchflex.fit.measurements.measurements import Measurements
 from notchflex.fit.model.constants import Constant, unknowns
 from notchflex.fit.model.drawing import deviations_of
 from notchflex.fit.model.samples import Samples
-from notchflex.pieces import Manifest, PieceFolder, Task, heads
+from notchflex.pieces import Manifest, PieceFolder, PieceTask, heads
 from notchflex.support import to_table
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 KIND = "calibration"
 
 
-class SearchTask(Task):
+class SearchTask(PieceTask):
     """Searches from starting points, each of which is a piece.
 
     Args:
