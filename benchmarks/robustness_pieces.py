@@ -19,7 +19,7 @@ from judge import plain
 from robustness import Outcome, follow
 from shapes import DRAWN, SHAPES
 
-from notchflex.pieces import Manifest, PieceFolder, Task, piece_file
+from notchflex.pieces import Manifest, PieceFolder, PieceTask, piece_file
 from notchflex.solver.programs.store import code_digest
 
 KIND = "robustness"
@@ -49,7 +49,7 @@ class Chosen(NamedTuple):
 
 
 @dataclass(frozen=True)
-class DrawsTask(Task):
+class DrawsTask(PieceTask):
     """Draws that are followed and judged, in pieces.
 
     Args:

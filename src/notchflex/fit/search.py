@@ -22,7 +22,7 @@ from notchflex import InputError
 from notchflex.fit.constants import Unknown
 from notchflex.fit.objective import Cost, FitObjective, Noise, Vector, first_noise
 from notchflex.fit.residuals import Samples
-from notchflex.pieces import Manifest, PieceFolder, Task, heads
+from notchflex.pieces import Manifest, PieceFolder, PieceTask, heads
 from notchflex.support import to_table
 
 if TYPE_CHECKING:
@@ -247,7 +247,7 @@ class FitProblem:
         return minimum
 
 
-class SearchTask(Task):
+class SearchTask(PieceTask):
     """Searches from starting points, each of which is a piece.
 
     What each finds does not depend on the others.

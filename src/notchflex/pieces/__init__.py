@@ -7,7 +7,7 @@ from notchflex.pieces.folder import (
     INVALID,
     REJECTED,
     Manifest,
-    Task,
+    PieceTask,
     check_target,
     damaged,
     encoded,
@@ -25,6 +25,6 @@ from notchflex.pieces.statistics import (
 )
 
 __all__ = ["ACCEPTED", "CODES", "FAILED", "INVALID", "REJECTED"]
-__all__ += ["Manifest", "PieceFolder", "Progress", "Scale", "Sketch", "Task"]
+__all__ += ["Manifest", "PieceFolder", "PieceTask", "Progress", "Scale", "Sketch"]
 __all__ += ["add_to", "check_target", "damaged", "encoded", "heads", "piece_file"]
 __all__ += ["scale_of", "sobol_points", "summed_up"]

@@ -140,7 +140,7 @@ def damaged(file: Path) -> InputError:
     )
 
 
-class Task:
+class PieceTask:
     """A computation that is cut into pieces, each of which depends on the task and its number.
 
     It is a data class; its pickle holds its fields, and nothing that was derived from them.
@@ -256,7 +256,7 @@ def piece_file(folder: str | os.PathLike[str], piece: int) -> Path:
     return Path(folder) / _PIECES / f"piece-{piece:09d}.parquet"
 
 
-def encoded(task: Task, piece: int) -> tuple[memoryview, dict[str, Any]]:
+def encoded(task: PieceTask, piece: int) -> tuple[memoryview, dict[str, Any]]:
     """Return the bytes of the file of a piece, and its head."""
     frame, content = task.piece(piece)
     head = {"sweep": task.manifest.digest, "piece": piece, **content}
@@ -283,7 +283,7 @@ def _checksum(data: memoryview) -> tuple[slice, bytes, bytes]:
     return place, there, b"%08x" % zlib.crc32(data)
 
 
-def write_piece(task: Task, folder: str | os.PathLike[str], piece: int) -> tuple[int, int]:
+def write_piece(task: PieceTask, folder: str | os.PathLike[str], piece: int) -> tuple[int, int]:
     """Work out a piece and write its file; return its number and its rows without a result.
 
     Raises:

@@ -28,7 +28,7 @@ from threadpoolctl import threadpool_limits
 
 from notchflex import ErrorCode, InputError
 from notchflex.pieces.folder import (
-    Task,
+    PieceTask,
     check_target,
     locked,
     open_folder,
@@ -105,7 +105,7 @@ class PieceFolder:
 
     def run(
         self,
-        task: Task,
+        task: PieceTask,
         *,
         pieces: range | None = None,
         cores: int | None = None,
@@ -152,7 +152,7 @@ class PieceFolder:
                 raise InputError.FILE_UNWRITABLE(message) from None
 
     def _finished(
-        self, task: Task, folder: str, pieces: list[int], cores: int | None
+        self, task: PieceTask, folder: str, pieces: list[int], cores: int | None
     ) -> Generator[tuple[int, int]]:
         """Work on pieces; yield number and rows without a result of each."""
         if not pieces:
@@ -186,7 +186,7 @@ def _work(task: bytes, needed: dict[str, str], folder: str, piece: int) -> tuple
 
 
 @lru_cache(maxsize=2)
-def _task(pickled: bytes) -> Task:
+def _task(pickled: bytes) -> PieceTask:
     """Return a task; one for a process, since what it derives takes time."""
     return pickle.loads(pickled)
 

@@ -26,9 +26,9 @@ from notchflex.pieces import (
     FAILED,
     Manifest,
     PieceFolder,
+    PieceTask,
     Progress,
     Scale,
-    Task,
     check_target,
     encoded,
     scale_of,
@@ -232,7 +232,7 @@ def _column_name(criterion: Criterion, has_load: bool) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class SweepTask(Task):
+class SweepTask(PieceTask):
     """The robots of a sweep, in pieces.
 
     Attributes:

@@ -34,10 +34,10 @@ from notchflex.pieces import (
     REJECTED,
     Manifest,
     PieceFolder,
+    PieceTask,
     Progress,
     Scale,
     Sketch,
-    Task,
     add_to,
     heads,
     scale_of,
@@ -402,7 +402,7 @@ _EXTREMES = 10
 
 
 @dataclass(frozen=True, eq=False)
-class ToleranceTask(Task):
+class ToleranceTask(PieceTask):
     """Drawn robots in pieces; arguments as for `tolerance_analysis`."""
 
     robot: Robot

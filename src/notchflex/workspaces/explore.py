@@ -29,7 +29,7 @@ from notchflex import (
 from notchflex.pieces import (
     Manifest,
     PieceFolder,
-    Task,
+    PieceTask,
     heads,
     piece_file,
     sobol_points,
@@ -178,7 +178,7 @@ def _under(load: ExternalLoad, tension: Float[np.ndarray, "s t"]) -> LoadPath:
 
 
 @dataclass(frozen=True, eq=False)
-class WorkspaceTask(Task):
+class WorkspaceTask(PieceTask):
     """States of a robot along rays of tension, in pieces; arguments as for `workspace`.
 
     Attributes:
@@ -459,16 +459,10 @@ def workspace(
     else:
         task = replace(task, cores=1)
         columns, counts = _explored_in_pieces(task, PieceFolder.of(folder), cores, report)
+    kept, beyond, failed = counts.tolist()
+    tried, unknown = kept + beyond + failed, np.full(len(columns["tip"]), np.nan)
     explored = Workspace(
-        robot,
-        checked,
-        load,
-        largest,
-        tried=int(counts.sum()),
-        failed=int(counts[2]),
-        beyond=int(counts[1]),
-        **columns,
-        stiffness=np.full(len(columns["tip"]), np.nan),
+        robot, checked, load, largest, tried, failed, beyond, **columns, stiffness=unknown
     )
     return with_stiffness(explored, stiffness)
 
