@@ -107,6 +107,16 @@ def test_dead_band_is_that_of_bisection(case, margin):
     assert by_stroke.dead_band(step.state).tolist() == [[[step.values["stroke"][0]] * 2]][0]
 
 
+def test_a_dead_band_is_there_whatever_rounding_does_to_the_sliding_contact(stepper):
+    """The log ratio of a contact that slides misses its bound by rounding, to either side."""
+    state = stepper.rest()
+    for tension in np.linspace(0.3, 1.7, 57):
+        state = stepper.step(state, [tension]).state
+        low, high = stepper.dead_band(state)[0]
+        assert low < 0.995 * tension
+        assert high >= tension
+
+
 def test_slack_and_rest_have_no_dead_band(stepper):
     assert stepper.dead_band(stepper.rest()).tolist() == [[0.0, 0.0]]
     assert stepper.dead_band(stepper.rest(3)).shape == (3, 1, 2)
