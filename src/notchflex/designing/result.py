@@ -44,7 +44,7 @@ _MAX_SENTENCES = 12
 # Change of a limit, relative to its size, for which its cost is stated.
 _PART = 0.05
 # No effect is below this part of the sum; a limit of a variable is reached within this part.
-_NO_EFFECT, _AT_LIMIT = 1e-9, 1e-6
+_NO_EFFECT, _AT_LIMIT = 1e-9, 1e-3
 MINIMISE, MAXIMISE = "as small as possible", "as great as possible"
 
 

@@ -28,6 +28,8 @@ _NO_SLOPE, _WEIGHT, _PENALTY = 1e-9, 1e3, 1e3
 # SLSQP's estimate of the curvature is wrong beyond a kink, such as a notch that closes: it starts
 # anew where it ended, while that brings so much.
 _GAIN, _PRECISION = 1e-7, 1e-12
+# At a kink its line search goes on for long: it ends after so many vectors without a better one.
+_PATIENCE = 30
 
 
 def violation(
@@ -78,7 +80,7 @@ def minimise(program: NonlinearProgram, start: Vector, iterations: int) -> Searc
     first = program.evaluate(start)
     if first is None:
         return None
-    best, last = (start, first), first
+    best, last, stale = (start, first), first, 0
     steepest, size = float(np.linalg.norm(first.gradient)), 1.0 + abs(first.value)
     scale = steepest if steepest > _NO_SLOPE * size else size
 
@@ -87,32 +89,34 @@ def minimise(program: NonlinearProgram, start: Vector, iterations: int) -> Searc
 
     @lru_cache(maxsize=1)  # SLSQP asks for the parts of one vector one after the other
     def evaluated(key: bytes) -> Linearisation:
-        nonlocal best, last, steepest
+        nonlocal best, last, stale, steepest
         variables = np.clip(np.frombuffer(key), *program.bounds.T)
         here = program.evaluate(variables)
         if here is None:  # so large that the step is refused
             return last._replace(value=last.value + _PENALTY * scale)
         last, steepest = here, max(steepest, float(np.linalg.norm(here.gradient)))
-        best = (variables, here) if merit(here) < merit(best[1]) else best
+        stale += 1
+        if merit(here) < merit(best[1]):
+            best, stale = (variables, here), 0
         return here
 
+    def stop(_: Vector) -> None:
+        if stale > _PATIENCE:
+            raise StopIteration
+
     done, before = 0, np.inf
-    minimum = _minimum(program, *best, steepest)
-    while (
-        len(start)
-        and done < iterations
-        and not minimum.is_stationary
-        and merit(best[1]) < before - _GAIN
-    ):
-        before = merit(best[1])
-        done += _descend(program, evaluated, *best, scale, iterations - done)
-        minimum = _minimum(program, *best, steepest)
-    return minimum
+    while len(start) and done < iterations and merit(best[1]) < before - _GAIN:
+        before, stale = merit(best[1]), 0
+        done += _descend(program, evaluated, stop, *best, scale, iterations - done)
+        if _minimum(program, *best, steepest).is_stationary:
+            break
+    return _minimum(program, *best, steepest)
 
 
 def _descend(
     program: NonlinearProgram,
     evaluated: Callable[[bytes], Linearisation],
+    stop: Callable[[Vector], None],
     start: Vector,
     first: Linearisation,
     scale: float,
@@ -140,6 +144,7 @@ def _descend(
         bounds=program.bounds,
         constraints=[constraint(rows) for rows in (is_equal, ~is_equal) if rows.any()],
         method="SLSQP",
+        callback=stop,
         options={"maxiter": iterations, "ftol": _PRECISION},
     )
     return int(result.nit)
