@@ -91,7 +91,8 @@ def test_open_ends_and_unknown_constants_are_drawn():
     opened = replace(found, intervals={NAMES[0]: Interval(None, None, known, "nothing")})
     # nothing depends on the second constant
     curvature = np.diag([found.reached.curvature[0, 0], 0.0])
-    opened = replace(opened, reached=found.reached._replace(curvature=curvature))
+    cost = found.reached._replace(curvature=curvature)
+    opened = replace(opened, best=found.best._replace(cost=cost))
     figure = calibration_picture(opened).figure()
     axes = panel(figure, "profile of constant 1, dotted: 95 %")
     assert [text.get_text() for text in axes.texts] == ["open below and above"]
