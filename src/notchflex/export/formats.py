@@ -20,11 +20,6 @@ if TYPE_CHECKING:
     from notchflex import EquilibriumPath, Robot
 
 
-Seam = Literal["past", "split"]
-AngleUnit = Literal["mm", "deg"]
-DxfVersion = Literal["R2000", "R12"]
-Paper = Literal["a4", "a3"]
-
 _LONGEST = 1e4  # mm; longer than any tube
 
 
@@ -79,16 +74,16 @@ class PatternOptions:
     kerf: _Kerf = 0.0  # pyright: ignore[reportAssignmentType] - made two widths
     corner_radius: Annotated[Float, _length("radius of sharp corners")] = 0.0
     polishing: _Polishing = 0.0
-    seam: Annotated[Seam, Field(description='"past" or "split"')] = "past"
+    seam: Annotated[Literal["past", "split"], Field(description='"past" or "split"')] = "past"
     seam_deg: Annotated[
         Float, quantity("deg", "side of the seam", at_least=-360.0, at_most=360.0)
     ] = 180.0
     two_axis: Annotated[bool, Field(strict=True)] = False
-    y_unit: Annotated[AngleUnit, Field(description='"mm" or "deg"')] = "mm"
+    y_unit: Annotated[Literal["mm", "deg"], Field(description='"mm" or "deg"')] = "mm"
     shank: _Shank = 10.0
     chord: _Chord = 0.001
-    dxf_version: Annotated[DxfVersion, Field(description='"R2000" or "R12"')] = "R2000"
-    paper: Annotated[Paper, Field(description='"a4" or "a3"')] = "a4"
+    dxf_version: Annotated[Literal["R2000", "R12"], Field(description='"R2000" or "R12"')] = "R2000"
+    paper: Annotated[Literal["a4", "a3"], Field(description='"a4" or "a3"')] = "a4"
 
     @property
     def inside(self) -> tuple[float, float]:

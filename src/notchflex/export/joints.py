@@ -289,12 +289,9 @@ def _hinges(robot: Robot, pulls: Sequence[EquilibriumPath]) -> HingeChain:
     """
     direction = np.radians([notch.direction_deg for notch in robot.notches])
     axis = np.stack([-np.sin(direction), np.cos(direction), 0.0 * direction], axis=1)
-    position, rotation, angle = (
-        np.concatenate(values)
-        for values in zip(
-            *((path.body_position, path.body_rotation, turned(path)) for path in pulls), strict=True
-        )
-    )
+    position = np.concatenate([path.body_position for path in pulls])
+    rotation = np.concatenate([path.body_rotation for path in pulls])
+    angle = np.concatenate([turned(path) for path in pulls])
     # Origins of the distal bodies in the frames of the proximal ones.
     moved = np.einsum("snba,snb->nsa", rotation[:, :-1], np.diff(position, axis=1))
     lever = 0.5 * moved[:, 0]
@@ -379,31 +376,24 @@ def _fitted(robot: Robot, top: float) -> JointModel:
     pulls = tuple(_pulled(robot, tendon, top) for tendon in tendons)
     holes = tuple(tendon_holes(robot, tendon) for tendon in tendons)
     hinges = _hinges(robot, pulls)
-    angle, moment, slips = (
-        np.concatenate(values)
-        for values in zip(
-            *(_samples(hinges, holes[tendon], pulls[tendon], tendon) for tendon in tendons),
-            strict=True,
-        )
-    )
+    angle = np.concatenate([turned(path) for path in pulls])
+    moment, slips = list[Array](), list[NDArray[np.bool_]]()
+    for tendon, path in enumerate(pulls):
+        way, tension = turned(path), path.commanded_tension[:, tendon, None]
+        moment.append(tendon_levers(hinges, holes[tendon], way) * tension)
+        # The friction before a notch that turns is at its limit, and its lips are open.
+        turns = np.abs(np.diff(way, axis=0, prepend=way[:1])) > _AT_REST
+        slips.append(turns & ~path.closed)
     rising = np.tile(np.repeat([1.0, -1.0], STEPS), len(pulls))
+    samples = zip(
+        angle.T,
+        np.concatenate(moment).T,
+        np.concatenate(slips).T,
+        robot.geometry.notch_stiffness.tolist(),
+        strict=True,
+    )
     springs = tuple(
-        fit_spring(angle[row, j], moment[row, j], rising[row], float(stiffness))
-        for j, (row, stiffness) in enumerate(
-            zip(slips.T, robot.geometry.notch_stiffness, strict=True)
-        )
+        fit_spring(turn[rows], answer[rows], rising[rows], stiffness)
+        for turn, answer, rows, stiffness in samples
     )
     return JointModel(robot, top, hinges, springs, holes, pulls)
-
-
-def _samples(
-    hinges: HingeChain, holes: Sequence[Hole], path: EquilibriumPath, tendon: int
-) -> tuple[np.ndarray, ...]:
-    """Return angles and moments of the hinges in a pull, and whether each turns in the step.
-
-    The friction before a notch that turns is at its limit, and its lips are open.
-    """
-    angle = turned(path)
-    moment = tendon_levers(hinges, holes, angle) * path.commanded_tension[:, tendon, None]
-    turns = np.abs(np.diff(angle, axis=0, prepend=angle[:1])) > _AT_REST
-    return angle, moment, turns & ~path.closed

@@ -233,10 +233,15 @@ def mesh_of(robot: Robot, options: DeckOptions, tendons: Sequence[int] = (0,)) -
                 f"{name} has no uncut_length behind it, in which the lines "
                 "of the mesh could go over to the next notch: give it one above 0 mm"
             )
-        low, high = _spine_lines(notch, float(edge[-1]), around, options)
-        knots = _knots(notch, edge, (low, high), np.radians(sides).tolist(), around)
-        shifts.append(_shifts(knots, around, name))
-        openings.append((high, around - (high - low)))
+        lines, shift = _lines(notch, edge, np.radians(sides).tolist(), around, options)
+        width = 1.0 + np.diff(shift, axis=1, append=shift[:, :1]) * around / np.pi
+        if width.min() < _NARROW or width.max() > _WIDE:
+            raise InputError.UNSUPPORTED(
+                f"{name}: a tendon lies so near to an edge of the notch that the mesh has no line "
+                "for each of them; take a finer mesh, or place the tendon elsewhere"
+            )
+        openings.append(lines)
+        shifts.append(shift)
     angle = _over(heights, faces, np.stack(shifts))
     angle += (np.arange(2 * around) * np.pi / around)[:, None]
     return _numbered(_grid(radius, angle, heights), faces, openings, x_deg=None)
@@ -250,25 +255,30 @@ def _grid(radius: Array, angle: Array, heights: Array) -> Array:
     )
 
 
-def _spine_lines(
-    notch: ArcNotch, edge: float, around: int, options: DeckOptions
-) -> tuple[int, int]:
-    """Return the lines at the edges of the spine of a notch, by their number."""
+def _lines(
+    notch: ArcNotch, edge: Array, sides: Sequence[float], around: int, options: DeckOptions
+) -> tuple[tuple[int, int], Array]:
+    """Return the lines of a whole tube at a notch.
+
+    Args:
+        notch: The notch.
+        edge: Half the angle of the wall that it leaves at every radius, rad, (a,).
+        sides: Sides of the tendons, rad.
+        around: Number of lines.
+        options: The mesh.
+
+    Returns:
+        The line where its opening begins and the number of elements to where it ends; by how much
+        lines and middle nodes lie beside their even places, rad, (a, 2 around).
+    """
+    per, spine = 2.0 * np.pi / around, np.radians(notch.direction_deg) + np.pi
     middle = round(around * (notch.direction_deg + 180.0) / 360.0)
-    even = around * edge / (2.0 * np.pi)
+    even = around * float(edge[-1]) / (2.0 * np.pi)
     # Somewhat finer than even where the spine is narrow.
     half = round(0.5 * (even + max(even, options.spine)))
     half = min(max(half, 2), around // 2 - 2)
-    return middle - half, middle + half
-
-
-def _knots(
-    notch: ArcNotch, edge: Array, lines: tuple[int, int], sides: Sequence[float], around: int
-) -> dict[int, Array]:
-    """Return by how much lines lie beside their even places at a notch, rad."""
-    spine, per = np.radians(notch.direction_deg) + np.pi, 2.0 * np.pi / around
-    first, last = lines
-    knots = {first % around: spine - edge - first * per, last % around: spine + edge - last * per}
+    first, last = middle - half, middle + half
+    places = {first: spine - edge, last: spine + edge}
     for side in sides:
         away = (side - spine + np.pi) % (2.0 * np.pi) - np.pi  # from the middle of the spine
         number = round((spine + away) / per)
@@ -277,24 +287,12 @@ def _knots(
         else:
             number = min(last + 1 + (number - last - 1) % around, first + around - 1)
             away %= 2.0 * np.pi
-        knots[number % around] = np.full(len(edge), spine + away - number * per)
-    return {line: (by + np.pi) % (2.0 * np.pi) - np.pi for line, by in knots.items()}
-
-
-def _shifts(knots: dict[int, Array], around: int, name: str) -> Array:
-    """Return by how much all lines lie beside their even places, between those that must.
-
-    Raises:
-        InputError: Two lines come too near to each other.
-    """
-    lines = sorted(knots)
-    half = np.arange(2 * around) / 2.0
-    rows = np.stack([knots[line] for line in lines], axis=1)
-    shift = np.stack([np.interp(half, lines, row, period=around) for row in rows])
-    width = 1.0 + np.diff(shift, axis=1, append=shift[:, :1]) * around / np.pi
-    if width.min() < _NARROW or width.max() > _WIDE:
-        raise InputError.UNSUPPORTED(
-            f"{name}: a tendon lies so near to an edge of the notch that the mesh has no line for "
-            "each of them; take a finer mesh, or place the tendon elsewhere"
-        )
-    return shift
+        places[number] = np.full(len(edge), spine + away)
+    shifts = {
+        number % around: (place - number * per + np.pi) % (2.0 * np.pi) - np.pi
+        for number, place in places.items()
+    }
+    lines, half_lines = sorted(shifts), np.arange(2 * around) / 2.0
+    rows = np.stack([shifts[line] for line in lines], axis=1)
+    shift = np.stack([np.interp(half_lines, lines, row, period=around) for row in rows])
+    return (last, around - (last - first)), shift

@@ -147,23 +147,7 @@ def mjcf(model: JointModel, head: str = "", numbers: Mapping[str, float] | None 
             solimp=[0.999, 0.9999, 1e-3],
         )
     _keyframes(root, model, drums)
-    actuators, sensors = _add(root, "actuator"), _add(root, "sensor")
-    for k in range(1, len(model.holes) + 1):
-        # A motor pushes along a tendon; a tendon pulls.
-        _add(
-            actuators,
-            "motor",
-            name=f"tension_{k}",
-            tendon=f"tendon_{k}",
-            gear=-1,
-            ctrlrange=[0, model.top],
-        )
-        _add(sensors, "tendonpos", name=f"tendon_length_{k}", tendon=f"tendon_{k}")
-        _add(sensors, "actuatorfrc", name=f"tendon_force_{k}", actuator=f"tension_{k}")
-    for j in range(1, len(model.springs) + 1):
-        _add(sensors, "jointpos", name=f"angle_{j}", joint=f"notch_{j}")
-    _add(sensors, "framepos", name="tip_position", objtype="site", objname="tip")
-    _add(sensors, "framequat", name="tip_rotation", objtype="site", objname="tip")
+    _drives(root, model)
     return _xml(root)
 
 
@@ -270,6 +254,27 @@ def _keyframes(root: Element, model: JointModel, drums: Drums) -> None:
             if drums:
                 yields = np.clip(drum_angle, -_YIELD, _YIELD)
                 key.set("plastic", _text(drum_angle - yields))
+
+
+def _drives(root: Element, model: JointModel) -> None:
+    """Write the motors that pull the tendons, and the sensors."""
+    actuators, sensors = _add(root, "actuator"), _add(root, "sensor")
+    for k in range(1, len(model.holes) + 1):
+        # A motor pushes along a tendon; a tendon pulls.
+        _add(
+            actuators,
+            "motor",
+            name=f"tension_{k}",
+            tendon=f"tendon_{k}",
+            gear=-1,
+            ctrlrange=[0, model.top],
+        )
+        _add(sensors, "tendonpos", name=f"tendon_length_{k}", tendon=f"tendon_{k}")
+        _add(sensors, "actuatorfrc", name=f"tendon_force_{k}", actuator=f"tension_{k}")
+    for j in range(1, len(model.springs) + 1):
+        _add(sensors, "jointpos", name=f"angle_{j}", joint=f"notch_{j}")
+    _add(sensors, "framepos", name="tip_position", objtype="site", objname="tip")
+    _add(sensors, "framequat", name="tip_rotation", objtype="site", objname="tip")
 
 
 def urdf(model: JointModel, head: str = "") -> str:
