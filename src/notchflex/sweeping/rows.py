@@ -5,7 +5,6 @@ What a row gives depends on the plan alone: not on the process, on the rows befo
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -16,17 +15,9 @@ from scipy.stats import qmc
 
 from notchflex import ErrorCode, InputError, Robot, simulate
 from notchflex.pieces.sobol import SobolPart
-from notchflex.support import REGISTERED, nearest, number_at
-from notchflex.sweeping.plan import KeptQuantity, Sampling, SweepPlan, SweepVariable
-from notchflex.tolerancing.spec import (
-    AXES,
-    FIRST,
-    INDICES,
-    LIMITED,
-    Criterion,
-    entries_of,
-    read_load,
-)
+from notchflex.specification import Criterion, entry_names, limited_numbers, placed, read_load
+from notchflex.support import number_at
+from notchflex.sweeping.plan import Sampling, SweepPlan, SweepVariable
 from notchflex.tolerancing.study import SAMPLE, PieceStudy
 
 _MAX_LATIN = 20_000_000
@@ -186,19 +177,14 @@ def model_of(plan: SweepPlan, robot: Robot) -> SweepModel:
     for name in between:
         number_at(base, name)
     loads = {name: read_load(table, name, base) for name, table in plan.load.items()}
-    for one in plan.keep:
-        _check(one, list(loads))
     paths = {name: simulate(base, load, refinement=plan.refinement) for name, load in loads.items()}
     criteria: dict[str, Criterion] = {}
-    for one in plan.keep:
-        load = one.load or next(iter(loads))
-        for entry in entries_of(one, load, paths[load], len(loads) > 1, "`keep`"):
-            if entry.name in criteria:
-                raise InputError.CONFLICT(f"`keep` has {entry.name} twice; keep it once.")
-            scale = entry.quantity.scale
-            criteria[entry.name] = dataclasses.replace(
-                entry, lower=entry.lower / scale, upper=entry.upper / scale
-            )
+    for number, one in enumerate(plan.keep, start=1):
+        with placed(f"`keep[{number}]`"):
+            for entry in limited_numbers(one.in_python, paths):
+                if entry.name in criteria:
+                    raise InputError.CONFLICT(f"{entry.name} is kept twice; keep it once.")
+                criteria[entry.name] = entry
     if not criteria:
         raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
     return SweepModel(
@@ -223,26 +209,6 @@ def _middle(robot: Robot, between: Mapping[str, tuple[float, float]]) -> Robot:
         raise type(problem)(message if invalid else str(problem), problem.code) from None
 
 
-def _check(kept: KeptQuantity, loads: list[str]) -> None:
-    """Check the names of a kept quantity."""
-    if kept.quantity not in LIMITED:
-        raise InputError.UNKNOWN_NAME(
-            f'`keep` names the quantity "{kept.quantity}"{nearest(kept.quantity, LIMITED)}; '
-            f"allowed: {', '.join(LIMITED)}."
-        )
-    per, what = REGISTERED[kept.quantity].per, f"`keep` of {kept.quantity}"
-    for key in INDICES:
-        if getattr(kept, key) is not None and key not in per:
-            has = f"one value per {' and '.join(per)}" if per else "a single value"
-            raise InputError.CONFLICT(f"{what} names one {key}, but there is {has}.")
-    allowed = f"allowed: {', '.join(loads)}"
-    if kept.load is None and len(loads) > 1:
-        raise InputError.MISSING_VALUE(f"{what} must name one of the loads; {allowed}.")
-    if kept.load is not None and kept.load not in loads:
-        near = nearest(kept.load, loads)
-        raise InputError.UNKNOWN_NAME(f'{what} names the load "{kept.load}"{near}; {allowed}.')
-
-
 def column_name(one: Criterion, named: bool) -> str:
     """Return the name of a column, such as `notch_angle_3_deg_at_pulled_step_2`.
 
@@ -250,10 +216,7 @@ def column_name(one: Criterion, named: bool) -> str:
         one: The kept number.
         named: Whether there are several loads.
     """
-    labels = [
-        AXES[number] if axis == "axis" else str(number + FIRST.get(axis, 1))
-        for axis, number in zip(one.quantity.per, one.index, strict=True)
-    ]
+    labels = entry_names(one.quantity.per, one.index)
     unit = one.quantity.unit.replace(" ", "")
     step = [f"step_{one.step + 1}"] if "step " in one.name else []
     return "_".join(
