@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from notchflex import InputError
-from notchflex.specification.reading import REFUSE, OldWords, known
+from notchflex.specification.reading import REFUSE, OldWords, coded, known
 from notchflex.support import QUANTITIES, Float, Int, ProblemError, part
 
 SHORT_NAMES = {"strain": "peak_strain", "angle": "total_angle", "force": "contact_force"}
@@ -59,6 +59,18 @@ class Between:
         """Least and greatest value, infinite where there is none."""
         low, high = self.lower, self.upper
         return -math.inf if low is None else low, math.inf if high is None else high
+
+    def words(self, unit: str, scale: float = 1.0) -> str:
+        """Return the limits in words, such as "at most 0.06".
+
+        Args:
+            unit: The unit that is written.
+            scale: Takes the limits to this unit.
+        """
+        low, high = (f"{end * scale:g} {unit}".rstrip() for end in self.ends)
+        if self.upper is None:
+            return f"at least {low}"
+        return f"at most {high}" if self.lower is None else f"{low.removesuffix(unit)}to {high}"
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -111,7 +123,7 @@ class Measured(OldWords):
     ] = None
 
 
-@part(kw_only=False, refuse=REFUSE)
+@part(kw_only=False, refuse=coded)
 class LimitedQuantity(Between, Measured):
     """Entries of a quantity at a step of a load, and their limits; the others as of `Measured`.
 
@@ -122,6 +134,12 @@ class LimitedQuantity(Between, Measured):
 
     _: KW_ONLY
     step: Annotated[Int | None, Field(ge=1, description="step of the load, from 1")] = None
+
+    @property
+    def text(self) -> str:
+        """Quantity and limits in words, in the unit of files; from the unit inside Python."""
+        quantity = QUANTITIES[self.quantity]
+        return f"{quantity.title} {self.words(quantity.unit, quantity.scale)}"
 
     @property
     def in_python(self) -> Self:

@@ -79,7 +79,7 @@ class WorkspaceTask:
             2 * LEVELS * min(_PIECE, number),
             robot=to_table(explorer.robot.replace(tolerance=None)),
             limits=[one.text for one in explorer.limits],
-            bounds=plain([[one.name, one.low, one.high] for one in explorer.limits]),
+            bounds=plain([[one.quantity, *one.ends] for one in explorer.limits]),
             load=plain(explorer.load),
             largest=plain(largest),
             pretension=pretension,

@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike
 from notchflex import InputError, LoadPath, Robot, Settings, closing, simulate_batch
 from notchflex.loads.load import NO_VECTOR
 from notchflex.pieces.sobol import SobolPart
+from notchflex.specification import LimitedQuantity
 from notchflex.support import ExternalLoad, short_repr
 from notchflex.workspaces.cloud import Workspace
-from notchflex.workspaces.limits import Limit, all_hold
+from notchflex.workspaces.limits import all_hold
 
 LEVELS = 16
 """Levels of tension on each way of a ray."""
@@ -46,7 +47,7 @@ class Explorer:
     """A robot whose rays are solved."""
 
     robot: Robot
-    limits: tuple[Limit, ...]
+    limits: tuple[LimitedQuantity, ...]
     load: ExternalLoad
     cores: int | None
 
@@ -54,7 +55,7 @@ class Explorer:
         """Solve rays as far as the limits allow."""
         if self.limits:
             tension = tension * self._allowed(tension)[:, None, None]
-        outputs = self._solve(tension, (*_KEPT, *(one.name for one in self.limits)))
+        outputs = self._solve(tension, (*_KEPT, *(one.quantity for one in self.limits)))
         keeps = all_hold(self.limits, outputs)
         # What follows a state beyond a limit has a history that the limit forbids.
         keeps = np.logical_and.accumulate(keeps, axis=1)
@@ -65,7 +66,7 @@ class Explorer:
         part = np.linspace(0.0, 1.0, _FIRST_LEVELS + 1)[1:]
         peak = tension[:, tension.shape[1] // 2]
         path = part[None, :, None] * peak[:, None]
-        hold = all_hold(self.limits, self._solve(path, [one.name for one in self.limits]))
+        hold = all_hold(self.limits, self._solve(path, [one.quantity for one in self.limits]))
         within = np.logical_and.accumulate(hold, axis=1).sum(axis=1)
         # Between the last level within and the first beyond: halved a few times, rays as a batch.
         low = np.concatenate([[0.0], part])[within]
@@ -73,7 +74,7 @@ class Explorer:
         for _ in range(5):
             middle = 0.5 * (low + high)
             steps = np.stack([low, middle], axis=1)[:, :, None] * peak[:, None]
-            names = [one.name for one in self.limits]
+            names = [one.quantity for one in self.limits]
             fits = all_hold(self.limits, self._solve(steps, names))[:, 1]
             low, high = np.where(fits, middle, low), np.where(fits, high, middle)
         return low
