@@ -17,10 +17,10 @@ EQUAL = {
     "name": "equal angles",
     "robot": "pacheco2021-a",
     "variable": [{"value": "notch.depth", "lower": 1.2, "upper": 1.5, "along": "each"}],
-    "state": [{"name": "pulled", "tension": TENSION}],
+    "load": {"pulled": {"tension": TENSION}},
     "constraint": [
-        {"quantity": "notch_angle", "state": "pulled", "take": "range", "equal": 0.0},
-        {"quantity": "total_angle", "state": "pulled", "equal": ANGLE},
+        {"quantity": "notch_angle", "load": "pulled", "take": "range", "equal": 0.0},
+        {"quantity": "total_angle", "load": "pulled", "equal": ANGLE},
     ],
     "search": {"starts": 3, "candidates": 32},
 }
@@ -67,7 +67,7 @@ def test_files(tmp_path):
 
 @pytest.mark.parametrize("name", ["total_angle", "bore"])
 def test_unknown_names_are_refused(name):
-    wish = {"quantity": f"{name}s", "state": "pulled", "equal": 1.0}
+    wish = {"quantity": f"{name}s", "load": "pulled", "equal": 1.0}
     with pytest.raises(nf.InputError) as caught:
         nf.design(EQUAL | {"constraint": [wish]})
     assert caught.value.code is nf.ErrorCode.UNKNOWN_NAME
@@ -82,7 +82,7 @@ def test_lengths_on_a_grid_are_evaluated_again(grid, along):
     """The numbers are those of the robot that a shop can make, not of the one beside it."""
     least = 152.0  # wrist A has 150 deg
     variable = EQUAL["variable"][0] | {"along": along}
-    limit = {"quantity": "total_angle", "state": "pulled", "lower": least}
+    limit = {"quantity": "total_angle", "load": "pulled", "lower": least}
     spec = EQUAL | {"variable": [variable], "constraint": [limit]}
     free, made = nf.design(spec), nf.design(spec, grid=grid)
     depths = [one.depth for one in made.robot.notches]

@@ -12,7 +12,7 @@ from notchflex.specification.entries import (
     load_named,
 )
 from notchflex.specification.loads import LOAD_KEYS, LoadTables, read_load
-from notchflex.specification.reading import REFUSE, OldWords, coded, known, made, placed
+from notchflex.specification.reading import OldWords, coded, known, made, placed, record
 from notchflex.specification.records import (
     Between,
     LimitedQuantity,
@@ -25,7 +25,6 @@ from notchflex.specification.records import (
 
 __all__ = [
     "LOAD_KEYS",
-    "REFUSE",
     "Between",
     "Criterion",
     "LimitedQuantity",
@@ -45,4 +44,5 @@ __all__ = [
     "made",
     "placed",
     "read_load",
+    "record",
 ]

@@ -27,9 +27,7 @@ _VECTORS = ("tip_force", "tip_moment", "tip_point", "gravity")
 LOAD_KEYS = (*_DRIVES, "base_rotation", *_VECTORS, "tip_mass", "body_force", "following")
 """Keys of a load in a file."""
 
-LoadTables = Annotated[
-    dict[str, dict[str, Any]], Field(min_length=1, max_length=100, description="loads by name")
-]
+LoadTables = Annotated[dict[str, dict[str, Any]], Field(min_length=1, max_length=100)]
 
 
 def read_load(table: Mapping[str, Any], name: str, robot: Robot) -> LoadPath:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import sys
 import warnings
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 from pydantic_core import ArgsKwargs
 
 from notchflex import ErrorCode, InputError
-from notchflex.support import nearest, validated
+from notchflex.support import nearest, part, validated
 
 Record = TypeVar("Record")
 
@@ -35,6 +36,34 @@ _CODES = {
     "less_than_equal": ErrorCode.OUT_OF_RANGE,
 }
 """Codes of what pydantic refuses; of anything else WRONG_TYPE."""
+
+
+_DESCRIBED = re.compile(r"^    (\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(Field,))
+def record(
+    *, kw_only: bool = True, refuse: Callable[[str], InputError] = REFUSE
+) -> Callable[[type[Record]], type[Record]]:
+    """Make a class a checked record, as `part` does; its docstring describes the fields.
+
+    Messages and the schema take the first sentence of each.
+
+    Args:
+        kw_only: Whether its fields are keyword arguments only.
+        refuse: Makes the error of a message, with its code.
+    """
+
+    def decorate(cls: type[Record]) -> type[Record]:
+        hints = get_type_hints(cls, include_extras=True)
+        for name, text in _DESCRIBED.findall(inspect.getdoc(cls) or ""):
+            if name in cls.__annotations__:
+                sentence = " ".join(text.removeprefix("The ").split()).rstrip(".").split(". ")[0]
+                described = Field(description=sentence[0].lower() + sentence[1:])
+                cls.__annotations__[name] = Annotated[hints[name], described]
+        return part(kw_only=kw_only, refuse=refuse)(cls)
+
+    return decorate
 
 
 class OldWords:

@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from notchflex import InputError
-from notchflex.specification.reading import REFUSE, OldWords, coded, known
-from notchflex.support import QUANTITIES, Float, Int, ProblemError, part
+from notchflex.specification.reading import OldWords, coded, known, record
+from notchflex.support import QUANTITIES, Float, Int, ProblemError
 
 SHORT_NAMES = {"strain": "peak_strain", "angle": "total_angle", "force": "contact_force"}
 """Short names of quantities that often have limits."""
@@ -42,7 +42,7 @@ FromOne = Annotated[tuple[Annotated[Int, Field(ge=1)], ...], BeforeValidator(as_
 QuantityName = Annotated[str, BeforeValidator(lambda name: SHORT_NAMES.get(str(name), name))]
 
 
-@part(kw_only=True, refuse=REFUSE)
+@record()
 class Between:
     """Limits.
 
@@ -51,8 +51,8 @@ class Between:
         upper: The greatest value.
     """
 
-    lower: Annotated[Float | None, Field(description="least value")] = None
-    upper: Annotated[Float | None, Field(description="greatest value")] = None
+    lower: Float | None = None
+    upper: Float | None = None
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -67,10 +67,12 @@ class Between:
             unit: The unit that is written.
             scale: Takes the limits to this unit.
         """
-        low, high = (f"{end * scale:g} {unit}".rstrip() for end in self.ends)
-        if self.upper is None:
-            return f"at least {low}"
-        return f"at most {high}" if self.lower is None else f"{low.removesuffix(unit)}to {high}"
+        low, high = (f"{end * scale:g}" for end in self.ends)
+        if self.lower is None or self.upper is None:
+            words = f"at most {high}" if self.lower is None else f"at least {low}"
+        else:
+            words = f"{low} to {high}"
+        return f"{words} {unit}".rstrip()
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -81,7 +83,7 @@ class Between:
         return self
 
 
-@part(kw_only=False, refuse=REFUSE)
+@record(kw_only=False)
 class Varied(Between):
     """A number of the robot file or of a load, with its limits in the unit of the file.
 
@@ -89,10 +91,10 @@ class Varied(Between):
         value: Path of the robot file, such as `notch.depth`.
     """
 
-    value: Annotated[str, Field(min_length=1, description="path of the robot file")]
+    value: Annotated[str, Field(min_length=1)]
 
 
-@part(kw_only=False, refuse=REFUSE)
+@record(kw_only=False)
 class Measured(OldWords):
     """Entries of a quantity under a load; all of them where none is chosen.
 
@@ -107,23 +109,18 @@ class Measured(OldWords):
         axis: Only this coordinate.
     """
 
-    quantity: Annotated[QuantityName, Field(description="name of a quantity")]
+    quantity: QuantityName
     _: KW_ONLY
-    load: Annotated[str | None, Field(description="name of a load")] = None
-    notch: Annotated[FromOne | None, Field(description="only these notches, from 1")] = None
-    tendon: Annotated[FromOne | None, Field(description="only these tendons, from 1")] = None
-    body: Annotated[
-        Annotated[tuple[Annotated[Int, Field(ge=0)], ...], BeforeValidator(as_list)] | None,
-        Field(description="only these bodies, 0 for the base"),
-    ] = None
-    span: Annotated[FromOne | None, Field(description="only these spans, from 1")] = None
-    contact: Annotated[FromOne | None, Field(description="only these contacts, from 1")] = None
-    axis: Annotated[
-        Literal["x", "y", "z"] | None, Field(description='only this coordinate: "x", "y" or "z"')
-    ] = None
+    load: str | None = None
+    notch: FromOne | None = None
+    tendon: FromOne | None = None
+    body: Annotated[tuple[Annotated[Int, Field(ge=0)], ...], BeforeValidator(as_list)] | None = None
+    span: FromOne | None = None
+    contact: FromOne | None = None
+    axis: Literal["x", "y", "z"] | None = None
 
 
-@part(kw_only=False, refuse=coded)
+@record(kw_only=False, refuse=coded)
 class LimitedQuantity(Between, Measured):
     """Entries of a quantity at a step of a load, and their limits; the others as of `Measured`.
 
@@ -133,7 +130,7 @@ class LimitedQuantity(Between, Measured):
     """
 
     _: KW_ONLY
-    step: Annotated[Int | None, Field(ge=1, description="step of the load, from 1")] = None
+    step: Annotated[Int | None, Field(ge=1)] = None
 
     @property
     def text(self) -> str:

@@ -14,17 +14,16 @@ from pydantic import Field, TypeAdapter, model_validator
 from notchflex import Robot
 from notchflex.specification import (
     LOAD_KEYS,
-    REFUSE,
     LimitedQuantity,
     LoadTables,
     Varied,
     made,
+    record,
 )
 from notchflex.support import (
     Float,
     Int,
     ProblemError,
-    part,
     read_specification,
     robot_named,
     schema_of,
@@ -38,7 +37,7 @@ _MAX_POINTS = 10**11
 """Points at most: the way to the last one of a Sobol sequence takes minutes."""
 
 
-@part(kw_only=True, refuse=REFUSE)
+@record()
 class SweepVariable(Varied):
     """A number of the robot file that is varied.
 
@@ -56,14 +55,10 @@ class SweepVariable(Varied):
 
     values: Annotated[
         tuple[Float, ...] | None,
-        Field(min_length=1, max_length=_MAX_VALUES, description="list of values"),
+        Field(min_length=1, max_length=_MAX_VALUES),
     ] = None
-    count: Annotated[
-        Int | None, Field(ge=2, le=_MAX_VALUES, description="number of values of a grid")
-    ] = None
-    spacing: Annotated[
-        Literal["linear", "log"], Field(description='"linear", or "log" for equal ratios')
-    ] = "linear"
+    count: Annotated[Int | None, Field(ge=2, le=_MAX_VALUES)] = None
+    spacing: Literal["linear", "log"] = "linear"
 
     @property
     def is_sampled(self) -> bool:
@@ -93,7 +88,7 @@ class SweepVariable(Varied):
         return self
 
 
-@part(kw_only=True, refuse=REFUSE)
+@record()
 class Sampling:
     """Sampling of variables without `count` or `values`.
 
@@ -103,14 +98,12 @@ class Sampling:
         seed: The same seed samples the same points.
     """
 
-    method: Annotated[
-        Literal["sobol", "latin-hypercube"], Field(description='"sobol" or "latin-hypercube"')
-    ] = "sobol"
-    points: Annotated[Int, Field(ge=1, le=_MAX_POINTS, description="number of points")]
-    seed: Annotated[Int, Field(ge=0, le=2**63 - 1, description="seed of the points")] = 0
+    method: Literal["sobol", "latin-hypercube"] = "sobol"
+    points: Annotated[Int, Field(ge=1, le=_MAX_POINTS)]
+    seed: Annotated[Int, Field(ge=0, le=2**63 - 1)] = 0
 
 
-@part(kw_only=True, refuse=REFUSE)
+@record()
 class SweepOutput:
     """Selection of what is written to files.
 
@@ -123,21 +116,17 @@ class SweepOutput:
         quantiles: Quantiles of every kept quantity, between 0 and 1.
     """
 
-    rows: Annotated[bool, Field(strict=True, description="whether all rows are kept")] = True
-    extremes: Annotated[
-        Int, Field(ge=0, le=10_000, description="rows with the smallest and largest values")
-    ] = 10
-    failures: Annotated[
-        Int, Field(ge=0, le=1_000_000, description="first rows without a result")
-    ] = 100
-    bins: Annotated[Int, Field(ge=0, le=1000, description="bins of histograms")] = 50
+    rows: Annotated[bool, Field(strict=True)] = True
+    extremes: Annotated[Int, Field(ge=0, le=10_000)] = 10
+    failures: Annotated[Int, Field(ge=0, le=1_000_000)] = 100
+    bins: Annotated[Int, Field(ge=0, le=1000)] = 50
     quantiles: Annotated[
         tuple[Annotated[Float, Field(ge=0.0, le=1.0)], ...],
-        Field(max_length=1000, description="quantiles, between 0 and 1"),
+        Field(max_length=1000),
     ] = (0.025, 0.25, 0.5, 0.75, 0.975)
 
 
-@part(refuse=REFUSE, kw_only=True)
+@record()
 class SweepPlan:
     """Plan of a sweep.
 
@@ -155,26 +144,18 @@ class SweepPlan:
     """
 
     _: KW_ONLY
-    robot: Annotated[str, Field(min_length=1, description="ready robot, or robot file")]
-    name: Annotated[str, Field(min_length=1, max_length=200, description="name of the sweep")] = (
-        "sweep"
-    )
-    refinement: Annotated[Int, Field(ge=0, le=3, description="more strain modes and fibres")] = 0
-    piece: Annotated[
-        Int | None, Field(ge=16, le=2**22, description="rows of a piece, which is one file")
-    ] = None
-    variable: Annotated[
-        tuple[SweepVariable, ...], Field(min_length=1, max_length=500, description="what is varied")
-    ]
-    sampling: Annotated[
-        Sampling | None, Field(description="how variables without count or values are sampled")
-    ] = None
+    robot: Annotated[str, Field(min_length=1)]
+    name: Annotated[str, Field(min_length=1, max_length=200)] = "sweep"
+    refinement: Annotated[Int, Field(ge=0, le=3)] = 0
+    piece: Annotated[Int | None, Field(ge=16, le=2**22)] = None
+    variable: Annotated[tuple[SweepVariable, ...], Field(min_length=1, max_length=500)]
+    sampling: Sampling | None = None
     load: LoadTables
     keep: Annotated[
         tuple[LimitedQuantity, ...],
-        Field(min_length=1, max_length=500, description="quantities that are kept"),
+        Field(min_length=1, max_length=500),
     ]
-    output: Annotated[SweepOutput, Field(description="what goes into files")] = SweepOutput()
+    output: SweepOutput = SweepOutput()
 
     @property
     def grid(self) -> tuple[SweepVariable, ...]:

@@ -22,11 +22,12 @@ from notchflex.specification import (
     made,
     placed,
     read_load,
+    record,
 )
-from notchflex.support import QUANTITIES, Float, part, read_specification
+from notchflex.support import QUANTITIES, Float, read_specification
 
 
-@part(kw_only=False, refuse=coded)
+@record(kw_only=False, refuse=coded)
 class AcceptanceLimit(LimitedQuantity):
     """Between what a quantity of a robot that is accepted must lie.
 
@@ -62,15 +63,13 @@ class AcceptanceLimit(LimitedQuantity):
 _Limits = Annotated[
     tuple[AcceptanceLimit, ...],
     BeforeValidator(as_list),
-    Field(min_length=1, description="acceptance limits"),
+    Field(min_length=1),
 ]
-_Tolerances = Annotated[Mapping[str, Any] | None, Field(description="tolerances of values")]
-_Yield = Annotated[
-    Float | None, Field(gt=0.0, lt=1.0, description="part of all robots that should be accepted")
-]
+_Tolerances = Mapping[str, Any] | None
+_Yield = Annotated[Float | None, Field(gt=0.0, lt=1.0)]
 
 
-@part(kw_only=False, refuse=coded)
+@record(kw_only=False, refuse=coded)
 class ToleranceSpec:
     """Loads, acceptance limits and tolerances of a robot that is made many times.
 
@@ -90,7 +89,7 @@ class ToleranceSpec:
     """
 
     limits: _Limits
-    loads: Annotated[Mapping[str, Any], Field(min_length=1, description="loads by name")]
+    loads: Annotated[Mapping[str, Any], Field(min_length=1)]
     tolerances: _Tolerances = None
     wanted_yield: _Yield = None
 
@@ -102,7 +101,7 @@ class ToleranceSpec:
         return self
 
 
-@part(kw_only=True, refuse=coded)
+@record(refuse=coded)
 class ToleranceFile(OldWords):
     """What a file of tolerances holds, in mm, N, MPa and deg.
 
