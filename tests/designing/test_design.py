@@ -73,6 +73,19 @@ def test_unknown_names_are_refused(name):
     assert caught.value.code is nf.ErrorCode.UNKNOWN_NAME
 
 
+def test_a_tension_may_be_a_variable():
+    """Wrist A as it is bends to 60 deg under one tension; its steps do not matter."""
+    wish = {"quantity": "angle", "load": "pulled", "equal": 60.0}
+    variable = {"value": "load.pulled.tension", "lower": 0.2, "upper": 2.0}
+    load = {"rest": {"tension": 0.1}, "pulled": {"tension": 1.0, "after": "rest", "steps": 2}}
+    spec = {"robot": "pacheco2021-a", "variable": [variable], "load": load, "constraint": [wish]}
+    made = nf.design(spec | {"search": {"starts": 1}})
+    assert made.converged, made.reason
+    assert made.wishes[0].title == "total_angle at pulled"
+    bent = nf.solve(made.robot, nf.Load(tension=made.variables[0].value)).total_angle
+    assert np.degrees(bent) == pytest.approx(60.0, rel=1e-6)  # of the search
+
+
 def on_grid(values, grid):
     return np.abs(np.asarray(values) / grid - np.round(np.asarray(values) / grid)).max() < 1e-9
 

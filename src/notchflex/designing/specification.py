@@ -187,6 +187,11 @@ class DesignVariable(Varied):
     along: Literal["all", "each", "polynomial"] = "all"
     degree: Annotated[Int | None, Field(ge=1, le=6)] = None
 
+    @property
+    def is_load(self) -> bool:
+        """Whether it is a number of a load; `state` is the old word."""
+        return self.value.startswith(("load.", "state."))
+
     @model_validator(mode="after")
     def _of_a_polynomial(self) -> DesignVariable:
         if self.degree is not None and self.along != "polynomial":

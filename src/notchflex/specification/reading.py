@@ -29,13 +29,8 @@ _CODES = {
     "unexpected_keyword_argument": ErrorCode.UNKNOWN_NAME,
     "literal_error": ErrorCode.UNKNOWN_NAME,
     "finite_number": ErrorCode.NOT_FINITE,
-    "value_error": ErrorCode.OUT_OF_RANGE,
-    "greater_than": ErrorCode.OUT_OF_RANGE,
-    "greater_than_equal": ErrorCode.OUT_OF_RANGE,
-    "less_than": ErrorCode.OUT_OF_RANGE,
-    "less_than_equal": ErrorCode.OUT_OF_RANGE,
 }
-"""Codes of what pydantic refuses; of anything else WRONG_TYPE."""
+"""Codes of what pydantic refuses; else WRONG_TYPE of a type, and OUT_OF_RANGE."""
 
 
 _DESCRIBED = re.compile(r"^    (\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)
@@ -102,7 +97,9 @@ def coded(text: str) -> InputError:
     first = error.errors(include_url=False)[0]
     cause = first.get("ctx", {}).get("error")
     if not isinstance(cause, InputError):
-        return InputError(text, _CODES.get(first["type"], ErrorCode.WRONG_TYPE))
+        is_type = first["type"].endswith(("_type", "_wanted"))
+        other = ErrorCode.WRONG_TYPE if is_type else ErrorCode.OUT_OF_RANGE
+        return InputError(text, _CODES.get(first["type"], other))
     place = "".join(f"[{key + 1}]" if isinstance(key, int) else key for key in first["loc"])
     return InputError(f"`{place}`: {cause}" if place else str(cause), cause.code)
 

@@ -19,7 +19,6 @@ from notchflex.designing.specification import DesignState, DesignVariable
 from notchflex.specification import known, placed
 from notchflex.support import ExternalLoad, Tolerance, described_at, numbers_at
 
-_LOADS = ("load.", "state.")  # the second is the old word
 _LOAD = re.compile(r"(?:load|state)\.([\w-]+)\.(tension|stroke)(?:\[([1-9]\d{0,3})\])?")
 _UNITS = {"tension": "N", "stroke": "mm"}
 
@@ -165,8 +164,6 @@ class Variables:
         return {one.load: number for one, number in pairs if one.load is not None}
 
 
-# A tension or stroke beyond is in another unit, N and mm.
-_MOST = 1e6
 # Limits beyond this factor of the value of the robot are in another unit.
 _OTHER_UNIT = 100.0
 
@@ -183,9 +180,11 @@ def variables_of(
     chosen_by: dict[str, int] = {}
     for number, variable in enumerate(variables, start=1):
         with placed(f"`variable[{number}]`"):
-            is_load = variable.value.startswith(_LOADS)
-            added = [_load(robot, variable, states)] if is_load else _columns(robot, variable)
-            for path in [variable.value] if is_load else numbers_at(robot, variable.value):
+            if variable.is_load:
+                added, paths = [_load(variable, states)], [variable.value]
+            else:
+                added, paths = _columns(robot, variable), numbers_at(robot, variable.value)
+            for path in paths:
                 if path in chosen_by:
                     raise InputError.CONFLICT(
                         f"`{path}` is already chosen by `variable[{chosen_by[path]}]`; leave one "
@@ -233,27 +232,24 @@ def _columns(robot: Robot, variable: DesignVariable) -> list[Column]:
     return columns
 
 
-def _load(robot: Robot, variable: DesignVariable, states: Mapping[str, DesignState]) -> Column:
+def _load(variable: DesignVariable, states: Mapping[str, DesignState]) -> Column:
     match = _LOAD.fullmatch(variable.value)
     if match is None:
         raise InputError.UNKNOWN_NAME(
-            f"`{variable.value}` is not the name of a number of a load; write it like "
-            "load.NAME.tension, or load.NAME.stroke[2] for the second tendon."
+            f"`{variable.value}` is no number of a load; write load.NAME.tension, or "
+            "load.NAME.stroke[2] for the second tendon."
         )
     name, kind, tendon = match[1], match[2], int(match[3] or 1)
     known(name, states, "load")
     number = LoadNumber(name, kind, tendon - 1)
     if not isfinite(number.commanded(states)):
         raise InputError.MISSING_VALUE(
-            f"`{variable.value}`: the load gives no {kind} of tendon {tendon} to begin with; give "
-            "one."
+            f"the load {name} gives no {kind} of tendon {tendon} to begin with; give one."
         )
     if kind == "tension" and variable.lower < 0.0:
         raise InputError.OUT_OF_RANGE(
             f"`lower` is {variable.lower:g} N; a tendon only pulls, so give 0 N or more."
         )
-    if tendon > robot.number_of_tendons:
-        raise InputError.OUT_OF_RANGE(f"the robot has {robot.number_of_tendons} tendons.")
     return Column(variable.value, _UNITS[kind], variable.lower, variable.upper, {}, number)
 
 
@@ -365,22 +361,23 @@ class StatePaths:
         external: list[ExternalLoad] = []
         for piece in self.pieces:
             before = np.zeros((2, self.tendons))
-            load = ExternalLoad()
-            for one in piece:
-                if isinstance(one, Probe):
-                    force = np.array(load.tip_force) + one.side * PROBE * np.array(one.direction)
+            for part in piece:
+                if isinstance(part, Probe):
+                    state, force = (
+                        self.states[part.state],
+                        part.side * PROBE * np.array(part.direction),
+                    )
                     commands.append(before[None])
-                    external.append(_external(self.states[one.state], tuple(force.tolist())))
+                    external.append(_external(state, force))
                     continue
-                state = self.states[one]
+                state = self.states[part]
                 after = self._commanded(state, numbers)
                 # A slack tendon is pulled from 0 N; what changes from stroke to tension jumps.
                 slack = np.isnan(before).all(axis=0) & np.array([[True], [False]])
                 first = np.where(slack, 0.0, np.where(np.isnan(before), after, before))
-                part = np.arange(1, state.steps + 1) / state.steps
-                commands.append(first + part[:, None, None] * (after - first))
-                load = _external(state, state.tip_force)
-                external += [load] * state.steps
+                done = np.arange(1, state.steps + 1)[:, None, None] / state.steps
+                commands.append(first + done * (after - first))
+                external += [_external(state)] * state.steps
                 before = after
         tension, stroke = np.concatenate(commands).swapaxes(0, 1)
         return LoadPath(tension, stroke, external=tuple(external))
@@ -392,6 +389,10 @@ class StatePaths:
         table = np.full((2, self.tendons), np.nan)
         for row, kind in enumerate(("tension", "stroke")):
             given = getattr(state, kind) or ()
+            if len(given) > self.tendons:
+                raise InputError.WRONG_SHAPE(
+                    f"it gives a {kind} of {len(given)} tendons, but the robot has {self.tendons}."
+                )
             table[row, : len(given)] = given
         for one, value in numbers.items():
             if one.state == state.name:
@@ -399,10 +400,10 @@ class StatePaths:
         return table
 
 
-def _external(state: DesignState, force: Sequence[float]) -> ExternalLoad:
-    return ExternalLoad(
-        tip_force=tuple(force), tip_moment=state.tip_moment, tip_mass=state.tip_mass
-    )
+def _external(state: DesignState, more: float | np.ndarray = 0.0) -> ExternalLoad:
+    """Return the external loads of a state, with more force at the tip."""
+    force = tuple((np.array(state.tip_force) + more).tolist())
+    return ExternalLoad(tip_force=force, tip_moment=state.tip_moment, tip_mass=state.tip_mass)
 
 
 def state_paths(
@@ -436,11 +437,10 @@ def state_paths(
 
 
 def check_states(states: Sequence[DesignState], tendons: int) -> None:
-    """Raise if loads contradict each other or the robot.
+    """Raise if loads contradict each other or the robot, or no path can have them.
 
     Raises:
-        InputError: Two loads of one name, an unknown load before another, a circle, no load, or
-            a load of a tendon that is not there.
+        InputError: It is so.
     """
     table = {one.name: one for one in states}
     for state in states:
@@ -448,17 +448,7 @@ def check_states(states: Sequence[DesignState], tendons: int) -> None:
             if table[state.name] is not state:
                 raise InputError.CONFLICT("another load has this name; rename one of them.")
             history(table, state.name)
-            for kind in ("tension", "stroke"):
-                values = getattr(state, kind) or ()
-                if len(values) > tendons:
-                    raise InputError.WRONG_SHAPE(
-                        f"it gives a {kind} of {len(values)} tendons, but the robot has {tendons}."
-                    )
-                if any(abs(value) > _MOST for value in values):
-                    raise InputError.OUT_OF_RANGE(f"it has a {kind} beyond 1e6; give N and mm.")
-            if any(value < 0.0 for value in state.tension or ()):
-                raise InputError.OUT_OF_RANGE("it has a tension below 0 N; a tendon only pulls.")
-            StatePaths({state.name: state}, tendons, ((state.name,),)).path({})  # raises for both
+            StatePaths({state.name: state}, tendons, ((state.name,),)).path({})
 
 
 def history(states: Mapping[str, DesignState], name: str) -> tuple[str, ...]:
