@@ -94,7 +94,7 @@ def _check_stock(spec: DesignSpec, robot: Robot) -> None:
                     raise InputError.CONFLICT(f"`stock[{number}]`: `{path}` is given twice.")
                 seen[one] = number
     for number, variable in enumerate(spec.variable, start=1):
-        if variable.value.startswith("state."):
+        if variable.is_load:
             continue
         try:
             both = [one for one in numbers_at(robot, variable.value) if one in seen]

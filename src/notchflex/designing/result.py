@@ -196,11 +196,7 @@ def asked_in_words(wish: Wish) -> str:
     if asked.equal is not None:
         return f"{asked.equal:g}{unit}"
     of = "" if asked.wanted_yield is None else f" for {100.0 * asked.wanted_yield:g} % of robots"
-    if asked.lower is not None and asked.upper is not None:
-        return f"{asked.lower:g} to {asked.upper:g}{unit}{of}"
-    if asked.lower is not None:
-        return f"at least {asked.lower:g}{unit}{of}"
-    return f"at most {asked.upper:g}{unit}{of}"
+    return f"{asked.words(wish.unit)}{of}"
 
 
 def design_document(made: Design) -> dict[str, Any]:

@@ -32,8 +32,8 @@ def tolerance(
             metavar="TOLERANCES.toml",
             help="A TOML file, which `notchflex new NAME --tolerance` writes: `[load.NAME]` (the "
             "options of `simulate` as keys), `[[accept]]` (`quantity`, `lower`, `upper`), and if "
-            "wanted `[tolerance]`, as in a robot file, and `wanted` in `[yield]`. Without "
-            "`[tolerance]` those of the robot hold.",
+            "wanted `[tolerance]`, as in a robot file, and `wanted_yield`. Without `[tolerance]` "
+            "those of the robot hold.",
         ),
     ],
     /,
