@@ -109,7 +109,7 @@ def _range(part: str) -> list[float]:
     if len(rest) != 2:
         raise InputError.BAD_SYNTAX(f"{part!r} is not start:stop:count; give {SPEC}.")
     first, last = parse_number(start, SPEC), parse_number(rest[0], SPEC)
-    count = parse_whole(1, MOST_STEPS, f"the count of {part!r}, ")(rest[1].strip())
+    count = parse_whole(1, MOST_STEPS, f"as the count of {part!r} ")(rest[1].strip())
     if count == 1 and first != last:
         raise InputError.OUT_OF_RANGE(
             f"a range of 1 step cannot go from {first:g} to {last:g}; give a count of 2 or more."
@@ -212,5 +212,5 @@ def read_body_force(text: str) -> BodyForceOption:
     if match is None:
         raise InputError.BAD_SYNTAX(f"give {_BODY}.")
     body, force, point = match.groups()
-    where = None if point is None else parse_vector("coordinates in mm after @")(point)
-    return BodyForceOption(int(body), parse_vector("forces in N after BODY:")(force), where)
+    where = None if point is None else parse_vector("coordinates in mm")(point)
+    return BodyForceOption(int(body), parse_vector("forces in N")(force), where)

@@ -136,8 +136,8 @@ class TargetCurve(OldWords):
     """A curve in the frame of the base that the tube axis must follow under a load.
 
     Args:
-        name: `curve.NAME` is the quantity: distance of every point from the axis, mm; the last
-            point is that of the tip.
+        name: Name of the curve; `curve.NAME` is the quantity: distance of every point from the
+            axis, mm; the last point is that of the tip.
         load: The load.
         points: Points, three numbers each, mm.
         curvature: Instead of points: pairs of arc length (mm, rising from 0) and curvature (1/mm,
@@ -206,7 +206,7 @@ class Stock:
 
     Args:
         values: Paths of the robot file.
-        sizes: A list of sizes, each with one number for every path.
+        sizes: List of sizes, each with one number for every path.
     """
 
     values: Annotated[tuple[str, ...], Field(min_length=1, max_length=20)]
@@ -229,7 +229,7 @@ class DesignState:
     """A load under which quantities of the robot are asked.
 
     Args:
-        name: What objectives and constraints call it.
+        name: Name by which objectives and constraints call it.
         tension: Tension of the first tendon, or of each, N; `nan` where not commanded.
         stroke: Stroke of the first tendon, or of each, mm; `nan` where not commanded.
         after: The load that comes before, with its friction; from rest where not given.
@@ -303,7 +303,7 @@ class DesignSpec(OldWords):
         number_of_notches: Numbers of equal notches to try; as in the robot where not given.
         variable: The variables.
         stock: Sizes that can be bought.
-        load: By name, the loads.
+        load: Loads by name.
         objective: The objectives; none means the smallest change of the robot.
         constraint: The constraints.
         curve: The curves to be followed.

@@ -42,7 +42,7 @@ def record(
 ) -> Callable[[type[Record]], type[Record]]:
     """Make a class a checked record, as `part` does; its docstring describes the fields.
 
-    Messages and the schema take the first sentence of each.
+    Messages and the schema take the first clause of each, up to a full stop or semicolon: a noun.
 
     Args:
         kw_only: Whether its fields are keyword arguments only.
@@ -53,8 +53,9 @@ def record(
         hints = get_type_hints(cls, include_extras=True)
         for name, text in _DESCRIBED.findall(inspect.getdoc(cls) or ""):
             if name in cls.__annotations__:
-                sentence = " ".join(text.removeprefix("The ").split()).rstrip(".").split(". ")[0]
-                described = Field(description=sentence[0].lower() + sentence[1:])
+                words = " ".join(text.removeprefix("The ").split())
+                clause = re.split(r"[.;] |\.$", words)[0]
+                described = Field(description=clause[0].lower() + clause[1:])
                 cls.__annotations__[name] = Annotated[hints[name], described]
         return part(kw_only=kw_only, refuse=refuse)(cls)
 

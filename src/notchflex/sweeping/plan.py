@@ -137,7 +137,7 @@ class SweepPlan:
         piece: Rows of a piece, which is one file; chosen where not given.
         variable: What is varied.
         sampling: How variables without `count` or `values` are sampled.
-        load: By name, the loads; the keys are the options of `notchflex simulate`.
+        load: Loads by name; the keys are the options of `notchflex simulate`.
         keep: The quantities that are kept, and within which limits a robot is accepted, in mm, N,
             MPa and deg.
         output: What of all rows goes into files.

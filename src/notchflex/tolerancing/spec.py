@@ -75,7 +75,7 @@ class ToleranceSpec:
 
     Args:
         limits: What a robot must meet to be accepted, all of it.
-        loads: By name, as for `simulate`; each is followed from rest.
+        loads: Loads by name, as for `simulate`; each is followed from rest.
         tolerances: As in the `[tolerance]` table of a robot file, and nothing else. None takes the
             table of the robot, and assumes the rest, as `uncertain` does.
         wanted_yield: The part of all robots that should be accepted, between 0 and 1; None where
@@ -106,7 +106,7 @@ class ToleranceFile(OldWords):
     """What a file of tolerances holds, in mm, N, MPa and deg.
 
     Args:
-        load: By name, the loads; the keys are the options of `notchflex simulate`.
+        load: Loads by name; the keys are the options of `notchflex simulate`.
         accept: What a robot must meet to be accepted.
         tolerance: As in a robot file; those of the robot where not given.
         wanted_yield: The part of all robots that should be accepted.
