@@ -209,11 +209,11 @@ def links() -> None:
         "variable": [
             {"value": "notch.strip_thickness", "lower": 0.5, "upper": 0.9, "along": "each"}
         ],
-        "state": [{"name": "pulled", "tension": 8.0}],
+        "load": {"pulled": {"tension": 8.0}},
         "objective": [
-            {"quantity": "peak_strain", "state": "pulled", "take": "largest", "goal": "minimise"}
+            {"quantity": "peak_strain", "load": "pulled", "take": "largest", "goal": "minimise"}
         ],
-        "constraint": [{"quantity": "total_angle", "state": "pulled", "equal": 60.0}],
+        "constraint": [{"quantity": "total_angle", "load": "pulled", "equal": 60.0}],
         "search": {"starts": 1},
     }
     for _ in range(2):  # the first compiles

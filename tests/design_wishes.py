@@ -27,13 +27,13 @@ def tip_first(along: str = "polynomial") -> dict[str, Any]:
             {"value": "notch.height", "lower": 0.4, "upper": 1.5},
             {"value": "tendon.radius", "lower": 0.7, "upper": 1.1},
         ],
-        "state": [{"name": "closed", "tension": 1.65}],
+        "load": {"closed": {"tension": 1.65}},
         "objective": [{"quantity": "notch.height", "goal": "minimise"}],
         "constraint": [
             {"quantity": "closing_tension", "order": "tip-first", "margin": 0.02},
             {"quantity": "closing_tension", "lower": 1.4, "upper": 1.6},
-            {"quantity": "outer_strain", "state": "closed", "upper": 0.06},
-            {"quantity": "total_angle", "state": "closed", "lower": 90.0},
+            {"quantity": "outer_strain", "load": "closed", "upper": 0.06},
+            {"quantity": "total_angle", "load": "closed", "lower": 90.0},
         ],
         "search": {"starts": 3, "candidates": 32},
     }
@@ -54,10 +54,10 @@ def bend() -> dict[str, Any]:
             {"value": "notch.depth", "lower": 1.2, "upper": 1.45, "along": "each"},
             {"value": "notch.uncut_length", "lower": 0.3, "upper": 2.5},
             {"value": "notch.height", "lower": 0.3, "upper": 1.2},
-            {"value": "state.bent.tension", "lower": 0.3, "upper": 2.5},
+            {"value": "load.bent.tension", "lower": 0.3, "upper": 2.5},
         ],
-        "state": [{"name": "bent", "tension": 1.2}],
-        "curve": [{"name": "bend", "state": "bent", "points": points}],
+        "load": {"bent": {"tension": 1.2}},
+        "curve": [{"name": "bend", "load": "bent", "points": points}],
         "search": {"starts": 2, "candidates": 16},
     }
 
@@ -79,10 +79,10 @@ def s_curve() -> dict[str, Any]:
     spec["variable"] = [
         {"value": "notch.depth", "lower": 1.2, "upper": 1.45, "along": "each"},
         {"value": "notch.uncut_length", "lower": 0.3, "upper": 2.5},
-        {"value": "state.bent.tension[1]", "lower": 0.0, "upper": 2.5},
-        {"value": "state.bent.tension[2]", "lower": 0.0, "upper": 2.5},
+        {"value": "load.bent.tension[1]", "lower": 0.0, "upper": 2.5},
+        {"value": "load.bent.tension[2]", "lower": 0.0, "upper": 2.5},
     ]
-    spec["state"] = [{"name": "bent", "tension": [1.0, 0.6]}]
+    spec["load"] = {"bent": {"tension": [1.0, 0.6]}}
     curvature = [[0.0, 0.12], [6.0, 0.12], [7.5, -0.12], [14.0, -0.12]]
-    spec["curve"] = [{"name": "S", "state": "bent", "curvature": curvature}]
+    spec["curve"] = [{"name": "S", "load": "bent", "curvature": curvature}]
     return spec

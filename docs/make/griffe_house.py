@@ -1,6 +1,6 @@
 """How griffe, which reads the sources for the Python reference, is to take what is ours.
 
-A class under `@part` (notchflex.robot) is a dataclass whose annotations carry units and limits; the
+A class under `@part` (notchflex.robot) or `@record` (notchflex.specification) is a dataclass whose annotations carry units and limits; the
 reference shows its plain types. A section `Example:` of a docstring is one that is executed. A
 public function may have the name of the module that it stands in; the reference shows the function.
 """
@@ -15,6 +15,8 @@ import griffe
 from notchflex.results.quantities import QUANTITIES
 
 _DATACLASS = griffe.ExprName("dataclasses.dataclass", None)
+_KEYWORDS = (griffe.ExprKeyword("kw_only", "True"),)
+"""What `@record` means unless it says otherwise."""
 
 
 class House(griffe.Extension):
@@ -32,14 +34,16 @@ class House(griffe.Extension):
                 pkg.set_member(name, griffe.Alias(name, function, parent=pkg))
 
     def on_class_instance(self, *, cls: griffe.Class, **_: Any) -> None:
-        """Take `@part` and `@part(kw_only=True)` as `@dataclass`."""
+        """Take `@part`, `@part(kw_only=True)` and `@record()` as `@dataclass`."""
         for decorator in cls.decorators:
             value = decorator.value
             called = isinstance(value, griffe.ExprCall)
-            if str(value.function if called else value) != "part":
+            name = str(value.function if called else value)
+            if name not in ("part", "record"):
                 continue
             if called:
-                decorator.value = griffe.ExprCall(_DATACLASS, value.arguments)
+                told = value.arguments if name == "part" else [*_KEYWORDS, *value.arguments]
+                decorator.value = griffe.ExprCall(_DATACLASS, told)
             else:
                 decorator.value = _DATACLASS
 

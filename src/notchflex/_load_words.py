@@ -7,6 +7,7 @@ before a load is read: `--help` needs this file.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -22,8 +23,6 @@ SPEC = "values or start:stop:count ranges joined by commas, such as 2 or 0,1,2.5
 _BODY = "BODY:X,Y,Z or BODY:X,Y,Z@X,Y,Z, such as 3:0,0.1,0 or 3:0,0.1,0@0.8,0,0.5"
 MOST_STEPS = 1_000_000
 """Steps of the longest range."""
-_DIGITS = 9
-"""More digits than any number of a body has."""
 
 
 def parse_number(word: str, form: str, *, least: float = -math.inf) -> float:
@@ -46,23 +45,23 @@ def parse_number(word: str, form: str, *, least: float = -math.inf) -> float:
     return value
 
 
-def parse_whole(low: int, high: int | None = None) -> Callable[[str], int]:
-    """Return a reader of whole numbers from `low` to `high`.
+def parse_whole(low: int, high: int | None = None, what: str = "") -> Callable[[str], int]:
+    """Return a reader of whole numbers from `low` to `high`; messages begin with `what`.
 
     Example:
         >>> parse_whole(0, 3)("2")
         2
     """
     form = f", {low} or more" if high is None else f" from {low} to {high}"
+    form = f"give {what}a whole number{form}."
 
     def read(word: str) -> int:
         # Python converts no more than some thousand digits.
         if not word.removeprefix("-").isdecimal() or len(word) > 18:
-            raise InputError.NOT_A_NUMBER(f"give a whole number{form}.")
-        value = int(word)
-        if value < low or (high is not None and value > high):
-            raise InputError.OUT_OF_RANGE(f"give a whole number{form}.")
-        return value
+            raise InputError.NOT_A_NUMBER(form)
+        if int(word) < low or (high is not None and int(word) > high):
+            raise InputError.OUT_OF_RANGE(form)
+        return int(word)
 
     return read
 
@@ -104,24 +103,20 @@ def parse_spec(text: str) -> list[float]:
 
 
 def _range(part: str) -> list[float]:
-    words = part.split(":")
-    if len(words) == 1:
-        return [parse_number(part, SPEC)]
-    if len(words) != 3:
+    start, *rest = part.split(":")
+    if not rest:
+        return [parse_number(start, SPEC)]
+    if len(rest) != 2:
         raise InputError.BAD_SYNTAX(f"{part!r} is not start:stop:count; give {SPEC}.")
-    start, stop = (parse_number(word, SPEC) for word in words[:2])
-    try:
-        count = parse_whole(1, MOST_STEPS)(words[2].strip())
-    except InputError as problem:
-        got = f"the count in {part!r} is {words[2]!r}"
-        raise InputError(f"{got}; {problem}", problem.code) from None
-    if count == 1 and start != stop:
+    first, last = parse_number(start, SPEC), parse_number(rest[0], SPEC)
+    count = parse_whole(1, MOST_STEPS, f"as the count of {part!r} ")(rest[1].strip())
+    if count == 1 and first != last:
         raise InputError.OUT_OF_RANGE(
-            f"a range of 1 step cannot go from {start:g} to {stop:g}; give a count of 2 or more."
+            f"a range of 1 step cannot go from {first:g} to {last:g}; give a count of 2 or more."
         )
     import numpy as np  # not for `--help`
 
-    return np.linspace(start, stop, count).tolist()
+    return np.linspace(first, last, count).tolist()
 
 
 class TendonCommand(NamedTuple):
@@ -169,38 +164,38 @@ def load_columns(
     longest = max((*tension, *stroke), key=lambda command: len(command.steps))
     tables = np.full((2, len(longest.steps), tendons), np.nan)
     commanded: dict[int, str] = {}
-    for table, commands in zip(tables, (tension, stroke), strict=True):
-        for command in commands:
-            index = _tendon_index(command, tendons)
-            if index in commanded:
+    for kind, commands in enumerate((tension, stroke)):
+        for source, number, steps in commands:
+            tendon = _tendon(source, number, tendons)
+            if tendon in commanded:
                 raise InputError.CONFLICT(
-                    f"{command.source}: tendon {index + 1} already has {commanded[index]}; "
-                    "give each tendon one tension or one stroke."
+                    f"{source}: tendon {tendon} already has {commanded[tendon]}; give each tendon "
+                    "one tension or one stroke."
                 )
-            if len(command.steps) not in (1, len(longest.steps)):
+            if len(steps) not in (1, len(longest.steps)):
                 raise InputError.WRONG_SHAPE(
-                    f"{command.source} has {len(command.steps)} steps and {longest.source} has "
+                    f"{source} has {len(steps)} steps and {longest.source} has "
                     f"{len(longest.steps)}; give equal numbers of steps, or a single value for all."
                 )
-            commanded[index] = command.source
-            table[:, index] = command.steps
+            commanded[tendon] = source
+            tables[kind, :, tendon - 1] = steps
     return tables[0], tables[1]
 
 
-def _tendon_index(command: TendonCommand, tendons: int) -> int:
-    """Return the tendon of a command, counted from 0."""
+def _tendon(source: str, number: int | None, tendons: int) -> int:
+    """Return the tendon of a command, counted from 1."""
     has = "1 tendon" if tendons == 1 else f"{tendons} tendons"
-    if command.tendon is None and tendons > 1:
-        option, _, text = command.source.partition(" ")
+    if number is None and tendons > 1:
+        option, _, text = source.partition(" ")
         raise InputError.MISSING_VALUE(
-            f"{command.source}: the robot has {has}; say which one, for example {option} 1={text}."
+            f"{source}: the robot has {has}; say which one, for example {option} 1={text}."
         )
-    number = 1 if command.tendon is None else command.tendon
-    if not 1 <= number <= tendons:
+    chosen = 1 if number is None else number
+    if not 1 <= chosen <= tendons:
         raise InputError.UNKNOWN_NAME(
-            f"{command.source}: there is no tendon {number}; the robot has {has}."
+            f"{source}: there is no tendon {chosen}; the robot has {has}."
         )
-    return number - 1
+    return chosen
 
 
 class BodyForceOption(NamedTuple):
@@ -213,17 +208,9 @@ class BodyForceOption(NamedTuple):
 
 def read_body_force(text: str) -> BodyForceOption:
     """Read `BODY:X,Y,Z` or `BODY:X,Y,Z@X,Y,Z`."""
-    body, colon, rest = text.partition(":")
-    force, separator, point = rest.partition("@")
-    if not colon or not body.strip().isdecimal() or len(body) > _DIGITS:
+    match = re.fullmatch(r"\s*(\d{1,9})\s*:([^@]*)(?:@(.*))?", text, re.ASCII | re.DOTALL)
+    if match is None:
         raise InputError.BAD_SYNTAX(f"give {_BODY}.")
-
-    def read(words: str, what: str) -> Vector:
-        try:
-            return parse_vector(what)(words)
-        except InputError as problem:
-            message = f"{words!r} is not three finite {what}; give {_BODY}."
-            raise InputError(message, problem.code) from None
-
-    where = read(point, "coordinates in mm") if separator else None
-    return BodyForceOption(int(body), read(force, "forces in N"), where)
+    body, force, point = match.groups()
+    where = None if point is None else parse_vector("coordinates in mm")(point)
+    return BodyForceOption(int(body), parse_vector("forces in N")(force), where)

@@ -16,7 +16,7 @@ def test_files_and_table(call, tmp_path):
     document = json.loads((tmp_path / "w.json").read_text())
     assert document["states"]["solved"] == 256
     assert document["peak_strain"]["largest"] <= 0.04
-    assert document["limits"] == ["peak strain 0.04 or less"]
+    assert document["limits"] == ["peak strain at most 0.04"]
     assert f"{document['convex_hull']['size']:.5g} mm²" in out
     assert (tmp_path / "w.png").stat().st_size > 1000
 

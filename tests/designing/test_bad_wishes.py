@@ -16,13 +16,13 @@ TEMPLATE = Path(nf.__file__).parent / "designing" / "template.toml"
 TEXT = TEMPLATE.read_text(encoding="utf-8")
 
 BAD = {
-    "no TOML": (TEXT + "\n[[state", "FILE_UNREADABLE"),
+    "no TOML": (TEXT + "\n[[load", "FILE_UNREADABLE"),
     "unknown key": (TEXT.replace("lower = 1.2", "lowest = 1.2"), "INVALID_SPECIFICATION"),
     "reversed": (TEXT.replace("lower = 1.2", "lower = 1.9"), "INVALID_SPECIFICATION"),
     "unknown robot": (TEXT.replace("pacheco2021-a", "pacheco2021-x"), "UNKNOWN_NAME"),
     "unknown value": (TEXT.replace("notch.depth", "notch.dept"), "UNKNOWN_NAME"),
     "unknown quantity": (TEXT.replace('"peak_strain"', '"peak_strian"'), "UNKNOWN_NAME"),
-    "unknown state": (TEXT.replace('state = "pulled"', 'state = "puled"', 1), "UNKNOWN_NAME"),
+    "unknown load": (TEXT.replace('load = "pulled"', 'load = "puled"', 1), "UNKNOWN_NAME"),
     "strain in percent": (TEXT.replace("upper = 0.06", "upper = 6.0"), "OUT_OF_RANGE"),
     "depth in metres": (TEXT.replace("lower = 1.2 ", "lower = -0.0012 "), "OUT_OF_RANGE"),
     "negative tension": (TEXT.replace("tension = 2.0", "tension = -2.0"), "OUT_OF_RANGE"),
@@ -30,10 +30,11 @@ BAD = {
     "nan": (TEXT.replace("equal = 90.0", "equal = nan"), "INVALID_SPECIFICATION"),
     "same twice": (TEXT.replace('"notch.height"', '"notch[2].depth"', 1), "CONFLICT"),
     "contradiction": (
-        TEXT + '[[constraint]]\nquantity = "total_angle"\nstate = "pulled"\nupper = 80.0\n',
+        TEXT + '[[constraint]]\nquantity = "total_angle"\nload = "pulled"\nupper = 80.0\n',
         "CONFLICT",
     ),
     "nothing asked": (TEXT.split("# --- Objectives")[0], "INVALID_SPECIFICATION"),
+    "load key": (TEXT.replace("tension = 2.0", "tensoin = 2.0"), "INVALID_SPECIFICATION"),
     "in a circle": (
         TEXT.replace("tension = 2.0", 'tension = 2.0\nafter = "pulled"'),
         "CONFLICT",
@@ -63,7 +64,7 @@ ROBUST = (
     .replace("# notch.depth = {", "notch.depth = {")
     .replace("# material.elastic_modulus", "material.elastic_modulus")
 )
-SECOND = '[[objective]]\nquantity = "total_angle"\nstate = "pulled"\ngoal = "maximise"\n\n'
+SECOND = '[[objective]]\nquantity = "total_angle"\nload = "pulled"\ngoal = "maximise"\n\n'
 FRONT = TEXT.replace("# --- Constraints", f"{SECOND}# --- Constraints")
 KINDS = {
     "plain": (TEXT, ()),
@@ -115,10 +116,31 @@ def test_300_mutated_files(kind, seeds, tmp_path, monkeypatch, capsys):
     assert refused > len(seeds) // 2
 
 
+OLD_VARIABLE = '[[variable]]\nvalue = "state.pulled.tension"\nlower = 1.0\nupper = 3.0'
+OLD = (
+    TEXT.replace("[load.pulled]", '[[state]]\nname = "pulled"')
+    .replace('load = "pulled"', 'state = "pulled"')
+    .replace("# --- Sizes", f"{OLD_VARIABLE}\n# --- Sizes")
+)
+
+
+def test_old_words_are_read_with_a_note(tmp_path):
+    (tmp_path / "old.toml").write_text(OLD, encoding="utf-8")
+    (tmp_path / "new.toml").write_text(TEXT, encoding="utf-8")
+    with pytest.warns(FutureWarning, match="`state` is now called `load`"):
+        old, _ = read_design(tmp_path / "old.toml")
+    new, _ = read_design(tmp_path / "new.toml")
+    assert old.load == new.load == old.state
+    assert old.constraint == new.constraint
+    with pytest.warns(FutureWarning):
+        assert nf.DesignSpec(robot="pacheco2021-a", state=old.load, variable=old.variable,
+                             objective=old.objective).load == new.load  # fmt: skip
+
+
 def test_schema_names_every_table(capsys):
     assert run(["schema", "--design"]) == 0
     schema = json.loads(capsys.readouterr().out)
-    tables = {"variable", "stock", "state", "objective", "constraint", "curve", "search"}
+    tables = {"variable", "stock", "load", "objective", "constraint", "curve", "search"}
     assert tables < set(schema["properties"])
 
 

@@ -17,10 +17,10 @@ EQUAL = {
     "name": "equal angles",
     "robot": "pacheco2021-a",
     "variable": [{"value": "notch.depth", "lower": 1.2, "upper": 1.5, "along": "each"}],
-    "state": [{"name": "pulled", "tension": TENSION}],
+    "load": {"pulled": {"tension": TENSION}},
     "constraint": [
-        {"quantity": "notch_angle", "state": "pulled", "take": "range", "equal": 0.0},
-        {"quantity": "total_angle", "state": "pulled", "equal": ANGLE},
+        {"quantity": "notch_angle", "load": "pulled", "take": "range", "equal": 0.0},
+        {"quantity": "total_angle", "load": "pulled", "equal": ANGLE},
     ],
     "search": {"starts": 3, "candidates": 32},
 }
@@ -67,10 +67,23 @@ def test_files(tmp_path):
 
 @pytest.mark.parametrize("name", ["total_angle", "bore"])
 def test_unknown_names_are_refused(name):
-    wish = {"quantity": f"{name}s", "state": "pulled", "equal": 1.0}
+    wish = {"quantity": f"{name}s", "load": "pulled", "equal": 1.0}
     with pytest.raises(nf.InputError) as caught:
         nf.design(EQUAL | {"constraint": [wish]})
     assert caught.value.code is nf.ErrorCode.UNKNOWN_NAME
+
+
+def test_a_tension_may_be_a_variable():
+    """Wrist A as it is bends to 60 deg under one tension; its steps do not matter."""
+    wish = {"quantity": "angle", "load": "pulled", "equal": 60.0}
+    variable = {"value": "load.pulled.tension", "lower": 0.2, "upper": 2.0}
+    load = {"rest": {"tension": 0.1}, "pulled": {"tension": 1.0, "after": "rest", "steps": 2}}
+    spec = {"robot": "pacheco2021-a", "variable": [variable], "load": load, "constraint": [wish]}
+    made = nf.design(spec | {"search": {"starts": 1}})
+    assert made.converged, made.reason
+    assert made.wishes[0].title == "total_angle at pulled"
+    bent = nf.solve(made.robot, nf.Load(tension=made.variables[0].value)).total_angle
+    assert np.degrees(bent) == pytest.approx(60.0, rel=1e-6)  # of the search
 
 
 def on_grid(values, grid):
@@ -82,7 +95,7 @@ def test_lengths_on_a_grid_are_evaluated_again(grid, along):
     """The numbers are those of the robot that a shop can make, not of the one beside it."""
     least = 152.0  # wrist A has 150 deg
     variable = EQUAL["variable"][0] | {"along": along}
-    limit = {"quantity": "total_angle", "state": "pulled", "lower": least}
+    limit = {"quantity": "total_angle", "load": "pulled", "lower": least}
     spec = EQUAL | {"variable": [variable], "constraint": [limit]}
     free, made = nf.design(spec), nf.design(spec, grid=grid)
     depths = [one.depth for one in made.robot.notches]

@@ -30,11 +30,11 @@ SPEC: dict[str, Any] = {
         {"value": "notch.depth", "lower": 1.2, "upper": 1.45},
         {"value": "notch.height", "lower": 0.4, "upper": 1.6},
     ],
-    "state": [{"name": "pulled", "tension": 2.0, "steps": 3}],
+    "load": {"pulled": {"tension": 2.0, "steps": 3}},
     "objective": [{"quantity": "notch.height", "goal": "minimise"}],
     "constraint": [
-        {"quantity": "total_angle", "state": "pulled", "lower": LEAST},
-        {"quantity": "peak_strain", "state": "pulled", "take": "largest", "upper": MOST},
+        {"quantity": "total_angle", "load": "pulled", "lower": LEAST},
+        {"quantity": "peak_strain", "load": "pulled", "take": "largest", "upper": MOST},
     ],
     "tolerance": TOLERANCE,
     "search": {"starts": 1},
@@ -154,7 +154,7 @@ def test_a_robust_wrist_closes_tip_first():
     order, limits, *others = spec["constraint"]
     limits = limits | {"lower": 1.3, "upper": 1.7}
     spec |= {
-        "state": [{"name": "closed", "tension": 1.8}],
+        "load": {"closed": {"tension": 1.8}},
         "constraint": [order | {"margin": 0.0}, limits, *others],
     }
     begin = process_time()

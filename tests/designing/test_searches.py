@@ -168,12 +168,12 @@ def test_front(tmp_path):
             {"value": "notch.depth", "lower": 1.2, "upper": 1.38},
             {"value": "notch.height", "lower": 0.5, "upper": 1.0},
         ],
-        "state": [{"name": "pulled", "tension": 1.5}],
+        "load": {"pulled": {"tension": 1.5}},
         "objective": [
-            {"quantity": "total_angle", "state": "pulled", "goal": "maximise"},
-            {"quantity": "peak_strain", "state": "pulled", "take": "largest", "goal": "minimise"},
+            {"quantity": "total_angle", "load": "pulled", "goal": "maximise"},
+            {"quantity": "peak_strain", "load": "pulled", "take": "largest", "goal": "minimise"},
         ],
-        "constraint": [{"quantity": "total_angle", "state": "pulled", "lower": 20.0}],
+        "constraint": [{"quantity": "total_angle", "load": "pulled", "lower": 20.0}],
     }
     front = nf.design_front(spec, points=5, generations=4)
     values = front.objectives

@@ -156,11 +156,11 @@ def test_tip_compliance_is_that_of_a_small_force():
     spec = {
         "robot": "pacheco2021-a",
         "variable": [{"value": "notch.depth", "lower": 1.2, "upper": 1.35}],
-        "state": [{"name": "held", "tension": 0.6}],
+        "load": {"held": {"tension": 0.6}},
         "constraint": [
             {
                 "quantity": "tip_compliance",
-                "state": "held",
+                "load": "held",
                 "direction": [1.0, 0.0, 0.0],
                 "equal": 8.0,
             }

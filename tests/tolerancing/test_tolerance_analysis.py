@@ -154,7 +154,7 @@ def test_an_interval_without_rejects_is_that_of_independent_draws():
 @pytest.mark.parametrize(
     ("limit", "code"),
     [
-        ({"quantity": "angle", "lower": 1.0}, "UNKNOWN_NAME"),
+        ({"quantity": "angel", "lower": 1.0}, "UNKNOWN_NAME"),
         ({"quantity": "total_angle"}, "MISSING_VALUE"),
         ({"quantity": "total_angle", "lower": 1.0, "upper": 0.5}, "OUT_OF_RANGE"),
         ({"quantity": "total_angle", "lower": float("nan")}, "NOT_FINITE"),

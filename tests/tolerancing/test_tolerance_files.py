@@ -14,6 +14,8 @@ from notchflex.cli import run
 from refusals import refused
 
 FILE = """
+wanted_yield = 0.95
+
 [load.pulled]
 tension = "0.45:0.9:2"
 
@@ -36,9 +38,6 @@ lower = 3.0
 [tolerance]
 notch.depth = { plus = 0.005, minus = 0.005 }
 material.elastic_modulus = "5 %"
-
-[yield]
-wanted = 0.95
 """
 WRIST = nf.load_robot("pacheco2021-a")
 
@@ -57,6 +56,22 @@ def test_what_a_file_says():
     assert spec.limits[0].upper == pytest.approx(np.radians(51.0))
     assert spec.limits[1].lower == 3.0
     assert spec.wanted_yield == 0.95
+
+
+def test_old_words_are_read_with_a_note(folder):
+    old = FILE.replace("wanted_yield = 0.95", "") + "[yield]\nwanted = 0.95\n"
+    (folder / "old.toml").write_text(old, encoding="utf-8")
+    with pytest.warns(FutureWarning, match="`yield.wanted` is now called `wanted_yield`"):
+        spec = nf.read_tolerance_spec("old.toml", WRIST)
+    assert spec == nf.read_tolerance_spec("limits.toml", WRIST)
+
+
+def test_a_limit_may_name_several_entries_and_a_short_quantity(folder):
+    more = FILE + '[[accept]]\nquantity = "strain"\nload = "pulled"\nnotch = [2, 1]\nupper = 0.04\n'
+    (folder / "more.toml").write_text(more, encoding="utf-8")
+    found = nf.tolerance_analysis(WRIST, "more.toml", draws=50)
+    names = [one.name for one in found.criteria if one.quantity.name == "peak_strain"]
+    assert names == ["peak_strain[2] at pulled", "peak_strain[1] at pulled"]
 
 
 def test_prints_and_writes(folder, capsys):
@@ -83,9 +98,10 @@ def test_prints_and_writes(folder, capsys):
 @pytest.mark.parametrize(
     ("old", "new", "code"),
     [
-        ("[yield]", "[yields]", "UNKNOWN_NAME"),
-        ("wanted = 0.95", "wanted = 95", "OUT_OF_RANGE"),
-        ("wanted = 0.95", "want = 0.95", "UNKNOWN_NAME"),
+        ("[tolerance]", "[tolerances]", "UNKNOWN_NAME"),
+        ("wanted_yield = 0.95", "wanted_yield = 95", "OUT_OF_RANGE"),
+        ("wanted_yield = 0.95", "want = 0.95", "UNKNOWN_NAME"),
+        ("wanted_yield = 0.95", "yield.want = 0.95", "UNKNOWN_NAME"),
         ('tension = "0.45:0.9:2"', "tension = true", "WRONG_TYPE"),
         ('tension = "0.45:0.9:2"', 'tension = "a"', "NOT_A_NUMBER"),
         ('tension = "0.45:0.9:2"', "tension = -1", "OUT_OF_RANGE"),
@@ -102,8 +118,10 @@ def test_prints_and_writes(folder, capsys):
         ('load = "pulled"', 'load = "pulls"', "UNKNOWN_NAME"),
         ('load = "pulled"', "load = 1", "WRONG_TYPE"),
         ('quantity = "total_angle"', "", "MISSING_VALUE"),
-        ('quantity = "total_angle"', 'quantity = ["a"]', "UNKNOWN_NAME"),
-        ('axis = "x"', 'axis = "w"', "MISSING_VALUE"),
+        ('quantity = "total_angle"', 'quantity = ["a"]', "WRONG_TYPE"),
+        ('quantity = "total_angle"', 'quantity = "totl_angle"', "UNKNOWN_NAME"),
+        ('axis = "x"', 'axis = "w"', "UNKNOWN_NAME"),
+        ('axis = "x"', "", "MISSING_VALUE"),
         ("[[accept]]", "[accept]", "FILE_UNREADABLE"),
         ("plus = 0.005, ", "", "INVALID_ROBOT"),
         ("notch.depth =", "notch.dept =", "INVALID_ROBOT"),

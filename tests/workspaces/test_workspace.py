@@ -159,8 +159,8 @@ def test_two_workspaces_are_compared(wrist, found):
 
 def test_limits_in_the_units_of_files():
     (limit,) = limits_of(in_python({"angle": (None, 90.0)}))
-    assert (limit.name, limit.high) == ("total_angle", pytest.approx(np.pi / 2))
-    assert limit.text == "total bending angle 90 deg or less"
+    assert (limit.quantity, limit.upper) == ("total_angle", pytest.approx(np.pi / 2))
+    assert limit.text == "total bending angle at most 90 deg"
 
 
 BAD = {

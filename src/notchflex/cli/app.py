@@ -289,7 +289,7 @@ def main() -> None:
     shown = warnings.showwarning
 
     def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
-        if issubclass(category, InputWarning):
+        if issubclass(category, InputWarning | FutureWarning):
             terminal.warn(str(message))
         else:
             shown(message, category, *place)

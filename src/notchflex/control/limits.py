@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from jaxtyping import Float
+from pydantic import Field, model_validator
 
 from notchflex import InputError
+from notchflex.specification import coded, record
+from notchflex.support import Float as Number
 from notchflex.support import check_number, short_repr
 
 Drive = Literal["tension", "stroke"]
 
-Range = tuple[float | Sequence[float] | None, float | Sequence[float] | None]
-"""Lowest and highest value, a number or one per tendon; None for no limit."""
 
-
-@dataclass(frozen=True, kw_only=True)
+@record(refuse=coded)
 class Limits:
     """Limits on drives and robot.
 
@@ -40,37 +38,28 @@ class Limits:
         (0.05, 2.0)
     """
 
-    tension: Range = (0.0, None)
-    stroke: Range = (None, None)
-    rate: float | None = None
-    strain: float | None = None
-    gap: float | None = None
+    tension: tuple[Any, Any] = (0.0, None)
+    stroke: tuple[Any, Any] = (None, None)
+    rate: Annotated[Number | None, Field(gt=0.0)] = None
+    strain: Annotated[Number | None, Field(gt=0.0)] = None
+    gap: Annotated[Number | None, Field(ge=0.0)] = None
 
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        for name, unit in (("tension", "N"), ("stroke", "mm")):
-            low, high = (self._side(name, side, None) for side in (0, 1))
-            if low.size > 1 and high.size > 1 and low.shape != high.shape:
-                raise InputError.WRONG_SHAPE(
-                    f"the limits of {name} have {low.size} lowest and {high.size} highest values; "
-                    "give one number, or one per tendon, for each"
-                )
-            if (low > high).any():
+    @model_validator(mode="after")
+    def _in_order(self) -> Limits:
+        for name in get_args(Drive):
+            given = getattr(self, name)
+            low, high = self.bounds(name, max(map(np.size, given)))
+            if not (low <= high).all():
                 raise InputError.OUT_OF_RANGE(
-                    f"the lowest {name} is above the highest: {short_repr(getattr(self, name))} "
-                    f"{unit}; give the lowest first"
+                    f"the lowest {name} is above the highest, or one is NaN: {short_repr(given)}; "
+                    "give the lowest first, None for no limit"
                 )
-        for name, unit in (("rate", "N or mm"), ("strain", "1"), ("gap", "mm")):
-            value = getattr(self, name)
-            if value is None:
-                continue
-            number = check_number(value, f"the limit {name}")
-            least_excluded = name != "gap" and number == 0.0
-            if not 0.0 <= number < np.inf or least_excluded:
+            if name == "tension" and (low < 0.0).any():
                 raise InputError.OUT_OF_RANGE(
-                    f"the limit {name} must be positive and finite ({unit}); got {number:g}"
+                    f"the lowest tension is {low.min():g} N; a tendon only pulls, so give 0 N or "
+                    "more"
                 )
-            object.__setattr__(self, name, number)
+        return self
 
     def bounds(
         self, drive: Drive, tendons: int
@@ -81,43 +70,22 @@ class Limits:
             drive: "tension" or "stroke".
             tendons: Number of tendons of the robot.
         """
-        low, high = (self._side(drive, side, tendons) for side in (0, 1))
+        least = 0.0 if drive == "tension" else -np.inf
+        low, high = (
+            self._of_tendons(drive, side, none, tendons)
+            for side, none in zip(getattr(self, drive), (least, np.inf), strict=True)
+        )
         return low, high
 
-    def _side(self, name: str, side: int, tendons: int | None) -> np.ndarray:
-        """Lowest or highest values of tension or stroke; per tendon if their number is given."""
-        given: Any = getattr(self, name)
-        if not isinstance(given, Sequence) or isinstance(given, str | bytes) or len(given) != 2:
-            raise InputError.WRONG_TYPE(
-                f"the limits of {name} are the lowest and the highest value, such as (0.05, 2.0) "
-                f"or (None, 2.0); got {short_repr(given)}"
-            )
-        value = given[side]
-        several = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes)
-        entries = list(value) if several else [value]  # pyright: ignore[reportArgumentType]
-        none = np.inf if side else -np.inf
-        numbers = np.array([none if e is None else check_number(e, name) for e in entries])
-        if np.isnan(numbers).any():
-            raise InputError.NOT_FINITE(f"a limit of {name} is NaN; give a number, or None")
-        if name == "tension":
-            if side and (numbers < 0.0).any():
-                raise InputError.OUT_OF_RANGE(
-                    f"the highest tension is {numbers.min():g} N; a tendon only pulls, so give "
-                    "0 N or more"
-                )
-            if not side and ((numbers < 0.0) & np.isfinite(numbers)).any():
-                raise InputError.OUT_OF_RANGE(
-                    f"the lowest tension is {numbers.min():g} N; a tendon only pulls, so give "
-                    "0 N or more"
-                )
-            numbers = np.maximum(numbers, 0.0)
-        if tendons is None:
-            return numbers
-        if several and len(numbers) != tendons:
+    @staticmethod
+    def _of_tendons(drive: str, side: Any, none: float, tendons: int) -> np.ndarray:
+        entries = list(side) if np.ndim(side) else [side]
+        if len(entries) not in (1, tendons):
             raise InputError.WRONG_SHAPE(
-                f"the limits of {name} have {len(numbers)} entries, but the robot has {tendons} "
-                "tendons; give one number, or one per tendon"
+                f"the limits of {drive} have {len(entries)} entries for {tendons} tendons; give "
+                "one number, or one per tendon"
             )
+        numbers = [none if e is None else check_number(e, f"a limit of {drive}") for e in entries]
         return np.broadcast_to(numbers, (tendons,)).astype(float)
 
 
@@ -139,16 +107,16 @@ class Bound(NamedTuple):
 
 def bounds_of_robot(limits: Limits, drive: Drive, tendons: int, notches: int) -> list[Bound]:
     """Return the limits that are not on the drives themselves."""
-    bounds: list[Bound] = []
     other: Drive = "stroke" if drive == "tension" else "tension"
     low, high = limits.bounds(other, tendons)
-    if np.isfinite(high).any():
-        bounds.append(Bound(other, 1.0, high, f"the highest {other}"))
-    if np.isfinite(low).any() and (other == "stroke" or low.any()):
-        bounds.append(Bound(other, -1.0, low, f"the lowest {other}"))
-    if limits.strain is not None:
-        largest = np.full(notches, limits.strain)
-        bounds.append(Bound("peak_strain", 1.0, largest, "the largest peak strain"))
-    if limits.gap is not None:
-        bounds.append(Bound("gap", -1.0, np.full(notches, limits.gap), "the smallest gap"))
-    return bounds
+    strain = np.inf if limits.strain is None else limits.strain
+    gap = -np.inf if limits.gap is None else limits.gap
+    if other == "tension" and not low.any():
+        low = np.full(tendons, -np.inf)  # a tendon pulls with 0 N or more by itself
+    bounds = [
+        Bound(other, 1.0, high, f"the highest {other}"),
+        Bound(other, -1.0, low, f"the lowest {other}"),
+        Bound("peak_strain", 1.0, np.full(notches, strain), "the largest peak strain"),
+        Bound("gap", -1.0, np.full(notches, gap), "the smallest gap"),
+    ]
+    return [bound for bound in bounds if np.isfinite(bound.limit).any()]

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex import InputError, Robot
+from notchflex.specification import entry_names, known
 from notchflex.support import (
     AXES,
     DEGREES,
-    QUANTITIES,
     REGISTERED,
     axis_sizes,
     check_is_robot,
@@ -92,16 +92,17 @@ def aim_at(
         InputError: A weight of what is not a target, not positive, or beyond `LARGEST_WEIGHT`.
     """
     weights = _check_weights(weights, targets)
-    index: list[np.ndarray] = []
+    entries: list[np.ndarray] = []
     for name in targets.values:
-        at = slices["tip_rotation" if name == DIRECTION else name]
-        numbers = np.arange(at.start, at.stop)
-        index.append(numbers[2::3] if name == DIRECTION else numbers)
-    count = len(targets)
-    goals = [np.reshape(values, (count, -1)) for values in targets.values.values()]
-    sizes = [len(numbers) for numbers in index]
-    each = np.repeat([weights.get(name, 1.0) for name in targets.values], sizes)
-    return Aim(np.concatenate(index), np.concatenate(goals, axis=1), each)
+        numbers = slices["tip_rotation" if name == DIRECTION else name]
+        places = np.arange(numbers.start, numbers.stop)
+        entries.append(places[2::3] if name == DIRECTION else places)
+    goals = [values.reshape(len(targets), -1) for values in targets.values.values()]
+    each = [
+        np.full(len(places), weights.get(name, 1.0))
+        for name, places in zip(targets.values, entries, strict=True)
+    ]
+    return Aim(np.concatenate(entries), np.concatenate(goals, axis=1), np.concatenate(each))
 
 
 def units_of(targets: Targets) -> tuple[str, ...]:
@@ -114,17 +115,14 @@ def units_of(targets: Targets) -> tuple[str, ...]:
     )
 
 
-def _check_weights(weights: Mapping[str, float] | None, targets: Targets) -> dict[str, float]:
-    if weights is not None and not isinstance(weights, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+def _check_weights(weights: Any, targets: Targets) -> dict[str, float]:
+    if weights is not None and not isinstance(weights, Mapping):
         raise InputError.WRONG_TYPE(
             f"weights are numbers by the name of a quantity; got {short_repr(weights)}"
         )
     checked: dict[str, float] = {}
-    for name, weight in (weights or {}).items():
-        if name not in targets.values:
-            raise InputError.UNKNOWN_NAME(
-                f"there is a weight of {name}, but the targets are {', '.join(targets.values)}"
-            )
+    for name, weight in cast("Mapping[str, Any]", weights or {}).items():
+        known(name, targets.values, "target")
         checked[name] = check_number(weight, f"the weight of {name}")
         if not 1.0 / LARGEST_WEIGHT <= checked[name] <= LARGEST_WEIGHT:
             raise InputError.OUT_OF_RANGE(
@@ -160,11 +158,8 @@ def make_targets(given: Any, robot: Robot, *, several: bool) -> Targets:
     if isinstance(given, Targets):
         return _checked(given.values, robot)
     named = given if isinstance(given, Mapping) else {"tip_position": given}
-    values: dict[str, np.ndarray] = {}
-    for name, value in named.items():
-        numbers = _numbers(value, name)
-        values[name] = numbers if several else numbers[None]
-    return _checked(values, robot)
+    values = {name: _numbers(value, name) for name, value in named.items()}
+    return _checked({name: v if several else v[None] for name, v in values.items()}, robot)
 
 
 def _checked(values: Mapping[str, np.ndarray], robot: Robot) -> Targets:
@@ -172,11 +167,13 @@ def _checked(values: Mapping[str, np.ndarray], robot: Robot) -> Targets:
     if not values:
         raise InputError.NO_DATA(f"there is no target; give {_FORMS}")
     for name, numbers in values.items():
-        if name not in shapes:
-            raise InputError.UNKNOWN_NAME(
-                f"there is no target {short_repr(name)}; there are {', '.join(shapes)}"
+        shape = known(name, shapes, "target")
+        if not numbers.size or numbers.shape[1:] != shape or numbers.ndim != len(shape) + 1:
+            wanted, got = ("×".join(map(str, size)) for size in (("k", *shape), numbers.shape))
+            raise InputError.WRONG_SHAPE(
+                f"k targets of {name}, at least one, have the shape {wanted} for this robot; "
+                f"got {got or 'one number'}"
             )
-        _check_shape(name, numbers, shapes[name])
         if (np.abs(numbers) > LARGEST_TARGET).any():
             raise InputError.OUT_OF_RANGE(
                 f"a target of {name} is at most {LARGEST_TARGET:g} in size (mm, N, rad); "
@@ -209,33 +206,18 @@ def _checked(values: Mapping[str, np.ndarray], robot: Robot) -> Targets:
 def _numbers(value: Any, name: str) -> np.ndarray:
     """Numbers of a target; None within them is NaN, NaN itself is refused."""
     try:
-        if isinstance(value, str | bytes | Mapping) or value is None:
-            raise TypeError
         entries = np.asarray(value, dtype=object)
-        free = np.array([one is None for one in entries.ravel()], bool).reshape(entries.shape)
-        if any(isinstance(one, bool | str | bytes) for one in entries.ravel()):
-            raise TypeError
-        numbers = np.where(free, np.nan, entries).astype(float)
-    except (TypeError, ValueError, OverflowError):
+        free = np.array([one is None for one in entries.flat], bool).reshape(entries.shape)
+        numbers = [check_number(0.0 if one is None else one, name) for one in entries.flat]
+    except ValueError:
         raise InputError.WRONG_TYPE(
             f"a target is {_FORMS}; got {short_repr(value)} for {short_repr(name)}"
         ) from None
-    if not np.isfinite(numbers[~free]).all():
+    if not np.isfinite(numbers).all():
         raise InputError.NOT_FINITE(
             f"a target of {name} is not finite; give finite numbers, and None where it is free"
         )
-    return numbers
-
-
-def _check_shape(name: str, numbers: np.ndarray, shape: Sequence[int]) -> None:
-    if numbers.shape[1:] == tuple(shape) and numbers.ndim == len(shape) + 1 and len(numbers):
-        return
-    expected = "×".join(map(str, shape)) or "one number"
-    got = "×".join(map(str, numbers.shape[1:])) or "one number"
-    raise InputError.WRONG_SHAPE(
-        f"a target of {name} is {expected} for this robot, and there must be at least one; "
-        f"got {len(numbers) if numbers.ndim else 0} of {got}"
-    )
+    return np.where(free, np.nan, np.reshape(numbers, entries.shape))
 
 
 def _unit(directions: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
@@ -247,10 +229,6 @@ def _unit(directions: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
             "tip_direction must not be zero, and no entry beside a free one may exceed 1"
         )
     return np.where(whole[:, None], directions / length, directions)
-
-
-# Columns of a simulation that say what was commanded are no targets, but may stand in the file.
-_COMMANDS = ("tension", "stroke")
 
 
 def read_targets(
@@ -281,52 +259,37 @@ def read_targets(
         2
     """
     table = read_data_table(source, columns)
-    known = dict(_columns(check_is_robot(robot)))
-    unknown = [name for name in table.header if name not in known]
-    if unknown:
-        near = nearest(unknown[0], known, 2)
-        raise InputError.TABLE_COLUMNS(
-            f"{table.name}: {short_repr(unknown[0])} is not a column of targets"
-            f"{near or f'; there are {_shown(known)}'}"
-        )
-    shapes = target_shapes(robot)
+    meant, shapes = _columns(check_is_robot(robot)), target_shapes(robot)
     values: dict[str, np.ndarray] = {}
     for header in table.header:
-        name, index = known[header]
+        if header not in meant:
+            # Of columns for every notch the first alone.
+            usual = ", ".join(
+                one for one, (_, entry) in meant.items() if not any(entry) or "notch" not in one
+            )
+            raise InputError.TABLE_COLUMNS(
+                f"{table.name}: {short_repr(header)} is not a column of targets"
+                f"{nearest(header, meant, 2) or f'; there are {usual}'}"
+            )
+        name, entry = meant[header]
         scale = DEGREES if header.endswith("_deg") else 1.0
         empty = np.full((len(table), *shapes[name]), np.nan)
-        values.setdefault(name, empty)[(slice(None), *index)] = (
+        values.setdefault(name, empty)[(slice(None), *entry)] = (
             table.numbers(header, may_miss=True) / scale
         )
     return make_targets(Targets(values), robot, several=True)
 
 
-def _columns(robot: Robot) -> Iterator[tuple[str, tuple[str, tuple[int, ...]]]]:
-    """Yield every column, and the quantity and entry that it is."""
-    sizes = axis_sizes(robot.number_of_notches, robot.number_of_tendons)
-    for name in target_shapes(robot):
-        if name == DIRECTION:
-            yield from ((f"{DIRECTION}_{axis}", (name, (i,))) for i, axis in enumerate(AXES))
-            continue
-        quantity = QUANTITIES[name]
-        if not quantity.column or name in _COMMANDS:
-            continue
-        match quantity.per:
-            case ():
-                yield quantity.header(), (name, ())
-            case ("axis",):
-                yield from ((quantity.header(axis=a), (name, (i,))) for i, a in enumerate(AXES))
-            case ("notch",):
-                count = sizes["notch"]
-                yield from ((quantity.header(notch=i + 1), (name, (i,))) for i in range(count))
-            case _:
-                continue
-
-
-def _shown(columns: dict[str, tuple[str, tuple[int, ...]]]) -> str:
-    """Columns for a message: of those per notch the first alone."""
-    names = [name for name, (_, index) in columns.items() if not ("notch_" in name and index[0])]
-    return ", ".join(names)
+def _columns(robot: Robot) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Return by its header the quantity and entry of every column of single numbers."""
+    columns = {f"{DIRECTION}_{axis}": (DIRECTION, (i,)) for i, axis in enumerate(AXES)}
+    for name, shape in target_shapes(robot).items():
+        quantity = REGISTERED.get(name)
+        if quantity and quantity.column and quantity.per in ((), ("axis",), ("notch",)):
+            for entry in np.ndindex(shape):
+                labels = zip(quantity.per, entry_names(quantity.per, entry), strict=True)
+                columns[quantity.header(**dict(labels))] = name, entry
+    return columns
 
 
 # A position is near a robot whose straight length it is a part from the first to the second of.

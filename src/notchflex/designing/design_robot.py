@@ -92,7 +92,7 @@ def _check_stock(spec: DesignSpec, robot: Robot) -> None:
     """Raise if a number of the robot is chosen by a stock and by something else."""
     paths = [(f"stock[{k}]", path) for k, one in enumerate(spec.stock, 1) for path in one.values]
     variables = enumerate(spec.variable, 1)
-    paths += [(f"variable[{k}]", v.value) for k, v in variables if not v.value.startswith("state.")]
+    paths += [(f"variable[{k}]", v.value) for k, v in variables if not v.is_load]
     chosen: dict[str, str] = {}
     for place, path in paths:
         try:

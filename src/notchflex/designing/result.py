@@ -208,10 +208,7 @@ def asked_in_words(wish: Wish) -> str:
     if asked.equal is not None:
         return f"{asked.equal:g}{unit}"
     of = "" if asked.wanted_yield is None else f" for {100.0 * asked.wanted_yield:g} % of robots"
-    low, high = (None if end is None else f"{end:g}" for end in (asked.lower, asked.upper))
-    if low and high:
-        return f"{low} to {high}{unit}{of}"
-    return (f"at least {low}" if low else f"at most {high}") + f"{unit}{of}"
+    return f"{asked.words(wish.unit)}{of}"
 
 
 def design_document(made: Design) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import KW_ONLY
@@ -10,20 +11,24 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter, model_validator
 
-from notchflex import InputError, Robot
+from notchflex import Robot
+from notchflex.specification import (
+    LOAD_KEYS,
+    LimitedQuantity,
+    LoadTables,
+    Varied,
+    made,
+    record,
+)
 from notchflex.support import (
     Float,
     Int,
     ProblemError,
-    part,
     read_specification,
     robot_named,
     schema_of,
-    validated,
 )
-from notchflex.tolerancing.spec import LOAD_KEYS
 
-_REFUSE = InputError.INVALID_SPECIFICATION
 _MAX_VALUES = 10_000_000
 MAX_ROWS = 10**12
 """Rows of a sweep at most: a month of 32 cores, and four million files."""
@@ -32,8 +37,8 @@ _MAX_POINTS = 10**11
 """Points at most: the way to the last one of a Sobol sequence takes minutes."""
 
 
-@part(kw_only=True, refuse=_REFUSE)
-class SweepVariable:
+@record()
+class SweepVariable(Varied):
     """A number of the robot file that is varied.
 
     With `values`, or with `lower`, `upper` and `count`, it is one axis of a grid; with `lower` and
@@ -48,50 +53,42 @@ class SweepVariable:
         spacing: "linear", or "log" for equal ratios.
     """
 
-    value: Annotated[str, Field(min_length=1, description="path of the robot file")]
     values: Annotated[
         tuple[Float, ...] | None,
-        Field(min_length=1, max_length=_MAX_VALUES, description="list of values"),
+        Field(min_length=1, max_length=_MAX_VALUES),
     ] = None
-    lower: Annotated[Float | None, Field(description="least value")] = None
-    upper: Annotated[Float | None, Field(description="greatest value")] = None
-    count: Annotated[
-        Int | None, Field(ge=2, le=_MAX_VALUES, description="number of values of a grid")
-    ] = None
-    spacing: Annotated[
-        Literal["linear", "log"], Field(description='"linear", or "log" for equal ratios')
-    ] = "linear"
+    count: Annotated[Int | None, Field(ge=2, le=_MAX_VALUES)] = None
+    spacing: Literal["linear", "log"] = "linear"
 
     @property
     def is_sampled(self) -> bool:
         """Whether its values are sampled, and not those of a grid."""
         return self.values is None and self.count is None
 
+    @property
+    def size(self) -> int:
+        """Number of values on the grid."""
+        return len(self.values) if self.values is not None else self.count or 1
+
     @model_validator(mode="after")
     def _one_form(self) -> SweepVariable:
-        limits = (self.lower is not None, self.upper is not None)
+        limits = [self.lower, self.upper]
         if self.values is not None:
-            if any(limits) or self.count is not None:
+            if limits != [None, None] or self.count is not None:
                 text = "excludes `lower`, `upper` and `count`; give one or the other."
                 raise ProblemError([("values", text)])
             if len(set(self.values)) != len(self.values):
                 raise ProblemError([("values", "has a value twice; give each once.")])
-            return self
-        if not all(limits):
+        elif None in limits:
             text = "or `lower` and `upper` are needed; give one or the other."
             raise ProblemError([("values", text)])
-        assert self.lower is not None
-        assert self.upper is not None
-        if not self.lower < self.upper:
-            text = f"is {self.lower:g}, not less than `upper`, {self.upper:g}; exchange them."
-            raise ProblemError([("lower", text)])
-        if self.spacing == "log" and self.lower <= 0.0:
+        elif self.spacing == "log" and self.ends[0] <= 0.0:
             text = f'is {self.lower:g}; spacing = "log" needs values above 0.'
             raise ProblemError([("lower", text)])
         return self
 
 
-@part(kw_only=True, refuse=_REFUSE)
+@record()
 class Sampling:
     """Sampling of variables without `count` or `values`.
 
@@ -101,54 +98,12 @@ class Sampling:
         seed: The same seed samples the same points.
     """
 
-    method: Annotated[
-        Literal["sobol", "latin-hypercube"], Field(description='"sobol" or "latin-hypercube"')
-    ] = "sobol"
-    points: Annotated[Int, Field(ge=1, le=_MAX_POINTS, description="number of points")]
-    seed: Annotated[Int, Field(ge=0, le=2**63 - 1, description="seed of the points")] = 0
+    method: Literal["sobol", "latin-hypercube"] = "sobol"
+    points: Annotated[Int, Field(ge=1, le=_MAX_POINTS)]
+    seed: Annotated[Int, Field(ge=0, le=2**63 - 1)] = 0
 
 
-@part(kw_only=True, refuse=_REFUSE)
-class KeptQuantity:
-    """A quantity that is kept, and within which limits a robot is accepted.
-
-    Args:
-        quantity: Name of a quantity, such as "total_angle".
-        load: Name of the load; not needed if there is one.
-        step: Step of the load, from 1; the last where not given.
-        notch: Only this notch, from 1.
-        tendon: Only this tendon, from 1.
-        body: Only this body, 0 for the base.
-        span: Only this span of a tendon, from 1.
-        contact: Only this contact of a tendon, from 1.
-        axis: Only this coordinate.
-        lower: Least value that is accepted, in mm, N, MPa and deg.
-        upper: Greatest value that is accepted.
-    """
-
-    quantity: Annotated[str, Field(description="name of a quantity")]
-    load: Annotated[str | None, Field(description="name of the load")] = None
-    step: Annotated[Int | None, Field(ge=1, description="step of the load, from 1")] = None
-    notch: Annotated[Int | None, Field(ge=1, description="only this notch, from 1")] = None
-    tendon: Annotated[Int | None, Field(ge=1, description="only this tendon, from 1")] = None
-    body: Annotated[Int | None, Field(ge=0, description="only this body, 0 for the base")] = None
-    span: Annotated[Int | None, Field(ge=1, description="only this span, from 1")] = None
-    contact: Annotated[Int | None, Field(ge=1, description="only this contact, from 1")] = None
-    axis: Annotated[
-        Literal["x", "y", "z"] | None, Field(description='only this coordinate: "x", "y" or "z"')
-    ] = None
-    lower: Annotated[Float | None, Field(description="least value that is accepted")] = None
-    upper: Annotated[Float | None, Field(description="greatest value that is accepted")] = None
-
-    @model_validator(mode="after")
-    def _in_order(self) -> KeptQuantity:
-        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
-            text = f"is {self.lower:g}, not less than `upper`, {self.upper:g}; exchange them."
-            raise ProblemError([("lower", text)])
-        return self
-
-
-@part(kw_only=True, refuse=_REFUSE)
+@record()
 class SweepOutput:
     """Selection of what is written to files.
 
@@ -161,21 +116,17 @@ class SweepOutput:
         quantiles: Quantiles of every kept quantity, between 0 and 1.
     """
 
-    rows: Annotated[bool, Field(strict=True, description="whether all rows are kept")] = True
-    extremes: Annotated[
-        Int, Field(ge=0, le=10_000, description="rows with the smallest and largest values")
-    ] = 10
-    failures: Annotated[
-        Int, Field(ge=0, le=1_000_000, description="first rows without a result")
-    ] = 100
-    bins: Annotated[Int, Field(ge=0, le=1000, description="bins of histograms")] = 50
+    rows: Annotated[bool, Field(strict=True)] = True
+    extremes: Annotated[Int, Field(ge=0, le=10_000)] = 10
+    failures: Annotated[Int, Field(ge=0, le=1_000_000)] = 100
+    bins: Annotated[Int, Field(ge=0, le=1000)] = 50
     quantiles: Annotated[
         tuple[Annotated[Float, Field(ge=0.0, le=1.0)], ...],
-        Field(max_length=1000, description="quantiles, between 0 and 1"),
+        Field(max_length=1000),
     ] = (0.025, 0.25, 0.5, 0.75, 0.975)
 
 
-@part(refuse=_REFUSE, kw_only=True)
+@record()
 class SweepPlan:
     """Plan of a sweep.
 
@@ -186,34 +137,25 @@ class SweepPlan:
         piece: Rows of a piece, which is one file; chosen where not given.
         variable: What is varied.
         sampling: How variables without `count` or `values` are sampled.
-        load: By name, the loads; the keys are the options of `notchflex simulate`.
-        keep: The quantities that are kept.
+        load: Loads by name; the keys are the options of `notchflex simulate`.
+        keep: The quantities that are kept, and within which limits a robot is accepted, in mm, N,
+            MPa and deg.
         output: What of all rows goes into files.
     """
 
     _: KW_ONLY
-    robot: Annotated[str, Field(min_length=1, description="ready robot, or robot file")]
-    name: Annotated[str, Field(min_length=1, max_length=200, description="name of the sweep")] = (
-        "sweep"
-    )
-    refinement: Annotated[Int, Field(ge=0, le=3, description="more strain modes and fibres")] = 0
-    piece: Annotated[
-        Int | None, Field(ge=16, le=2**22, description="rows of a piece, which is one file")
-    ] = None
-    variable: Annotated[
-        tuple[SweepVariable, ...], Field(min_length=1, max_length=500, description="what is varied")
-    ]
-    sampling: Annotated[
-        Sampling | None, Field(description="how variables without count or values are sampled")
-    ] = None
-    load: Annotated[
-        dict[str, dict[str, Any]], Field(min_length=1, max_length=100, description="loads by name")
-    ]
+    robot: Annotated[str, Field(min_length=1)]
+    name: Annotated[str, Field(min_length=1, max_length=200)] = "sweep"
+    refinement: Annotated[Int, Field(ge=0, le=3)] = 0
+    piece: Annotated[Int | None, Field(ge=16, le=2**22)] = None
+    variable: Annotated[tuple[SweepVariable, ...], Field(min_length=1, max_length=500)]
+    sampling: Sampling | None = None
+    load: LoadTables
     keep: Annotated[
-        tuple[KeptQuantity, ...],
-        Field(min_length=1, max_length=500, description="quantities that are kept"),
+        tuple[LimitedQuantity, ...],
+        Field(min_length=1, max_length=500),
     ]
-    output: Annotated[SweepOutput, Field(description="what goes into files")] = SweepOutput()
+    output: SweepOutput = SweepOutput()
 
     @property
     def grid(self) -> tuple[SweepVariable, ...]:
@@ -228,10 +170,8 @@ class SweepPlan:
     @property
     def rows(self) -> int:
         """Number of rows: the grid times the points."""
-        count = 1 if self.sampling is None else self.sampling.points
-        for one in self.grid:
-            count *= len(one.values) if one.values is not None else (one.count or 1)
-        return count
+        points = 1 if self.sampling is None else self.sampling.points
+        return points * math.prod(one.size for one in self.grid)
 
     @model_validator(mode="after")
     def _fits(self) -> SweepPlan:
@@ -283,13 +223,12 @@ def plan_from_table(table: Mapping[str, Any]) -> SweepPlan:
         >>> plan_from_table(table).rows
         7
     """
-    return validated(SweepPlan, table)
+    return made(SweepPlan, table)
 
 
 def plan_table(plan: SweepPlan) -> dict[str, Any]:
     """Return a plan as a plain table, which `plan_from_table` reads back."""
-    table = TypeAdapter(SweepPlan).dump_python(plan, mode="json", exclude_none=True)
-    return {key: value for key, value in table.items() if value is not None}
+    return TypeAdapter(SweepPlan).dump_python(plan, mode="json", exclude_none=True)
 
 
 def plan_schema() -> dict[str, Any]:

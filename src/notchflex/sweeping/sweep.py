@@ -5,7 +5,6 @@ What a row gives depends on the plan alone: not on the process, on the rows befo
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import shutil
 import time
@@ -35,10 +34,9 @@ from notchflex.pieces import (
     sobol_points,
     summed_up,
 )
+from notchflex.specification import Criterion, entry_names, limited_numbers, placed, read_load
 from notchflex.support import (
-    REGISTERED,
     check_integer,
-    nearest,
     need,
     number_at,
     number_of_cores,
@@ -47,7 +45,6 @@ from notchflex.support import (
     write_json,
 )
 from notchflex.sweeping.plan import (
-    KeptQuantity,
     Sampling,
     SweepPlan,
     SweepVariable,
@@ -57,15 +54,6 @@ from notchflex.sweeping.plan import (
 )
 from notchflex.sweeping.result import KIND, Sweep, read_sweep
 from notchflex.tolerancing import Study, piece_rows
-from notchflex.tolerancing.spec import (
-    AXES,
-    FIRST,
-    INDICES,
-    LIMITED,
-    Criterion,
-    entries_of,
-    read_load,
-)
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -168,19 +156,14 @@ def _study_of(plan: SweepPlan, robot: Robot) -> Study:
     for variable in plan.variable:
         number_at(base, variable.value)
     loads = {name: read_load(table, name, base) for name, table in plan.load.items()}
-    for kept in plan.keep:
-        _check(kept, list(loads))
     paths = {name: simulate(base, load, refinement=plan.refinement) for name, load in loads.items()}
     criteria: dict[str, Criterion] = {}
-    for kept in plan.keep:
-        load = kept.load or next(iter(loads))
-        for entry in entries_of(kept, load, paths[load], len(loads) > 1, "`keep`"):
-            if entry.name in criteria:
-                raise InputError.CONFLICT(f"`keep` has {entry.name} twice; keep it once.")
-            scale = entry.quantity.scale
-            criteria[entry.name] = dataclasses.replace(
-                entry, lower=entry.lower / scale, upper=entry.upper / scale
-            )
+    for number, kept in enumerate(plan.keep, start=1):
+        with placed(f"`keep[{number}]`"):
+            for entry in limited_numbers(kept.in_python, paths):
+                if entry.name in criteria:
+                    raise InputError.CONFLICT(f"{entry.name} is kept twice; keep it once.")
+                criteria[entry.name] = entry
     if not criteria:
         raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
     return Study(base, (), paths, tuple(criteria.values()), None, plan.refinement, 1)
@@ -200,31 +183,9 @@ def _middle(plan: SweepPlan, robot: Robot) -> Robot:
         raise type(problem)(message if invalid else str(problem), problem.code) from None
 
 
-def _check(kept: KeptQuantity, loads: list[str]) -> None:
-    """Check the names of a kept quantity."""
-    if kept.quantity not in LIMITED:
-        raise InputError.UNKNOWN_NAME(
-            f'`keep` names the quantity "{kept.quantity}"{nearest(kept.quantity, LIMITED)}; '
-            f"allowed: {', '.join(LIMITED)}."
-        )
-    per, what = REGISTERED[kept.quantity].per, f"`keep` of {kept.quantity}"
-    for key in INDICES:
-        if getattr(kept, key) is not None and key not in per:
-            has = f"one value per {' and '.join(per)}" if per else "a single value"
-            raise InputError.CONFLICT(f"{what} names one {key}, but there is {has}.")
-    allowed = f"allowed: {', '.join(loads)}"
-    if kept.load is None and len(loads) > 1:
-        raise InputError.MISSING_VALUE(f"{what} must name one of the loads; {allowed}.")
-    if kept.load is not None and kept.load not in loads:
-        near = nearest(kept.load, loads)
-        raise InputError.UNKNOWN_NAME(f'{what} names the load "{kept.load}"{near}; {allowed}.')
-
-
 def _column_name(criterion: Criterion, has_load: bool) -> str:
     """Return the name of a column, such as `notch_angle_3_deg_at_pulled_step_2`."""
-    words = [criterion.quantity.name]
-    for axis, number in zip(criterion.quantity.per, criterion.index, strict=True):
-        words.append(AXES[number] if axis == "axis" else str(number + FIRST.get(axis, 1)))
+    words = [criterion.quantity.name, *entry_names(criterion.quantity.per, criterion.index)]
     words.append(criterion.quantity.unit.replace(" ", ""))
     words.append(f"at_{criterion.load}" if has_load else "")
     words.append(f"step_{criterion.step + 1}" if "step " in criterion.name else "")

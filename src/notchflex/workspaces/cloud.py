@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import ConvexHull, Delaunay, QhullError
 
 from notchflex import InputError, Robot
+from notchflex.specification import LimitedQuantity
 from notchflex.support import (
     AXES,
     DEGREES,
@@ -25,7 +26,6 @@ from notchflex.support import (
     short,
     write_groups,
 )
-from notchflex.workspaces.limits import Limit
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -261,7 +261,7 @@ class Workspace(Displayed):
     """
 
     robot: Robot
-    limits: tuple[Limit, ...]
+    limits: tuple[LimitedQuantity, ...]
     load: ExternalLoad
     largest: Float[np.ndarray, " t"]
     tried: int

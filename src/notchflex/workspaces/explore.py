@@ -34,6 +34,7 @@ from notchflex.pieces import (
     piece_file,
     sobol_points,
 )
+from notchflex.specification import LimitedQuantity
 from notchflex.support import (
     ExternalLoad,
     check_integer,
@@ -43,7 +44,7 @@ from notchflex.support import (
     to_table,
 )
 from notchflex.workspaces.cloud import Workspace, hull_of, nearest_directions
-from notchflex.workspaces.limits import Limit, all_hold, limits_of
+from notchflex.workspaces.limits import all_hold, limits_of
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -186,7 +187,7 @@ class WorkspaceTask(PieceTask):
     """
 
     robot: Robot
-    limits: tuple[Limit, ...]
+    limits: tuple[LimitedQuantity, ...]
     load: ExternalLoad
     largest: Float[np.ndarray, " t"]
     number: int
@@ -202,7 +203,7 @@ class WorkspaceTask(PieceTask):
             _STATES * self.number,
             _STATES * min(_PIECE, self.number),
             robot=to_table(self.robot.replace(tolerance=None)),
-            limits=[[limit.name, limit.low, limit.high] for limit in self.limits],
+            limits=[[limit.quantity, *limit.ends] for limit in self.limits],
             load=self.load,
             largest=self.largest,
             pretension=self.pretension,
@@ -272,7 +273,7 @@ class WorkspaceTask(PieceTask):
         outputs = simulate_batch(
             self.robot,
             [_under(self.load, ray) for ray in tension],
-            outputs=[*names, "converged", *(limit.name for limit in self.limits)],
+            outputs=[*names, "converged", *(limit.quantity for limit in self.limits)],
             settings=_SETTINGS,
             cores=self.cores,
         )

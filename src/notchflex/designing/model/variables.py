@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import comb, isfinite
+from math import comb, isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,10 @@ from jaxtyping import Bool, Float
 from notchflex import InputError, LoadPath, Robot
 from notchflex.analysis.draws import moments, sources_of
 from notchflex.designing.specification import DesignState, DesignVariable
-from notchflex.support import ExternalLoad, Tolerance, described_at, nearest, numbers_at
+from notchflex.specification import known, placed
+from notchflex.support import ExternalLoad, Tolerance, described_at, numbers_at
 
-_LOAD = re.compile(r"state\.([\w-]+)\.(tension|stroke)(?:\[([1-9]\d{0,3})\])?")
+_LOAD = re.compile(r"(?:load|state)\.([\w-]+)\.(tension|stroke)(?:\[([1-9]\d{0,3})\])?")
 _UNITS = {"tension": "N", "stroke": "mm"}
 
 
@@ -29,6 +30,11 @@ class LoadNumber:
     state: str
     kind: str
     tendon: int
+
+    def commanded(self, states: Mapping[str, DesignState]) -> float:
+        """Return its value in the specification, NaN where it has none."""
+        values = getattr(states[self.state], self.kind) or ()
+        return values[self.tendon] if self.tendon < len(values) else nan
 
 
 @dataclass(frozen=True)
@@ -59,8 +65,12 @@ class Column:
     @property
     def law(self) -> str | None:
         """The path of a constant of material or friction, where this is one."""
-        path = next(iter(self.weights), "")
-        return path if path.startswith(("material.", "friction.")) else None
+        return _law(self.weights)
+
+
+def _law(numbers: Mapping[str, float]) -> str | None:
+    path = next(iter(numbers), "")
+    return path if path.startswith(("material.", "friction.")) else None
 
 
 @dataclass(frozen=True)
@@ -69,7 +79,7 @@ class Variables:
 
     Attributes:
         robot: The robot with its stock and number of notches.
-        states: The states by name.
+        states: The loads by name.
         columns: The numbers of the vector.
         tolerances: Within what robots are made; derivatives by what deviates follow those by the
             vector.
@@ -95,33 +105,27 @@ class Variables:
     @cached_property
     def start(self) -> Float[np.ndarray, " v"]:
         """The robot as it is, within the limits."""
-        values = np.zeros(len(self.columns))
+        loads = (one.load for one in self.columns)
+        values = np.array([0.0 if one is None else one.commanded(self.states) for one in loads])
         paths = list(dict.fromkeys(path for one in self.columns for path in one.weights))
         if paths:
-            present = np.array([np.mean(list(numbers_at(self.robot, p).values())) for p in paths])
+            present = [np.mean(list(numbers_at(self.robot, path).values())) for path in paths]
             parts = [[one.weights.get(path, 0.0) for one in self.columns] for path in paths]
-            values = np.linalg.lstsq(np.array(parts), present)[0]
-        for number, one in enumerate(self.columns):
-            if one.load is not None:
-                state = self.states[one.load.state]
-                values[number] = getattr(state, one.load.kind)[one.load.tendon]
+            values += np.linalg.lstsq(np.array(parts), np.array(present))[0]
         return np.clip(values, self.lower, self.lower + self.span)
 
     def parts_of(self, path: str) -> Float[np.ndarray, " v"]:
         """Return how much of a single number of the robot file each variable makes."""
-        if path not in self._parts:
-            self._parts[path] = np.array([self._part(one, path) for one in self.columns])
-        return self._parts[path]
-
-    def _part(self, column: Column, path: str) -> float:
-        for name, weight in column.weights.items():
-            if path in numbers_at(self.robot, name):
-                return weight
-        return 0.0
+        return self._parts.get(path, np.zeros(len(self.columns)))
 
     @cached_property
     def _parts(self) -> dict[str, np.ndarray]:
-        return {}
+        parts: dict[str, np.ndarray] = {}
+        for number, column in enumerate(self.columns):
+            for name, weight in column.weights.items():
+                for path in numbers_at(self.robot, name):
+                    parts.setdefault(path, np.zeros(len(self.columns)))[number] = weight
+        return parts
 
     def values(self, x: Float[np.ndarray, " v"]) -> dict[str, float]:
         """Return the values of the robot file, by path."""
@@ -173,110 +177,80 @@ def variables_of(
         InputError: A path is not known, given twice or no number, or limits are out of range.
     """
     columns: list[Column] = []
-    numbers: dict[str, int] = {}
-    for number, one in enumerate(variables, start=1):
-        shown = f"`variable[{number}]`: "
-        try:
-            added = _columns(robot, one, states)
-        except InputError as error:
-            raise InputError(f"{shown}{error}", error.code) from None
-        for path in dict.fromkeys(path for column in added for path in _every(robot, column)):
-            if path in numbers:
-                raise InputError.CONFLICT(
-                    f"{shown}`{path}` is already chosen by `variable[{numbers[path]}]`; "
-                    "leave one out."
-                )
-            numbers[path] = number
-        columns += added
+    chosen_by: dict[str, int] = {}
+    for number, variable in enumerate(variables, start=1):
+        with placed(f"`variable[{number}]`"):
+            if variable.is_load:
+                added, paths = [_load(variable, states)], [variable.value]
+            else:
+                added, paths = _columns(robot, variable), numbers_at(robot, variable.value)
+            for path in paths:
+                if path in chosen_by:
+                    raise InputError.CONFLICT(
+                        f"`{path}` is already chosen by `variable[{chosen_by[path]}]`; leave one "
+                        "out."
+                    )
+                chosen_by[path] = number
+            columns += added
     return Variables(robot, states, tuple(columns))
 
 
-def _every(robot: Robot, column: Column) -> list[str]:
-    """Every single number that a column sets."""
-    if column.load is not None:
-        return [column.name]
-    return [path for name in column.weights for path in numbers_at(robot, name)]
-
-
-def _columns(
-    robot: Robot, variable: DesignVariable, states: Mapping[str, DesignState]
-) -> list[Column]:
-    limits = (variable.lower, variable.upper)
-    if variable.value.startswith("state."):
-        load = _load_number(robot, variable, states)
-        return [Column(variable.value, _UNITS[load.kind], *limits, {}, load)]
-    numbers = numbers_at(robot, variable.value)
-    described = described_at(robot, variable.value)
+def _columns(robot: Robot, variable: DesignVariable) -> list[Column]:
+    limits, path, along = (variable.lower, variable.upper), variable.value, variable.along
+    numbers, (unit, least, most) = numbers_at(robot, path), described_at(robot, path)
     for key, limit in zip(("lower", "upper"), limits, strict=True):
-        if not described.lower <= limit <= described.upper:
+        if not least <= limit <= most:
+            between = f"{least:g} and {most:g} {unit}".rstrip()
             raise InputError.OUT_OF_RANGE(
-                f"`{key}` is {limit:g}; `{variable.value}` must lie between {described.lower:g} "
-                f"and {described.upper:g} {described.unit}".rstrip()
-                + ". Give it in that unit."
+                f"`{key}` is {limit:g}; `{path}` must lie between {between}. Give it in that unit."
             )
-    unit = described.unit
     for value in numbers.values():
         if value > _OTHER_UNIT * variable.upper > 0.0 or 0.0 < _OTHER_UNIT * value < variable.lower:
             raise InputError.OUT_OF_RANGE(
-                f"`{variable.value}` is {value:g} {unit}".rstrip()
-                + f" in the robot, and may lie between {variable.lower:g} and {variable.upper:g}: "
-                f"give the limits in {unit or 'the unit of the robot file'}, or change the robot."
+                f"`{path}` is {value:g} in the robot, and may lie between {limits[0]:g} and "
+                f"{limits[1]:g}: give the limits in {unit or 'the unit of the robot file'}, or "
+                "change the robot."
             )
-    if variable.along == "all":
-        return [Column(variable.value, unit, *limits, {variable.value: 1.0})]
-    if not variable.value.startswith("notch") or len(numbers) < 2:
+    if along == "all":
+        return [Column(path, unit, *limits, {path: 1.0})]
+    if not path.startswith("notch") or len(numbers) < 2:
         raise InputError.UNSUPPORTED(
-            f'along = "{variable.along}" is for values of several notches, such as notch.depth; '
-            f"`{variable.value}` is a single number."
+            f'along = "{along}" is for values of several notches, such as notch.depth; `{path}` is '
+            "a single number."
         )
-    if variable.along == "each":
-        return [Column(path, unit, *limits, {path: 1.0}) for path in numbers]
+    if along == "each":
+        return [Column(one, unit, *limits, {one: 1.0}) for one in numbers]
     degree = min(variable.degree or 1, len(numbers) - 1)
-    at = np.linspace(0.0, 1.0, len(numbers))
+    place = np.linspace(0.0, 1.0, len(numbers))
     columns: list[Column] = []
     for k in range(degree + 1):
         # Bernstein's polynomials: where their factors are within the limits, so is the sum.
-        shape = comb(degree, k) * at**k * (1.0 - at) ** (degree - k)
-        weights = {p: w for p, w in zip(numbers, shape.tolist(), strict=True) if w}
-        columns.append(Column(f"{variable.value} ({_place(k, degree)})", unit, *limits, weights))
+        shape = comb(degree, k) * place**k * (1.0 - place) ** (degree - k)
+        weights = {one: w for one, w in zip(numbers, shape.tolist(), strict=True) if w}
+        where = {0: "at the base", degree: "at the tip"}.get(k, f"coefficient {k + 1}")
+        columns.append(Column(f"{path} ({where})", unit, *limits, weights))
     return columns
 
 
-def _place(k: int, degree: int) -> str:
-    if k in (0, degree):
-        return "at the tip" if k else "at the base"
-    return f"coefficient {k + 1}"
-
-
-def _load_number(
-    robot: Robot, variable: DesignVariable, states: Mapping[str, DesignState]
-) -> LoadNumber:
+def _load(variable: DesignVariable, states: Mapping[str, DesignState]) -> Column:
     match = _LOAD.fullmatch(variable.value)
     if match is None:
         raise InputError.UNKNOWN_NAME(
-            f"`{variable.value}` is not the name of a load; write it like state.NAME.tension, or "
-            "state.NAME.stroke[2] for the second tendon."
+            f"`{variable.value}` is no number of a load; write load.NAME.tension, or "
+            "load.NAME.stroke[2] for the second tendon."
         )
     name, kind, tendon = match[1], match[2], int(match[3] or 1)
-    if name not in states:
-        raise InputError.UNKNOWN_NAME(
-            f"`{variable.value}`: there is no state `{name}`{nearest(name, states)}."
-        )
-    commanded = getattr(states[name], kind) or ()
-    if tendon > len(commanded) or not isfinite(commanded[tendon - 1]):
+    known(name, states, "load")
+    number = LoadNumber(name, kind, tendon - 1)
+    if not isfinite(number.commanded(states)):
         raise InputError.MISSING_VALUE(
-            f"`{variable.value}`: the state gives no {kind} of tendon {tendon} to begin with; "
-            "give one."
+            f"the load {name} gives no {kind} of tendon {tendon} to begin with; give one."
         )
     if kind == "tension" and variable.lower < 0.0:
         raise InputError.OUT_OF_RANGE(
             f"`lower` is {variable.lower:g} N; a tendon only pulls, so give 0 N or more."
         )
-    if tendon > robot.number_of_tendons:
-        raise InputError.OUT_OF_RANGE(
-            f"`{variable.value}`: the robot has {robot.number_of_tendons} tendons."
-        )
-    return LoadNumber(name, kind, tendon - 1)
+    return Column(variable.value, _UNITS[kind], variable.lower, variable.upper, {}, number)
 
 
 @dataclass(frozen=True)
@@ -296,8 +270,7 @@ class Deviation:
     @property
     def law(self) -> str | None:
         """The path of a constant of material or friction, where this is one."""
-        path = next(iter(self.nominal))
-        return path if path.startswith(("material.", "friction.")) else None
+        return _law(self.nominal)
 
     def moved(self, robot: Robot, part: float) -> Robot:
         """Return a robot that deviates by a number of standard deviations.
@@ -354,32 +327,29 @@ class StatePaths:
     pieces: tuple[tuple[str | Probe, ...], ...]
 
     @property
+    def _sizes(self) -> list[list[int]]:
+        """Number of steps of every part of every piece."""
+        return [
+            [1 if isinstance(part, Probe) else self.states[part].steps for part in piece]
+            for piece in self.pieces
+        ]
+
+    @property
     def step(self) -> dict[str | Probe, int]:
-        """The step of every state and probe, from 0; of one in several pieces the first."""
-        steps: dict[str | Probe, int] = {}
-        last = -1
-        for piece in self.pieces:
-            for one in piece:
-                last += 1 if isinstance(one, Probe) else self.states[one].steps
-                steps.setdefault(one, last)
-        return steps
+        """The step of every load and probe, from 0; of one in several pieces the first."""
+        parts = list(itertools.chain(*self.pieces))
+        last = itertools.accumulate(itertools.chain(*self._sizes), initial=-1)
+        return dict(list(zip(parts, itertools.islice(last, 1, None), strict=True))[::-1])
 
     @property
     def lengths(self) -> list[int]:
         """Number of steps of every piece."""
-        steps = (
-            (1 if isinstance(one, Probe) else self.states[one].steps for one in piece)
-            for piece in self.pieces
-        )
-        return [sum(one) for one in steps]
+        return list(map(sum, self._sizes))
 
     @property
     def from_rest(self) -> Bool[np.ndarray, " s"]:
         """Which steps begin at rest."""
-        lengths = self.lengths
-        begins = np.zeros(sum(lengths), bool)
-        begins[np.cumsum([0, *lengths[:-1]])] = True
-        return begins
+        return np.concatenate([np.arange(length) == 0 for length in self.lengths])
 
     def path(self, numbers: Mapping[LoadNumber, float]) -> LoadPath:
         """Return the whole path.
@@ -391,25 +361,26 @@ class StatePaths:
         external: list[ExternalLoad] = []
         for piece in self.pieces:
             before = np.zeros((2, self.tendons))
-            load = ExternalLoad()
-            for one in piece:
-                if isinstance(one, Probe):
-                    force = np.array(load.tip_force) + one.side * PROBE * np.array(one.direction)
+            for part in piece:
+                if isinstance(part, Probe):
+                    state, force = (
+                        self.states[part.state],
+                        part.side * PROBE * np.array(part.direction),
+                    )
                     commands.append(before[None])
-                    external.append(_external(self.states[one.state], tuple(force.tolist())))
+                    external.append(_external(state, force))
                     continue
-                state = self.states[one]
+                state = self.states[part]
                 after = self._commanded(state, numbers)
                 # A slack tendon is pulled from 0 N; what changes from stroke to tension jumps.
                 slack = np.isnan(before).all(axis=0) & np.array([[True], [False]])
                 first = np.where(slack, 0.0, np.where(np.isnan(before), after, before))
-                part = np.arange(1, state.steps + 1) / state.steps
-                commands.append(first + part[:, None, None] * (after - first))
-                load = _external(state, state.tip_force)
-                external += [load] * state.steps
+                done = np.arange(1, state.steps + 1)[:, None, None] / state.steps
+                commands.append(first + done * (after - first))
+                external += [_external(state)] * state.steps
                 before = after
-        every = np.concatenate(commands)
-        return LoadPath(every[:, 0], every[:, 1], external=tuple(external))
+        tension, stroke = np.concatenate(commands).swapaxes(0, 1)
+        return LoadPath(tension, stroke, external=tuple(external))
 
     def _commanded(
         self, state: DesignState, numbers: Mapping[LoadNumber, float]
@@ -418,6 +389,10 @@ class StatePaths:
         table = np.full((2, self.tendons), np.nan)
         for row, kind in enumerate(("tension", "stroke")):
             given = getattr(state, kind) or ()
+            if len(given) > self.tendons:
+                raise InputError.WRONG_SHAPE(
+                    f"it gives a {kind} of {len(given)} tendons, but the robot has {self.tendons}."
+                )
             table[row, : len(given)] = given
         for one, value in numbers.items():
             if one.state == state.name:
@@ -425,10 +400,10 @@ class StatePaths:
         return table
 
 
-def _external(state: DesignState, force: Sequence[float]) -> ExternalLoad:
-    return ExternalLoad(
-        tip_force=tuple(force), tip_moment=state.tip_moment, tip_mass=state.tip_mass
-    )
+def _external(state: DesignState, more: float | np.ndarray = 0.0) -> ExternalLoad:
+    """Return the external loads of a state, with more force at the tip."""
+    force = tuple((np.array(state.tip_force) + more).tolist())
+    return ExternalLoad(tip_force=force, tip_moment=state.tip_moment, tip_mass=state.tip_mass)
 
 
 def state_paths(
@@ -462,36 +437,22 @@ def state_paths(
 
 
 def check_states(states: Sequence[DesignState], tendons: int) -> None:
-    """Raise if states contradict each other or the robot.
+    """Raise if loads contradict each other or the robot, or no path can have them.
 
     Raises:
-        InputError: Two states of one name, an unknown state before another, a circle, no load, or
-            a load of a tendon that is not there.
+        InputError: It is so.
     """
     table = {one.name: one for one in states}
-    for number, one in enumerate(states, start=1):
-        shown = f"`state[{number}]` ({one.name})"
-        if table[one.name] is not one:
-            raise InputError.CONFLICT(f"{shown}: another state has this name; rename one of them.")
-        history(table, one.name)
-        for kind in ("tension", "stroke"):
-            given = getattr(one, kind) or ()
-            if len(given) > tendons:
-                raise InputError.WRONG_SHAPE(
-                    f"{shown} gives a {kind} of {len(given)} tendons, but the robot has {tendons}."
-                )
-            finite = [value for value in given if value == value]
-            if any(abs(value) > 1e6 for value in finite):
-                raise InputError.OUT_OF_RANGE(f"{shown} has a {kind} beyond 1e6; give N and mm.")
-            if kind == "tension" and any(value < 0.0 for value in finite):
-                raise InputError.OUT_OF_RANGE(
-                    f"{shown} has a tension below 0 N; a tendon only pulls."
-                )
-        StatePaths({one.name: one}, tendons, ((one.name,),)).path({})  # raises for both at once
+    for state in states:
+        with placed(f"`load.{state.name}`"):
+            if table[state.name] is not state:
+                raise InputError.CONFLICT("another load has this name; rename one of them.")
+            history(table, state.name)
+            StatePaths({state.name: state}, tendons, ((state.name,),)).path({})
 
 
 def history(states: Mapping[str, DesignState], name: str) -> tuple[str, ...]:
-    """Return the states from rest up to one.
+    """Return the loads from rest up to one.
 
     Raises:
         InputError: One of them does not exist, or they run in a circle.
@@ -499,16 +460,11 @@ def history(states: Mapping[str, DesignState], name: str) -> tuple[str, ...]:
     way: list[str] = []
     before: str | None = name
     while before is not None:
-        if before not in states:
-            raise InputError.UNKNOWN_NAME(
-                f"there is no state `{before}`{nearest(before, states)}; "
-                f"there are {', '.join(states) or 'none'}."
-            )
         if before in way:
             raise InputError.CONFLICT(
-                f"the states {' and '.join(way)} come after each other in a circle; one of them "
+                f"the loads {' and '.join(way)} come after each other in a circle; one of them "
                 "must begin at rest, without `after`."
             )
         way.insert(0, before)
-        before = states[before].after
+        before = known(before, states, "load").after
     return tuple(way)
