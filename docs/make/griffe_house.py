@@ -1,8 +1,9 @@
 """How griffe, which reads the sources for the Python reference, is to take what is ours.
 
-A class under `@part` (notchflex.robot) or `@record` (notchflex.specification) is a dataclass whose annotations carry units and limits; the
-reference shows its plain types. A section `Example:` of a docstring is one that is executed. A
-public function may have the name of the module that it stands in; the reference shows the function.
+A class under `@part` (notchflex.robot) or `@record` (notchflex.specification) is a dataclass whose
+annotations carry units and limits; the reference shows its plain types. A section `Example:` of a
+docstring is one that is executed. A public function may have the name of the module that it stands
+in; the reference shows the function.
 """
 
 from __future__ import annotations

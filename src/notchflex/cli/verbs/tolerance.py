@@ -51,8 +51,8 @@ def tolerance(
     Args:
         tolerances: A TOML file, which `notchflex new NAME --tolerance` writes: `[load.NAME]` (the
             options of `simulate` as keys), `[[accept]]` (`quantity`, `lower`, `upper`), and if
-            wanted `[tolerance]`, as in a robot file, and `wanted` in `[yield]`. Without
-            `[tolerance]` those of the robot hold.
+            wanted `[tolerance]`, as in a robot file, and `wanted_yield`. Without `[tolerance]`
+            those of the robot hold.
         draws: About how many robots are drawn: 25 independent sets of scrambled Sobol points, each
             as large as the nearest power of two. More than 10 000 000 need `--folder`.
         seed: Seed of the draws.
