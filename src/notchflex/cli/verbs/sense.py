@@ -141,7 +141,7 @@ def _print(sensed: SensedForce) -> None:
     contact = np.where(sensed.contact, "yes", "")
     console.print(tables.table([*columns, ("contact", contact[shown], "")]))
     if stride > 1:
-        console.print(f"every {stride}th of {len(sensed)} readings; --csv and --json have all")
+        console.print(f"{len(shown)} of {len(sensed)} readings; --csv and --json have all")
     if sensed.limited.any():
         terminal.note(
             f"open: the interval ends at the range of the search, {sensed.largest:.3g} N."
