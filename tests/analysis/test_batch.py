@@ -158,6 +158,7 @@ def test_robots_of_unlike_length(wrist, load, margin):
     margin.within("tip", found["tip_position"][1] - nf.solve(robots[1], load).tip_position, 1e-9)
 
 
+@pytest.mark.nightly
 def test_robots_with_unlike_tendons(wrist):
     robots = [wrist, nf.load_robot("two-axis-wrist")]
     load = nf.Load(tension=0.3, tip_force=(0.0, 0.01, 0.0))

@@ -145,6 +145,7 @@ def test_slopes_by_loads_of_the_tip(margin):
             margin.within(f"{name} {axis}", (both - expected) / np.abs(slopes).max(), 1e-7)
 
 
+@pytest.mark.nightly
 def test_weight_of_bodies_counts_in_gradients(margin):
     """Loads depend on the numbers of a robot: forward and backward agree with differences."""
     load = nf.pull(0.5, 0.5, steps=1).loaded(gravity=(9.81, 0.0, 0.0), tip_mass=2.0)
@@ -269,6 +270,7 @@ def test_rows_that_fail_are_nan_alone():
     assert np.isfinite(by).all(axis=(1, 2)).tolist() == [True, True, False]
 
 
+@pytest.mark.nightly
 def test_what_acts_on_bodies_is_mapped_too(margin):
     """Forces at the tip are rows of one robot; numbers of a robot that weighs something are not."""
     load = nf.pull(0.5, 0.5, steps=1).loaded(tip_force=(0.01, 0.0, 0.0))

@@ -90,7 +90,10 @@ def test_many_numbers_take_the_adjoint_and_few_the_tangents(margin):
     margin.within("against differences", float(reverse[3]) / expected - 1.0, 1e-5)
 
 
-@pytest.mark.parametrize("name", ["pacheco2021-a", "gao2017", "liu2022"])
+@pytest.mark.parametrize(
+    "name",
+    ["pacheco2021-a", pytest.param("gao2017", marks=pytest.mark.nightly), "liu2022"],
+)
 def test_other_laws_make_the_chain_that_is_assembled_anew(name, margin):
     robot = nf.load_robot(name)
     values = {"material.elastic_modulus": 7e3, "friction.coefficient": 0.21}

@@ -99,8 +99,8 @@ def coded(text: str) -> InputError:
     cause = first.get("ctx", {}).get("error")
     if not isinstance(cause, InputError):
         is_type = first["type"].endswith(("_type", "_wanted"))
-        other = ErrorCode.WRONG_TYPE if is_type else ErrorCode.OUT_OF_RANGE
-        return InputError(text, _CODES.get(first["type"], other))
+        usual = ErrorCode.WRONG_TYPE if is_type else ErrorCode.OUT_OF_RANGE
+        return getattr(InputError, _CODES.get(first["type"], usual).name)(text)
     place = "".join(f"[{key + 1}]" if isinstance(key, int) else key for key in first["loc"])
     return InputError(f"`{place}`: {cause}" if place else str(cause), cause.code)
 
