@@ -151,7 +151,7 @@ def test_300_mutated_files(seeds, tmp_path, monkeypatch, capsys):
     class ReachedError(Exception):
         """The plan was accepted."""
 
-    def stop(*_: Any) -> None:
+    def stop(*_: Any, **__: Any) -> None:
         raise ReachedError
 
     monkeypatch.setattr(PieceFolder, "run", stop)
