@@ -101,7 +101,7 @@ def test_bad_measurements_hold_the_last_command():
 def test_a_fault_of_the_program_is_no_invalid_input(monkeypatch):
     controller = nf.Controller(nf.load_robot("pacheco2021-a"), "total_angle")
 
-    def fails(*_):
+    def fails(*_, **__):
         raise ValueError("a fault")
 
     monkeypatch.setattr("notchflex.control.controller.find", fails)
@@ -189,3 +189,20 @@ def test_a_reversal_with_closed_notches_takes_few_solves(top):
     assert controller.status.reached
     assert controller.status.solves <= 8
     assert command[0] == pytest.approx(1.4046, abs=1e-5)
+
+
+def test_a_limited_rate_leads_back_from_closed_notches():
+    """Notches that are pressed together hold the tip for longer than a step of the rate."""
+    largest = 1.3 * float(nf.closing(WRIST).tension.max())
+    change = 0.05 * largest
+    controller = nf.Controller(WRIST, limits=nf.Limits(tension=(0.0, largest), rate=change))
+    pulled = path(
+        WRIST, np.concatenate([np.linspace(0.0, largest, 27), np.linspace(largest, 0, 9)])
+    )
+    for tip in pulled.tip_position[:27]:
+        controller.step(tip)
+    assert controller.command[0] > 0.7 * largest
+    for tip in [*pulled.tip_position[27:], *20 * [pulled.tip_position[-1]]]:
+        controller.step(tip)
+    assert controller.status.reached
+    assert controller.command[0] < change

@@ -13,7 +13,7 @@ from notchflex import InputError, Load, Robot, State, Stepper
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.observer import Observer
 from notchflex.control.problem import ProblemOptions, Response, TargetSearch, make_problem
-from notchflex.control.search import DriveSearch, find
+from notchflex.control.search import DriveSearch, find, go_towards
 from notchflex.control.targets import DIRECTION, LARGEST_TARGET, Targets, target_shapes
 from notchflex.support import check_is_robot, check_number, short_repr
 
@@ -203,8 +203,10 @@ class Controller:
             self._known = self._present()
 
     def _seek(self, goal: np.ndarray) -> None:
-        problem = self._problem.near(self._command)
-        attempt = find(problem, self._before, goal, self._known, problem.search.solves)
+        problem, before, budget = self._problem, self._before, self._problem.search.solves
+        near = problem.near(self._command)
+        attempt = find(near, before, goal, self._known, budget, elsewhere=False)
+        attempt = go_towards(problem, near, before, goal, attempt, self._known, budget)
         if attempt.solved:
             self._known = attempt.response
             self._command, self._before = attempt.drives, attempt.response.step.state

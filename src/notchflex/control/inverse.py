@@ -19,7 +19,7 @@ from notchflex.control.problem import (
     TargetSearch,
     make_problem,
 )
-from notchflex.control.search import KEPT, find, smallest_tensions
+from notchflex.control.search import KEPT, find, go_towards, smallest_tensions
 from notchflex.control.targets import Targets, make_targets, units_of
 from notchflex.support import check_is_robot, load_path, short_repr
 
@@ -147,11 +147,13 @@ def _follow(
     for goal in aim.goals:
         near = problem.near(problem.present(before))
         way = _approach(near, before, goal, approach, response)
-        drives += [*way.via, way.last.drives]
+        attempt = go_towards(problem, near, before, goal, way.last, response)
+        via = way.via if attempt.drives is way.last.drives else []
+        drives += [*via, attempt.drives]
         last.append(len(drives) - 1)
-        attempts.append(way.last)
-        if way.last.solved:
-            response = way.last.response
+        attempts.append(attempt)
+        if attempt.solved:
+            response = attempt.response
             before = response.step.state
     values = np.array([attempt.response.step.flat_values[aim.entries] for attempt in attempts])
     return Following(

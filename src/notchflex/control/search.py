@@ -152,9 +152,9 @@ class DriveSearch:
         solved = self.solve(ahead, response)
         if solved is None:
             return None
-        across = 0.0
-        if leapt:
-            across = 1.0 + 1e-9 if solved.stuck[leapt].any() else _ACROSS
+        # Notches that are pressed together hold on, with or without a dead band on the way.
+        holds = (response.stuck & solved.stuck & (ahead != drives)).any()
+        across = 1.0 + 1e-9 if holds else _ACROSS if leapt else 0.0
         return self.point(solved, across)
 
     def _leap(
@@ -230,6 +230,7 @@ def find(
     goal: Float[np.ndarray, " m"],
     known: Response | None = None,
     budget: int | None = None,
+    elsewhere: bool = True,
 ) -> Attempt:
     """Search drives that meet a target, from the present ones and where that fails from others.
 
@@ -238,8 +239,8 @@ def find(
         before: The state before.
         goal: The target; NaN where an entry is free.
         known: Values and slopes of the state before, where they are known.
-        budget: Largest number of solves, from the present drives alone; where None other drives
-            are tried too, each with the number of solves of the problem.
+        budget: Largest number of solves; where None the number of the problem from every start.
+        elsewhere: Whether other drives than the present ones are tried where these fail.
     """
     search, solves, best = DriveSearch(problem, before, goal), 0, None
     if known is None:
@@ -252,12 +253,12 @@ def find(
     slack = problem.driven & (present <= problem.low)
     for drives, moved in _starts(problem, present, slack):
         left = problem.search.solves if budget is None else budget - solves
-        elsewhere = bool((drives != present).any())
-        if best is not None and (left <= 0 or (elsewhere and budget is not None)):
+        is_present = bool((drives == present).all())
+        if best is not None and (left <= 0 or not (is_present or elsewhere)):
             break
         part = search.moving(moved, drives)
         start = here._replace(stuck=moved)
-        if elsewhere:
+        if not is_present:
             start, solves = part.solve(drives, here), solves + 1
         if start is None:
             continue
@@ -271,6 +272,43 @@ def find(
             break
     assert best is not None
     return best._replace(solves=solves)
+
+
+def go_towards(
+    problem: Problem,
+    near: Problem,
+    before: Float[np.ndarray, " state"],
+    goal: Float[np.ndarray, " m"],
+    attempt: Attempt,
+    known: Response | None,
+    budget: int | None = None,
+) -> Attempt:
+    """Return an attempt within the rate, or what goes towards drives that meet the target.
+
+    Friction and notches that are pressed together hold a tip for longer than a step of the rate,
+    and what is nearest within it may lead away. What is not met within the rate is sought without.
+
+    Args:
+        problem: The problem without the rate.
+        near: The problem within the rate.
+        before: The state before.
+        goal: The target.
+        attempt: What was found within the rate.
+        known: Values and slopes of the state before, where they are known.
+        budget: Largest number of solves of both, as of `find`.
+    """
+    left = None if budget is None else budget - attempt.solves - 1
+    if attempt.failure is None or near is problem or (left is not None and left <= 0):
+        return attempt
+    ahead = find(problem, before, goal, known, left)
+    solves, response = attempt.solves + ahead.solves + 1, None
+    search = DriveSearch(near, before, goal)
+    if ahead.failure is None:
+        response = search.solve(np.clip(ahead.drives, near.low, near.high), ahead.response)
+    if response is None:
+        return attempt._replace(solves=solves)
+    point = search.point(response)
+    return Attempt(response, point.error, point.excess, solves, Failure.LIMITS_PREVENT)
 
 
 def _starts(
