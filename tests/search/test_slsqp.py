@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from notchflex.pieces import sobol_points
 from notchflex.search.slsqp import Linearisation, NonlinearProgram, minimise
-from notchflex.search.starts import sobol_points, spread_out
+from notchflex.search.starts import spread_out
 
 
 def hock_schittkowski_71(x: np.ndarray) -> Linearisation:
@@ -75,7 +76,7 @@ def test_where_there_is_no_value_a_step_is_refused():
 
 
 def test_starts_are_far_from_each_other():
-    points = sobol_points(64, 2, 0)
+    points = sobol_points(2, 0, 0, 64, 64)
     assert points.shape == (64, 2)
     chosen = spread_out([*points], 5)
     assert chosen[0] == 0

@@ -17,8 +17,9 @@ from scipy.optimize import least_squares
 from notchflex import InputError
 from notchflex.designing.problem import DesignEvaluation, DesignProblem, Progress
 from notchflex.designing.specification import SearchOptions
+from notchflex.pieces import sobol_points
 from notchflex.search.slsqp import SearchMinimum, Vector, minimise
-from notchflex.search.starts import sobol_points, spread_out
+from notchflex.search.starts import spread_out
 
 _NUMBER = re.compile(r"\[\d+\]")
 # Largest difference of scaled variables of equal robots.
@@ -213,11 +214,11 @@ def drawn_robots(problem: DesignProblem, most: int, seed: int) -> Float[np.ndarr
     group = [groups.index(name) for name in names]
     place = np.array([names[:number].count(name) for number, name in enumerate(names)])
     along = place / np.maximum([names.count(name) - 1 for name in names], 1)
-    half = max(1, most // 2)
-    first, last = np.split(sobol_points(half, 2 * len(groups), seed), 2, axis=1)
+    half = max(1, most // 2) if groups else 1
+    first, last = np.split(sobol_points(2 * len(groups), seed, 0, half, half), 2, axis=1)
     last = np.where(np.arange(len(first))[:, None] % 2, last, first)
     smooth = first[:, group] + along * (last - first)[:, group]
-    return np.concatenate([smooth, sobol_points(half, problem.count, seed)])
+    return np.concatenate([smooth, sobol_points(problem.count, seed, 0, half, half)])
 
 
 def on_grid(searches: Searches, grid: float) -> Searches:

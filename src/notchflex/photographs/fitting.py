@@ -141,7 +141,8 @@ class Fit:
         Errors of lines are among the unknowns (`lines.py`): neighbouring edges are correlated.
         """
         weights = _weights(self.model, self.edges, len(self.numbers))
-        normal, _ = _normal(self.model, self.numbers, self.jacobian, self.residual, weights)
+        known = _parameters(self.model, self.numbers)
+        normal, _ = _normal(known, self.numbers, self.jacobian, self.residual, weights)
         scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-200))
         inverse = np.linalg.pinv(normal * scale[:, None] * scale, hermitian=True)
         count = len(self.numbers)
@@ -227,7 +228,7 @@ def _stepped(
 ) -> Numbers:
     """Take one damped Gauss-Newton step within the bounds."""
     count, known = len(numbers), _parameters(model, numbers)
-    normal, pull = _normal(model, numbers, jacobian, offset, weights)
+    normal, pull = _normal(known, numbers, jacobian, offset, weights)
     scales = np.append(known.scale, np.ones(len(weights.spreads)))
     normal = normal * scales[:, None] * scales
     # Errors of lines leave little of the diagonal: more damping would hardly let numbers move.
@@ -252,10 +253,10 @@ def _stepped(
 
 
 def _normal(
-    model: OutlineModel, numbers: Numbers, jacobian: Numbers, offset: Numbers, weights: _EdgeWeights
+    known: _Parameters, numbers: Numbers, jacobian: Numbers, offset: Numbers, weights: _EdgeWeights
 ) -> tuple[Numbers, Numbers]:
     """Return the normal matrix and the right side, for the numbers and the errors of lines."""
-    rows, known = np.hstack([jacobian, weights.columns]), _parameters(model, numbers)
+    rows = np.hstack([jacobian, weights.columns])
     heavy = rows * weights.weight[:, None]
     inverse = np.append(1.0 / known.spread, 1.0 / weights.spreads) ** 2
     pull = heavy.T @ np.nan_to_num(offset)
