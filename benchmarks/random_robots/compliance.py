@@ -1,8 +1,6 @@
 """Small loads on a single notch, against the textbook: cantilevers in bending and torsion.
 
-Run it as
-
-    python benchmarks/independent/compliance.py --count 12
+python -m random_robots.compliance --count 12  # in benchmarks/
 """
 
 from __future__ import annotations
@@ -14,6 +12,8 @@ import numpy as np
 
 import notchflex as nf
 
+from .sections import section_of
+
 
 def arc_error(random: np.random.Generator) -> float:
     """Return the largest relative error of an arc notch's answers to small loads in space."""
@@ -21,12 +21,10 @@ def arc_error(random: np.random.Generator) -> float:
     inner, depth = outer * random.uniform(0.5, 0.95), outer * random.uniform(0.9, 1.85)
     height, uncut = outer * random.uniform(0.3, 2), outer * random.uniform(0.0, 3)
     modulus, poisson = float(np.exp(random.uniform(5, 12))), random.uniform(0, 0.45)
-    on_axis = bool(random.random() < 0.5)
-    made = (nf.annular_sector if on_axis else nf.annular_segment)(outer, inner, depth)
-    cut = "on-axis" if on_axis else "off-axis"
-    weak, strong = float(made.second_moment_weak), float(made.second_moment_strong)
-    torsion = float(made.torsion_constant)
-    neutral, shear = float(made.centroid), float(made.shear_centre)
+    cut = "on-axis" if random.random() < 0.5 else "off-axis"
+    left = section_of(cut, outer, inner, depth)
+    weak, strong, torsion = left.weak, left.strong, left.torsion
+    neutral, shear = left.centroid, left.shear_centre
     robot = nf.Robot(
         name="one notch",
         tube=nf.Tube(2 * outer, 2 * inner),

@@ -1,6 +1,6 @@
 """Unusable values in robots and loads: each must be refused by `InputError`, or taken.
 
-python benchmarks/independent/inputs.py --seed 1 --count 2000
+python -m random_robots.inputs --seed 1 --count 2000  # in benchmarks/
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import traceback
 from typing import Any
 
 import numpy as np
-from build import make_loads, make_robot
-from generator import VARIANTS, draw_case
 
 import notchflex as nf
+
+from .by_form import VARIANTS, make_loads, make_robot, tables_of
 
 ODD: list[Any] = [0, -1, 1e-300, 1e300, -1e300, float("nan"), float("inf"), -float("inf"), True]
 ODD += [None, "1", "", "arc", [], [1.0], {}, (0.0, 0.0), 2**70, 1e-9, 1e9, 0.5, np.float32(2), "é"]
@@ -63,8 +63,8 @@ def main() -> None:
     seen: dict[str, str] = {}
     for number in range(told.count):
         random = np.random.default_rng([told.seed, number, 3])
-        case = draw_case(told.seed, VARIANTS * number)
-        tables = {"robot": case.robot, "loads": copy.deepcopy(case.loads[:2])}
+        robot, loads, _ = tables_of(told.seed, VARIANTS * number)
+        tables = {"robot": robot, "loads": copy.deepcopy(loads[:2])}
         which = "robot" if random.random() < 0.6 else "loads"
         what = mutate(random, tables[which])
         try:
@@ -76,7 +76,7 @@ def main() -> None:
             count["refused"] += 1
         except Exception as error:  # whatever it is, it is a finding
             last = traceback.extract_tb(error.__traceback__)[-1]
-            ours = "build" in last.filename
+            ours = "by_form" in last.filename
             ours |= isinstance(error, TypeError) and "keyword" in str(error)
             kind = f"{type(error).__name__}: {error}"[:150]
             kind = "not for the library" if ours else kind
