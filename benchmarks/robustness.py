@@ -26,9 +26,10 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
@@ -130,20 +131,10 @@ class DrawsTask(PieceTask):
             form, outcomes = judged(self.chosen, draw)
             bad = any(one.silent or one.wrong for one in outcomes)
             codes[1 if bad else 2 if outcomes[-1].reason else 0] += 1
-            rows += [
-                {
-                    "form": form,
-                    "draw": one.number,
-                    "step": one.step,
-                    "reason": plain(one.reason),
-                    "silent": "\n".join(one.silent),
-                    "wrong": "\n".join(one.wrong),
-                }
-                for one in outcomes
-            ]
-        schema = dict.fromkeys(rows[0], polars.String)
-        schema |= {"draw": polars.Int64, "step": polars.Int64}
-        return polars.DataFrame(rows, schema=schema), {"codes": codes}
+            rows += [asdict(one) | {"form": form, "reason": plain(one.reason)} for one in outcomes]
+        lists = dict.fromkeys(("silent", "wrong"), polars.List(polars.String))
+        frame = polars.DataFrame(rows, schema_overrides=lists).drop("seconds")
+        return frame, {"codes": codes}
 
 
 def in_pieces(chosen: Chosen, folder: PieceFolder) -> Iterator[tuple[str, list[Outcome]]]:
@@ -153,20 +144,23 @@ def in_pieces(chosen: Chosen, folder: PieceFolder) -> Iterator[tuple[str, list[O
     print()
     for piece in range(task.manifest.pieces):
         rows = polars.read_parquet(piece_file(folder.directory, piece)).to_dicts()
-        for (form, _), states in groupby(rows, lambda row: (row["form"], row["draw"])):
-            yield (
-                form,
-                [
-                    Outcome(
-                        row["draw"],
-                        row["step"],
-                        reason=row["reason"],
-                        silent=row["silent"].splitlines(),
-                        wrong=row["wrong"].splitlines(),
-                    )
-                    for row in states
-                ],
+        for _, states in groupby(rows, lambda row: row["number"]):
+            forms, outcomes = zip(
+                *((one.pop("form"), Outcome(**one)) for one in states), strict=True
             )
+            yield forms[0], list(outcomes)
+
+
+def one_by_one(chosen: Chosen, compiled: dict[str, float]) -> Iterator[tuple[str, list[Outcome]]]:
+    """Follow draws; yield what came of each, and keep the time to compile a shape's programs, s."""
+    for _, numbers in groupby(chosen.numbers, chosen.place):
+        start = None
+        for number in numbers:
+            if start is None:
+                start = time.perf_counter()
+                form, _ = judged(chosen, number)
+                compiled[form] = time.perf_counter() - start
+            yield judged(chosen, number)
 
 
 def tell(form: str, outcomes: list[Outcome]) -> None:
@@ -225,11 +219,12 @@ def main() -> int:
     parser.add_argument("--workers", type=int, help="processes that work on the pieces")
     given = vars(parser.parse_args())
     chosen = Chosen(**{name: given[name] for name in Chosen._fields})
+    compiled: dict[str, float] = {}
     by_name: dict[str, list[Outcome]] = {}
     if given["folder"]:
         draws = in_pieces(chosen, PieceFolder(given["folder"], given["workers"]))
     else:
-        draws = (judged(chosen, number) for number in chosen.numbers)
+        draws = one_by_one(chosen, compiled)
     for form, outcomes in draws:
         tell(form, outcomes)  # at once: a run that is stopped loses nothing
         by_name.setdefault(form, []).extend(outcomes)
@@ -241,7 +236,7 @@ def main() -> int:
     show(rows)
     if given["json"]:
         bad = [vars(one) for one in every if one.reason or one.silent or one.wrong]
-        content = {**chosen._asdict(), "rows": rows, "not_good": bad}
+        content = {**chosen._asdict(), "rows": rows, "compiled_s": compiled, "not_good": bad}
         given["json"].write_text(json.dumps(content, indent=1) + "\n")
     return int(any(one.silent or one.wrong for one in every))
 

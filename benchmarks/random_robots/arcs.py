@@ -24,7 +24,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 import notchflex as nf
 
 from .forces import State, about_z
-from .rings import ends_of, rings
+from .rings import Ends, ends_of, rings
 from .sections import Curve, Left, Memory, fibres, left_by, memory_of, remembered, stress
 
 # Seven Gauss nodes all along, those of the solver: where the law of the material has a kink within
@@ -61,34 +61,27 @@ class ArcLaw(NamedTuple):
     Attributes:
         height: h, mm.
         centroid: Distance of the neutral axis from the tube axis, mm.
-        twist: Distance of the shear centre from the neutral axis, mm.
         closure: Distance of the lips from the neutral axis, mm.
         lips: Flexibility of the closed lips, mm/N.
-        weak: Length of the bending, over the height; 1 for rigid ends.
-        strong: The same sideways.
-        torsion: The same of torsion.
-        odd: Flattening: q = 1 + odd θ + even θ².
-        even: Its other number.
+        ends: Its lengths with its rings; the height for rigid ends.
         push: Displacement of the rings by the force of a unit of linear bending, mm; and force.
         sway: The same sideways.
         section: Section between the ends.
-        edge: What an edge angle lacks of the elastic angle.
     """
 
     height: float
     centroid: float
-    twist: float
     closure: float
     lips: float
-    weak: float
-    strong: float
-    torsion: float
-    odd: float
-    even: float
+    ends: Ends
     push: tuple[float, float]
     sway: tuple[float, float]
     section: Left
-    edge: float
+
+    @property
+    def twist(self) -> float:
+        """Distance of the shear centre from the neutral axis, mm."""
+        return self.ends.shear_centre - self.centroid
 
 
 class Arcs(NamedTuple):
@@ -97,14 +90,12 @@ class Arcs(NamedTuple):
     Attributes:
         notches: Which notches of the robot.
         modes: Bending toward the side (elastic; constant, linear), sideways, and twist, rad.
-        misfit: What of the relative poses no strains explain, rad and heights.
         problems: What does not hold.
         laws: How each of them bends.
     """
 
     notches: list[int]
     modes: np.ndarray
-    misfit: np.ndarray
     problems: list[str]
     laws: list[ArcLaw]
 
@@ -114,7 +105,7 @@ def judge_arcs(state: State) -> Arcs:
     robot, now = state.robot, state.now
     chosen = [i for i, notch in enumerate(robot.notches) if isinstance(notch, nf.ArcNotch)]
     if not chosen:
-        return Arcs([], np.zeros((0, 5)), np.zeros(0), [], [])
+        return Arcs([], np.zeros((0, 5)), [], [])
     notches = [robot.notches[i] for i in chosen]
     laws = [arc_law(state, i) for i in chosen]
     centroid, height = (np.array([getattr(one, k) for one in laws]) for k in ("centroid", "height"))
@@ -174,13 +165,13 @@ def judge_arcs(state: State) -> Arcs:
         gap += law.lips * now.contact_force[i]  # as the lips' fibre has it and as they yield
         if abs(gap - now.gap[i]) > POSE * law.height:
             problems.append(f"notch {i + 1}: gap {now.gap[i]:.3g} mm, not {gap:.3g}")
-        edge = edge_angle(turn[k], law.edge * modes[k, 0])
+        edge = edge_angle(turn[k], _EDGE * (1.0 - law.height / law.ends.weak) * modes[k, 0])
         if abs(edge - now.edge_angle[i]) > POSE:
             problems.append(f"notch {i + 1}: its edge angle is not {edge:.6g}")
         largest = inside[np.abs(inside[:, 1]).argmax(), 1]
         if abs(largest - now.notch_moment[i]) > BALANCE * scale:
             problems.append(f"notch {i + 1}: notch_moment is not that of its strains")
-    return Arcs(chosen, modes, misfit, problems, laws)
+    return Arcs(chosen, modes, problems, laws)
 
 
 def _out_of_balance(
@@ -221,15 +212,10 @@ def _inside(
     section, material = law.section, state.robot.material
     modulus = material.elastic_modulus
     shear = modulus / (2.0 * (1.0 + material.poisson_ratio))
-    sideways = (modes[2] + modes[3] * _LINEAR) / law.height
-    bent = bending(state, i, law, modes[0] + modes[1] * _LINEAR, memory)
-    twist = np.full(len(_NODES), modes[4] / law.height)
-    moments = [
-        modulus * section.strong * sideways / law.strong,
-        bent.moment,
-        shear * section.torsion * twist / law.torsion,
-    ]
-    return np.stack(moments, axis=-1), bent.problems
+    bent, problems = bending(state, i, law, modes[0] + modes[1] * _LINEAR, memory)
+    sideways = modulus * section.strong * (modes[2] + modes[3] * _LINEAR) / law.ends.strong
+    twist = np.full(len(_NODES), shear * section.torsion * modes[4] / law.ends.torsion)
+    return np.stack([sideways, bent, twist], axis=-1), problems
 
 
 def _fit(
@@ -297,104 +283,73 @@ def arc_law(state: State, i: int) -> ArcLaw:
     """The law of notch i (from 0)."""
     robot = state.robot
     notch, tube, material = robot.notches[i], robot.tube, robot.material
-    height, modulus = notch.height, material.elastic_modulus
-    left = left_by(notch, tube)
-    centroid, centre, second, other = left.centroid, left.shear_centre, left.weak, left.strong
-    closure = tube.outer_radius + centroid
-    weak = strong = torsion = height
-    lips = odd = even = edge = 0.0
-    push = sway = (0.0, 0.0)
-    if notch.has_elastic_ends:
-        sides = rings(robot, state.length, i)
-        ends = ends_of(notch, tube, material.poisson_ratio, sides)
-        if notch.closing == "elastic":
-            closure /= _CLOSING[notch.cut]
-            wall, radius = tube.outer_radius - tube.inner_radius, tube.outer_radius
-            radius -= 0.5 * wall
-            # Of the lips alone, beside the open notch.
-            lips = closure**2 / (_CLOSED * modulus * wall * radius**2)
-        if notch.ends == "shell":
-            weak, strong, torsion = ends.weak, ends.strong, ends.torsion
-            centroid -= ends.coupling / weak
-            centre, odd, even = ends.shear_centre, ends.odd, ends.even
-            edge = _EDGE * (weak - height) / weak
-            push, sway = (
-                (shear * (2 * moment / (height * length)), 2 * modulus * moment / (height * length))
-                for shear, moment, length in (
-                    (ends.push - height**2 * weak / (12 * second), second, weak),
-                    (ends.sway - height**2 * strong / (12 * other), other, strong),
-                )
-            )
+    height, modulus, left = notch.height, material.elastic_modulus, left_by(notch, tube)
+    closure, lips = tube.outer_radius + left.centroid, 0.0
+    sheared = [height**3 / (12.0 * moment) for moment in (left.weak, left.strong)]
+    ends = Ends(height, height, height, 0.0, left.shear_centre, *sheared, 0.0, 0.0)
+    if notch.closing == "elastic" and notch.has_elastic_ends:
+        wall = tube.outer_radius - tube.inner_radius
+        closure /= _CLOSING[notch.cut]
+        # Of the lips alone, beside the open notch.
+        lips = closure**2 / (_CLOSED * modulus * wall * (tube.outer_radius - 0.5 * wall) ** 2)
+    if notch.ends == "shell":
+        ends = ends_of(notch, tube, material.poisson_ratio, rings(robot, state.length, i))
+
+    def slides(compliance: float, moment: float, length: float) -> tuple[float, float]:
+        force = 2.0 * moment / (height * length)
+        return (compliance - height**2 * length / (12.0 * moment)) * force, modulus * force
+
     return ArcLaw(
         height=height,
-        centroid=centroid,
-        twist=centre - centroid,
+        centroid=left.centroid - ends.coupling / ends.weak,
         closure=closure,
         lips=lips,
-        weak=weak / height,
-        strong=strong / height,
-        torsion=torsion / height,
-        odd=odd,
-        even=even,
-        push=push,
-        sway=sway,
+        ends=ends,
+        push=slides(ends.push, left.weak, ends.weak),
+        sway=slides(ends.sway, left.strong, ends.strong),
         section=left,
-        edge=edge,
     )
 
 
-class Bent(NamedTuple):
-    """The bending inside a notch at its nodes.
-
-    Attributes:
-        moment: About the weak axis, N mm.
-        problems: What does not hold of the memory of its fibres.
-    """
-
-    moment: np.ndarray
-    problems: list[str]
-
-
-def bending(state: State, i: int, law: ArcLaw, angle: np.ndarray, memory: Memory | None) -> Bent:
-    """Moments of notch i at elastic angles, as if the notch were bent so all along, rad."""
-    q = 1.0 + law.odd * angle + law.even * angle**2
-    reduced = angle / (q * law.height)
-    section, material = law.section, state.robot.material
-    modulus, second = material.elastic_modulus, section.weak
-    soft = (1.0 - _SHARE) * (law.weak - 1.0) / (modulus * second)
-    own = 1.0 + _SHARE * (law.weak - 1.0)
+def bending(
+    state: State, i: int, law: ArcLaw, angle: np.ndarray, memory: Memory | None
+) -> tuple[np.ndarray, list[str]]:
+    """Moments of notch i at elastic angles (rad), as if it were bent so all along; problems."""
+    robot, second, spine = state.robot, law.section.weak, law.section.spine
+    q = 1.0 + law.ends.odd * angle + law.ends.even * angle**2
+    reduced, added = angle / (q * law.height), law.ends.weak / law.height - 1.0
+    material, rigidity = robot.material, robot.material.elastic_modulus * second
     if isinstance(material, nf.Linear):
-        return Bent(modulus * second * reduced / (law.weak * q), [])
+        return rigidity * reduced / ((1.0 + added) * q), []
+    soft, own = (1.0 - _SHARE) * added / rigidity, 1.0 + _SHARE * added
     if isinstance(material, nf.Superelastic):
-        spine = section.spine
+        problems: list[str] = []
 
         def moment(curvature: np.ndarray) -> np.ndarray:
             return second / spine * stress(material, curvature * spine)
 
-        curvature = _bisected(lambda k: own * k + soft * moment(k) - reduced, np.abs(reduced))
-        return Bent(moment(curvature) / q, [])
-    arm, area, off = fibres(state.fibres, i, state.robot.notches[i], state.robot.tube)
+    else:
+        arm, area, problems = fibres(state.fibres, i, robot.notches[i], robot.tube)
+        curve = None if memory else Curve(material)
+
+        def moment(curvature: np.ndarray) -> np.ndarray:
+            """Moment at the strain of the neutral axis at which the forces vanish."""
+            bent = curvature[..., None] * arm
+            most = np.abs(bent).max(axis=-1)
+            middle = _bisected(lambda e: curve(e[..., None] + bent) @ area, most)
+            return curve(middle[..., None] + bent) @ (area * arm)
+
     if memory is not None:
         used = np.asarray(state.node_length)[i] > 0.0  # the rods of other kinds have more nodes
         past, now = memory.before[i][used], memory.after[i][used]
         moved = now @ (area * arm) / second
-        curvature = (reduced + soft * modulus * second * moved) / law.weak
+        curvature = (reduced + soft * rigidity * moved) / (1.0 + added)
         strain = (now @ area / area.sum())[..., None] + curvature[..., None] * arm
-        closed = law.closure / law.height
-        near = _ON_CURVE * np.abs(arm).max() / closed / law.height
-        problems = remembered(i, material, strain, past, now, near)
-        return Bent(modulus * second * (curvature - moved) / q, [*off, *problems])
-    curve = Curve(material)
-
-    def sums(curvature: np.ndarray) -> np.ndarray:
-        """Moment at the strain of the neutral axis at which the forces vanish."""
-        bent = curvature[..., None] * arm
-        most = np.abs(bent).max(axis=-1)
-        middle = _bisected(lambda e: curve(e[..., None] + bent) @ area, most)
-        return curve(middle[..., None] + bent) @ (area * arm)
-
-    curvature = _bisected(lambda k: own * k + soft * sums(k) - reduced, np.abs(reduced))
-    return Bent(sums(curvature) / q, off)
+        near = _ON_CURVE * np.abs(arm).max() / law.closure
+        problems += remembered(i, material, strain, past, now, near)
+        return rigidity * (curvature - moved) / q, problems
+    curvature = _bisected(lambda k: own * k + soft * moment(k) - reduced, np.abs(reduced))
+    return moment(curvature) / q, problems
 
 
 def _bisected(rising, most: np.ndarray) -> np.ndarray:
