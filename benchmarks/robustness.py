@@ -8,6 +8,7 @@ the same draw is solved in another way (random_robots/follow.py).
 
     python benchmarks/robustness.py [--count 640] [--seed 1] [--robots shapes] [--json FILE]
     python benchmarks/robustness.py --robots forms --first 17 --count 1 --tell
+    python benchmarks/robustness.py --only spoiled  # or inputs, compliance: other checks
 
 Robots come from two generators that know nothing of each other: `shapes` (by_shape.py), `drawn`
 (its shapes with elastic ends, fibres, memory of the material) and `forms` (by_form.py). Draw i of
@@ -37,7 +38,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import polars
-from random_robots import by_form, by_shape
+from random_robots import by_form, by_shape, compliance, inputs, spoiled
 from random_robots.draws import Draw
 from random_robots.follow import WAYS, Outcome, compared, follow
 from random_robots.judge import plain
@@ -50,6 +51,11 @@ from notchflex.solver.programs.store import code_digest
 
 EACH = 8
 """Draws of a piece."""
+CHECKS = {
+    "spoiled": spoiled.failed,
+    "inputs": inputs.failed,
+    "compliance": compliance.failed,
+}
 SHAPES = {"shapes": by_shape.SHAPES, "drawn": by_shape.DRAWN}
 
 
@@ -213,11 +219,14 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0, help="number of the first draw")
     parser.add_argument("--form", help="only draws of this shape")
     parser.add_argument("--way", choices=[*WAYS, "none"], help="how all are solved once more")
+    parser.add_argument("--only", choices=CHECKS, help="another check, of no solved draws")
     parser.add_argument("--tell", action="store_true", help="print robots and loads")
     parser.add_argument("--json", type=Path, help="write rows and every state that is not good")
     parser.add_argument("--folder", type=Path, help="keep pieces here, and go on with them")
     parser.add_argument("--workers", type=int, help="processes that work on the pieces")
     given = vars(parser.parse_args())
+    if given["only"]:
+        return int(CHECKS[given["only"]](given["seed"], given["count"]))
     chosen = Chosen(**{name: given[name] for name in Chosen._fields})
     compiled: dict[str, float] = {}
     by_name: dict[str, list[Outcome]] = {}

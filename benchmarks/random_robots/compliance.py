@@ -1,12 +1,9 @@
 """Small loads on a single notch, against the textbook: cantilevers in bending and torsion.
 
-python -m random_robots.compliance --count 12  # in benchmarks/
+python benchmarks/robustness.py --only compliance --count 12
 """
 
 from __future__ import annotations
-
-import argparse
-import sys
 
 import numpy as np
 
@@ -79,18 +76,10 @@ def strip_error(random: np.random.Generator) -> float:
     return float(np.abs(path.notch_angle[:, 0] / angles - 1).max())
 
 
-def main() -> None:
-    """Compare and tell."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--count", type=int, default=12)
-    told = options.parse_args()
-    random = np.random.default_rng([told.seed, 4])
-    arcs = max(arc_error(random) for _ in range(told.count))
-    strips = max(strip_error(random) for _ in range(told.count))
+def failed(seed: int, count: int) -> bool:
+    """Compare, tell, and return whether an error is too large."""
+    random = np.random.default_rng([seed, 4])
+    arcs = max(arc_error(random) for _ in range(count))
+    strips = max(strip_error(random) for _ in range(count))
     print(f"largest relative error: arc notches {arcs:.1e}, strips {strips:.1e}")
-    sys.exit(not (arcs < 2e-5 and strips < 1e-8))
-
-
-if __name__ == "__main__":
-    main()
+    return not (arcs < 2e-5 and strips < 1e-8)

@@ -1,11 +1,10 @@
 """Unusable values in robots and loads: each must be refused by `InputError`, or taken.
 
-python -m random_robots.inputs --seed 1 --count 2000  # in benchmarks/
+python benchmarks/robustness.py --only inputs --count 2000
 """
 
 from __future__ import annotations
 
-import argparse
 import collections
 import copy
 import traceback
@@ -53,17 +52,13 @@ def mutate(random: np.random.Generator, table: Any) -> str:
     return "; ".join(told)
 
 
-def main() -> None:
-    """Mutate and count."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--count", type=int, default=500)
-    told = options.parse_args()
-    count: collections.Counter[str] = collections.Counter()
+def failed(seed: int, count: int) -> bool:
+    """Mutate, tell, and return whether anything but an InputError was raised."""
+    ended: collections.Counter[str] = collections.Counter()
     seen: dict[str, str] = {}
-    for number in range(told.count):
-        random = np.random.default_rng([told.seed, number, 3])
-        robot, loads, _ = tables_of(told.seed, VARIANTS * number)
+    for number in range(count):
+        random = np.random.default_rng([seed, number, 3])
+        robot, loads, _ = tables_of(seed, VARIANTS * number)
         tables = {"robot": robot, "loads": copy.deepcopy(loads[:2])}
         which = "robot" if random.random() < 0.6 else "loads"
         what = mutate(random, tables[which])
@@ -71,21 +66,18 @@ def main() -> None:
             robot = make_robot(tables["robot"])
             loads = make_loads(tables["loads"])
             _ = robot.number_of_notches, robot == robot, repr(robot), repr(loads)
-            count["taken"] += 1
+            ended["taken"] += 1
         except nf.InputError:
-            count["refused"] += 1
+            ended["refused"] += 1
         except Exception as error:  # whatever it is, it is a finding
             last = traceback.extract_tb(error.__traceback__)[-1]
             ours = "by_form" in last.filename
             ours |= isinstance(error, TypeError) and "keyword" in str(error)
             kind = f"{type(error).__name__}: {error}"[:150]
             kind = "not for the library" if ours else kind
-            count["not for the library" if ours else "EXCEPTION"] += 1
+            ended["not for the library" if ours else "EXCEPTION"] += 1
             seen.setdefault(kind, f"{number} {last.filename}:{last.lineno} {what}")
-    print(dict(count))
+    print(dict(ended))
     for kind, where in seen.items():
         print(kind, "|", where)
-
-
-if __name__ == "__main__":
-    main()
+    return "EXCEPTION" in ended

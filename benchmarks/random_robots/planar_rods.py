@@ -165,6 +165,7 @@ def _integrated(state: State, i: int, rod: Rod, missed: float) -> list[str]:
         slope,
         (0.0, rod.length),
         np.zeros(3),
+        method="DOP853",
         t_eval=places,
         rtol=_ACCURATE,
         atol=_ACCURATE * rod.length,

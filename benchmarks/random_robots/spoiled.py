@@ -1,11 +1,10 @@
 """Spoil one quantity of a good result at a time: the checks must find every one.
 
-python -m random_robots.spoiled  # in benchmarks/
+python benchmarks/robustness.py --only spoiled
 """
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import numpy as np
@@ -76,8 +75,8 @@ def findings(paths: list[Any], loads: list[nf.Load]) -> list[str]:
     return found
 
 
-def main() -> int:
-    """Spoil and tell."""
+def failed(seed: int, count: int) -> bool:
+    """Spoil, tell, and return whether anything is missed; it needs no seed and no count."""
     loads = with_neighbours(Draw(0, 0, "", ROBOT, LOADS))
     paths = solved(ROBOT, loads)
     missed = findings(paths, loads)
@@ -101,8 +100,4 @@ def main() -> int:
     print(f"modulus 0.1 % larger: {len(found)} found, {found[0] if found else 'NOT FOUND'}")
     missed += [] if found else ["modulus"]
     print("missed:", missed or "none")
-    return int(bool(missed))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return bool(missed)
