@@ -69,7 +69,7 @@ class State:
         self.fibres = path.chain.rods.section.fibres
         self.tension = self.now.span_tension
         around = [*robot.notches[1:], None]
-        behind = [_length(one, after) for one, after in zip(robot.notches, around, strict=True)]
+        behind = [one.spacing(after) for one, after in zip(robot.notches, around, strict=True)]
         self.length = np.array([robot.tube.base_length, *behind])
         self.tip = self.point(len(behind), behind[-1] * _Z)
         self.external = list(self._external())
@@ -227,15 +227,6 @@ class State:
                     Force(int(notch) + 1, edge, push, np.zeros(3)),
                     Force(body, edge, -push, np.zeros(3)),
                 ]
-
-
-def _length(notch: nf.ArcNotch | nf.StripNotch | nf.ULink, after: object) -> float:
-    """From the origin of the body behind a notch to the next notch or the tip, mm."""
-    if not isinstance(notch, nf.ULink):
-        return notch.uncut_length + getattr(notch, "strip_thickness", 0.0)
-    shared = isinstance(after, nf.ULink)  # links of a row share the slots between them
-    whole = 2.0 * notch.slot_radius + notch.uncut_length
-    return notch.strip_thickness + (0.0 if shared else whole)
 
 
 def about_z(degrees: float) -> np.ndarray:

@@ -12,6 +12,11 @@ the load. Asked for:
 - tendons turn as the poses say, friction is within its bound there, opposes what slides, and
   tensions fall by it; strokes and slid lengths are those of the poses (tendons.py);
 - from a near state on, the work of loads and drives is energy gained and heat.
+
+No formula of the solver is called: those of sections, materials, friction and rings are written
+again (sections.py, rings.py). Read are its data: openings of notches and lengths between them, masses of bodies, places of
+fibres (which are judged) and what they remember. Not checked are moments inside strips and U-links
+in space, but by energy, and energy where tendons pull along a channel or fibres remember.
 """
 
 from __future__ import annotations
@@ -27,6 +32,7 @@ import notchflex as nf
 from .arcs import judge_arcs
 from .forces import State, about_z
 from .planar_rods import judge_planar_rods
+from .sections import memory_of
 from .tendons import judge_tendons
 
 EXACT = 1e-8  # relative, of what is added up
@@ -211,6 +217,8 @@ def _energy(before: State, state: State) -> list[str]:
     robot, first, second = state.robot, before.now, state.now
     if {tendon.path for tendon in robot.tendon} - {"wall-arc", "straight"}:
         return []  # a pull along a channel is no conservative one
+    if memory_of(state.path) is not None:
+        return []  # its fibres lose energy from state to state
     gained = float(second.stored_energy - first.stored_energy)
     work = size = 0.0
     for one, other in zip(before.external, state.external, strict=True):
