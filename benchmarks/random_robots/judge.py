@@ -14,9 +14,10 @@ the load. Asked for:
 - from a near state on, the work of loads and drives is energy gained and heat.
 
 No formula of the solver is called: those of sections, materials, friction and rings are written
-again (sections.py, rings.py). Read are its data: openings of notches and lengths between them, masses of bodies, places of
-fibres (which are judged) and what they remember. Not checked are moments inside strips and U-links
-in space, but by energy, and energy where tendons pull along a channel or fibres remember.
+again (sections.py, rings.py). Read are its data: openings of notches and lengths between them,
+masses of bodies, places of fibres (which are judged) and what they remember. Not checked are
+moments inside strips and U-links in space, but by energy, and energy where tendons pull along a
+channel or fibres remember.
 """
 
 from __future__ import annotations

@@ -42,6 +42,7 @@ def test_a_draw_as_the_tube_makes_it_is_solved_or_says_why(robustness, number):
 
 
 @pytest.mark.nightly
+@pytest.mark.filterwarnings("ignore::notchflex.errors.InputWarning")  # unusual robots on purpose
 def test_a_draw_of_a_form_is_solved_or_says_why(robustness):
     follow_draws(robustness, "forms", FORM)
 
