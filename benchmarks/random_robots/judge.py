@@ -239,7 +239,9 @@ def _energy(before: State, state: State) -> list[str]:
     heat = float(rubbed.sum() + np.sum(second.material_dissipation - first.material_dissipation))
     # A tendon let go to slack rubs backward while the mean of its tensions is still forward.
     taut = np.minimum(first.tension, second.tension) > least
-    lasting = float(rubbed[taut].sum())
+    # So does a contact that turns round on the way.
+    stays = (first.contact_state == second.contact_state)[:, : rubbed.shape[1]]
+    lasting = float(np.where(stays, rubbed, 0.0)[taut].sum())
     most, reach = float(second.tension.max()), float(state.length.sum()) + state.height
     reach += 2.0 * robot.tube.outer_radius
     size += float(np.nansum(along[:, :-1] * np.abs(moved))) + 1e-10 * most * reach
