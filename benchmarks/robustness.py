@@ -1,22 +1,25 @@
-"""Fuzzing: random robots under random paths of loads, each from rest, and what came of them.
+"""Random robots under random loads, each from rest, and what came of them.
 
-A row for each shape of robot (shapes.py): how many states were solved, how many were not and for
+A row for each shape (or form) of robot: how many states were solved, how many were not and for
 which reason, how many failed silently (NaN in a state that is called solved, an exception, a
 failure without a reason), how many are wrong, and how long a state took. Wrong is what does not
-balance when it is added up outside the solver (judge.py).
+balance when it is added up outside the solver (random_robots/judge.py), and what is another when
+the same draw is solved in another way (random_robots/follow.py).
 
-    python benchmarks/robustness.py [--count 640] [--seed 1] [--drawn] [--json FILE] [--shape NAME]
+    python benchmarks/robustness.py [--count 640] [--seed 1] [--robots shapes] [--json FILE]
+    python benchmarks/robustness.py --robots forms --first 17 --count 1 --tell
+    python benchmarks/robustness.py --only spoiled  # or inputs, compliance: other checks
 
-With `--drawn` the shapes are those of a drawing: elastic ends, fibres, memory of the material.
+Robots come from two generators that know nothing of each other: `shapes` (by_shape.py), `drawn`
+(its shapes with elastic ends, fibres, memory of the material) and `forms` (by_form.py). Draw i of
+a seed is the same whatever the count. Each is solved state by state; then its
+last load is held and changed a little, and the whole is solved once more in one of several ways
+(`--way`; `none` leaves that out). Exit code 1: something silent or wrong.
 
-Draw i of a seed is the same whatever the count; `--first I --count 1` runs it alone if the shape
-is left to its number, and `--first I` goes on where a run was stopped. Exit code 1: something
-silent or wrong. Shapes are judged one after the other, and the robots of a shape share their
-programs. The first robot of a shape compiles one, which is no part of the times; putting a robot's
-arrays together is, in the first step.
-
-With `--folder DIR` the draws are worked on in pieces that are kept, without times: the same call
-goes on where it was stopped, and `--workers N` takes so many processes (robustness_pieces.py).
+Draws of one shape are judged one after the other and share their programs; the first compiles one,
+which is no part of the times. With `--folder DIR` the draws are worked on in pieces that are kept,
+without times: the same call goes on where it was stopped, and `--workers N` takes so many
+processes.
 """
 
 from __future__ import annotations
@@ -26,104 +29,163 @@ import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from itertools import groupby
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
-from draw import Draw, draw
-from judge import plain, wrong
-from shapes import DRAWN, SHAPES, Shape
+import polars
+from random_robots import by_form, by_shape, compliance, inputs, spoiled
+from random_robots.draws import Draw
+from random_robots.follow import WAYS, Outcome, compared, follow
+from random_robots.judge import plain
+from rich.console import Console
+from rich.table import Table
 
 import notchflex as nf
+from notchflex.pieces import Manifest, PieceFolder, PieceTask, piece_file
+from notchflex.solver.programs.store import code_digest
 
-# What a solved state must tell as finite numbers; gap and contact tables have NaN where nothing is.
-FINITE = (
-    "tension",
-    "stroke",
-    "notch_angle",
-    "total_angle",
-    "body_position",
-    "body_rotation",
-    "tip_position",
-    "notch_moment",
-    "outer_strain",
-    "peak_strain",
-    "contact_force",
-    "base_force",
-    "base_moment",
-    "moment_error",
-    "stored_energy",
-    "residual",
-    "smallest_eigenvalue",
-)
+EACH = 8
+"""Draws of a piece."""
+CHECKS = {
+    "spoiled": spoiled.failed,
+    "inputs": inputs.failed,
+    "compliance": compliance.failed,
+}
+SHAPES = {"shapes": by_shape.SHAPES, "drawn": by_shape.DRAWN}
 
 
-@dataclass
-class Outcome:
-    """What came of one state of a draw.
+class Chosen(NamedTuple):
+    """Which robots are drawn, and in which way they are solved again; see the options."""
 
-    Attributes:
-        number: Of the draw.
-        step: Of its path, from 0.
-        seconds: How long the state took.
-        reason: Why it was not solved; empty where it was.
-        silent: What failed without being told.
-        wrong: What does not hold of a solved state.
+    robots: str
+    seed: int
+    first: int
+    count: int
+    form: str | None
+    way: str | None
+
+    def place(self, number: int) -> int:
+        """Place of the shape or form of a draw: draws of one share their programs."""
+        if self.robots == "forms":
+            return number // by_form.VARIANTS
+        return number % len(SHAPES[self.robots])
+
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of the draws, those of one shape after one another."""
+        numbers = sorted(range(self.first, self.first + self.count), key=self.place)
+        if self.form is None or self.robots == "forms":
+            return numbers
+        names = [shape.name for shape in SHAPES[self.robots]]
+        return [number for number in numbers if names[self.place(number)] == self.form]
+
+    def draw(self, number: int) -> Draw:
+        """Draw a robot and its loads."""
+        if self.robots == "forms":
+            return by_form.draw(self.seed, number)
+        return by_shape.draw(self.seed, number, SHAPES[self.robots])
+
+
+def judged(chosen: Chosen, number: int) -> tuple[str, list[Outcome]]:
+    """Solve and judge a draw in every way; its shape or form, and what came of its states."""
+    try:
+        draw = chosen.draw(number)
+    except nf.InputError as error:
+        if chosen.robots != "forms":
+            raise  # a fault of the generator
+        return "no robots", [Outcome(number, 0, reason=f"refused: {error}")]
+    outcomes, paths = [], []
+    for outcome, path in follow(draw, near=chosen.way != "none"):
+        outcomes.append(outcome)
+        paths.append(path)
+    if paths[-1] is not None and chosen.way != "none":
+        try:
+            outcomes[-1].wrong += compared(draw, paths, chosen.way)
+        except Exception as error:  # whatever it is, it is counted
+            outcomes[-1].silent.append(f"{type(error).__name__}: {error}")
+    return draw.form, outcomes
+
+
+@dataclass(frozen=True)
+class DrawsTask(PieceTask):
+    """Draws that are followed and judged, in pieces, with a row for each of their states.
+
+    What a process solved before decides which constants its programs share, and with them last
+    digits: so times and numbers in reasons are left out of the files.
     """
 
-    number: int
-    step: int
-    seconds: float = float("nan")
-    reason: str = ""
-    silent: list[str] = field(default_factory=list)
-    wrong: list[str] = field(default_factory=list)
+    chosen: Chosen
+
+    @cached_property
+    def manifest(self) -> Manifest:
+        """Which robots, and the code that solves them."""
+        content = self.chosen._asdict()
+        draws = len(self.chosen.numbers)
+        return Manifest.of("robustness", draws, EACH, code=code_digest(), **content)
+
+    def piece(self, number: int) -> tuple[polars.DataFrame, dict[str, Any]]:
+        """Follow and judge the draws of one piece."""
+        rows: list[dict[str, Any]] = []
+        codes = [0, 0, 0, 0]
+        start, stop = self.manifest.between(number)
+        for draw in self.chosen.numbers[start:stop]:
+            form, outcomes = judged(self.chosen, draw)
+            bad = any(one.silent or one.wrong for one in outcomes)
+            codes[1 if bad else 2 if outcomes[-1].reason else 0] += 1
+            rows += [asdict(one) | {"form": form, "reason": plain(one.reason)} for one in outcomes]
+        lists = dict.fromkeys(("silent", "wrong"), polars.List(polars.String))
+        frame = polars.DataFrame(rows, schema_overrides=lists).drop("seconds")
+        return frame, {"codes": codes}
 
 
-def silent(path: nf.EquilibriumPath) -> list[str]:
-    """What a path of one load fails to tell."""
-    if not path.converged[0]:
-        return [] if path.reason[0] else ["not converged, and no reason"]
-    names = [name for name in FINITE if not np.isfinite(getattr(path, name)).all()]
-    return [f"{name} is not finite" for name in names]
+def in_pieces(chosen: Chosen, folder: PieceFolder) -> Iterator[tuple[str, list[Outcome]]]:
+    """Follow draws in pieces that are kept; yield what came of each."""
+    task = DrawsTask(chosen)
+    folder.run(task, cores=1, progress=lambda *told: print(f"\r{told[0]} of {told[1]}", end=""))
+    print()
+    for piece in range(task.manifest.pieces):
+        rows = polars.read_parquet(piece_file(folder.directory, piece)).to_dicts()
+        for _, states in groupby(rows, lambda row: row["number"]):
+            forms, outcomes = zip(
+                *((one.pop("form"), Outcome(**one)) for one in states), strict=True
+            )
+            yield forms[0], list(outcomes)
 
 
-def follow(one: Draw) -> Iterator[Outcome]:
-    """Solve the loads of a draw one after the other, up to the first that is not solved."""
-    state = None
-    for step, load in enumerate(one.loads):
-        outcome = Outcome(one.number, step)
-        try:
-            start = time.perf_counter()
-            path = nf.simulate(one.robot, load, from_state=state)
-            outcome.seconds = time.perf_counter() - start
-            outcome.reason = path.reason[0]
-            outcome.silent = silent(path)
-            if path.converged[0]:
-                outcome.wrong = wrong(one.robot, load, path)
-        except Exception as error:  # whatever it is, it is counted
-            outcome.silent = [f"{type(error).__name__}: {error}"]
-        yield outcome
-        if outcome.reason or outcome.silent:
-            return
-        state = path.state
+def one_by_one(chosen: Chosen, compiled: dict[str, float]) -> Iterator[tuple[str, list[Outcome]]]:
+    """Follow draws; yield what came of each, and keep the time to compile a shape's programs, s."""
+    for _, numbers in groupby(chosen.numbers, chosen.place):
+        start = None
+        for number in numbers:
+            if start is None:
+                start = time.perf_counter()
+                form, _ = judged(chosen, number)
+                compiled[form] = time.perf_counter() - start
+            yield judged(chosen, number)
 
 
-def warm(one: Draw) -> float:
-    """Compile the program of a draw's shape; its time, s."""
-    start = time.perf_counter()
-    path = nf.simulate(one.robot, one.loads[0])
-    _ = path.smallest_eigenvalue  # a program of its own, computed when asked for
-    return time.perf_counter() - start
+def tell(form: str, outcomes: list[Outcome]) -> None:
+    """Print every state that is silent, wrong or not solved, with what reproduces it."""
+    for one in outcomes:
+        what = [*one.silent, *one.wrong, *([one.reason] if one.reason else [])]
+        if what:
+            kind = "silent" if one.silent else "wrong" if one.wrong else "unsolved"
+            place = f"{kind}: draw {one.number} ({form}) step {one.step}"
+            print(f"{place}: " + "\n    ".join(what), flush=True)
 
 
-def row(name: str, outcomes: list[Outcome]) -> dict[str, object]:
-    """Counts and times (ms) of one shape, or of all."""
+def row(form: str, outcomes: list[Outcome]) -> dict[str, Any]:
+    """Counts and times (ms) of one shape or form, or of all."""
     seconds = [one.seconds for one in outcomes if np.isfinite(one.seconds)]
     middle, late, last = 1e3 * np.quantile(seconds, [0.5, 0.95, 1.0]) if seconds else [None] * 3
     reasons = Counter(plain(one.reason) for one in outcomes if one.reason)
     return {
-        "shape": name,
+        "form": form,
         "draws": len({one.number for one in outcomes}),
         "states": len(outcomes),
         "solved": sum(not one.reason and not one.silent for one in outcomes),
@@ -136,105 +198,55 @@ def row(name: str, outcomes: list[Outcome]) -> dict[str, object]:
     }
 
 
-def show(rows: Iterable[dict]) -> None:
+def show(rows: list[dict[str, Any]]) -> None:
     """Print the table and, below, the reasons."""
-    rows = list(rows)
-    print(
-        f"{'shape':22}{'draws':>7}{'states':>8}{'solved':>8}{'unsolved':>9}{'silent':>7}"
-        f"{'wrong':>6}{'median':>9}{'95 %':>9}{'max ms':>9}"
-    )
+    table = Table(*rows[0], box=None)
     for one in rows:
-        print(
-            f"{one['shape']:22}{one['draws']:7}{one['states']:8}{one['solved']:8}"
-            f"{sum(one['unsolved'].values()):9}{one['silent']:7}{one['wrong']:6}"
-            + "".join(
-                f"{'-' if one[name] is None else format(one[name], '.2f'):>9}"
-                for name in ("median_ms", "p95_ms", "max_ms")
-            )
-        )
-    for one in rows:
+        shown = one | {"unsolved": sum(one["unsolved"].values())}
+        table.add_row(*(f"{x:.2f}" if isinstance(x, float) else str(x) for x in shown.values()))
+    Console(width=120).print(table)
+    for one in rows[:-1]:
         for reason, count in one["unsolved"].items():
-            print(f"{one['shape']}: {count} x {reason}")
-
-
-def judged(every: list[Draw], shape: Shape) -> tuple[list[Outcome], float]:
-    """Follow all draws of a shape; what came of them, and the time to compile, s."""
-    compiled = warm(every[0])
-    outcomes = []
-    for one in every:
-        found = list(follow(one))
-        outcomes += found
-        told(found, shape.name)  # at once: a run that is stopped loses nothing
-        print(f"\r{one.number:6}  {shape.name:24}", end="", file=sys.stderr)
-    show([row(shape.name, outcomes)])
-    sys.stdout.flush()
-    return outcomes, compiled
-
-
-def told(outcomes: list[Outcome], name: str) -> None:
-    """Print every state that is silent, wrong or not solved, with what reproduces it."""
-    for one in outcomes:
-        what = [*one.silent, *one.wrong, *([one.reason] if one.reason else [])]
-        if what:
-            kind = "silent" if one.silent else "wrong" if one.wrong else "unsolved"
-            place = f"draw {one.number} ({name}) step {one.step}"
-            print(f"{kind}: {place}: {what[0]}", flush=True)
-            for more in what[1:]:
-                print(f"    {more}", flush=True)
-
-
-def judged_shapes(
-    given: argparse.Namespace, compiled: dict[str, float]
-) -> dict[str, list[Outcome]]:
-    """Follow the draws of all shapes, one after the other; what came of them, by shape.
-
-    Args:
-        given: The options.
-        compiled: Takes the time to compile, s, by shape.
-    """
-    shapes = DRAWN if given.drawn else SHAPES
-    outcomes: dict[str, list[Outcome]] = {}
-    for number, shape in enumerate(shapes):
-        numbers = range(number, given.first + given.count, len(shapes))
-        every = [draw(one, given.seed, shape) for one in numbers if one >= given.first]
-        if every and given.shape in (None, shape.name):
-            outcomes[shape.name], compiled[shape.name] = judged(every, shape)
-    print(file=sys.stderr)
-    return outcomes
+            print(f"{one['form']}: {count} x {reason}")
 
 
 def main() -> int:
     """Draw, solve, judge, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", choices=[*SHAPES, "forms"], default="shapes")
     parser.add_argument("--count", type=int, default=640, help="robots to draw")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first draw")
-    parser.add_argument("--drawn", action="store_true", help="shapes as the tube makes them")
-    parser.add_argument("--shape", help="only draws of this shape")
+    parser.add_argument("--form", help="only draws of this shape")
+    parser.add_argument("--way", choices=[*WAYS, "none"], help="how all are solved once more")
+    parser.add_argument("--only", choices=CHECKS, help="another check, of no solved draws")
+    parser.add_argument("--tell", action="store_true", help="print robots and loads")
     parser.add_argument("--json", type=Path, help="write rows and every state that is not good")
     parser.add_argument("--folder", type=Path, help="keep pieces here, and go on with them")
     parser.add_argument("--workers", type=int, help="processes that work on the pieces")
-    given = parser.parse_args()
-    last = given.first + given.count
+    given = vars(parser.parse_args())
+    if given["only"]:
+        return int(CHECKS[given["only"]](given["seed"], given["count"]))
+    chosen = Chosen(**{name: given[name] for name in Chosen._fields})
     compiled: dict[str, float] = {}
-    if given.folder:
-        from robustness_pieces import Chosen, PieceFolder, followed
-
-        chosen = Chosen(given.seed, given.first, given.count, given.drawn, given.shape)
-        outcomes = followed(chosen, PieceFolder(given.folder, given.workers))
-        for name, some in outcomes.items():
-            told(some, name)
+    by_name: dict[str, list[Outcome]] = {}
+    if given["folder"]:
+        draws = in_pieces(chosen, PieceFolder(given["folder"], given["workers"]))
     else:
-        outcomes = judged_shapes(given, compiled)
-    every = sorted((one for some in outcomes.values() for one in some), key=lambda o: o.number)
-    rows = [row(name, some) for name, some in outcomes.items() if some]
-    rows.append(row("all", every))
-    print(f"\nseed {given.seed}, draws {given.first} to {last - 1}")
+        draws = one_by_one(chosen, compiled)
+    for form, outcomes in draws:
+        tell(form, outcomes)  # at once: a run that is stopped loses nothing
+        by_name.setdefault(form, []).extend(outcomes)
+        if given["tell"]:
+            print(*chosen.draw(outcomes[0].number), sep="\n")
+    every = sorted((one for some in by_name.values() for one in some), key=lambda o: o.number)
+    rows = [row(name, some) for name, some in (by_name | {"all": every}).items()]
+    print(f"\n{chosen.robots}, seed {chosen.seed}, draws {chosen.first} to {every[-1].number}")
     show(rows)
-    if given.json:
+    if given["json"]:
         bad = [vars(one) for one in every if one.reason or one.silent or one.wrong]
-        content = {"seed": given.seed, "rows": rows, "compiled_s": compiled, "not_good": bad}
-        given.json.write_text(json.dumps(content, indent=1) + "\n")
+        content = {**chosen._asdict(), "rows": rows, "compiled_s": compiled, "not_good": bad}
+        given["json"].write_text(json.dumps(content, indent=1) + "\n")
     return int(any(one.silent or one.wrong for one in every))
 
 

@@ -18,12 +18,13 @@ from scipy.linalg import null_space
 
 import notchflex as nf
 
+from .sections import Left, nodes, outer_depth, section_of
+
 _DEGREE, _HARMONICS = 18, 41
 _RELAXED = 0.833
 _BETWEEN, _BRAZIER = (0.207, 1.69), 0.97
 _SPECIMEN, _BRAZIER_OF_SPECIMEN = (0.465, 1.51), 0.74
 _POINTS, _HALVES = leggauss(_DEGREE + 2)
-_SECTIONS = {"on-axis": nf.annular_sector, "off-axis": nf.annular_segment}
 
 
 class Ends(NamedTuple):
@@ -59,12 +60,6 @@ class Ring(NamedTuple):
     length: float
 
 
-@lru_cache(maxsize=16)
-def nodes(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights of Gauss and Legendre, kept: several hundred take a fifth of a second."""
-    return leggauss(count)
-
-
 def rings(robot: nf.Robot, length: np.ndarray, i: int) -> tuple[Ring, Ring]:
     """The rings before and behind a notch, by the lengths of the bodies, mm."""
     last = i == len(robot.notches) - 1
@@ -76,11 +71,11 @@ def rings(robot: nf.Robot, length: np.ndarray, i: int) -> tuple[Ring, Ring]:
 def ends_of(notch: nf.ArcNotch, tube: nf.Tube, poisson: float, sides: tuple[Ring, Ring]) -> Ends:
     """Compute the ends of an arc notch."""
     outer, inner, depth = tube.outer_radius, tube.inner_radius, outer_depth(notch, tube)
-    section = _SECTIONS[notch.cut](outer, inner, depth)
+    section = section_of(notch.cut, outer, inner, depth)
     radius, wall, height = 0.5 * (outer + inner), outer - inner, notch.height
-    second, strong = float(section.second_moment_weak), float(section.second_moment_strong)
-    half = float(section.area) / (2.0 * radius * wall)
-    arc = nf.annular_sector(outer, inner, outer * (1.0 + cos(half)))
+    second, strong = section.weak, section.strong
+    half = section.area / (2.0 * radius * wall)
+    arc = section_of("on-axis", outer, inner, outer * (1.0 + cos(half)))
     loads = _edge_loads(radius, wall, half, arc)
     energy = np.zeros((3, 3))
     bends = 0.0
@@ -90,10 +85,9 @@ def ends_of(notch: nf.ArcNotch, tube: nf.Tube, poisson: float, sides: tuple[Ring
             bends += (0.5 if side.held == "between" else 1.0) * side.length
     moment = 0.25 * pi * (outer**4 - inner**4)
     bends /= moment
-    centroid = float(arc.centroid)
-    weak = height + float(arc.second_moment_weak) * (energy[0, 0] - bends)
-    sideways = height + float(arc.second_moment_strong) * (energy[1, 1] - bends)
-    coupling = float(arc.second_moment_weak) * (energy[0, 2] - bends * centroid)
+    weak = height + arc.weak * (energy[0, 0] - bends)
+    sideways = height + arc.strong * (energy[1, 1] - bends)
+    coupling = arc.weak * (energy[0, 2] - bends * arc.centroid)
     # Flattening.
     outer_angle = acos((depth - outer) / outer)
     a = outer_angle if notch.cut == "on-axis" else acos(min((depth - outer) / radius, 1 - 1e-9))
@@ -112,11 +106,11 @@ def ends_of(notch: nf.ArcNotch, tube: nf.Tube, poisson: float, sides: tuple[Ring
     sine = sin(half) - half * cos(half)
     warping = 2 / 3 * wall * radius**5 * (half**3 - 6 * sine**2 / (half - sin(half) * cos(half)))
     warping += width**3 * wall**3 / 144
-    rate = sqrt(float(section.torsion_constant) / (2 * (1 + poisson)) / warping)
+    rate = sqrt(section.torsion / (2 * (1 + poisson)) / warping)
     spring = 0.004 * diameter * (wall / diameter) ** -1.98 * exp(0.16 * width / diameter)
     cotangent = cosh(rate * height / 2) / sinh(rate * height / 2)
     torsion = height + wall * (3.11 - 1.60 * half) - 2 / (rate * (cotangent + spring * rate))
-    off = float(section.shear_centre) * (1 + 0.027 * width / (height + 0.72 * width))
+    off = section.shear_centre * (1 + 0.027 * width / (height + 0.72 * width))
 
     def shifted(factor: float, powers: tuple, length: float, second_moment: float) -> float:
         t, b, ell, c = powers
@@ -137,26 +131,16 @@ def ends_of(notch: nf.ArcNotch, tube: nf.Tube, poisson: float, sides: tuple[Ring
     )
 
 
-def outer_depth(notch: nf.ArcNotch, tube: nf.Tube) -> float:
-    """Depth at the outer surface of a cut with radial edges, read at another surface, mm."""
-    if notch.cut == "off-axis" or notch.depth_at == "outer":
-        return notch.depth
-    middle = 0.5 * (tube.outer_radius + tube.inner_radius)
-    read = {"mid-wall": middle, "inner": tube.inner_radius}[notch.depth_at]
-    return tube.outer_radius * (1.0 + (notch.depth - tube.outer_radius) / read)
-
-
-def _edge_loads(radius: float, wall: float, half: float, arc: nf.Section) -> np.ndarray:
+def _edge_loads(radius: float, wall: float, half: float, arc: Left) -> np.ndarray:
     """Harmonics of (N, −M) of bending, bending sideways and tension, (3, harmonics, 2)."""
     points, weights = nodes(200)
     at, of = half * points, half * weights
     through, weighs = nodes(3)
     through, weighs = 0.5 * wall * through, 0.5 * wall * weighs
     stresses = (
-        ((radius + through) * np.cos(at)[:, None] - float(arc.centroid))
-        / float(arc.second_moment_weak),
-        (radius + through) * np.sin(at)[:, None] / float(arc.second_moment_strong),
-        np.ones((len(at), len(through))) / float(arc.area),
+        ((radius + through) * np.cos(at)[:, None] - arc.centroid) / arc.weak,
+        (radius + through) * np.sin(at)[:, None] / arc.strong,
+        np.ones((len(at), len(through))) / arc.area,
     )
     n = np.arange(_HARMONICS)[:, None]
     found = []
@@ -194,8 +178,8 @@ def _flexibilities(
     bending = wall**2 / 12 * membrane
     of = 0.5 * length * _HALVES
     # The loaded edge is at 0, the far one at the length.
-    edge = np.stack([np.r_[value[-2], 0 * value[-2], 0 * value[-2]],
-                     np.r_[0 * value[-2], 0 * value[-2], slope[-2]]], axis=-1)  # fmt: skip
+    none = 0.0 * value[-2]
+    edge = np.stack([np.r_[value[-2], none, none], np.r_[none, none, slope[-2]]], axis=-1)
     found = []
     for n in range(_HARMONICS):
         strains = [

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from acting import State, Stop
-from arcs import Arcs, about_z
-from moments import arc_law
+from scipy.spatial.transform import Rotation
 
 import notchflex as nf
+
+from .arcs import Arcs, arc_law
+from .forces import State, Stop, about_z
+from .sections import bounds
 
 EXACT = 1e-8  # relative, of tensions; of log ratios
 # Relative, of what all gaps are shorter or longer by: strains are fitted to poses (arcs.py). And
@@ -20,12 +20,11 @@ _SLIDES, _OPPOSES = 1e-7, 1e-6
 _Z = np.array([0.0, 0.0, 1.0])
 
 
-def judge_ropes(state: State, path: nf.EquilibriumPath, arcs: Arcs) -> list[str]:
-    """Judge strokes, turning angles, friction and tensions of one step.
+def judge_tendons(state: State, arcs: Arcs) -> list[str]:
+    """Judge strokes, slid lengths, turning angles, friction and tensions of a state.
 
     Args:
         state: The bodies, and the spans of straight tendons between them.
-        path: The path, for what it reports of the tendons.
         arcs: The strains of the arc notches, which tendons on the wall follow.
     """
     found = []
@@ -34,21 +33,21 @@ def judge_ropes(state: State, path: nf.EquilibriumPath, arcs: Arcs) -> list[str]
             shortening, turning, lengths = _on_wall(state, arcs, number)
         else:
             shortening, turning, lengths = _straight(state, number)
-        found += _stroke(state, path, number, shortening, lengths)
-        found += _friction(state, path, number, turning)
-    return [*found, *_opposed(state, path)]
+        found += _slid(state, number, shortening, lengths)
+        found += _friction(state, number, turning)
+    return [*found, *_opposed(state)]
 
 
-def _opposed(state: State, path: nf.EquilibriumPath) -> list[str]:
+def _opposed(state: State) -> list[str]:
     """Friction opposes what a tendon slides: from the last state that entered the history on."""
-    run, step, found = path.run, state.step, []
-    last = path.prepared.state.unpack(run.between).memory
-    now, groups = run.solved.memory, path.chain.groups
+    path, found = state.path, []
+    last = path.prepared.state.unpack(path.run.between).memory
+    now = path.run.solved.memory
     height = np.array([notch.height for notch in state.robot.notches])[:, None, None]
-    for k, group in enumerate(groups):
-        slip = (np.asarray(now.slid[k][step]) - np.asarray(last.slid[k][step])) / height
-        ratio, bound = (np.asarray(part[k][step]) for part in (now.log_ratio, now.bound))
-        taut = path.tension[step, list(group.numbers)] > 1e6 * state.rounding
+    for k, group in enumerate(path.chain.groups):
+        slip = (np.asarray(now.slid[k][0]) - np.asarray(last.slid[k][0])) / height
+        ratio, bound = (np.asarray(part[k][0]) for part in (now.log_ratio, now.bound))
+        taut = state.now.tension[list(group.numbers)] > 1e6 * state.rounding
         slides = (np.abs(slip) > _SLIDES) & (bound > 0.0) & taut[None, :, None]
         against = slides & (np.sign(slip) * ratio < bound - _OPPOSES)
         for notch, tendon, _ in np.argwhere(against)[:1]:
@@ -117,78 +116,77 @@ def _free_lengths(state: State, number: int, stops: list[Stop]) -> list[float]:
 
 def _free_arc(notch: nf.ArcNotch, off: float) -> tuple[np.ndarray, np.ndarray]:
     """From the near face of a free arc notch, whose neutral axis is a circle, to its far one."""
-    frame = about_z(notch.direction_deg)
-    angle = np.radians(notch.precurvature_deg)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    frame, angle = about_z(notch.direction_deg), np.radians(notch.precurvature_deg)
+    turn = Rotation.from_rotvec([0.0, angle, 0.0]).as_matrix()
     radius = notch.height / angle
-    over = np.array([radius * (1.0 - cosine) - off, 0.0, radius * sine]) + turn @ [off, 0.0, 0.0]
+    over = np.array([radius * (1.0 - np.cos(angle)) - off, 0.0, radius * np.sin(angle)])
+    over += turn @ [off, 0.0, 0.0]
     return frame @ over, frame @ turn @ frame.T
 
 
-def _stroke(
-    state: State, path: nf.EquilibriumPath, number: int, shorter: np.ndarray, lengths: np.ndarray
-) -> list[str]:
-    """The stroke is what the poses set free and what the tendon is stretched."""
-    tendon, tension = state.robot.tendon[number], state.tension[number]
+def _slid(state: State, number: int, shorter: np.ndarray, lengths: np.ndarray) -> list[str]:
+    """What slides at the edges of gaps is what these get shorter by, less what is stretched."""
+    tendon, tension, found = state.robot.tendon[number], state.tension[number], []
     along = tension[~np.isnan(tension)]
     along = np.append(along, along[-1])  # in its end body it has the tension of the last gap
-    stretch = along @ lengths + along[0] * tendon.free_length
-    drawn = float(shorter.sum()) + stretch / tendon.axial_stiffness
-    size, reach = float(np.abs(shorter).sum()), state.reach + state.height
-    told = path.stroke[state.step, number]
-    if abs(drawn - told) > STROKE * (size + abs(stretch / tendon.axial_stiffness)) + LENGTH * reach:
-        return [f"tendon {number + 1}: stroke {told:.6g} mm, not {drawn:.6g}"]
-    return []
+    stretch = along * lengths / tendon.axial_stiffness
+    stretch[0] += along[0] * tendon.free_length / tendon.axial_stiffness
+    size = float(np.abs(shorter).sum() + np.abs(stretch).sum())
+    near = STROKE * size + LENGTH * (state.reach + state.height)
+    off = abs(shorter.sum() + stretch.sum() - state.now.stroke[number])
+    if off > near:
+        found.append(f"tendon {number + 1}: its stroke is off by {off:.1e} mm")
+    there = ~np.isnan(state.now.contact_log_ratio[number])
+    slid = state.now.contact_slid[number][there]
+    slid = np.concatenate([[state.now.stroke[number]], slid, [0.0]])
+    grown = stretch.copy()
+    grown[1::2] += shorter
+    # Where it enters its end body is no contact: last gap and end are one piece.
+    grown = np.append(grown[:-2], grown[-2:].sum())
+    off = np.abs(np.diff(slid) + grown).max()
+    if off > near:
+        found.append(f"tendon {number + 1}: slid lengths are off by {off:.1e} mm")
+    return found
 
 
-def _friction(
-    state: State, path: nf.EquilibriumPath, number: int, turning: np.ndarray
-) -> list[str]:
+def _friction(state: State, number: int, turning: np.ndarray) -> list[str]:
     """Tensions are not negative, fall by the log ratios, and these are within their bound."""
-    step, name, found = state.step, f"tendon {number + 1}", []
-    ratio = path.contact_log_ratio[step, number]
-    there = ~np.isnan(ratio)
-    ratio, bound = ratio[there], path.contact_bound[step, number][there]
-    told = path.contact_turning[step, number][there]
+    now, name, found = state.now, f"tendon {number + 1}", []
+    there = ~np.isnan(now.contact_log_ratio[number])
+    ratio, bound, told, moves = (
+        getattr(now, f"contact_{what}")[number][there]
+        for what in ("log_ratio", "bound", "turning", "state")
+    )
     tension = state.tension[number][~np.isnan(state.tension[number])]
     if len(tension) != len(ratio) + 1 or len(turning) != len(ratio) + 1:
         return [f"{name}: {len(tension)} tensions, {len(ratio)} contacts, {len(turning)} edges"]
     if (tension < -state.rounding).any():
         found.append(f"{name}: pushed with {-tension.min():.1e} N")
+    if abs(tension[0] - now.tension[number]) > EXACT * tension[0] + state.rounding:
+        found.append(f"{name}: its first span has not the tension of its base")
     off = np.abs(tension[1:] - tension[:-1] * np.exp(-ratio)).max(initial=0.0)
     if off > EXACT * tension[0] + state.rounding:
         found.append(f"{name}: tensions do not fall by their log ratios")
     if (np.abs(ratio) > bound + EXACT).any():
         found.append(f"{name}: friction beyond its bound by {(np.abs(ratio) - bound).max():.1e}")
+    off = np.abs(ratio - moves * bound)[(moves != 0) & (tension[0] > 1e6 * state.rounding)]
+    if off.max(initial=0.0) > _OPPOSES:
+        found.append(f"{name}: slips below its bound by {off.max():.1e}")
     friction = state.robot.friction
     chord = getattr(friction, "turning", None) == "chord"
     edges = slice(0, None, 2) if chord else slice(None)
-    off = np.abs(told - turning[:-1])[edges].max(initial=0.0)
-    if off > _turning_error(state):
-        found.append(f"{name}: turns by other angles than the poses have (by {off:.1e})")
+    off = np.abs(told - turning[:-1])[edges]
+    if (off > _turning_error(state, number, len(turning))[:-1][edges]).any():
+        found.append(f"{name}: turns by other angles than the poses have (by {off.max():.1e})")
     own = np.append(told, turning[-1])
-    off = np.abs(bound - _bounds(friction, own)).max(initial=0.0)
+    off = np.abs(bound - bounds(friction, own)).max(initial=0.0)
     # Of the last edge, where it counts ahead, only the fit knows the turning.
     if off > (1e-6 if getattr(friction, "wrap", None) == "whole-before" else EXACT):
         found.append(f"{name}: the bound of its friction is off by {off:.1e}")
     return found
 
 
-def _turning_error(state: State) -> float:
+def _turning_error(state: State, number: int, edges: int) -> np.ndarray:
     """Angles of short spans carry the rounding of the poses; those on the wall that of the fit."""
-    spans = [span.length for one in state.spans for span in one]
-    return 1e-6 + 1e-13 * state.reach / max(min(spans, default=1.0), 1e-9)
-
-
-def _bounds(friction: Any, turning: np.ndarray) -> np.ndarray:
-    """Largest log ratios at all contacts by the law of friction, the fixed end left out."""
-    if isinstance(friction, nf.Frictionless):
-        return np.zeros(len(turning) - 1)
-    if isinstance(friction, nf.Corner):
-        return 2.0 * np.arctanh(friction.coefficient * np.tan(0.5 * turning[:-1]))
-    if friction.wrap == "whole-before":
-        whole = np.zeros_like(turning)
-        whole[0::2] = turning[0::2] + turning[1::2]
-        turning = whole
-    return friction.coefficient * turning[:-1]
+    lengths = [span.length for span in state.spans[number] for _ in range(2)]
+    return 1e-6 + 1e-13 * state.reach / np.maximum(lengths or [1.0] * edges, 1e-300)

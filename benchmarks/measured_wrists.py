@@ -1,6 +1,6 @@
 """The law of the tube on the measured wrists, written again: what moves eq. 17, and by how much.
 
-    python benchmarks/independent/measured_wrists.py FOLDER [--only NAME] [--left-out] [--profile]
+    python benchmarks/measured_wrists.py FOLDER [--only NAME] [--left-out] [--profile]
 
 Notch after notch from the base, without the solver: a table of the moment over the angle, the
 capstan law, and the smallest angle that holds the tension. FOLDER has the measured angles of

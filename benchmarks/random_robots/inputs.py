@@ -1,21 +1,20 @@
 """Unusable values in robots and loads: each must be refused by `InputError`, or taken.
 
-python benchmarks/independent/inputs.py --seed 1 --count 2000
+python benchmarks/robustness.py --only inputs --count 2000
 """
 
 from __future__ import annotations
 
-import argparse
 import collections
 import copy
 import traceback
 from typing import Any
 
 import numpy as np
-from build import make_loads, make_robot
-from generator import VARIANTS, draw_case
 
 import notchflex as nf
+
+from .by_form import VARIANTS, make_loads, make_robot, tables_of
 
 ODD: list[Any] = [0, -1, 1e-300, 1e300, -1e300, float("nan"), float("inf"), -float("inf"), True]
 ODD += [None, "1", "", "arc", [], [1.0], {}, (0.0, 0.0), 2**70, 1e-9, 1e9, 0.5, np.float32(2), "é"]
@@ -53,39 +52,32 @@ def mutate(random: np.random.Generator, table: Any) -> str:
     return "; ".join(told)
 
 
-def main() -> None:
-    """Mutate and count."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--count", type=int, default=500)
-    told = options.parse_args()
-    count: collections.Counter[str] = collections.Counter()
+def failed(seed: int, count: int) -> bool:
+    """Mutate, tell, and return whether anything but an InputError was raised."""
+    ended: collections.Counter[str] = collections.Counter()
     seen: dict[str, str] = {}
-    for number in range(told.count):
-        random = np.random.default_rng([told.seed, number, 3])
-        case = draw_case(told.seed, VARIANTS * number)
-        tables = {"robot": case.robot, "loads": copy.deepcopy(case.loads[:2])}
+    for number in range(count):
+        random = np.random.default_rng([seed, number, 3])
+        robot, loads, _ = tables_of(seed, VARIANTS * number)
+        tables = {"robot": robot, "loads": copy.deepcopy(loads[:2])}
         which = "robot" if random.random() < 0.6 else "loads"
         what = mutate(random, tables[which])
         try:
             robot = make_robot(tables["robot"])
             loads = make_loads(tables["loads"])
             _ = robot.number_of_notches, robot == robot, repr(robot), repr(loads)
-            count["taken"] += 1
+            ended["taken"] += 1
         except nf.InputError:
-            count["refused"] += 1
+            ended["refused"] += 1
         except Exception as error:  # whatever it is, it is a finding
             last = traceback.extract_tb(error.__traceback__)[-1]
-            ours = "build" in last.filename
+            ours = "by_form" in last.filename
             ours |= isinstance(error, TypeError) and "keyword" in str(error)
             kind = f"{type(error).__name__}: {error}"[:150]
             kind = "not for the library" if ours else kind
-            count["not for the library" if ours else "EXCEPTION"] += 1
+            ended["not for the library" if ours else "EXCEPTION"] += 1
             seen.setdefault(kind, f"{number} {last.filename}:{last.lineno} {what}")
-    print(dict(count))
+    print(dict(ended))
     for kind, where in seen.items():
         print(kind, "|", where)
-
-
-if __name__ == "__main__":
-    main()
+    return "EXCEPTION" in ended

@@ -1,4 +1,4 @@
-"""All forces on the bodies of a solved robot, put together in numpy from what a result reports.
+"""All forces on the bodies of a solved robot, put together in NumPy from what a result reports.
 
 External loads, tendons and closed edges: `State` holds them with the point and the body they
 act on, so that `beyond` adds up what acts beyond a notch. Nothing is taken from the solver but
@@ -15,6 +15,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import notchflex as nf
 
@@ -50,32 +51,33 @@ class Span(NamedTuple):
 
 
 class State:
-    """One step of a path, with all forces on its bodies.
+    """A solved state, the only one of its path, with all forces on its bodies.
 
     Attributes:
         forces: Force by force, but for tendons on the wall and lips opposite a spine.
+        external: Those of them that act from outside, but for tendons.
         gap: Narrowest opening between edges of pieces at every notch, mm; inf where there is none.
         node_length: Length that each node of every notch stands for, mm; 0 for none.
         fibres: Those that the solver sums up, of every notch and node; None without.
         undecided: Whether a contact force is reported that may stand on either of two edges.
     """
 
-    def __init__(self, robot: nf.Robot, path: nf.EquilibriumPath, step: int) -> None:
-        self.robot, self.step = robot, step
-        self.origin, self.rotation = path.body_position[step], path.body_rotation[step]
-        self.load = path.load.external[step]
+    def __init__(self, robot: nf.Robot, load: nf.Load, path: nf.EquilibriumPath) -> None:
+        self.robot, self.load, self.path, self.now = robot, load, path, path[0]
+        self.origin, self.rotation = self.now.body_position, self.now.body_rotation
         self.node_length = path.chain.rods.length
         self.fibres = path.chain.rods.section.fibres
-        self.tension = path.span_tension[step]
+        self.tension = self.now.span_tension
         around = [*robot.notches[1:], None]
         behind = [one.spacing(after) for one, after in zip(robot.notches, around, strict=True)]
         self.length = np.array([robot.tube.base_length, *behind])
         self.tip = self.point(len(behind), behind[-1] * _Z)
-        self.forces = list(self._external(path))
+        self.external = list(self._external())
+        self.forces = list(self.external)
         self.spans = [self._tendon(number) for number in range(robot.number_of_tendons)]
         self.gap = np.full(len(behind), np.inf)
         self.undecided = False
-        self._edges(path.contact_force[step])
+        self._edges(self.now.contact_force)
 
     @property
     def height(self) -> float:
@@ -128,36 +130,31 @@ class State:
         way = self.way(tendon.direction_deg, tendon.radius)
         return [one for one in way if one.body <= self.end_body(number)]
 
-    def beyond(self, body: int, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Force and moment of all that acts on a body and those beyond it, about a point."""
-        force, moment, _ = self.beyond_with_size(body, about)
-        return force, moment
-
-    def beyond_with_size(
+    def beyond(
         self, body: int, about: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
-        """The same, and the sums of the magnitudes of forces and of moments."""
+        """Sum up what acts on a body and those beyond it: force, moment about a point, sizes.
+
+        The sizes are the sums of the magnitudes of forces and of moments.
+        """
         chosen = [one for one in self.forces if one.body >= body]
-        force, moment = np.zeros(3), np.zeros(3)
-        sizes = [0.0, 0.0]
-        for one in chosen:
-            lever = np.cross(one.point - about, one.force)
-            force, moment = force + one.force, moment + lever + one.moment
-            sizes[0] += np.linalg.norm(one.force)
-            sizes[1] += np.linalg.norm(lever) + np.linalg.norm(one.moment)
-        return force, moment, (sizes[0], sizes[1])
+        if not chosen:
+            return np.zeros(3), np.zeros(3), (0.0, 0.0)
+        _, points, forces, moments = (np.array(part) for part in zip(*chosen, strict=True))
+        levers = np.cross(points - about, forces)
+        sizes = [np.linalg.norm(part, axis=1).sum() for part in (forces, levers, moments)]
+        return forces.sum(0), (levers + moments).sum(0), (sizes[0], sizes[1] + sizes[2])
 
     def tendon_place(self, number: int) -> np.ndarray:
         """Where a tendon crosses a section of the tube, mm."""
         tendon = self.robot.tendon[number]
-        side = np.radians(tendon.direction_deg)
-        return tendon.radius * np.array([np.cos(side), np.sin(side), 0.0])
+        return tendon.radius * about_z(tendon.direction_deg)[:, 0]
 
     def end_body(self, number: int) -> int:
         """Body in which a tendon ends."""
         return self.robot.tendon[number].end_body or len(self.robot.notches)
 
-    def _external(self, path: nf.EquilibriumPath):
+    def _external(self):
         """External loads, as the load tells them."""
         load, last, none = self.load, len(self.origin) - 1, np.zeros(3)
         for one in load.body_forces:
@@ -167,13 +164,13 @@ class State:
         turn = self.rotation[last] if load.following else np.eye(3)
         hangs = self.tip + self.rotation[last] @ load.tip_point
         yield Force(last, hangs, turn @ load.tip_force, turn @ load.tip_moment)
-        yield Force(last, hangs, np.array(load.weight(load.tip_mass)), none)
+        down = 1e-3 * np.array(load.gravity or (0.0, 0.0, -9.81))  # N/g
+        yield Force(last, hangs, load.tip_mass * down, none)
         if load.gravity is not None:
             for body, (mass, centre) in enumerate(
-                zip(path.chain.body_mass, path.chain.body_centre, strict=True)
+                zip(self.path.chain.body_mass, self.path.chain.body_centre, strict=True)
             ):
-                weight = np.array(load.weight(float(mass)))
-                yield Force(body, self.point(body, np.asarray(centre)), weight, none)
+                yield Force(body, self.point(body, np.asarray(centre)), mass * down, none)
 
     def _tendon(self, number: int) -> list[Span]:
         """Pull of a straight tendon on the bodies it leaves and enters; its spans, base to tip."""
@@ -210,10 +207,8 @@ class State:
         }
         touching: dict[int, list[tuple[int, np.ndarray, np.ndarray]]] = {}
         for side in sides:
-            turn = np.radians(side)
-            out = self.robot.tube.outer_radius * np.array([np.cos(turn), np.sin(turn), 0.0])
-            stops = self.way(side)
-            for before, behind in pairwise(stops):
+            out = self.robot.tube.outer_radius * about_z(side)[:, 0]
+            for before, behind in pairwise(self.way(side)):
                 if not behind.faces:
                     continue
                 normal = self.rotation[before.body] @ _Z
@@ -232,6 +227,11 @@ class State:
                     Force(int(notch) + 1, edge, push, np.zeros(3)),
                     Force(body, edge, -push, np.zeros(3)),
                 ]
+
+
+def about_z(degrees: float) -> np.ndarray:
+    """Rotation about the tube axis; its first column is a direction across the tube."""
+    return Rotation.from_euler("z", degrees, degrees=True).as_matrix()
 
 
 def angle(one: np.ndarray, other: np.ndarray) -> float:

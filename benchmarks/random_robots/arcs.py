@@ -4,9 +4,10 @@ An arc notch is a rod along its neutral axis with five strains: bending toward i
 sideways, each constant and linear along the rod, and a constant twist about the shear centre.
 Pose of the distal body against the proximal one: six numbers. So the strains follow from the two
 poses that are reported, with one number left that must fit. From the strains follow by the law of
-the material and of the ends the moments inside (moments.py), and these must balance, in the mean
-over the notch, what acts on everything beyond (acting.py) and what tendons on the wall and closed
-lips do to the notch. Elastic ends also shear, in the ratio in which one force bends and shears.
+the material and of the ends (docs/from_the_drawing.md) the moments inside, and these must balance,
+in the mean over the notch, what acts on everything beyond (forces.py) and what tendons on the wall
+and closed lips do to the notch. Elastic ends also shear, in the ratio in which one force bends and
+shears. What the fibres of a material with hysteresis remember is read from the path and judged.
 
 A mode whose strain is nil may be one that the solver left out for these loads; its balance is not
 asked for. (What is left out is told by `moment_error`.)
@@ -17,12 +18,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from acting import State
-from fibres import Memory, memory_of
-from moments import ArcLaw, arc_law, bending
 from numpy.polynomial.legendre import leggauss
+from scipy.spatial.transform import RigidTransform, Rotation
 
 import notchflex as nf
+
+from .forces import State, about_z
+from .rings import Ends, ends_of, rings
+from .sections import Curve, Left, Memory, fibres, left_by, memory_of, remembered, stress
 
 # Seven Gauss nodes all along, those of the solver: where the law of the material has a kink within
 # the notch, the mean over other nodes would differ.
@@ -42,6 +45,43 @@ _NIL = 1e-7  # rad, of a mode
 POSE = 1e-6
 # Relative to what acts, and of the moment that bends the notch by a tenth of a degree.
 BALANCE, _SMALL = 1e-6, 2e-3
+_SHARE = 0.25  # of the end compliance that follows the material
+_CLOSING, _CLOSED = {"on-axis": 1.0248, "off-axis": 1.0203}, 0.354
+_EDGE = 0.086
+# Tries for a curvature or a strain: to 1e-15 of where they begin.
+_TRIES = 60
+# What a strain may be off for one that is on a curve, over the strain of the notch when closed: the
+# strains are fitted to poses.
+_ON_CURVE = 1e-6
+
+
+class ArcLaw(NamedTuple):
+    """One arc notch of a robot, between its rings.
+
+    Attributes:
+        height: h, mm.
+        centroid: Distance of the neutral axis from the tube axis, mm.
+        closure: Distance of the lips from the neutral axis, mm.
+        lips: Flexibility of the closed lips, mm/N.
+        ends: Its lengths with its rings; the height for rigid ends.
+        push: Displacement of the rings by the force of a unit of linear bending, mm; and force.
+        sway: The same sideways.
+        section: Section between the ends.
+    """
+
+    height: float
+    centroid: float
+    closure: float
+    lips: float
+    ends: Ends
+    push: tuple[float, float]
+    sway: tuple[float, float]
+    section: Left
+
+    @property
+    def twist(self) -> float:
+        """Distance of the shear centre from the neutral axis, mm."""
+        return self.ends.shear_centre - self.centroid
 
 
 class Arcs(NamedTuple):
@@ -50,29 +90,22 @@ class Arcs(NamedTuple):
     Attributes:
         notches: Which notches of the robot.
         modes: Bending toward the side (elastic; constant, linear), sideways, and twist, rad.
-        misfit: What of the relative poses no strains explain, rad and heights.
         problems: What does not hold.
         laws: How each of them bends.
     """
 
     notches: list[int]
     modes: np.ndarray
-    misfit: np.ndarray
     problems: list[str]
     laws: list[ArcLaw]
 
 
-def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
-    """Fit strains to the poses of one step, and add up every arc notch.
-
-    Args:
-        state: The forces on the bodies.
-        path: The path, for contact forces, gaps and moments that it reports.
-    """
-    robot, step = state.robot, state.step
+def judge_arcs(state: State) -> Arcs:
+    """Fit strains to the poses of a state, and add up every arc notch."""
+    robot, now = state.robot, state.now
     chosen = [i for i, notch in enumerate(robot.notches) if isinstance(notch, nf.ArcNotch)]
     if not chosen:
-        return Arcs([], np.zeros((0, 5)), np.zeros(0), [], [])
+        return Arcs([], np.zeros((0, 5)), [], [])
     notches = [robot.notches[i] for i in chosen]
     laws = [arc_law(state, i) for i in chosen]
     centroid, height = (np.array([getattr(one, k) for one in laws]) for k in ("centroid", "height"))
@@ -83,7 +116,7 @@ def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
     axis = np.stack([-centroid, 0 * centroid, 0 * centroid], axis=-1)
     lead = np.stack([0 * height, 0 * height, state.length[before]], axis=-1)
     start = state.rotation[before] @ frames
-    begins = _at(state.origin[before], state.rotation[before], lead) + _turned(start, axis)
+    begins = state.origin[before] + _turned(state.rotation[before], lead) + _turned(start, axis)
     end = state.rotation[behind] @ frames
     ends = state.origin[behind] + _turned(end, axis)
     turn = np.swapaxes(start, 1, 2) @ end
@@ -95,11 +128,11 @@ def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
         for i, miss in zip(chosen, misfit, strict=True)
         if miss > POSE
     ]
-    memory = memory_of(path, step)
+    memory = memory_of(state.path)
     for k, (i, law) in enumerate(zip(chosen, laws, strict=True)):
         node_at = begins[k] + height[k] * places[:, k] @ start[k].T
         node_turn = start[k] @ rotations[:, k]
-        force, about, size = state.beyond_with_size(i + 1, node_at[2])
+        force, about, size = state.beyond(i + 1, node_at[2])
         asked = about + np.cross(node_at[2] - node_at, force)
         local = np.einsum("gba,gb->ga", node_turn, asked)
         across = np.einsum("gba,b->ga", node_turn, force)
@@ -112,12 +145,12 @@ def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
                 local[:, 0] -= pull * place[1]
                 local[:, 1] += pull * place[0]
                 scale += abs(pull) * float(np.hypot(place[0], place[1]))
-        lip = path.contact_force[step, i] * law.closure
+        lip = now.contact_force[i] * law.closure
         local[:, 1] -= lip
         scale += abs(lip)
         inside, found = _inside(state, i, law, modes[k], memory)
         problems += found
-        floor = _SMALL * robot.material.elastic_modulus * float(law.section.second_moment_weak)
+        floor = _SMALL * robot.material.elastic_modulus * law.section.weak
         scale += floor / height[k]
         forces = np.stack(
             [
@@ -128,14 +161,17 @@ def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
         )
         sheared = [law.push[0] * (_WEIGHTS @ forces[:, 0]), law.sway[0] * (_WEIGHTS @ forces[:, 1])]
         problems += _out_of_balance(i, modes[k], inside - local, sheared, scale)
-        problems += _disagreeing(state, path, i, modes[k], precurved[k], law)
-        edge = edge_angle(turn[k], law.edge * modes[k, 0])
-        if abs(edge - path.edge_angle[step, i]) > POSE:
+        gap = law.height - law.closure * (precurved[k] + modes[k, 0])
+        gap += law.lips * now.contact_force[i]  # as the lips' fibre has it and as they yield
+        if abs(gap - now.gap[i]) > POSE * law.height:
+            problems.append(f"notch {i + 1}: gap {now.gap[i]:.3g} mm, not {gap:.3g}")
+        edge = edge_angle(turn[k], _EDGE * (1.0 - law.height / law.ends.weak) * modes[k, 0])
+        if abs(edge - now.edge_angle[i]) > POSE:
             problems.append(f"notch {i + 1}: its edge angle is not {edge:.6g}")
         largest = inside[np.abs(inside[:, 1]).argmax(), 1]
-        if abs(largest - path.notch_moment[step, i]) > BALANCE * scale:
+        if abs(largest - now.notch_moment[i]) > BALANCE * scale:
             problems.append(f"notch {i + 1}: notch_moment is not that of its strains")
-    return Arcs(chosen, modes, misfit, problems, laws)
+    return Arcs(chosen, modes, problems, laws)
 
 
 def _out_of_balance(
@@ -154,23 +190,6 @@ def _out_of_balance(
         for k, (name, value) in enumerate(left.items())
         if (k == 0 or abs(modes[k]) > _NIL) and abs(value) > BALANCE * scale
     ]
-
-
-def _disagreeing(
-    state: State,
-    path: nf.EquilibriumPath,
-    notch: int,
-    modes: np.ndarray,
-    precurved: float,
-    law: ArcLaw,
-) -> list[str]:
-    """Gap as the lips' fibre has it and as they yield."""
-    step, found = state.step, []
-    gap = law.height - law.closure * (precurved + modes[0])
-    gap += law.lips * path.contact_force[step, notch]
-    if abs(gap - path.gap[step, notch]) > POSE * law.height:
-        found.append(f"notch {notch + 1}: gap {path.gap[step, notch]:.3g} mm, not {gap:.3g}")
-    return found
 
 
 def edge_angle(turn: np.ndarray, beyond: float) -> float:
@@ -193,15 +212,10 @@ def _inside(
     section, material = law.section, state.robot.material
     modulus = material.elastic_modulus
     shear = modulus / (2.0 * (1.0 + material.poisson_ratio))
-    sideways = (modes[2] + modes[3] * _LINEAR) / law.height
-    bent = bending(state, i, law, modes[0] + modes[1] * _LINEAR, memory)
-    twist = np.full(len(_NODES), modes[4] / law.height)
-    moments = [
-        modulus * float(section.second_moment_strong) * sideways / law.strong,
-        bent.moment,
-        shear * float(section.torsion_constant) * twist / law.torsion,
-    ]
-    return np.stack(moments, axis=-1), bent.problems
+    bent, problems = bending(state, i, law, modes[0] + modes[1] * _LINEAR, memory)
+    sideways = modulus * section.strong * (modes[2] + modes[3] * _LINEAR) / law.ends.strong
+    twist = np.full(len(_NODES), shear * section.torsion * modes[4] / law.ends.torsion)
+    return np.stack([sideways, bent, twist], axis=-1), problems
 
 
 def _fit(
@@ -212,12 +226,10 @@ def _fit(
 
     def off(modes: np.ndarray) -> np.ndarray:
         rotations, places = _rods(modes, precurved, shear)
-        left = [_unskew(back @ rotations[-1]), _turned(back, places[-1] - move)]
-        return np.concatenate(left, axis=-1)
+        turned = Rotation.from_matrix(back @ rotations[-1]).as_rotvec()
+        return np.concatenate([turned, _turned(back, places[-1] - move)], axis=-1)
 
-    vector = _unskew(turn)
-    angle = np.arctan2(np.linalg.norm(vector, axis=-1), 0.5 * (np.trace(turn.T) - 1.0))
-    vector = vector / np.maximum(np.sinc(angle / np.pi), 1e-3)[:, None]
+    vector = Rotation.from_matrix(turn).as_rotvec()
     modes = np.zeros((len(turn), 5))
     modes[:, 0], modes[:, 2], modes[:, 4] = vector[:, 1] - precurved, vector[:, 0], vector[:, 2]
     here = off(modes)
@@ -247,32 +259,14 @@ def _rods(
     middle = constant + (0.5 * (_STOPS[1:] + _STOPS[:-1]) - 0.5)[:, None, None] * linear
     # Magnus to fourth order, of a strain that is linear in the place.
     twist = size * middle + size**3 / 12.0 * _bracket(middle, np.broadcast_to(linear, middle.shape))
-    by, to = _exponential(twist)
-    rotation = np.broadcast_to(np.eye(3), (len(modes), 3, 3))
-    place = np.zeros((len(modes), 3))
-    rotations, places = [], []
-    for k in range(len(by)):
-        place = place + _turned(rotation, to[k])
-        rotation = rotation @ by[k]
-        if (k + 1) % _STEPS == 0:
-            rotations.append(rotation)
-            places.append(place)
-    return np.stack(rotations), np.stack(places)
-
-
-def _exponential(twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation and displacement along a constant twist (angular, linear) of small angle."""
-    angular, linear = twist[..., :3], twist[..., 3:]
-    square = np.sum(angular**2, axis=-1)
-    angle = np.sqrt(square)
-    first = np.sinc(angle / np.pi)[..., None]
-    second = 0.5 * np.sinc(0.5 * angle / np.pi)[..., None] ** 2
-    series = 1 - square / 20 * (1 - square / 42 * (1 - square / 72 * (1 - square / 110)))
-    once = np.cross(angular, linear)
-    moved = linear + second * once + series[..., None] / 6.0 * np.cross(angular, once)
-    matrix = np.cross(np.eye(3), angular[..., None, :])  # its rows are e_i x w
-    turned = np.eye(3) + first[..., None] * matrix + second[..., None] * (matrix @ matrix)
-    return turned, moved
+    frame = RigidTransform.identity(len(modes))
+    frames = []
+    for one in twist:
+        frame = frame * RigidTransform.from_exp_coords(one)
+        frames.append(frame)
+    kept = frames[_STEPS - 1 :: _STEPS]
+    rotations = np.stack([one.rotation.as_matrix() for one in kept])
+    return rotations, np.stack([one.translation for one in kept])
 
 
 def _bracket(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -281,21 +275,101 @@ def _bracket(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.concatenate([turn, move], axis=-1)
 
 
-def _unskew(matrix: np.ndarray) -> np.ndarray:
-    above = matrix[:, [2, 0, 1], [1, 2, 0]]
-    return 0.5 * (above - matrix[:, [1, 2, 0], [2, 0, 1]])
-
-
-def about_z(degrees: float) -> np.ndarray:
-    """Rotation about the tube axis."""
-    turn = np.radians(degrees)
-    cosine, sine = np.cos(turn), np.sin(turn)
-    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-
-
 def _turned(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return np.einsum("nij,nj->ni", rotation, vector)
 
 
-def _at(origin: np.ndarray, rotation: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    return origin + _turned(rotation, inside)
+def arc_law(state: State, i: int) -> ArcLaw:
+    """The law of notch i (from 0)."""
+    robot = state.robot
+    notch, tube, material = robot.notches[i], robot.tube, robot.material
+    height, modulus, left = notch.height, material.elastic_modulus, left_by(notch, tube)
+    closure, lips = tube.outer_radius + left.centroid, 0.0
+    sheared = [height**3 / (12.0 * moment) for moment in (left.weak, left.strong)]
+    ends = Ends(height, height, height, 0.0, left.shear_centre, *sheared, 0.0, 0.0)
+    if notch.closing == "elastic" and notch.has_elastic_ends:
+        wall = tube.outer_radius - tube.inner_radius
+        closure /= _CLOSING[notch.cut]
+        # Of the lips alone, beside the open notch.
+        lips = closure**2 / (_CLOSED * modulus * wall * (tube.outer_radius - 0.5 * wall) ** 2)
+    if notch.ends == "shell":
+        ends = ends_of(notch, tube, material.poisson_ratio, rings(robot, state.length, i))
+
+    def slides(compliance: float, moment: float, length: float) -> tuple[float, float]:
+        force = 2.0 * moment / (height * length)
+        return (compliance - height**2 * length / (12.0 * moment)) * force, modulus * force
+
+    return ArcLaw(
+        height=height,
+        centroid=left.centroid - ends.coupling / ends.weak,
+        closure=closure,
+        lips=lips,
+        ends=ends,
+        push=slides(ends.push, left.weak, ends.weak),
+        sway=slides(ends.sway, left.strong, ends.strong),
+        section=left,
+    )
+
+
+def bending(
+    state: State, i: int, law: ArcLaw, angle: np.ndarray, memory: Memory | None
+) -> tuple[np.ndarray, list[str]]:
+    """Moments of notch i at elastic angles (rad), as if it were bent so all along; problems."""
+    robot, second, spine = state.robot, law.section.weak, law.section.spine
+    q = 1.0 + law.ends.odd * angle + law.ends.even * angle**2
+    reduced, added = angle / (q * law.height), law.ends.weak / law.height - 1.0
+    material, rigidity = robot.material, robot.material.elastic_modulus * second
+    if isinstance(material, nf.Linear):
+        return rigidity * reduced / ((1.0 + added) * q), []
+    soft, own = (1.0 - _SHARE) * added / rigidity, 1.0 + _SHARE * added
+    if isinstance(material, nf.Superelastic):
+        problems: list[str] = []
+
+        def moment(curvature: np.ndarray) -> np.ndarray:
+            return second / spine * stress(material, curvature * spine)
+
+    else:
+        arm, area, problems = fibres(state.fibres, i, robot.notches[i], robot.tube)
+        curve = None if memory else Curve(material)
+
+        def moment(curvature: np.ndarray) -> np.ndarray:
+            """Moment at the strain of the neutral axis at which the forces vanish."""
+            bent = curvature[..., None] * arm
+            most = np.abs(bent).max(axis=-1)
+            middle = _bisected(lambda e: curve(e[..., None] + bent) @ area, most)
+            return curve(middle[..., None] + bent) @ (area * arm)
+
+    if memory is not None:
+        used = np.asarray(state.node_length)[i] > 0.0  # the rods of other kinds have more nodes
+        past, now = memory.before[i][used], memory.after[i][used]
+        moved = now @ (area * arm) / second
+        curvature = (reduced + soft * rigidity * moved) / (1.0 + added)
+        strain = (now @ area / area.sum())[..., None] + curvature[..., None] * arm
+        near = _ON_CURVE * np.abs(arm).max() / law.closure
+        problems += remembered(i, material, strain, past, now, near)
+        return rigidity * (curvature - moved) / q, problems
+    curvature = _bisected(lambda k: own * k + soft * moment(k) - reduced, np.abs(reduced))
+    return moment(curvature) / q, problems
+
+
+def _bisected(rising, most: np.ndarray) -> np.ndarray:
+    """Where a rising function is nil, between -most and most: false position (Illinois)."""
+    low, high = -most, most.copy()
+    at_low, at_high = rising(low), rising(high)
+    enough = 1e-15 * np.maximum(np.abs(at_low), np.abs(at_high))
+    best = low
+    side = np.zeros(np.shape(most))
+    for _ in range(_TRIES):
+        steep = np.where(at_high > at_low, at_high - at_low, 1.0)
+        best = np.clip(low - at_low * (high - low) / steep, low, high)
+        value = rising(best)
+        under = value < 0.0
+        # An end that stays twice counts half.
+        at_high = np.where(under & (side < 0.0), 0.5 * at_high, at_high)
+        at_low = np.where(~under & (side > 0.0), 0.5 * at_low, at_low)
+        low, at_low = np.where(under, best, low), np.where(under, value, at_low)
+        high, at_high = np.where(under, high, best), np.where(under, at_high, value)
+        side = np.where(under, -1.0, 1.0)
+        if np.all(np.abs(value) <= enough) or np.all(high - low <= 1e-16 * most):
+            break
+    return best

@@ -1,0 +1,431 @@
+"""Random robots by form: `draw(seed, number)`, with a random history of loads each.
+
+Sixteen draws after one another share a form (notches, laws, tendons, number of steps, what acts
+from outside), each with its own sizes and its own history. Tables have the keys of robot files;
+lengths in mm, forces in N, angles of robots in degrees. Some draws are no robots and are refused.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import notchflex as nf
+
+from .draws import LENGTHS, Draw
+from .sections import section_of
+
+Table = dict[str, Any]
+VARIANTS = 16
+NOTCHES = {"arc": nf.ArcNotch, "strip": nf.StripNotch, "u-link": nf.ULink}
+MATERIALS = {"linear": nf.Linear, "superelastic": nf.Superelastic}
+FRICTIONS = {"capstan": nf.Capstan, "corner": nf.Corner, "frictionless": nf.Frictionless}
+
+
+def pick(random: np.random.Generator, **weights: float) -> str:
+    """Return one of the names, by weight."""
+    names = list(weights)
+    share = np.array([weights[name] for name in names])
+    return names[random.choice(len(names), p=share / share.sum())].replace("_", "-")
+
+
+def between_decades(random: np.random.Generator, low: float, high: float) -> float:
+    """Return a number whose logarithm is uniform."""
+    return float(np.exp(random.uniform(np.log(low), np.log(high))))
+
+
+def draw_tube(random: np.random.Generator) -> Table:
+    """Return a tube between hair and hose."""
+    outer = between_decades(random, 0.2, 40.0)
+    base = 0.0 if random.random() < 0.5 else outer * random.uniform(0, 3)
+    inner = outer * random.uniform(0.4, 0.95)
+    return {"outer_diameter": outer, "inner_diameter": inner, "base_length": base}
+
+
+def draw_notch(random: np.random.Generator, kind: str, tube: Table) -> Table:
+    """Return one notch of a kind, its sizes relative to the tube."""
+    radius = tube["outer_diameter"] / 2
+    uncut = 0.0 if random.random() < 0.2 else radius * random.uniform(0.05, 3)
+    notch: Table = {"kind": kind, "uncut_length": uncut}
+    if kind == "arc":
+        cut = "on-axis" if random.random() < 0.5 else "off-axis"
+        depth, height = radius * random.uniform(1.0, 1.9), radius * random.uniform(0.2, 2)
+        notch |= {"cut": cut, "depth": depth, "height": height}
+        if random.random() < 0.25:
+            most = math.degrees(height / (2 * radius))
+            notch["precurvature_deg"] = most * random.uniform(-0.5, 0.9)
+    elif kind == "strip":
+        notch |= {
+            "height": radius * random.uniform(0.15, 0.9),
+            "strip_thickness": radius * random.uniform(0.05, 0.35),
+            "depth": radius * random.uniform(1.05, 1.7),
+            "deflection": pick(random, large=3, small=1),
+        }
+        if random.random() < 0.4:
+            notch["strip_length"] = radius * random.uniform(0.8, 1.9)
+        if random.random() < 0.4:
+            notch["wall_width"] = radius * random.uniform(0.1, 1.2)
+    else:
+        notch |= {
+            "slot_radius": radius * random.uniform(0.04, 0.14),
+            "strip_thickness": radius * random.uniform(0.08, 0.35),
+            "strip_length": radius * random.uniform(0.3, 0.9),
+            "proximal_slot": pick(random, away=1, toward=1),
+        }
+    return notch
+
+
+def draw_notches(random: np.random.Generator, tube: Table, planar: bool) -> list[Table]:
+    """Return the notches: of one kind or mixed, equal or each its own."""
+    family = pick(random, arc=5, strip=2, u_link=2, mixed=3)
+    count = int(random.choice([1, 2, 3, 4, 5, 6, 8, 12, 20, 40], p=[0.1] * 7 + [0.15, 0.1, 0.05]))
+    notches: list[Table] = []
+    while sum(notch.get("repeat", 1) for notch in notches) < count:
+        kind = pick(random, arc=2, strip=1, u_link=1) if family == "mixed" else family
+        if kind == "u-link" and notches and notches[-1]["kind"] == "u-link":
+            kind = "arc"  # rows side by side would have to share a slot
+        notch = draw_notch(random, kind, tube)
+        left = count - sum(other.get("repeat", 1) for other in notches)
+        equal = left if random.random() < 0.4 or count > 12 else 1
+        if family == "mixed":
+            equal = int(random.integers(1, min(4, left) + 1))
+        if kind == "u-link":  # neighbours of a row share their slots: one row, mostly
+            equal = left if family == "u-link" else equal
+        notch["repeat"] = equal
+        side = random.choice([0.0, 180.0], p=[0.8, 0.2])
+        if not planar and kind == "arc":
+            side = random.choice([0.0, 90.0, 180.0, 270.0, random.uniform(-180, 180)])
+        elif not planar:
+            side = random.uniform(-20, 20)
+        notch["direction_deg"] = float(side)
+        notches.append(notch)
+    return notches
+
+
+def ends_for(robot: Table, direction: float) -> list[int]:
+    """Return the bodies in which a tendon may end: those with a wall on its side."""
+    ends, body = [], 0
+    for notch in robot["notch"]:
+        for place in range(notch["repeat"]):
+            body += 1
+            if notch["kind"] == "u-link":  # the slots before a row's links are on its sides in turn
+                faces = np.cos(np.radians(direction - notch["direction_deg"])) > 0
+                if (notch["proximal_slot"] == "toward") != (faces == (place % 2 == 0)):
+                    continue
+            ends.append(body)
+    return ends or [body]
+
+
+def draw_tendons(random: np.random.Generator, robot: Table, planar: bool) -> list[Table]:
+    """Return one to four tendons that suit the notches, mostly."""
+    tube, kinds = robot["tube"], {notch["kind"] for notch in robot["notch"]}
+    radius, count = (
+        tube["outer_diameter"] / 2,
+        int(random.choice([1, 2, 3, 4], p=[0.5, 0.3, 0.1, 0.1])),
+    )
+    bodies = sum(notch["repeat"] for notch in robot["notch"])
+    tendons: list[Table] = []
+    for number in range(count):
+        direction = (
+            0.0 if number == 0 else 180.0 if number == 1 else float(random.choice([0.0, 180.0]))
+        )
+        if not planar:
+            direction = 360.0 / count * number if kinds == {"arc"} else direction
+            direction += float(random.uniform(-20, 20))
+        tendon: Table = {"radius": radius * random.uniform(0.65, 0.94), "direction_deg": direction}
+        straight = {"straight": 6.0, "straight_dead": 1.0, "straight_follower": 1.0}
+        wall = {"wall_arc": 8.0} if kinds == {"arc"} else {"wall_arc": 0.08}
+        tendon["path"] = pick(random, **straight, **wall)
+        if random.random() < 0.25 and bodies > 1:
+            tendon["end_body"] = int(random.choice(ends_for(robot, direction)))
+        elif bodies not in ends_for(robot, direction) and random.random() < 0.97:
+            tendon["end_body"] = ends_for(robot, direction)[-1]
+        if random.random() < 0.3:
+            tendon["axial_stiffness"] = tension_scale(robot) * between_decades(random, 10, 1e5)
+            tendon["free_length"] = radius * random.uniform(0, 20)
+        tendons.append(tendon)
+    return tendons
+
+
+def draw_material(random: np.random.Generator) -> Table:
+    """Return a polymer, steel or nitinol."""
+    table: Table = {"kind": "linear", "elastic_modulus": between_decades(random, 100, 2e5)}
+    if random.random() < 0.5:
+        first = between_decades(random, 0.002, 0.04)
+        table |= {
+            "kind": "superelastic",
+            "superelastic_modulus": table["elastic_modulus"] * random.uniform(0.02, 0.6),
+            "transition_strain": first,
+            "plastic_strain": first * random.uniform(1.5, 10),
+            "plastic_modulus": table["elastic_modulus"] * random.uniform(0.01, 0.3),
+        }
+    if random.random() < 0.5:
+        table["poisson_ratio"] = random.uniform(0.0, 0.49)
+    if random.random() < 0.4:
+        table["density"] = between_decades(random, 500, 10000)
+    return table
+
+
+def draw_friction(random: np.random.Generator) -> Table:
+    """Return one of the laws, sometimes with a coefficient of 0."""
+    kind = pick(random, capstan=4, corner=3, frictionless=2)
+    if kind == "frictionless":
+        return {"kind": kind}
+    coefficient = float(random.choice([0.0, random.uniform(0, 0.2), random.uniform(0, 0.6)]))
+    if kind == "capstan":
+        wrap = pick(random, geometric=2, whole_before=1)
+        return {"kind": kind, "coefficient": coefficient, "wrap": wrap}
+    return {"kind": kind, "coefficient": coefficient, "turning": pick(random, slope=3, chord=1)}
+
+
+def tension_scale(robot: Table) -> float:
+    """Return a tension that bends the robot far [N]."""
+    sizes = [reference(robot, notch) for notch in robot["notch"]]
+    return float(np.median([stiff * angle / lever for stiff, angle, lever in sizes]))
+
+
+def varied(random: np.random.Generator, robot: Table) -> None:
+    """Give all sizes of a robot other values; its form, and so its program, stays."""
+    size = between_decades(random, 0.2, 5.0)
+    for part in [robot["tube"], *robot["notch"], *robot["tendon"]]:
+        for key in LENGTHS:
+            if part.get(key):
+                part[key] *= size * random.uniform(0.97, 1.03)
+        if "axial_stiffness" in part:
+            part["axial_stiffness"] *= size**2
+    for part, keys in (("material", ("elastic_modulus",)), ("friction", ("coefficient",))):
+        for key in keys:
+            if key in robot[part]:
+                robot[part][key] *= random.uniform(0.3, 1.5)
+
+
+def reference(robot: Table, notch: Table) -> tuple[float, float, float]:
+    """Return stiffness (N mm), a large angle and the lever (mm) of a notch, roughly."""
+    tube, modulus = robot["tube"], robot["material"]["elastic_modulus"]
+    outer, inner = tube["outer_diameter"] / 2, tube["inner_diameter"] / 2
+    if notch["kind"] == "arc":
+        left = section_of(notch["cut"], outer, inner, notch["depth"])
+        centroid, second = left.centroid, left.weak
+        angle = min(notch["height"] / (outer + centroid), 0.8)
+        return modulus * second / notch["height"], angle, outer * 0.9 + centroid
+    width = notch.get("wall_width") or 2 * (outer - inner)
+    thickness = notch["strip_thickness"]
+    second = width * thickness**3 / 12
+    if notch["kind"] == "strip":
+        length = notch.get("strip_length") or outer + inner
+        return modulus * second / length, min(notch["height"] / (2 * outer), 0.5), 0.5 * length
+    length = notch["strip_length"] + 2 * notch["slot_radius"]
+    return modulus * second / length, min(notch["slot_radius"] / outer, 0.3), 0.8 * outer
+
+
+def draw_course(random: np.random.Generator, steps: int, both_signs: bool) -> np.ndarray:
+    """Return the course of one command over the steps, of the size of 1."""
+    names = ["ramp", "loop", "partial", "walk", "jump", "hold"]
+    name = str(random.choice(names, p=[0.2, 0.25, 0.2, 0.2, 0.1, 0.05]))
+    part = np.linspace(0, 1, steps)
+    if name == "ramp":
+        course = part
+    elif name == "loop":
+        course = 1 - np.abs(2 * part - 1)
+    elif name == "partial":
+        turns = np.concatenate([[0.0, 1.0], random.uniform(0, 1, 3)])
+        course = np.interp(part * 4, np.arange(5), turns)
+    elif name == "walk":
+        course = np.cumsum(random.normal(0, 0.3, steps))
+        course = course if both_signs else np.abs(course)
+    elif name == "jump":
+        course = np.where(random.random(steps) < 0.5, random.uniform(0, 1, steps), 0.0)
+    else:
+        course = np.ones(steps)
+    if both_signs and random.random() < 0.3:
+        course = -course
+    return course
+
+
+def sizes_of(robot: Table) -> tuple[float, float, float, float]:
+    """Return stroke (mm), moment (N mm), force (N) and length (mm) that are large for a robot."""
+    rows = [(*reference(robot, notch), notch["repeat"]) for notch in robot["notch"]]
+    stroke = sum(angle * lever * count for _, angle, lever, count in rows)
+    moment = min(stiff * angle for stiff, angle, _, _ in rows)
+    length = robot["tube"]["base_length"] + robot["tube"]["outer_diameter"] * 0.5
+    for notch in robot["notch"]:
+        piece = notch.get("height", 2 * notch.get("slot_radius", 0.0)) + notch["uncut_length"]
+        length += notch["repeat"] * (piece + notch.get("strip_thickness", 0.0))
+    return stroke, moment, moment / length, length
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What histories of one form share: another one would ask for another program."""
+
+    steps: int
+    commands: tuple[str, ...]
+    outside: tuple[str, ...]
+    following: bool
+
+
+def draw_frame(random: np.random.Generator, tendons: int) -> Frame:
+    """Return how many steps, what tendons are told, and which loads act from outside."""
+    steps = int(random.choice([2, 5, 9, 15, 25], p=[0.1, 0.2, 0.3, 0.3, 0.1]))
+    commands = ["tension", "stroke", "both", "slack"]
+    first = str(random.choice(commands[:3], p=[0.55, 0.35, 0.1]))
+    others = random.choice(commands, size=tendons - 1, p=[0.4, 0.23, 0.07, 0.3])
+    kinds = ["tip_force", "tip_moment", "tip_mass", "gravity", "body_forces", "base_rotation"]
+    count = int(random.integers(1, 4)) if random.random() < 0.55 else 0
+    outside = random.choice(kinds, size=count, replace=False)
+    following = bool(random.random() < 0.3)
+    return Frame(steps, (first, *map(str, others)), tuple(map(str, outside)), following)
+
+
+def draw_outside(random: np.random.Generator, robot: Table, planar: bool, frame: Frame) -> Table:
+    """Return external loads at their full size."""
+    _, moment, force, _ = sizes_of(robot)
+    size = float(np.exp(random.uniform(np.log(0.01), np.log(1.0))))
+    flat = np.array([1.0, 0.0, 1.0]) if planar else np.ones(3)
+    turn = np.array([0.0, 1.0, 0.0]) if planar else np.ones(3)
+    radius = robot["tube"]["outer_diameter"] / 2
+    bodies = sum(notch["repeat"] for notch in robot["notch"])
+    load: Table = {}
+    for what in frame.outside:
+        if what == "tip_force":
+            load["tip_force"] = size * force * flat * random.normal(size=3)
+            if random.random() < 0.3:
+                load["tip_point"] = flat * random.uniform(-1, 1, 3) * radius
+        elif what == "tip_moment":
+            load["tip_moment"] = size * moment * turn * random.normal(size=3)
+        elif what == "tip_mass":
+            load["tip_mass"] = size * force * 100
+        elif what == "gravity":
+            load["gravity"] = 9.81 * flat * random.normal(size=3)
+        elif what == "base_rotation":
+            load["base_rotation"] = turn * random.uniform(-1, 1, 3) * 3.0
+        else:
+            load["body_forces"] = [
+                {
+                    "body": int(random.integers(0, bodies + 1)),
+                    "force": size * force * flat * random.normal(size=3),
+                    "moment": size * moment * 0.5 * turn * random.normal(size=3),
+                    "point": flat * random.uniform(-1, 1, 3) * radius,
+                    "following": frame.following,
+                }
+                for _ in range(1 + frame.steps % 2)
+            ]
+    heavy = robot["material"].get("density") is not None or "tip_mass" in load
+    if "gravity" in load and not heavy and random.random() < 0.9:
+        del load["gravity"]  # nothing to act on, which is refused
+    load["following"] = frame.following
+    return load
+
+
+def scaled(load: Table, factor: float) -> Table:
+    """Return external loads with forces, moments and masses times a factor."""
+    load = dict(load)
+    for key in ("tip_force", "tip_moment"):
+        if key in load:
+            load[key] = load[key] * factor
+    if "tip_mass" in load:
+        load["tip_mass"] = load["tip_mass"] * abs(factor)
+    if "body_forces" in load:
+        load["body_forces"] = [
+            one | {"force": one["force"] * factor, "moment": one["moment"] * factor}
+            for one in load["body_forces"]
+        ]
+    return load
+
+
+def draw_history(
+    random: np.random.Generator,
+    robot: Table,
+    planar: bool,
+    tension: float,
+    frame: Frame,
+) -> list[Table]:
+    """Return the loads, step by step."""
+    steps = frame.steps
+    size = float(np.exp(random.uniform(np.log(1e-3), np.log(3.0))))
+    if random.random() < 0.04:
+        size *= float(10 ** random.uniform(2, 6))
+    stroke = sizes_of(robot)[0]
+    tendons = len(robot["tendon"])
+    told: Table = {
+        "tension": np.full((steps, tendons), np.nan),
+        "stroke": np.full((steps, tendons), np.nan),
+    }
+    for tendon, kind in enumerate(frame.commands):
+        if kind == "slack":
+            continue
+        course = draw_course(random, steps, both_signs=kind == "stroke" and tendon > 0)
+        unit = {"tension": tension, "stroke": min(size, 0.9) * stroke / size}
+        if kind == "both":
+            change = int(random.integers(1, steps))
+            told["tension"][:change, tendon] = size * tension * course[:change]
+            told["stroke"][change:, tendon] = size * unit["stroke"] * course[change:]
+        else:
+            told[kind][:, tendon] = size * unit[kind] * course
+    # two strokes that work against each other agree, mostly: nothing stretches where they do not
+    both = tendons > 1 and not np.isnan(told["stroke"][:, :2]).any()
+    if both and random.random() < 0.85:
+        told["stroke"][:, 1] = -random.choice([1.0, 1.1, 0.7]) * told["stroke"][:, 0]
+    outside: Table = {}
+    if frame.outside:
+        outside = draw_outside(random, robot, planar, frame)
+    changes = random.random() < 0.5
+    course = draw_course(random, steps, both_signs=True) if changes else np.ones(steps)
+    return [
+        {key: [None if np.isnan(x) else float(x) for x in told[key][step]] for key in told}
+        | scaled(outside, float(course[step]))
+        for step in range(steps)
+    ]
+
+
+def tables_of(seed: int, number: int) -> tuple[Table, list[Table], str]:
+    """Return robot and loads of draw `number` of a seed, and the name of their form."""
+    of_form = np.random.default_rng([seed, number // VARIANTS, 0])
+    random = np.random.default_rng([seed, number, 2])
+    planar = bool(of_form.random() < 0.55)
+    tube = draw_tube(of_form)
+    robot: Table = {"name": f"draw {seed}-{number}", "tube": tube}
+    robot["notch"] = draw_notches(of_form, tube, planar)
+    robot["material"] = draw_material(of_form)
+    robot["friction"] = draw_friction(of_form)
+    robot["tendon"] = draw_tendons(of_form, robot, planar)
+    frame = draw_frame(of_form, len(robot["tendon"]))
+    if number % VARIANTS:
+        varied(random, robot)
+    kinds = "+".join(sorted({notch["kind"] for notch in robot["notch"]}))
+    form = f"{kinds} {'planar' if planar else 'spatial'}"
+    return robot, draw_history(random, robot, planar, tension_scale(robot), frame), form
+
+
+def draw(seed: int, number: int) -> Draw:
+    """Draw one robot with loads.
+
+    Raises:
+        InputError: The library does not take what was drawn.
+    """
+    robot, loads, form = tables_of(seed, number)
+    return Draw(seed, number, form, make_robot(robot), make_loads(loads))
+
+
+def make_robot(table: Table) -> nf.Robot:
+    """Return the robot of a table."""
+    return nf.Robot(
+        name=table["name"],
+        tube=nf.Tube(**table["tube"]),
+        notch=tuple(NOTCHES[notch["kind"]](**notch) for notch in table["notch"]),
+        tendon=tuple(nf.Tendon(**tendon) for tendon in table["tendon"]),
+        material=MATERIALS[table["material"]["kind"]](**table["material"]),
+        friction=FRICTIONS[table["friction"]["kind"]](**table["friction"]),
+    )
+
+
+def make_loads(rows: list[Table]) -> tuple[nf.Load, ...]:
+    """Return the loads of tables."""
+    loads = []
+    for row in rows:
+        forces = [nf.BodyForce(**one) for one in row.get("body_forces", [])]
+        loads.append(nf.Load(**{**row, "body_forces": forces}))
+    return tuple(loads)
