@@ -12,6 +12,7 @@ mean width of the intervals (linearised), and how often the fit is told not to b
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -101,6 +102,7 @@ def trial(case: Case, number: int) -> dict[str, Any]:
         case.names,
         starts=1,
         intervals=False,
+        priors=False,
         objective=LeastSquares(1.5) if case.outliers else None,
     )
     pairs = zip(case.names, case.truth.tolist(), strict=True)
@@ -136,5 +138,5 @@ if __name__ == "__main__":
     chosen = options(__doc__, every, count=400, part="0/1")
     for name in chosen.cases:
         case = every[name]
-        rows = list(trials(lambda number, case=case: trial(case, number), chosen, name))
+        rows = list(trials(partial(trial, case), chosen, name))
         show(summary(name, case, rows))

@@ -18,6 +18,7 @@ Every result is judged by `wrong` (judge.py) as well. Exit code 1: one unsolved 
 from __future__ import annotations
 
 import sys
+from functools import partial
 from math import sqrt
 from typing import Any
 
@@ -65,8 +66,9 @@ def loads(count: int, seed: int) -> list[nf.Load]:
     return [load() for _ in range(count)]
 
 
-def trial(arm: nf.Robot, load: nf.Load) -> dict[str, Any]:
+def trial(arm: nf.Robot, hard: list[nf.Load], number: int) -> dict[str, Any]:
     """Solve a load as a user does, and judge it."""
+    load = hard[number]
     with timed() as seconds:
         path = nf.simulate(arm, load)
     return {
@@ -84,7 +86,7 @@ def main() -> int:
     for friction in chosen.cases:
         arm = robot(FRICTIONS[friction])
         nf.simulate(arm, nf.Load(tension=[1.0] * 6, tip_force=(0.1, 0.1, 0.0)))  # compiles
-        make = lambda number, arm=arm: trial(arm, hard[number])  # noqa: E731
+        make = partial(trial, arm, hard)
         rows = list(trials(make, chosen, f"{friction}, seed {chosen.seed}"))
         times = np.quantile([row["ms"] for row in rows], [0.5, 0.95, 1.0])
         table.append(

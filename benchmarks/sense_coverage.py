@@ -16,6 +16,7 @@ hold the truth in any reading.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -127,7 +128,6 @@ if __name__ == "__main__":
     table = []
     for name in chosen.cases:
         case = CASES[name]
-        robot = nf.load_robot(case.robot)
-        rows = list(trials(lambda number: trial(robot, case, number), chosen, name))
-        table.append(summary(name, rows))
+        make = partial(trial, nf.load_robot(case.robot), case)
+        table.append(summary(name, list(trials(make, chosen, name))))
     show(table)
