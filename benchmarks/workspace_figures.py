@@ -36,7 +36,8 @@ def explore(robot: nf.Robot, states: int) -> dict[str, object]:
         f"convex hull, {hull.unit} (s)": f"{hull.size:.4f} ({of_hull['wall']:.1f})",
         "alpha shape (s)": f"{alpha:.2f} ({of_alpha['wall']:.1f})",
         "voxels (s)": f"{len(voxels)} of {voxels.size:.3f} mm ({of_voxels['wall']:.1f})",
-        "dexterity, mean and largest": (voxels.dexterity.mean(), voxels.dexterity.max()),
+        "dexterity, mean": float(voxels.dexterity.mean()),
+        "dexterity, largest": float(voxels.dexterity.max()),
         "hysteresis up to, mm": float(np.nanmax(found.hysteresis)),
         "memory, GB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
     }

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from differences import Difference, difference, joined, table_of
+from matplotlib.axes import Axes
+from pictures import TENSION, beside, label_all, picture
 
 import gao2017
 import notchflex as nf
-from notchflex.plotting.style import (
-    BLUE,
-    VERMILLION,
-    house_style,
-    new_figure,
-    save,
-    sequence_colours,
-)
+from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from reference_data import reference
 
 CASES = (
@@ -59,36 +52,26 @@ def tables() -> dict[str, str]:
     return {"gao2017": table_of(differences(0)), "gao2017_finer": table_of(differences(1))}
 
 
-def pictures(folder: Path) -> None:
+@picture("gao2017.svg", 9.0, 3.4, 2)
+def pictures(left: Axes, right: Axes) -> None:
     """Draw the loop and the tension along the tendon."""
     path, rows = gao2017.pulled_and_let_go(), reference("gao_free_bending.csv")
     profile = reference("gao_tension_profiles.csv")
     half = gao2017.PULLED
-    with house_style():
-        figure = new_figure(9.0, 3.4)
-        left, right = figure.subplots(1, 2)
-        for steps, colour, way in (
-            (slice(0, half), BLUE, "pulling"),
-            (slice(half, None), VERMILLION, "unloading"),
-        ):
-            tension, angle = path.tension[steps, 0], np.degrees(path.total_angle[steps])
-            left.plot(tension, angle, color=colour)
-            left.plot(
-                rows[steps, 1], np.degrees(rows[steps, 4]), "o", ms=3.5, mfc="none", color=colour
-            )
-            left.plot([], [], "o-", ms=3.5, mfc="none", color=colour, label=way)
-        left.set_xlabel("tendon tension [N]")
-        left.set_ylabel("rotation of the tip [deg]")
-        left.legend()
-        chosen = (half - 1, half + 2, half + 4, half + 6, half + 8, half + 10)
-        for step, colour in zip(chosen, sequence_colours(len(chosen)), strict=True):
-            right.plot(path.span_tension[step, 0], color=colour)
-            label = f"{path.tension[step, 0]:.0f} N" + (
-                ", loading" if step < half else ", unloading"
-            )
-            right.plot(profile[step, 2:], "o", ms=3.0, mfc="none", color=colour)
-            right.plot([], [], "o-", ms=3.0, mfc="none", color=colour, label=label)
-        right.set_xlabel("span of the tendon, 0 at the base")
-        right.set_ylabel("tension [N]")
-        right.legend(fontsize=7.0)
-    save(figure, folder / "gao2017.svg")
+    for steps, colour, way in (
+        (slice(0, half), BLUE, "pulling"),
+        (slice(half, None), VERMILLION, "unloading"),
+    ):
+        left.plot(path.tension[steps, 0], np.degrees(path.total_angle[steps]), color=colour)
+        beside(left, (rows[steps, 1], np.degrees(rows[steps, 4])), colour, way)
+    chosen = (half - 1, half + 2, half + 4, half + 6, half + 8, half + 10)
+    for step, colour in zip(chosen, sequence_colours(len(chosen)), strict=True):
+        way = "loading" if step < half else "unloading"
+        right.plot(path.span_tension[step, 0], color=colour)
+        spans = np.arange(profile.shape[1] - 2)
+        label = f"{path.tension[step, 0]:.0f} N, {way}"
+        beside(right, (spans, profile[step, 2:]), colour, label, ms=3.0)
+    label_all((left,), TENSION, "rotation of the tip [deg]")
+    label_all((right,), "span of the tendon, 0 at the base", "tension [N]")
+    left.legend()
+    right.legend(fontsize=7.0)

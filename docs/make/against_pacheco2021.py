@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from differences import Difference, difference, joined, table_of
+from matplotlib.axes import Axes
+from pictures import TENSION, TOTAL, beside, label_all, picture
 
 import notchflex as nf
 from loads import tensions
-from notchflex.plotting.style import house_style, new_figure, save, sequence_colours
+from notchflex.plotting.style import sequence_colours
 from reference_data import CUTS, choose, reference
 from robots import linear_copy, ready
 
@@ -79,21 +79,15 @@ def tables() -> dict[str, str]:
     return {"pacheco2021": table_of(differences())}
 
 
-def pictures(folder: Path) -> None:
+@picture("pacheco2021.svg", 8.0, 3.4, 2, sharey=True)
+def pictures(*places: Axes) -> None:
     """Draw the total angles of the curves."""
     every = curves()
-    with house_style():
-        figure = new_figure(8.0, 3.4)
-        places = figure.subplots(1, 2, sharey=True)
-        for number, (axes, cut) in enumerate(zip(places, CUTS, strict=True)):
-            for name, colour in zip("ABC", sequence_colours(3), strict=True):
-                path, wanted = every[name, number]
-                axes.plot(path.tension[:, 0], np.degrees(path.total_angle), color=colour)
-                dots = wanted[::3]
-                axes.plot(dots[:, 2], dots[:, 8], "o", ms=3.5, mfc="none", color=colour)
-                axes.plot([], [], "o-", ms=3.5, mfc="none", color=colour, label=f"wrist {name}")
-            axes.set_title(f'cut = "{cut}"', loc="left")
-            axes.set_xlabel("tendon tension [N]")
-        places[0].set_ylabel("total bending angle [deg]")
-        places[0].legend(loc="lower right")
-    save(figure, folder / "pacheco2021.svg")
+    for number, (axes, cut) in enumerate(zip(places, CUTS, strict=True)):
+        for name, colour in zip("ABC", sequence_colours(3), strict=True):
+            path, wanted = every[name, number]
+            axes.plot(path.tension[:, 0], np.degrees(path.total_angle), color=colour)
+            beside(axes, (wanted[::3, 2], wanted[::3, 8]), colour, f"wrist {name}")
+        axes.set_title(f'cut = "{cut}"', loc="left")
+    label_all(places, TENSION, TOTAL)
+    places[0].legend(loc="lower right")
