@@ -1,32 +1,25 @@
 """Rendered photographs of known wrists against what `notchflex measure` finds in them.
 
     python benchmarks/measured_photographs.py [--count 400] [--first 0] [--json FILE]
-    python benchmarks/measured_photographs.py constants --json FILE [--sets 200]
 
 With a FILE, a run that was stopped goes on where it was. One thread is quicker in CPU time: set
-OPENBLAS_NUM_THREADS=1. `constants` reads FILE and counts how often constants fitted to photographs
-lie in their 95 % intervals: each set bends a wrist by six pulls, gives the angles of each
-photograph the errors and the standard deviations of a photograph of FILE, all notches together, and
-calibrates.
+OPENBLAS_NUM_THREADS=1.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-import tempfile
 from collections import Counter
 from pathlib import Path
 
 import cv2
 import numpy as np
-from harness import options, read_rows, rms, share, show, timed, trials
+from harness import options, rms, share, show, timed, trials
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import notchflex as nf
-from notchflex.fit import calibrate, read_measurements, simulate_measurements
-from notchflex.photographs import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.measure import measure_picture
 from photographs.renderer import Scene, render
@@ -35,8 +28,6 @@ ROBOT = nf.load_robot("pacheco2021-a")
 TABLE = chain_table(ROBOT)
 WRONG = 1.0  # deg
 MOST = 32.0  # deg: a notch of this wrist closes soon after
-TRUE = {"material.elastic_modulus": 9200.0, "friction.coefficient": 0.18}
-TENSIONS = (0.7, 1.2, 1.6, 1.1, 0.6, 0.3)  # N
 
 
 def drawn(seed: int) -> tuple[np.ndarray, Scene]:
@@ -119,44 +110,10 @@ def summary(rows: list[dict]) -> dict[str, object]:
     }
 
 
-def photograph(angles: np.ndarray, row: dict) -> MeasuredPhotograph:
-    """Return a photograph with the errors and standard deviations of another."""
-    return MeasuredPhotograph(
-        "", "", angles + np.radians(row["error"]), np.radians(row["deviation"]),
-        np.zeros(3), np.ones(3), 1.0, 0.0, 0.0, 0.0, 1.0, np.zeros((0, 2)), np.zeros(0, bool),
-    )  # fmt: skip
-
-
-def constants(rows: list[dict], sets: int):
-    """Make a row for each constant: how many intervals hold the value that bent the wrist."""
-    bent = simulate_measurements(
-        ROBOT.with_values(TRUE), [nf.Load(tension=tension) for tension in TENSIONS], from_rest=False
-    )
-    holds: dict[str, list[bool]] = {name: [] for name in TRUE}
-    with tempfile.TemporaryDirectory() as folder:
-        file = f"{folder}/measured.csv"
-        for number in range(sets):
-            chosen = np.random.default_rng(number).integers(len(rows), size=len(TENSIONS))
-            pairs = zip(bent.observed["notch_angle"], chosen, strict=True)
-            photographs = tuple(photograph(angles, rows[index]) for angles, index in pairs)
-            loads = {"tendon_force_N": tuple(map(str, TENSIONS))}
-            MeasuredPhotographs(ROBOT, photographs, loads).write_csv(file)
-            fitted = calibrate(ROBOT, read_measurements(file, ROBOT), list(TRUE), starts=1)
-            for name, value in TRUE.items():
-                interval = fitted.intervals[name]
-                holds[name].append(interval.lower < value < interval.upper)
-    return [{"constant": name, "held": share(held), "sets": sets} for name, held in holds.items()]
-
-
 def main() -> None:
-    """Measure photographs, or fit constants to those of a file."""
+    """Measure photographs; print how well, and why others were refused."""
     cv2.setNumThreads(1)
-    chosen = options(__doc__, ("angles", "constants"), count=400, first=0, sets=200)
-    if chosen.cases == ["constants"]:
-        rows = [row for row in read_rows(chosen.json) if not row["reason"]]
-        show(constants(rows, chosen.sets))
-        return
-    rows = list(trials(trial, chosen))
+    rows = list(trials(trial, options(__doc__, count=400, first=0)))
     show({"": key, "angles": value} for key, value in summary(rows).items())
     reasons = Counter(row["reason"] for row in rows if row["reason"])
     show({"refused": reason, "times": times} for reason, times in reasons.most_common())

@@ -118,15 +118,10 @@ def _notches() -> str:
         "sway": "shift by a force across, sideways",
     }
     errors |= {names[name]: values for name, values in other_directions().items()}
-    rows = [
-        (
-            name,
-            len(values),
-            percent(np.sqrt(np.mean(np.square(values)))),
-            percent(np.abs(values).max()),
-        )
-        for name, values in errors.items()
-    ]
+    rows = []
+    for name, values in errors.items():
+        both = np.sqrt(np.mean(np.square(values))), np.abs(values).max()
+        rows.append((name, len(values), *map(percent, both)))
     return table(("compared", "numbers", "root mean square", "largest"), rows)
 
 

@@ -1,4 +1,4 @@
-"""One way to draw the pictures of the pages: a function draws into axes, `@picture` does the rest."""
+"""How pictures of the pages are made: a function draws into axes, `@picture` does the rest."""
 
 from __future__ import annotations
 

@@ -82,21 +82,12 @@ def test_page_from_the_drawing(make: Any):
 
 
 @pytest.mark.nightly
-def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any, monkeypatch: pytest.MonkeyPatch):
-    figures = make("figures")
-    monkeypatch.setattr(figures, "IMAGES", tmp_path)
-    figures.main()
-    drawings = {
-        "control": ("three_inverses", "feedback", "reversal"),
-        "learning": ("two_policies",),
-        "sweep": ("main",),
-        "tolerances": ("main",),
-    }
-    for name, functions in drawings.items():
-        module = make(name)
-        monkeypatch.setattr(module, "IMAGES", tmp_path)
-        for function in functions:
-            getattr(module, function)()
+def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any):
+    for script in ("figures", "control", "learning"):
+        make(script).main(tmp_path)
+    analyses = make("analyses")
+    analyses.sweep(tmp_path)
+    analyses.tolerances(tmp_path)
     for part in ("finite_elements", "drawing"):
         make(f"against_{part}").pictures(tmp_path)
     drawn = {file.name for file in tmp_path.iterdir()}
