@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from differences import Difference, difference, joined, table_of
+from differences import Differences
 from matplotlib.axes import Axes
 from pictures import TENSION, beside, label_all, picture
 
@@ -21,35 +21,32 @@ CASES = (
 )
 
 
-def differences(refinement: int) -> list[Difference]:
-    """Compare the loop, its tensions and front, the friction, and weights on the robot."""
-    path, rows = gao2017.pulled_and_let_go(refinement), reference("gao_free_bending.csv")
-    profile = reference("gao_tension_profiles.csv")
-    found = [
-        difference("tip, loading to 13 N and unloading", gao2017.tip(path), rows[:, 2:4], "mm"),
-        difference("rotation of the tip", path.total_angle, rows[:, 4], "rad"),
-        difference("tension of every span", path.span_tension[:, 0], profile[:, 2:], "N"),
-    ]
-    m = path.front[0][gao2017.PULLED :, 0]
-    found.append(
-        difference("contact at the friction front", m, rows[gao2017.PULLED :, 7], "contacts")
-    )
-    if not refinement:
-        for mu, pull, y, z, _, _ in reference("gao_mu_sweep.csv"):
-            robot = gao2017.robot().with_value("friction.coefficient", mu)
-            bent = nf.simulate(robot, nf.pull(0.0, pull, gao2017.PULLED)).raise_if_failed()
-            name = "tip at 13 N, nine coefficients of friction"
-            found.append(difference(name, gao2017.tip(bent)[-1], [y, z], "mm"))
-        for case in CASES:
-            rows = gao2017.external_rows(case)
-            tip = gao2017.tip(gao2017.under_weight(case))
-            found.append(difference("tip under weights, five cases", tip, rows[:, 3:5], "mm"))
-    return joined(found)
-
-
 def tables() -> dict[str, str]:
-    """Return what stands on the page."""
-    return {"gao2017": table_of(differences(0)), "gao2017_finer": table_of(differences(1))}
+    """Compare the loop, its tensions and front; the friction, and weights on the robot."""
+    compared, finer = loop(0), loop(1)
+    for mu, pull, y, z, _, _ in reference("gao_mu_sweep.csv"):
+        robot = gao2017.robot().with_value("friction.coefficient", mu)
+        bent = nf.simulate(robot, nf.pull(0.0, pull, gao2017.PULLED)).raise_if_failed()
+        name = "tip at 13 N, nine coefficients of friction"
+        compared.add(name, gao2017.tip(bent)[-1], [y, z], "mm")
+    for case in CASES:
+        rows = gao2017.external_rows(case)
+        tip = gao2017.tip(gao2017.under_weight(case))
+        compared.add("tip under weights, five cases", tip, rows[:, 3:5], "mm")
+    return {"gao2017": compared.table(), "gao2017_finer": finer.table()}
+
+
+def loop(refinement: int) -> Differences:
+    """Compare loading to 13 N and unloading."""
+    path, rows = gao2017.pulled_and_let_go(refinement), reference("gao_free_bending.csv")
+    profile, half = reference("gao_tension_profiles.csv"), gao2017.PULLED
+    compared = Differences()
+    compared.add("tip, loading to 13 N and unloading", gao2017.tip(path), rows[:, 2:4], "mm")
+    compared.add("rotation of the tip", path.total_angle, rows[:, 4], "rad")
+    compared.add("tension of every span", path.span_tension[:, 0], profile[:, 2:], "N")
+    m = path.front[0][half:, 0]
+    compared.add("contact at the friction front", m, rows[half:, 7], "contacts")
+    return compared
 
 
 @picture("gao2017.svg", 9.0, 3.4, 2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from differences import Difference, difference, joined, table_of
+from differences import Differences
 from matplotlib.axes import Axes
 from pictures import beside, label_all, picture
 
@@ -30,30 +30,21 @@ def run(model: int, mu: float, turning: str = "chord") -> tuple[nf.EquilibriumPa
     return pulled(liu(model, mu, turning), pull).raise_if_failed(), rows
 
 
-def differences() -> list[Difference]:
+def tables() -> dict[str, str]:
     """Compare chord angles in every reading, slopes where bodies turn with them, tensions."""
-    rows = []
+    compared = Differences()
     for model, reading in enumerate(READINGS):
         for mu in COEFFICIENTS:
             path, wanted = run(model, mu)
             chords = np.radians(wanted[:, 3:10])
-            rows.append(difference(f"chord angles, {reading}", path.chord_angle, chords, "rad"))
+            compared.add(f"chord angles, {reading}", path.chord_angle, chords, "rad")
             spans = path.span_tension[:, 0, [1, 13]]
-            rows.append(
-                difference("tension in the first and last gap", spans, wanted[:, 13:15], "")
-            )
+            compared.add("tension in the first and last gap", spans, wanted[:, 13:15])
     for mu in (0.0, 0.1, 0.2, 0.3):
         path, wanted = run(0, mu, "slope")
         slopes = np.radians(wanted[:, 2:9])
-        rows.append(
-            difference("slopes, friction turning with them", path.notch_angle, slopes, "rad")
-        )
-    return joined(rows)
-
-
-def tables() -> dict[str, str]:
-    """Return what stands on the page."""
-    return {"liu2022": table_of(differences())}
+        compared.add("slopes, friction turning with them", path.notch_angle, slopes, "rad")
+    return {"liu2022": compared.table()}
 
 
 @picture("liu2022.svg", 8.0, 3.4, 2)

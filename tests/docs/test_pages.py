@@ -106,12 +106,12 @@ def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any):
 
 
 def test_differences_are_those_of_arrays(make: Any):
-    differences = make("differences")
-    row = differences.difference("it", [1.0, 2.5], [1.0, 2.0], "mm")
-    assert row == ("it", 2, 0.5, "mm")
-    assert differences.difference("it", [1.0, 2.5], [1.0, 2.0], "").worst == 0.25
-    both = differences.joined([row, differences.difference("it", [1.0], [0.0], "mm")])
-    assert both == [("it", 3, 1.0, "mm")]
+    compared = make("differences").Differences()
+    compared.add("it", [1.0, 2.5], [1.0, 2.0], "mm")
+    compared.add("it", [1.0, 2.5], [1.0, 2.0])
+    compared.add("it", [1.0], [0.0], "mm")
+    assert compared.rows == {("it", "mm"): (3, 1.0), ("it", ""): (2, 0.25)}
+    assert "| it | 3 | 1e+00 mm |" in compared.table()
 
 
 def nav_files(entries: list[Any]) -> list[str]:
