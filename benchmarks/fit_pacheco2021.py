@@ -136,7 +136,7 @@ def linear(robots, data) -> None:
         these = {name: robot.with_values(values | more) for name, robot in robots.items()}
         found = calibrate(these, data, fit, objective=SumOfRobotErrors(), starts=3)
         print(f"linear model ({label}): {found.cost:.4f} deg at {_text(found)}")
-        print("  ", *diagnose(found), sep="\n  ")
+        print("  " + "\n  ".join(diagnose(found)))
 
 
 def least_squares(robots, data) -> None:
@@ -151,7 +151,7 @@ def least_squares(robots, data) -> None:
         }
         for name, interval in found.intervals.items()
     )
-    print(*diagnose(found), sep="\n  ")
+    print("  " + "\n  ".join(diagnose(found)))
 
 
 def law_of_the_tube(robots, data, starts: int = 4) -> None:
