@@ -9,10 +9,10 @@ is enough (fig. 8), and the modulus of the samples with that friction.
 
 from __future__ import annotations
 
-import argparse
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
+from harness import options
 
 import notchflex as nf
 from notchflex.fit import (
@@ -24,38 +24,32 @@ from notchflex.fit import (
 )
 
 TRUE_FRICTION, TRUE_MODULUS = 0.2, 1000.406
+FRICTION, MODULUS = "friction.coefficient", "material.elastic_modulus"
 ANGLE_NOISE = np.radians(0.3)
 
 
 def main() -> None:
-    """Read what is asked, and run all of it."""
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments.add_argument("--seed", type=int, default=0)
-    random = np.random.default_rng(arguments.parse_args().seed)
+    """Print what the rig says, and the modulus."""
+    random = np.random.default_rng(options(__doc__, seed=0).seed)
     for label, slope in (("constant", 0.0), ("falls with load", -0.02)):
-        rig = friction_rig(readings(random, slope))
-        print(f"rig, coefficient {label}:")
-        for sentence in rig.words:
-            print(f"  {sentence}")
+        print(
+            f"rig, coefficient {label}:", *friction_rig(readings(random, slope)).words, sep="\n  "
+        )
     friction = friction_rig(readings(random, 0.0)).coefficient
-    robot = nf.load_robot("liu2022").with_value("friction.coefficient", TRUE_FRICTION)
-    single = dataclasses.replace(
-        robot,
-        notch=(dataclasses.replace(robot.notch[0], repeat=1),),
-        tendon=tuple(dataclasses.replace(one, end_body=1) for one in robot.tendon),
+    robot = nf.load_robot("liu2022").with_value(FRICTION, TRUE_FRICTION)
+    single = robot.replace(
+        notch=(replace(robot.notch[0], repeat=1),),
+        tendon=tuple(replace(tendon, end_body=1) for tendon in robot.tendon),
     )
-    load = nf.pull(1.0, 9.0, steps=9)
+    load, deviation = nf.pull(1.0, 9.0, steps=9), {"notch_angle": ANGLE_NOISE}
     samples = [
-        simulate_measurements(single, load, deviation={"notch_angle": ANGLE_NOISE}, seed=random)
-        for _ in range(3)
+        simulate_measurements(single, load, deviation=deviation, seed=random) for _ in range(3)
     ]
-    start = single.with_values(
-        {"friction.coefficient": friction, "material.elastic_modulus": 800.0}
-    )
-    found = calibrate(start, samples, "material.elastic_modulus", starts=1)
-    interval = found.intervals["material.elastic_modulus"]
+    start = single.with_values({FRICTION: friction, MODULUS: 800.0})
+    found = calibrate(start, samples, MODULUS, starts=1)
+    interval = found.intervals[MODULUS]
     print(
-        f"modulus {found.values['material.elastic_modulus']:.2f} MPa, 95 % {interval.lower:.2f} to "
+        f"modulus {found.values[MODULUS]:.2f} MPa, 95 % {interval.lower:.2f} to "
         f"{interval.upper:.2f} (true {TRUE_MODULUS}), with friction {friction:.4f} from the rig"
     )
 

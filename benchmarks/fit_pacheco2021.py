@@ -3,23 +3,21 @@
 Needs their measured angles, `pacheco2021_wrist_A_measured.csv` and so on, in a folder (public, see
 docs/papers/pacheco2021.md):
 
-    python benchmarks/fit_pacheco2021.py FOLDER [--starts 20] [--json FILE]
+    python benchmarks/fit_pacheco2021.py FOLDER [--starts 20] [--only tube]
 
 Prints where every start of eq. 17 ends, with the time and the solved rows beside the paper's 2,800
 trial points; constants and errors of each wrist left out; the two linear models of the paper, whose
 friction goes to its limit; least squares with 95 % intervals; and eq. 17 with the law of the tube
 (elastic ends, Nitinol by fibres), one set, with a factor for wrist A and one for each, each wrist
-left out, and after one photograph of it. `--only tube` makes that alone.
+left out, and after one photograph of it; `--only tube` makes that alone.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import time
 from pathlib import Path
 
 import numpy as np
+from harness import options, show, timed
 
 import notchflex as nf
 from notchflex.fit import (
@@ -76,157 +74,128 @@ LEFT_OUT_TARGETS = {"A": (7.5, 4.1), "B": (3.4, 1.3), "C": (3.6, 2.3)}
 
 
 def main() -> None:
-    """Read what is asked, and run all of it."""
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments.add_argument("folder", type=Path)
-    arguments.add_argument("--starts", type=int, default=20)
-    arguments.add_argument("--json", type=Path)
-    arguments.add_argument("--only", choices=["tube"])
-    given = arguments.parse_args()
-    told = {} if given.only else papers_law(given.folder, given.starts)
-    told["tube"] = law_of_the_tube(given.folder)
-    if given.json:
-        given.json.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    """Fit what is asked for, and print it."""
+    chosen = options(__doc__, folder=Path, starts=20, only="")
+    if chosen.only != "tube":
+        robots, data = wrists(chosen.folder, "specimen")  # with the authors' precurvature
+        eq17(robots, data, chosen.starts)
+        left_out(robots, data)
+        linear(robots, data)
+        least_squares(robots, data)
+    law_of_the_tube(*wrists(chosen.folder, "true", measured="edge"))
 
 
-def papers_law(folder: Path, starts: int):
-    """What the paper fits, and tests of it."""
-    robots, data = specimens(folder)
-    return {
-        "eq17": eq17(robots, data, starts),
-        "left_out": left_out(robots, data),
-        "linear": linear(robots, data),
-        "least_squares": least_squares(robots, data),
-    }
-
-
-def specimens(folder: Path):
-    """The three wrists with the authors' precurvature, and what was measured of them."""
-    robots = {name: nf.load_robot(f"pacheco2021-{name.lower()}-specimen") for name in "ABC"}
+def wrists(folder: Path, kind: str, **reading: str):
+    """The three wrists of a kind, and what was measured of them."""
+    robots = {name: nf.load_robot(f"pacheco2021-{name.lower()}-{kind}") for name in "ABC"}
     data = {
-        name: read_measurements(folder / f"pacheco2021_wrist_{name}_measured.csv", robot)
+        name: read_measurements(folder / f"pacheco2021_wrist_{name}_measured.csv", robot, **reading)
         for name, robot in robots.items()
     }
     return robots, data
 
 
-def eq17(robots, data, starts: int):
+def eq17(robots, data, starts: int) -> None:
     """Four constants of three wrists, from random starts."""
-    began = time.perf_counter()
-    found = calibrate(robots, data, FOUR, objective=SumOfRobotErrors(), starts=starts, seed=0)
-    seconds = time.perf_counter() - began
-    ends = [one.cost.value for one in found.searches if one.cost is not None]
-    calls = sum(one.calls for one in found.searches)
+    with timed() as seconds:
+        found = calibrate(robots, data, FOUR, objective=SumOfRobotErrors(), starts=starts, seed=0)
+    ends = [search.cost.value for search in found.searches if search.cost is not None]
     print(f"eq. 17: {found.cost:.6f} deg at {_text(found)}")
     print(
         f"  {sum(end <= 11.5942 for end in ends)} of {starts} starts end at or below 11.5942 "
-        f"(highest {max(ends):.6f}); {seconds:.0f} s, {calls} evaluations of all 226 rows "
+        f"(highest {max(ends):.6f}); {seconds['cpu']:.0f} s of CPU, "
+        f"{sum(search.calls for search in found.searches)} evaluations of all 226 rows "
         f"({found.solves} solves) beside the paper's {PAPERS_TRIALS} trial points"
     )
-    return {
-        "values": found.values,
-        "cost": found.cost,
-        "ends": ends,
-        "seconds": seconds,
-        "evaluations": calls,
-        "solves": found.solves,
-    }
 
 
-def left_out(robots, data):
-    """Each wrist, and each pull, left out of eq. 17."""
-    told = {}
+def left_out(robots, data) -> None:
+    """Each wrist, and each pull, left out of eq. 17: errors of its total angle."""
     found = calibrate(robots, data, FOUR, objective=SumOfRobotErrors(), starts=3)
-    for by, starts in (("robot", 3), ("pull", 1)):
-        tested = leave_out(found, by=by, starts=starts)
-        for fold in tested.folds:
-            without = np.degrees(fold.errors["total_angle"])
-            of_all = np.degrees(fold.errors_of_all["total_angle"])
-            print(f"without {fold.label}: total {without:.2f} deg (fitted to all {of_all:.2f})")
-            values = fold.found.values
-            told[fold.label] = {"values": values, "total_deg": without, "of_all": of_all}
-    return told
+    folds = [*leave_out(found, by="robot", starts=3).folds]
+    folds += leave_out(found, by="pull", starts=1).folds
+    show(
+        {
+            "left out": fold.label,
+            "never seen, deg": float(np.degrees(fold.errors["total_angle"])),
+            "fitted to all, deg": float(np.degrees(fold.errors_of_all["total_angle"])),
+        }
+        for fold in folds
+    )
 
 
-def linear(robots, data):
+def linear(robots, data) -> None:
     """Models (i) and (ii): one modulus, with and without friction, in the authors' limits."""
-    told = {}
-    plain = {name: robot.with_value("material.kind", "linear") for name, robot in robots.items()}
     modulus = Constant("material.elastic_modulus", 2e3, 20e3)
     bounded = Constant("friction.coefficient", 0.05, 0.5)
-    slick = {name: robot.with_value("friction.coefficient", 0.0) for name, robot in plain.items()}
-    for label, these, fit in (("i", plain, (modulus, bounded)), ("ii", slick, (modulus,))):
+    values = {"material.kind": "linear"}
+    for label, more, fit in (
+        ("i", {}, (modulus, bounded)),
+        ("ii", {"friction.coefficient": 0.0}, (modulus,)),
+    ):
+        these = {name: robot.with_values(values | more) for name, robot in robots.items()}
         found = calibrate(these, data, fit, objective=SumOfRobotErrors(), starts=3)
         print(f"linear model ({label}): {found.cost:.4f} deg at {_text(found)}")
-        for sentence in diagnose(found):
-            print(f"  {sentence}")
-        told[label] = {"values": found.values, "cost": found.cost}
-    return told
+        print("  " + "\n  ".join(diagnose(found)))
 
 
-def least_squares(robots, data):
+def least_squares(robots, data) -> None:
     """The same four constants by least squares over the noise of the repeats, with intervals."""
     found = calibrate(robots, data, FOUR, objective=LeastSquares(), starts=3)
     print(f"least squares: reduced chi squared {found.reduced_chi_squared:.2f}")
-    told = {}
-    for name, interval in found.intervals.items():
-        ends = (interval.lower, interval.upper)
-        print(f"  {name}: {found.values[name]:.6g}, 95 % {ends[0]:.6g} to {ends[1]:.6g}")
-        told[name] = {"value": found.values[name], "interval": ends}
-    for sentence in diagnose(found):
-        print(f"  {sentence}")
-    return told
+    show(
+        {
+            "constant": name,
+            "found": f"{found.values[name]:.6g}",
+            "95 %": f"{interval.lower:.6g} to {interval.upper:.6g}",
+        }
+        for name, interval in found.intervals.items()
+    )
+    print("  " + "\n  ".join(diagnose(found)))
 
 
-def law_of_the_tube(folder: Path, starts: int = 4):
+def law_of_the_tube(robots, data, starts: int = 4) -> None:
     """Elastic ends, mid-wall depth and Nitinol by fibres: eq. 17 on edge angles of all wrists."""
-    robots = {name: nf.load_robot(f"pacheco2021-{name.lower()}-true") for name in "ABC"}
-    data = {
-        name: read_measurements(
-            folder / f"pacheco2021_wrist_{name}_measured.csv", robot, measured="edge"
-        )
-        for name, robot in robots.items()
-    }
-    told = {}
     for label, (values, fit, target) in TUBE_FITS.items():
         these = {name: robot.with_values(values) for name, robot in robots.items()}
         # Ten constants take minutes from each start.
         tries = starts if len(fit) < 7 else 1
         found = calibrate(these, data, fit, objective=SumOfRobotErrors(), starts=tries)
-        totals = [one.error for one in errors_of_parts(found) if one.quantity == EDGES]
+        totals = [part.error for part in errors_of_parts(found) if part.quantity == EDGES]
         print(f"{label}: eq. 17 {found.cost:.4f} deg (target {target}) at {_text(found)}")
-        print("  totals A, B, C: " + ", ".join(f"{one:.2f}" for one in totals))
-        told[label] = {"values": found.values, "cost": found.cost, "totals_deg": totals}
-    print("rms error of every notch beside repeats, with a factor for each wrist:")
-    for one in errors_of_parts(found):
-        print(f"  {one.robot} {one.title}: {one.error:.2f} ({one.repeats:.2f}) {one.unit}")
-    for fold in leave_out(found, by="robot", photograph=PHOTOGRAPH, starts=3).folds:
-        blind, updated = (
-            float(np.degrees(one[EDGES])) for one in (fold.errors, fold.errors_updated)
-        )
-        targets = LEFT_OUT_TARGETS[fold.label]
-        inside = fold.share_inside()[EDGES]
-        print(
-            f"without {fold.label}: total {blind:.2f} deg blind (target {targets[0]}), "
-            f"{updated:.2f} after one photograph ({targets[1]}), which narrows it to "
-            f"{fold.specimen.gain:.2f}; {100.0 * inside:.0f} % in the blind 90 % band"
-        )
-        told[f"without {fold.label}"] = {
-            "values": fold.found.values,
-            "before": fold.before,
-            "photograph": fold.specimen.values,
-            "gain": fold.specimen.gain,
-            "inside_90": inside,
-            "blind_deg": blind,
-            "updated_deg": updated,
-        }
-    return told
+        print("  totals A, B, C: " + ", ".join(f"{error:.2f}" for error in totals))
+    show(
+        (
+            {
+                "wrist": part.robot,
+                "quantity": part.title,
+                "rms error": part.error,
+                "of repeats": part.repeats,
+                "unit": part.unit,
+            }
+            for part in errors_of_parts(found)
+        ),
+        "with a factor for each wrist",
+    )
+    folds = leave_out(found, by="robot", photograph=PHOTOGRAPH, starts=3).folds
+    show(map(_left_out_wrist, folds))
+
+
+def _left_out_wrist(fold) -> dict[str, object]:
+    targets = LEFT_OUT_TARGETS[fold.label]
+    return {
+        "wrist left out": fold.label,
+        "total blind, deg (target)": f"{np.degrees(fold.errors[EDGES]):.2f} ({targets[0]})",
+        "after one photograph": f"{np.degrees(fold.errors_updated[EDGES]):.2f} ({targets[1]})",
+        "which narrows it to": fold.specimen.gain,
+        "in the blind 90 % band": f"{100.0 * fold.share_inside()[EDGES]:.0f} %",
+    }
 
 
 def _text(found: Calibration) -> str:
     names = (name.replace("material.", "").replace("sensor.", "") for name in found.names)
-    every = (f"{name} {value:.6g}" for name, value in zip(names, found.best.values, strict=True))
-    return ", ".join(every)
+    pairs = zip(names, found.best.values, strict=True)
+    return ", ".join(f"{name} {value:.6g}" for name, value in pairs)
 
 
 if __name__ == "__main__":

@@ -1,27 +1,31 @@
 """Rendered photographs of known wrists against what `notchflex measure` finds in them.
 
-`python benchmarks/measured_photographs.py [COUNT] [FIRST] [FILE]` prints one line per photograph
-and the totals. With a FILE, a run that was stopped goes on where it was. One thread is quicker in
-CPU time: set OPENBLAS_NUM_THREADS=1.
+    python benchmarks/measured_photographs.py [--count 400] [--first 0] [--json FILE]
+
+With a FILE, a run that was stopped goes on where it was. One thread is quicker in CPU time: set
+OPENBLAS_NUM_THREADS=1.
 """
 
-import json
+from __future__ import annotations
+
 import math
 import sys
-import time
 from collections import Counter
 from pathlib import Path
 
 import cv2
 import numpy as np
+from harness import options, rms, share, show, timed, trials
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import notchflex as nf
-from notchflex.photographs.chain_table import ChainTable, chain_table
+from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.measure import measure_picture
 from photographs.renderer import Scene, render
 
+ROBOT = nf.load_robot("pacheco2021-a")
+TABLE = chain_table(ROBOT)
 WRONG = 1.0  # deg
 MOST = 32.0  # deg: a notch of this wrist closes soon after
 
@@ -59,8 +63,8 @@ def drawn(seed: int) -> tuple[np.ndarray, Scene]:
 
 def _framed(angles: np.ndarray, scene: Scene) -> tuple[float, float]:
     """Return the place of the first notch that puts the whole robot into the photograph."""
-    bodies, _ = nf.bodies_from_angles(nf.load_robot("pacheco2021-a"), angles[None])
-    tip, _ = nf.tip_from_angles(nf.load_robot("pacheco2021-a"), angles[None])
+    bodies, _ = nf.bodies_from_angles(ROBOT, angles[None])
+    tip, _ = nf.tip_from_angles(ROBOT, angles[None])
     points = np.vstack([[0.0, 0.0, -1.0], bodies[0], tip])
     side = math.copysign(1.0, math.cos(math.radians(scene.roll)))
     turn = math.radians(scene.direction)
@@ -71,77 +75,49 @@ def _framed(angles: np.ndarray, scene: Scene) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def one(robot: nf.Robot, table: ChainTable, seed: int) -> dict:
+def trial(seed: int) -> dict[str, object]:
     """Return what is found in one photograph: errors and standard deviations, deg."""
     angles, scene = drawn(seed)
-    picture = cv2.cvtColor(render(robot, angles, scene), cv2.COLOR_GRAY2BGR)
-    begin = time.process_time()
-    found = measure_picture(picture, table, str(seed))
+    picture = cv2.cvtColor(render(ROBOT, angles, scene), cv2.COLOR_GRAY2BGR)
+    with timed() as seconds:
+        found = measure_picture(picture, TABLE, str(seed))
     return {
-        "seed": seed,
         "reason": found.reason,
-        "seconds": time.process_time() - begin,
-        "error": np.degrees(found.notch_angle - angles).tolist(),
-        "deviation": np.degrees(found.notch_angle_deviation).tolist(),
+        "seconds": seconds["cpu"],
+        "error": np.degrees(found.notch_angle - angles),
+        "deviation": np.degrees(found.notch_angle_deviation),
     }
 
 
-def rms(row: dict) -> float:
-    """Return the root mean square of the errors of one photograph, deg."""
-    return float(np.sqrt(np.mean(np.square(row["error"]))))
-
-
-def line(row: dict) -> str:
-    """Return what is printed of one photograph."""
-    if row["reason"]:
-        return f"{row['seed']}: refused, {row['reason']}"
-    worst = np.abs(row["error"]).max()
-    ratio = np.abs(np.divide(row["error"], row["deviation"])).max()
-    return f"{row['seed']}: rms {rms(row):.3f} deg, worst {worst:.3f}, {ratio:.1f} deviations"
-
-
-def totals(rows: list[dict]) -> None:
-    """Print how many were measured, how well, and how often intervals hold the angles."""
+def summary(rows: list[dict]) -> dict[str, object]:
+    """Make the table: how many were measured, how well, how often intervals hold the angles."""
     measured = [row for row in rows if not row["reason"]]
-    seconds = [row["seconds"] for row in rows]
-    good = sum(rms(row) <= 0.15 for row in measured)
-    print(f"{len(rows)} photographs: {len(measured)} measured, {good} of them rms <= 0.15 deg")
-    print(f"seconds of CPU: {np.median(seconds):.1f} (median), {max(seconds):.1f} (most)")
-    reasons = Counter(row["reason"] for row in rows if row["reason"])
-    for reason, times in reasons.most_common():
-        print(f"{times} x {reason}")
     if not measured:
-        return
-    error = np.array([row["error"] for row in measured])
-    ratio = np.abs(error / np.array([row["deviation"] for row in measured]))
-    wrong = int((np.abs(error).max(axis=1) > WRONG).sum())
-    print(f"rms {np.sqrt((error**2).mean()):.3f} deg, worst {np.abs(error).max():.3f} deg")
-    print(f"wrong by more than {WRONG:g} deg and not refused: {wrong}")
-    print(f"within 1.96 standard deviations: {100 * (ratio < 1.96).mean():.1f} %")
+        return {"photographs": len(rows), "measured": 0}
+    errors, deviations = (
+        np.array([row[key] for row in measured]) for key in ("error", "deviation")
+    )
+    seconds = [row["seconds"] for row in rows]
+    return {
+        "photographs": len(rows),
+        "measured": len(measured),
+        "rms <= 0.15 deg": sum(rms(row) <= 0.15 for row in errors),
+        f"wrong by more than {WRONG:g} deg": int((np.abs(errors).max(axis=1) > WRONG).sum()),
+        "rms, deg": rms(errors),
+        "worst, deg": float(np.abs(errors).max()),
+        "within 1.96 deviations": share(np.abs(errors / deviations) < 1.96),
+        "CPU s, median and most": (float(np.median(seconds)), max(seconds)),
+    }
 
 
-def main(count: int, first: int, file: Path | None) -> None:
-    """Measure photographs and print how far their angles are off."""
+def main() -> None:
+    """Measure photographs; print how well, and why others were refused."""
     cv2.setNumThreads(1)
-    robot = nf.load_robot("pacheco2021-a")
-    table = chain_table(robot)
-    texts = file.read_text().splitlines() if file and file.exists() else []
-    known = {row["seed"]: row for row in map(json.loads, texts)}
-    rows = []
-    for seed in range(first, first + count):
-        row = known.get(seed) or one(robot, table, seed)
-        if file and seed not in known:
-            with file.open("a") as out:
-                out.write(json.dumps(row) + "\n")
-        rows.append(row)
-        print(line(row), flush=True)
-    totals(rows)
+    rows = list(trials(trial, options(__doc__, count=400, first=0)))
+    show({"": key, "angles": value} for key, value in summary(rows).items())
+    reasons = Counter(row["reason"] for row in rows if row["reason"])
+    show({"refused": reason, "times": times} for reason, times in reasons.most_common())
 
 
 if __name__ == "__main__":
-    words = sys.argv[1:]
-    main(
-        int(words[0]) if words else 400,
-        int(words[1]) if words[1:] else 0,
-        Path(words[2]) if words[2:] else None,
-    )
+    main()

@@ -1,33 +1,36 @@
-"""Make segment_table.csv of notchflex.mechanics with sectionproperties (half an hour).
+"""Make segment_table.csv of notchflex.mechanics with sectionproperties (an hour of one core).
 
-    python benchmarks/segment_table.py --raw FILE     # writes the table
-    python benchmarks/segment_table.py 0.864 0.7      # prints one section: r_i, depth over r_o
+    python benchmarks/segment_table.py --json FILE     # writes the table
+    python -c "from segment_table import analyse; print(analyse(0.864, 0.7))"     # of one section
 
-Torsion constant and (Trefftz) shear centre of the annular segment of outer radius 1 at Chebyshev
-nodes of the coordinates that `segment_torsion.py` there interpolates over, by warping analysis with
-quadratic triangles, three across the wall and smaller where it tapers. Divided by the estimates of
-`segment_estimates` and fitted by least squares, on 2 cores. FILE keeps the values of the analysis:
-a second run only fits, or goes on where the mesher crashed.
+Torsion constant and (Trefftz) shear centre of the annular segment of outer radius 1, by the ratio
+of the radii and the depth of the cut, at Chebyshev nodes of the coordinates that `segment_torsion`
+of `mechanics/cuts.py` interpolates over, by warping analysis with quadratic triangles, three across
+the wall and smaller where it tapers. Divided by the estimates there and fitted by least squares.
+FILE keeps the values of the analysis: a second run only fits, or goes on where the mesher crashed.
+`--part 0/2` and `--part 1/2` analyse half of the nodes each, into one FILE.
 """
 
-import sys
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np
+from harness import options, trials
 from sectionproperties.analysis import Section
 from sectionproperties.pre import Geometry
 from shapely import Polygon, affinity
+
+from notchflex._jax import jnp
+from notchflex.mechanics import cuts
 
 TABLE = Path(__file__).parents[1] / "src/notchflex/mechanics/segment_table.csv"
 LAYERS = 3  # elements across the wall
 COARSEST = 0.1  # size of an element over the outer radius
 NODES = {"closed": (9, 16), "open": (9, 20), "solid": (1, 12)}  # ratios, chord angles
 ORDERS = {"closed": (7, 11), "open": (8, 16), "solid": (0, 8)}  # highest of the polynomials
-SHEAR_NOISE = (
-    3e-3  # over the outer radius: a shear centre this near the axis weighs half in the fit
-)
+SHEAR_NOISE = 3e-3
+"""Over the outer radius: a shear centre this near the axis weighs half in the fit."""
 
 
 def spaced(end, size):
@@ -85,15 +88,15 @@ def analyse(ratio, depth):
 
 def places(shape):
     """Ratios and chord angles of the nodes, and the depths that they stand for."""
-    from notchflex.mechanics.cuts import CHORD_RANGE, RATIO_RANGE
 
     def nodes(count, low, high):
         x = np.cos(np.pi * (np.arange(count) + 0.5) / count)
         return 0.5 * (low + high) + 0.5 * (high - low) * x
 
     many, along = NODES[shape]
-    roots = nodes(many, *(np.sqrt(1.0 - ratio) for ratio in reversed(RATIO_RANGE)))
-    root, angle = (a.ravel() for a in np.meshgrid(roots, nodes(along, *CHORD_RANGE[shape])))
+    roots = nodes(many, *(np.sqrt(1.0 - ratio) for ratio in reversed(cuts.RATIO_RANGE)))
+    grid = np.meshgrid(roots, nodes(along, *cuts.CHORD_RANGE[shape]))
+    root, angle = (axis.ravel() for axis in grid)
     ratio = 1.0 - root**2
     if shape == "closed":
         return ratio, angle, (1.0 - ratio) * np.cos(angle / 2.0) ** 2
@@ -103,77 +106,62 @@ def places(shape):
     return np.minimum(ratio, np.cos(angle)), angle, 1.0 + np.cos(angle)
 
 
-def analyse_all(raw):
-    """Analyse every node that the file does not hold yet; return shape -> (J, e)."""
-    done = {}
-    if raw.exists():
-        for line in raw.read_text().splitlines():
-            shape, *numbers = line.split(",")
-            done[shape, *map(float, numbers[:2])] = tuple(map(float, numbers[2:]))
-    wanted = [(s, float(r), float(d)) for s in NODES for r, _, d in zip(*places(s), strict=True)]
-    missing = [key for key in wanted if key not in done]
-    with ProcessPoolExecutor(2, get_context("spawn")) as pool, raw.open("a") as file:
-        jobs = {key: pool.submit(analyse, *key[1:]) for key in missing}
-        for key, job in jobs.items():
-            done[key] = job.result()
-            file.write(",".join([key[0], *map(repr, (*key[1:], *map(float, done[key])))]) + "\n")
-            file.flush()
-    return {s: np.array([done[key] for key in wanted if key[0] == s]) for s in NODES}
+def estimates(shape, ratio, depth):
+    """Estimates of torsion constant and shear centre, which the factors multiply."""
+    one, ratio, depth = jnp.ones(len(ratio)), jnp.asarray(ratio), jnp.asarray(depth)
+    area = cuts.annular_segment(one, ratio, depth).area
+    if shape == "closed":
+        return cuts.closed_estimate(one, ratio, depth)
+    if shape == "open":
+        return cuts.open_estimate(one, ratio, depth, area)
+    return area * (2.0 * one - depth) ** 2 / 3.0, one
 
 
 def fit(shape, values):
-    """Fit the factors: coefficients and largest relative residual of J and e."""
-    from notchflex._jax import jnp
-    from notchflex.mechanics import cuts as segment_estimates
-    from notchflex.mechanics.cuts import CHORD_RANGE, RATIO_RANGE, annular_segment
-
+    """Fit the factors: coefficients and largest relative residual, by quantity."""
     ratio, angle, depth = places(shape)
-    one = jnp.ones(len(ratio))
-    inner, cut = jnp.asarray(ratio), jnp.asarray(depth)
-    area = annular_segment(one, inner, cut).area
-    estimate = {
-        "closed": lambda: segment_estimates.closed_estimate(one, inner, cut),
-        "open": lambda: segment_estimates.open_estimate(one, inner, cut, area),
-        "solid": lambda: (area * (2.0 * one - cut) ** 2 / 3.0, one),
-    }[shape]()
-    low, high = (np.sqrt(1.0 - r) for r in reversed(RATIO_RANGE))
-    x = (2.0 * np.sqrt(1.0 - ratio) - low - high) / (high - low)
-    low, high = CHORD_RANGE[shape]
-    y = (2.0 * angle - low - high) / (high - low)
-    orders = ORDERS[shape]
+
+    def scaled(x, low, high):
+        return (2.0 * x - low - high) / (high - low)
+
+    x = scaled(np.sqrt(1.0 - ratio), *(np.sqrt(1.0 - end) for end in reversed(cuts.RATIO_RANGE)))
+    y = scaled(angle, *cuts.CHORD_RANGE[shape])
+    orders = np.array(ORDERS[shape])
     matrix = np.polynomial.chebyshev.chebvander2d(x, y, orders)
-    found = []
-    for value, guess, noise in zip(
-        values.T, map(np.asarray, estimate), (0, SHEAR_NOISE), strict=True
+    guesses = map(np.asarray, estimates(shape, ratio, depth))
+    for name, value, guess, noise in zip(
+        ("torsion", "shear"), values.T, guesses, (0, SHEAR_NOISE), strict=True
     ):
         weight = guess / (np.abs(guess) + noise)
         factor = value / guess
         solution = np.linalg.lstsq(matrix * weight[:, None], factor * weight, rcond=None)[0]
         worst = np.max(np.abs((matrix @ solution - factor) * weight / factor))
-        found.append((solution.reshape(np.array(orders) + 1), worst))
-    return found
+        print(f"{shape} {name}: largest relative residual {worst:.1e}")
+        yield name, solution.reshape(orders + 1)
 
 
-def main(raw):
-    """Analyse, fit and write the table."""
-    values = analyse_all(raw)
+def main():
+    """Analyse all nodes, or a part of them; then fit and write the table."""
+    chosen = options(__doc__, part="0/1")
     lines = [
         "# Chebyshev coefficients of the factors on the estimates of an annular segment, made by",
         "# benchmarks/segment_table.py: shape, quantity, then one row for each order in the wall",
         "# ratio, with one column for each order in the chord angle (segment_torsion.py).",
     ]
     for shape in NODES:
-        for quantity, (table, worst) in zip(
-            ("torsion", "shear"), fit(shape, values[shape]), strict=True
-        ):
-            print(f"{shape} {quantity}: largest relative residual {worst:.1e}")
-            for row in table:
-                lines.append(",".join([shape, quantity, *(f"{c:.6f}" for c in row)]))
-    TABLE.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        ratio, _, depth = places(shape)
+        chosen.count = len(ratio)
+        made = trials(lambda n, r=ratio, d=depth: {"values": analyse(r[n], d[n])}, chosen, shape)
+        values = np.array([row["values"] for row in made])
+        if chosen.part == "0/1":
+            for quantity, table in fit(shape, values):
+                lines += [
+                    ",".join([shape, quantity, *(f"{number:.6f}" for number in row)])
+                    for row in table
+                ]
+    if chosen.part == "0/1":
+        TABLE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == "--raw":
-        main(Path(sys.argv[2]))
-    else:
-        print("torsion constant, shear centre over r_o:", *analyse(*map(float, sys.argv[1:])))
+    main()

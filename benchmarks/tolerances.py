@@ -1,14 +1,12 @@
 """Tolerances of a wrist: gradients against draws, time of the draws, coverage of the interval.
 
-Prints a table; 40 s of CPU. `python benchmarks/tolerances.py`
+python benchmarks/tolerances.py [gradients] [time] [coverage]     # 40 s of CPU
 """
 
 from __future__ import annotations
 
-import sys
-import time
-
 import numpy as np
+from harness import options, share, show, timed
 
 import notchflex as nf
 from notchflex.tolerancing import Study, replicates, yield_interval
@@ -40,7 +38,12 @@ def study_of(tolerances: dict, *limits: nf.AcceptanceLimit) -> Study:
     return Study(WRIST, chosen, paths, criteria_of(spec, paths))
 
 
-def against_draws() -> None:
+def shop() -> Study:
+    """Return the wrist with the tolerances of a shop."""
+    return study_of(SHOP, nf.AcceptanceLimit("total_angle", lower=0.735, upper=0.9))
+
+
+def gradients():
     """Compare gradients with a million independent draws of small tolerances."""
     study = study_of(
         SMALL,
@@ -49,50 +52,50 @@ def against_draws() -> None:
         nf.AcceptanceLimit("peak_strain", notch=1, upper=1.0),
     )
     effects = linear_effects(study)
-    drawn = study.at_levels(np.random.default_rng(1).random((1_000_000, len(study.sources)))).values
-    for index, one in enumerate(study.criteria):
-        spread = drawn[:, index].std() / effects.sd[index] - 1.0
-        ends = np.array([drawn[:, index].min(), drawn[:, index].max()]) - effects.nominal[index]
-        worst = ends / (effects.worst_case[index] - effects.nominal[index]) - 1.0
-        print(
-            f"{one.name:16s} RSS against 1e6 draws {100 * spread:+.2f} %, worst case "
-            f"{100 * worst[0]:+.2f} and {100 * worst[1]:+.2f} %"
-        )
+    levels = np.random.default_rng(1).random((1_000_000, len(study.sources)))
+    values = study.at_levels(levels).values
+    spread = values.std(axis=0) / effects.sd - 1.0
+    ends = np.stack([values.min(axis=0), values.max(axis=0)], axis=1) - effects.nominal[:, None]
+    worst = ends / (effects.worst_case - effects.nominal[:, None]) - 1.0
+    for k, criterion in enumerate(study.criteria):
+        yield {
+            "1e6 draws of": criterion.name,
+            "SD by RSS, %": float(100 * spread[k]),
+            "ends by worst case, %": (100 * worst[k]).round(2).tolist(),
+        }
 
 
-def time_of_draws() -> Study:
+def time_of_draws():
     """Time a hundred thousand draws, the first with compiling."""
-    study = study_of(SHOP, nf.AcceptanceLimit("total_angle", lower=0.735, upper=0.9))
+    study = shop()
     levels = np.concatenate(replicates(len(study.sources), 4096, 0))
-    for what in ("first", "again"):
-        wall, cpu = time.perf_counter(), time.process_time()
-        study.at_levels(levels)
-        wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-        print(f"{len(levels)} draws of a wrist, {what}: {wall:.2f} s, {cpu:.2f} s of processor")
-    return study
+    for call in ("first", "again"):
+        with timed() as seconds:
+            study.at_levels(levels)
+        yield {"draws": len(levels), "call": call} | seconds
 
 
-def coverage(study: Study) -> None:
+def coverage():
     """Count how often the 95 % interval holds the yield of very many draws."""
-    many = np.random.default_rng(7)
-    count = len(study.sources)
+    study = shop()
+    many, count = np.random.default_rng(7), len(study.sources)
     parts = [study.at_levels(many.random((250_000, count))).accepted.mean() for _ in range(8)]
     truth = float(np.mean(parts))
     # All repetitions in one batch: a call of its own for each costs more than its solves.
     levels = [np.concatenate(replicates(count, EACH, 1000 + k)) for k in range(REPETITIONS)]
     accepted = study.at_levels(np.concatenate(levels)).accepted.reshape(REPETITIONS, -1, EACH)
-    ends = np.array([yield_interval(one.sum(axis=1), EACH) for one in accepted])
-    held = int(np.sum((ends[:, 0] <= truth) & (truth <= ends[:, 1])))
-    width = float(np.sum(ends[:, 1] - ends[:, 0]))
-    plain = 2.0 * 1.96 * np.sqrt(truth * (1.0 - truth) / (25 * EACH))
-    print(
-        f"yield {100 * truth:.2f} %; its interval of {25 * EACH} draws holds it in "
-        f"{100 * held / REPETITIONS:.2f} % of {REPETITIONS}, and is "
-        f"{width / REPETITIONS / plain:.2f} of one of independent draws"
-    )
+    low, high = np.transpose([yield_interval(one.sum(axis=1), EACH) for one in accepted])
+    draws = accepted[0].size
+    independent = 2.0 * 1.96 * np.sqrt(truth * (1.0 - truth) / draws)
+    yield {
+        "yield, %": 100 * truth,
+        "draws": draws,
+        "interval holds it": share((low <= truth) & (truth <= high)),
+        "width over that of independent draws": float(np.mean(high - low) / independent),
+    }
 
 
 if __name__ == "__main__":
-    against_draws()
-    sys.stdout.flush()
-    coverage(time_of_draws())
+    parts = {"gradients": gradients, "time": time_of_draws, "coverage": coverage}
+    for name in options(__doc__, parts).cases:
+        show(parts[name]())

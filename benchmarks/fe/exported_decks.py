@@ -9,12 +9,11 @@ program. A notch takes three seconds on one core, the wrist half a minute (fine:
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+import calculix
 import numpy as np
 
 import notchflex as nf
@@ -34,9 +33,7 @@ def run(subject: nf.Robot | nf.EquilibriumPath, options: DeckOptions) -> RingMot
     robot = subject if isinstance(subject, nf.Robot) else subject.robot
     with tempfile.TemporaryDirectory() as folder:
         nf.export_robot(subject, Path(folder, "deck.inp"), options)
-        alone = {**os.environ, "OMP_NUM_THREADS": "1"}
-        subprocess.run(["ccx", "deck"], cwd=folder, env=alone, check=True, capture_output=True)
-        return read_rings(mesh_of(robot, options), Path(folder, "deck.dat").read_text())
+        return read_rings(mesh_of(robot, options), calculix.run(Path(folder), "deck"))
 
 
 def notches(mesh: str) -> None:

@@ -1,5 +1,11 @@
 """Finite elements of a strip between two opposite slots: its compliance, with gmsh and CalculiX.
 
+    python strip_cells.py strip|link PARTS.csv OUT.csv
+
+computes the parts of one table (those in tests/reference: fem_strip_cells.csv and
+fem_u_link_cells.csv) anew, and writes them to another. Parts to "fit" differ from the first in one
+number; those to "judge" were not fitted.
+
 Half of the tube (x > 0) is meshed with quadratic tetrahedra. One face is held, the other is moved
 as a rigid plate in the six ways, three of them symmetric about x = 0 and three antisymmetric. The
 energies of these fields within the cell of one strip give its compliance, in the six directions
@@ -11,13 +17,16 @@ with round ends (`Link`) lies between the middles of neighbouring slots of a row
 
 from __future__ import annotations
 
-import os
-import subprocess
+import csv
+import sys
+import tempfile
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import gmsh
 import numpy as np
+from calculix import ORDER, PRINTED, displacements, solid_lines
 
 BODY = 0.5  # uncut length beyond the last cut, over the outer diameter
 NAMES = ("ux", "uy", "uz", "rx", "ry", "rz")
@@ -185,7 +194,7 @@ def mesh(part: Strip | Link, fine: float, coarse: float) -> tuple[np.ndarray, np
     place = np.full(int(tags.max()) + 1, -1)
     place[tags.astype(int)] = np.arange(len(tags))
     nodes = where.reshape(-1, 3)[place[used.astype(int)]]
-    cells = inverse.reshape(-1, 10)[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]]
+    cells = inverse.reshape(-1, 10)[:, ORDER]
     _straighten(nodes, cells)
     return nodes, cells
 
@@ -224,14 +233,8 @@ def solve(part: Strip | Link, nodes: np.ndarray, cells: np.ndarray, work: Path) 
     for axis in range(3):
         motion[axis, :, axis] = 1.0
         motion[3 + axis] = np.cross(np.eye(3)[axis], nodes[top])
-    lines = ["*NODE, NSET=ALL"]
-    lines += [f"{i + 1},{x:.12g},{y:.12g},{z:.12g}" for i, (x, y, z) in enumerate(nodes)]
-    lines.append("*ELEMENT, TYPE=C3D10, ELSET=E")
-    lines += [f"{i + 1}," + ",".join(str(n + 1) for n in c) for i, c in enumerate(cells)]
-    lines += [
-        "*MATERIAL, NAME=M", "*ELASTIC", f"1.,{part.nu}", "*SOLID SECTION, ELSET=E, MATERIAL=M",
-    ]  # fmt: skip
-    found = np.zeros((6, len(nodes), 3))
+    lines = solid_lines(enumerate(nodes, 1), cells + 1, 1.0, part.nu)
+    fields = np.zeros((6, len(nodes), 3))
     for name, held, cases in (("even", (0,), (1, 2, 3)), ("odd", (1, 2), (0, 4, 5))):
         deck = list(lines)
         for case in cases:
@@ -243,23 +246,10 @@ def solve(part: Strip | Link, nodes: np.ndarray, cells: np.ndarray, work: Path) 
                 for k, n in enumerate(top)
                 for d in range(3)
             ]
-            deck += ["*NODE PRINT, NSET=ALL", "U", "*END STEP"]
-        (work / f"{name}.inp").write_text("\n".join(deck) + "\n", encoding="utf-8")
-        subprocess.run(
-            ["ccx", name], cwd=work, check=True, stdout=subprocess.DEVNULL, env=_one_thread()
-        )
-        rows = [
-            line.split()
-            for line in (work / f"{name}.dat").read_text(encoding="utf-8").splitlines()
-            if len(line.split()) == 4
-        ]
-        values = np.array(rows, dtype=float)[:, 1:].reshape(len(cases), len(nodes), 3)
-        found[list(cases)] = values
-    return found
-
-
-def _one_thread() -> dict[str, str]:
-    return {**os.environ, "OMP_NUM_THREADS": "1"}
+            deck += PRINTED
+        _, moved = displacements(work, name, deck)
+        fields[list(cases)] = moved.reshape(len(cases), len(nodes), 3)
+    return fields
 
 
 # Quadrature of the tetrahedron, exact to degree 2, in barycentric coordinates.
@@ -318,3 +308,38 @@ def compliance(
     whole = np.linalg.inv(stiffness)
     cell = whole @ energies(part, nodes, cells, fields, part.cell) @ whole
     return cell, whole, len(nodes)
+
+
+ENTRIES = [(i, j) for i in range(6) for j in range(i, 6) if (i in (1, 2, 3)) == (j in (1, 2, 3))]
+
+
+def sizes(part: Strip | Link) -> tuple[float, float]:
+    """Sizes of the elements of a part, fine and coarse, mm."""
+    if isinstance(part, Strip):
+        return part.thickness / 5.5, 0.3 * part.outer
+    return min(part.thickness / 5.0, part.slot_radius / 1.8), 0.2 * part.outer
+
+
+def main(kind: type[Strip] | type[Link], parts: Path, out: Path) -> None:
+    """Write E times the compliance of each part that the table `out` has not yet."""
+    heads = [f"EC_{NAMES[i]}_{NAMES[j]}" for i, j in ENTRIES]
+    with parts.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    keys = list(rows[0])[1:7]
+    if not out.exists():
+        out.write_text(",".join(["use", *keys, "nodes", *heads]) + "\n", encoding="utf-8")
+    done = len(out.read_text(encoding="utf-8").splitlines()) - 1
+    for row in rows[done:]:
+        begun = time.time()
+        part = kind(**{key: float(row[key]) for key in keys})
+        with tempfile.TemporaryDirectory() as work:
+            cell, _, nodes = compliance(part, Path(work), *sizes(part))
+        words = [row["use"], *(row[key] for key in keys), nodes]
+        words += [f"{cell[entry]:.6g}" for entry in ENTRIES]
+        with out.open("a", encoding="utf-8") as file:
+            file.write(",".join(map(str, words)) + "\n")
+        print(f"{part} {nodes} nodes, {time.time() - begun:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main({"strip": Strip, "link": Link}[sys.argv[1]], *map(Path, sys.argv[2:]))

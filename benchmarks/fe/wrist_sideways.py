@@ -8,20 +8,17 @@ least-squares fit of a rigid motion to its middle slice. Off-axis cuts from +y; 
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import gmsh
 import numpy as np
+from calculix import ORDER, PRINTED, displacements, solid_lines
 
 OUTER, INNER, DEPTH, HEIGHT, UNCUT, NOTCHES = 0.81, 0.70, 1.40, 0.8, 1.2, 5
 LENGTH = UNCUT + NOTCHES * (HEIGHT + UNCUT)
 YOUNG, POISSON, FORCE = 60_000.0, 0.33, 0.02
-# CalculiX counts the last two middle nodes of a tetrahedron the other way round.
-ORDER = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 
 def mesh(size: float) -> tuple[dict[int, np.ndarray], np.ndarray, np.ndarray]:
@@ -58,22 +55,13 @@ def solve(
     for row, area in zip(end[:, 3:].tolist(), areas, strict=True):
         for node in row:  # a constant traction loads the middle nodes alone
             force[node] += FORCE * area / sum(areas) / 3.0
-    base = [n for n, at in nodes.items() if abs(at[2]) < 1e-6]
-    lines = ["*NODE,NSET=ALL", *(f"{n},{x:.9g},{y:.9g},{z:.9g}" for n, (x, y, z) in nodes.items())]
-    lines += ["*ELEMENT,TYPE=C3D10,ELSET=WRIST"]
-    lines += [f"{k},{','.join(map(str, cell))}" for k, cell in enumerate(cells.tolist(), 1)]
-    lines += ["*NSET,NSET=BASE", *(f"{n}," for n in base), "*MATERIAL,NAME=TUBE", "*ELASTIC"]
-    lines += [f"{YOUNG},{POISSON}", "*SOLID SECTION,ELSET=WRIST,MATERIAL=TUBE", "*STEP", "*STATIC"]
+    base = [n for n, place in nodes.items() if abs(place[2]) < 1e-6]
+    lines = solid_lines(nodes.items(), cells, YOUNG, POISSON)
+    lines += ["*NSET, NSET=BASE", *(f"{n}," for n in base), "*STEP", "*STATIC"]
     lines += ["*BOUNDARY", "BASE,1,3", "*CLOAD", *(f"{n},1,{f:.10g}" for n, f in force.items())]
-    lines += ["*NODE PRINT,NSET=ALL", "U", "*END STEP", ""]
     with tempfile.TemporaryDirectory() as folder:
-        Path(folder, "wrist.inp").write_text("\n".join(lines), encoding="utf-8")
-        alone = {**os.environ, "OMP_NUM_THREADS": "1"}
-        subprocess.run(["ccx", "wrist"], cwd=folder, env=alone, check=True, capture_output=True)
-        rows = [line.split() for line in Path(folder, "wrist.dat").read_text().splitlines()]
-    return {
-        int(row[0]): np.array(row[1:], float) for row in rows if len(row) == 4 and row[0].isdigit()
-    }
+        numbers, moved = displacements(Path(folder), "wrist", lines + PRINTED)
+    return dict(zip(numbers.tolist(), moved, strict=True))
 
 
 def rotation(nodes: dict[int, np.ndarray], moved: dict[int, np.ndarray], z: float) -> np.ndarray:

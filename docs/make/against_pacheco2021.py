@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-from differences import Difference, difference, joined, table_of
+from differences import Differences
+from matplotlib.axes import Axes
+from pictures import TENSION, TOTAL, beside, label_all, picture
 
 import notchflex as nf
 from loads import tensions
-from notchflex.plotting.style import house_style, new_figure, save, sequence_colours
+from notchflex.plotting.style import sequence_colours
 from reference_data import CUTS, choose, reference
 from robots import linear_copy, ready
 
@@ -28,72 +28,55 @@ def curves() -> dict[tuple[str, int], tuple[nf.EquilibriumPath, np.ndarray]]:
     return found
 
 
-def differences() -> list[Difference]:
+def tables() -> dict[str, str]:
     """Compare the curves, the closing of every notch, and the simpler models."""
-    rows = []
+    compared = Differences()
     for path, wanted in curves().values():
         n = path.robot.number_of_notches
         angles = np.radians(wanted[:, 3 : 3 + n])
-        rows += [
-            difference("angle of every notch, 0 to 3 N", path.notch_angle, angles, "rad"),
-            difference("tip", path.tip_position[:, [0, 2]], wanted[:, 9:11], "mm"),
-            difference("stroke", path.stroke[:, 0], wanted[:, 11], "mm"),
-            difference("tension at the tip", path.span_tension[:, 0, -1], wanted[:, 12], "N"),
-        ]
-    closing = reference("pacheco_closing.csv")
+        compared.add("angle of every notch, 0 to 3 N", path.notch_angle, angles, "rad")
+        compared.add("tip", path.tip_position[:, [0, 2]], wanted[:, 9:11], "mm")
+        compared.add("stroke", path.stroke[:, 0], wanted[:, 11], "mm")
+        compared.add("tension at the tip", path.span_tension[:, 0, -1], wanted[:, 12], "N")
+    table = reference("pacheco_closing.csv")
     for number, cut in enumerate(CUTS):
         for wrist, name in enumerate("ABC"):
-            found = nf.closing(ready(name).with_value("notch[*].cut", cut))
-            wanted = choose(closing, cut=(0, number), wrist=(1, wrist))
-            angle = np.radians(wanted[:, 7])
-            rows.append(difference("closing angle of every notch", found.angle, angle, ""))
-            rows.append(difference("closing tension", found.tension, wanted[:, 8], ""))
+            closing = nf.closing(ready(name).with_value("notch[*].cut", cut))
+            wanted = choose(table, cut=(0, number), wrist=(1, wrist))
+            compared.add("closing angle of every notch", closing.angle, np.radians(wanted[:, 7]))
+            compared.add("closing tension", closing.tension, wanted[:, 8])
     for wrist, name in enumerate("ABC"):
-        for model, (angle, wanted) in simpler(name, wrist).items():
-            rows.append(difference(f"model: {MODELS[model]}", angle, wanted, "rad"))
-    return joined(rows)
+        simpler(compared, name, choose(reference("pacheco_simplified.csv"), wrist=(0, wrist)))
+    return {"pacheco2021": compared.table()}
 
 
-def simpler(name: str, wrist: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Notch angles of the paper's four models, and those of the table."""
-    found = {}
-    table = choose(reference("pacheco_simplified.csv"), wrist=(0, wrist))
+def simpler(compared: Differences, name: str, table: np.ndarray) -> None:
+    """Compare the notch angles of the paper's four models of one wrist."""
     full = ready(name)
     linear = linear_copy(full)
-    robots = full, linear, linear.replace(friction=nf.Frictionless())
+    robots = full, linear, linear.replace(friction=nf.Frictionless()), None
     stroke = np.zeros(0)
-    for model in range(4):
+    for model, (text, robot) in enumerate(zip(MODELS, robots, strict=True)):
         rows = choose(table, model=(2, model))
-        if model < 3:
-            path = nf.simulate(robots[model], tensions(rows[:, 1])).raise_if_failed()
+        if robot is None:
+            angle = nf.equal_stroke(full, stroke).notch_angle
+        else:
+            path = nf.simulate(robot, tensions(rows[:, 1])).raise_if_failed()
             stroke = stroke if model else path.stroke[:, 0]
             angle = path.notch_angle
-        else:
-            angle = nf.equal_stroke(full, stroke).notch_angle
-        found[model] = angle, np.radians(rows[:, 3 : 3 + full.number_of_notches])
-    return found
+        wanted = np.radians(rows[:, 3 : 3 + full.number_of_notches])
+        compared.add(f"model: {text}", angle, wanted, "rad")
 
 
-def tables() -> dict[str, str]:
-    """Return what stands on the page."""
-    return {"pacheco2021": table_of(differences())}
-
-
-def pictures(folder: Path) -> None:
+@picture("pacheco2021.svg", 8.0, 3.4, 2, sharey=True)
+def pictures(*places: Axes) -> None:
     """Draw the total angles of the curves."""
     every = curves()
-    with house_style():
-        figure = new_figure(8.0, 3.4)
-        places = figure.subplots(1, 2, sharey=True)
-        for number, (axes, cut) in enumerate(zip(places, CUTS, strict=True)):
-            for name, colour in zip("ABC", sequence_colours(3), strict=True):
-                path, wanted = every[name, number]
-                axes.plot(path.tension[:, 0], np.degrees(path.total_angle), color=colour)
-                dots = wanted[::3]
-                axes.plot(dots[:, 2], dots[:, 8], "o", ms=3.5, mfc="none", color=colour)
-                axes.plot([], [], "o-", ms=3.5, mfc="none", color=colour, label=f"wrist {name}")
-            axes.set_title(f'cut = "{cut}"', loc="left")
-            axes.set_xlabel("tendon tension [N]")
-        places[0].set_ylabel("total bending angle [deg]")
-        places[0].legend(loc="lower right")
-    save(figure, folder / "pacheco2021.svg")
+    for number, (axes, cut) in enumerate(zip(places, CUTS, strict=True)):
+        for name, colour in zip("ABC", sequence_colours(3), strict=True):
+            path, wanted = every[name, number]
+            axes.plot(path.tension[:, 0], np.degrees(path.total_angle), color=colour)
+            beside(axes, (wanted[::3, 2], wanted[::3, 8]), colour, f"wrist {name}")
+        axes.set_title(f'cut = "{cut}"', loc="left")
+    label_all(places, TENSION, TOTAL)
+    places[0].legend(loc="lower right")

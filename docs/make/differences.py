@@ -2,54 +2,33 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 from page import table
 
 
-class Difference(NamedTuple):
-    """Numbers of the package against others.
+class Differences:
+    """Numbers of the package against others: how many are compared, and the worst difference.
 
     Attributes:
-        what: What is compared.
-        count: How many numbers.
-        worst: Largest difference.
-        unit: Its unit; "" where it is relative.
+        rows: Number and worst difference by what is compared and its unit; "" is relative.
     """
 
-    what: str
-    count: int
-    worst: float
-    unit: str
+    def __init__(self) -> None:
+        """Begin with none."""
+        self.rows: dict[tuple[str, str], tuple[int, float]] = {}
 
+    def add(self, what: str, ours: ArrayLike, wanted: ArrayLike, unit: str = "") -> None:
+        """Compare two arrays, without a unit relative to the wanted one."""
+        ours, wanted = np.broadcast_arrays(np.asarray(ours, float), np.asarray(wanted, float))
+        error = np.abs(ours - wanted) if unit else np.abs(ours / wanted - 1.0)
+        count, worst = self.rows.get((what, unit), (0, 0.0))
+        self.rows[what, unit] = count + error.size, max(worst, float(error.max()))
 
-def difference(what: str, found: ArrayLike, wanted: ArrayLike, unit: str) -> Difference:
-    """Compare two arrays; without a unit relative to the wanted one."""
-    found, wanted = np.broadcast_arrays(np.asarray(found, float), np.asarray(wanted, float))
-    error = np.abs(found - wanted) if unit else np.abs(found / wanted - 1.0)
-    return Difference(what, error.size, float(error.max()), unit)
-
-
-def joined(rows: list[Difference]) -> list[Difference]:
-    """Put rows that compare the same things together: all their numbers, the worst of them."""
-    found: dict[tuple[str, str], Difference] = {}
-    for row in rows:
-        old = found.get((row.what, row.unit), Difference(row.what, 0, 0.0, row.unit))
-        worst = max(old.worst, row.worst)
-        found[row.what, row.unit] = Difference(row.what, old.count + row.count, worst, row.unit)
-    return list(found.values())
-
-
-def table_of(rows: list[Difference]) -> str:
-    """Return the table in Markdown; what is below 1e-12 is rounding and said to be that."""
-    return table(
-        ("compared", "numbers", "worst difference"),
-        [(row.what, row.count, f"{worst(row)} {row.unit or '(relative)'}") for row in rows],
-    )
-
-
-def worst(row: Difference) -> str:
-    """Return the worst difference with one digit."""
-    return "below 1e-12" if row.worst < 1e-12 else f"{row.worst:.0e}"
+    def table(self) -> str:
+        """Return the table in Markdown; what is below 1e-12 is rounding and said to be that."""
+        rows = []
+        for (what, unit), (count, worst) in self.rows.items():
+            text = "below 1e-12" if worst < 1e-12 else f"{worst:.0e}"
+            rows.append((what, count, f"{text} {unit or '(relative)'}"))
+        return table(("compared", "numbers", "worst difference"), rows)

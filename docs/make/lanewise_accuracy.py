@@ -4,6 +4,7 @@ Usage: python docs/make/lanewise_accuracy.py. It needs long doubles of 64 digits
 """
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,11 @@ import numpy as np
 from lanewise import Program, lower, machine_code
 from lanewise.elementary import ELEMENTARY
 
-ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "lanewise.md"
-BEGIN, END = "<!-- accuracy -->", "<!-- end of accuracy -->"
+sys.path.append(str(Path(__file__).resolve().parents[1] / "papers"))
+from page import rewrite, table
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = "../lanewise.md"  # from the folder of page.py
 
 
 def cases() -> dict:
@@ -25,8 +28,9 @@ def cases() -> dict:
     return module.CASES
 
 
-def row(name: str, arguments: tuple, function, limit: float) -> str:
+def row(name: str, case: tuple) -> tuple:
     """Return a row of the table: errors of the compiled function in units in the last place."""
+    arguments, function, limit = case
     size = len(arguments[0])
     lowered, _ = lower(ELEMENTARY[name], arguments, (size,))
     program = Program(machine_code(lowered.text), lowered.sizes, lowered.memory, None)
@@ -39,20 +43,14 @@ def row(name: str, arguments: tuple, function, limit: float) -> str:
     error = (abs(result[kept] - exact[kept]) / unit).astype(float)
     spans = "; ".join(f"{one.min():.3g} to {one.max():.3g}" for one in arguments)
     print(name, round(error.max(), 2))
-    return f"| `{name}` | {spans} | {size:,} | {error.mean():.2f} | {error.max():.2f} | {limit} |"
+    return f"`{name}`", spans, f"{size:,}", f"{error.mean():.2f}", f"{error.max():.2f}", limit
 
 
 def main() -> None:
     """Measure all functions and write the table."""
-    lines = [
-        "| function | arguments | number | mean error, ulp | largest error, ulp | limit of the tests, ulp |",  # noqa: E501
-        "| --- | --- | --- | --- | --- | --- |",
-        *(row(name, *case) for name, case in cases().items()),
-    ]
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    after = rest.partition(END)[2]
-    text = f"{before}{BEGIN}\n" + "\n".join(lines) + f"\n{END}{after}"
-    PAGE.write_text(text, encoding="utf-8")
+    head = ("function", "arguments", "number")
+    errors = (f"{what}, ulp" for what in ("mean error", "largest error", "limit of the tests"))
+    rewrite(PAGE, {"accuracy": table((*head, *errors), (row(*case) for case in cases().items()))})
 
 
 if __name__ == "__main__":

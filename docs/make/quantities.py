@@ -10,6 +10,9 @@ from pathlib import Path
 
 from notchflex.results.quantities import QUANTITIES
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "papers"))
+from page import rewrite, table
+
 PAGE = "../units_and_frames.md"  # from the folder of page.py
 
 
@@ -20,10 +23,9 @@ def tables() -> dict[str, str]:
         (_code(one.name), one.description, one.unit, _code(one.key), _code(one.column))
         for one in QUANTITIES.values()
     ]
-    text = "\n".join(f"| {' | '.join(row)} |" for row in [head, ("---",) * len(head), *rows])
     # The class keeps the column of sentences wide (docs/style.css): the names would squeeze it.
-    table = f'<div class="quantities" markdown="1">\n\n{text}\n\n</div>'
-    return {"quantities": f"\n\n{table.replace('|  |', '| |')}\n\n"}
+    wide = f'<div class="quantities" markdown="1">{table(head, rows)}</div>'
+    return {"quantities": f"\n\n{wide}\n\n"}
 
 
 def _code(text: str) -> str:
@@ -31,7 +33,4 @@ def _code(text: str) -> str:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "papers"))
-    from page import rewrite
-
     rewrite(PAGE, tables())

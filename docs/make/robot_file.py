@@ -12,10 +12,12 @@ from typing import Any
 
 import notchflex as nf
 
-ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(Path(__file__).resolve().parents[1] / "papers"))
+from page import rewrite, table
+
 PAGE = "../robot_file.md"  # from the folder of page.py
 SINGLE = ("Tube", "Tendon", "Drawing")
-LISTS = {"notch": "notch", "material": "material", "friction": "friction"}
+KINDS = ("notch", "material", "friction")
 
 
 def tables() -> dict[str, str]:
@@ -23,7 +25,7 @@ def tables() -> dict[str, str]:
     schema = nf.json_schema()
     parts = schema["$defs"]
     found = {name.lower(): _part(parts[name]) for name in SINGLE}
-    for key in LISTS:
+    for key in KINDS:
         found[key] = "\n" + "\n".join(_kind(key, parts[name]) for name in _kinds(schema, key))
     found["top"] = _top(schema)
     return found
@@ -40,7 +42,7 @@ def _top(schema: dict[str, Any]) -> str:
             written = f"`[[{key}]]`" if several else single
         number = "one or more" if several else "one" if key in schema["required"] else "none or one"
         rows.append((written, number, MEANING[key]))
-    return _table(("written", "how many", "meaning"), rows)
+    return table(("written", "how many", "meaning"), rows)
 
 
 MEANING = {
@@ -83,7 +85,7 @@ def _part(part: dict[str, Any]) -> str:
     if not rows:
         return "\n\nIt has no keys but `kind`.\n"
     rows.sort(key=lambda row: row[3] != "required")
-    return _table(("key", "unit", "allowed", "if left out", "meaning"), rows)
+    return table(("key", "unit", "allowed", "if left out", "meaning"), rows)
 
 
 def _default(title: str, key: str) -> str:
@@ -116,13 +118,5 @@ def _number(value: float) -> str:
     return re.sub(r"e([+-])0*", lambda found: f"e{found[1].strip('+')}", f"{value:g}")
 
 
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    text = "\n".join(f"| {' | '.join(line)} |" for line in [head, ("---",) * len(head), *rows])
-    return f"\n\n{re.sub(' +', ' ', text)}\n\n"
-
-
 if __name__ == "__main__":
-    sys.path.insert(0, str(ROOT / "docs" / "papers"))
-    from page import rewrite
-
     rewrite(PAGE, tables())

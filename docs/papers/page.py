@@ -24,9 +24,14 @@ def marked(page: str) -> dict[str, list[str]]:
 
 def table(head: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a table in Markdown, with the line breaks that its marks need."""
-    lines = [tuple(head)]
-    lines += [("---",) * len(lines[0]), *(tuple(map(str, row)) for row in rows)]
-    return "\n\n" + "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n\n"
+    head = tuple(head)
+    lines = (f"| {' | '.join(map(str, line))} |" for line in (head, ("---",) * len(head), *rows))
+    return "\n\n" + re.sub(" +", " ", "\n".join(lines)) + "\n\n"
+
+
+def percent(part: float, digits: int = 1) -> str:
+    """Return a part in percent."""
+    return f"{100.0 * part:.{digits}f} %"
 
 
 def rewrite(page: str, numbers: Mapping[str, str]) -> None:

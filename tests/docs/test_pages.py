@@ -82,21 +82,12 @@ def test_page_from_the_drawing(make: Any):
 
 
 @pytest.mark.nightly
-def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any, monkeypatch: pytest.MonkeyPatch):
-    figures = make("figures")
-    monkeypatch.setattr(figures, "IMAGES", tmp_path)
-    figures.main()
-    drawings = {
-        "control": ("three_inverses", "feedback", "reversal"),
-        "learning": ("two_policies",),
-        "sweep": ("main",),
-        "tolerances": ("main",),
-    }
-    for name, functions in drawings.items():
-        module = make(name)
-        monkeypatch.setattr(module, "IMAGES", tmp_path)
-        for function in functions:
-            getattr(module, function)()
+def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any):
+    for script in ("figures", "control", "learning"):
+        make(script).main(tmp_path)
+    analyses = make("analyses")
+    analyses.sweep(tmp_path)
+    analyses.tolerances(tmp_path)
     for part in ("finite_elements", "drawing"):
         make(f"against_{part}").pictures(tmp_path)
     drawn = {file.name for file in tmp_path.iterdir()}
@@ -115,12 +106,12 @@ def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any, monkeypatch: pyt
 
 
 def test_differences_are_those_of_arrays(make: Any):
-    differences = make("differences")
-    row = differences.difference("it", [1.0, 2.5], [1.0, 2.0], "mm")
-    assert row == ("it", 2, 0.5, "mm")
-    assert differences.difference("it", [1.0, 2.5], [1.0, 2.0], "").worst == 0.25
-    both = differences.joined([row, differences.difference("it", [1.0], [0.0], "mm")])
-    assert both == [("it", 3, 1.0, "mm")]
+    compared = make("differences").Differences()
+    compared.add("it", [1.0, 2.5], [1.0, 2.0], "mm")
+    compared.add("it", [1.0, 2.5], [1.0, 2.0])
+    compared.add("it", [1.0], [0.0], "mm")
+    assert compared.rows == {("it", "mm"): (3, 1.0), ("it", ""): (2, 0.25)}
+    assert "| it | 3 | 1e+00 mm |" in compared.table()
 
 
 def nav_files(entries: list[Any]) -> list[str]:
