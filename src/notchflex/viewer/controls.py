@@ -15,6 +15,8 @@ import numpy as np
 from notchflex import Load, Robot, solve
 
 TENSION, STROKE = "tension", "stroke"
+UNITS = {TENSION: "N", STROKE: "mm"}
+_AT_TIP = (("force x", "N"), ("force y", "N"), ("force z", "N"), ("hung weight", "g"))
 
 # Rotation vectors [rad] of the tube, whose axis is z of the world at first. Sideways the robot lies
 # along -x, so that notches of direction 0 lift it when they bend.
@@ -84,6 +86,13 @@ class Controls:
     def same_kind(self, other: Controls) -> bool:
         """Return whether other settings can be approached in small steps."""
         return (self.by, self.pointing) == (other.by, other.pointing)
+
+
+def name_of(number: int, by: str, count: int) -> tuple[str, str]:
+    """Return name and unit of one of the `Controls.numbers` of a robot with `count` tendons."""
+    if number >= count:
+        return _AT_TIP[number - count]
+    return f"{by} {number + 1}" if count > 1 else by, UNITS[by]
 
 
 # Tensions are doubled from 1/64 N until the robot is well bent; a slider has half as much more.

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 HOST, PORT = "127.0.0.1", 8080
 INSTALL = "pip install 'notchflex[viewer]'"
-NEEDED = ("viser", "trimesh", "manifold3d", "matplotlib")
+NEEDED = ("viser", "trimesh", "manifold3d", "matplotlib", "plotly")
 
 
 def check_installed() -> None:
