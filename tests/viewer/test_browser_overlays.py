@@ -125,19 +125,19 @@ def test_a_saved_picture_is_without_the_arrows_to_drag(visit):
 def test_the_cloud_and_the_sensed_force_come_and_go(visit):
     viewer, plain = visit.viewer, visit.picture()
     switch(visit, "reachable cloud")
-    wait(lambda: len(viewer.overlays.cloud.points) > 1000)
+    wait(lambda: len(viewer.scene.cloud.points) > 1000)
     assert changed(plain, visit.picture()) > 0.003
     visit.set_tension(0.8)
     visit.type("force x [N]", "0.03")
     switch(visit, "sensed force")
     wait(lambda: viewer.session.controls.tip_force[0] == 0.03)
-    wait(lambda: viewer.overlays.sensed.label.startswith("sensed x"))
-    found = viewer.overlays.sensed.found
+    wait(lambda: viewer.scene.sensed.label.startswith("sensed x"))
+    found = viewer.scene.sensed.sensed
     assert found.low[-1, 0] <= 0.03 <= found.high[-1, 0]
     switch(visit, "reachable cloud")
     switch(visit, "sensed force")
-    wait(lambda: not len(viewer.overlays.cloud.points))
-    wait(lambda: viewer.overlays.sensed.label == "")
+    wait(lambda: not len(viewer.scene.cloud.points))
+    wait(lambda: viewer.scene.sensed.label == "")
     visit.no_notice()
     assert visit.errors == []
 

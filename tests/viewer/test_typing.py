@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from notchflex.viewer.page import NumberField, Slider
+from notchflex.viewer.page import Input, Slider
 from notchflex.viewer.tasks import PAUSE, Tasks
 
 
@@ -44,7 +44,7 @@ def control(request, viewer):
     viewer.set = lambda number, value, by: viewer.done.append(value)
     if request.param == "slider":
         return Slider(viewer, 0, "tension")
-    return NumberField(viewer, Handle(0.0), viewer.done.append)
+    return Input(viewer, Handle(0.0), viewer.done.append, PAUSE)
 
 
 def test_a_number_that_arrived_is_not_overwritten_before_its_callback_has_run(viewer, control):

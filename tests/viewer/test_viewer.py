@@ -94,13 +94,14 @@ def test_a_law_that_is_refused_leaves_the_law_before_on_the_page_too(start, monk
     viewer.ask(lambda: viewer.set(0, 0.5, "tension"))
     wait(lambda: reached(viewer, 0.5))
     robot, angle = viewer.session.robot, float(viewer.session.state.total_angle)
-    law = viewer.page.parts["friction"].kind.handle
+    kind = viewer.page.parts["friction"].kind
+    law = kind.handle
 
     def refuse(*_, **__):
         raise nf.InputError("this law does not fit these notches")
 
     monkeypatch.setattr(type(viewer.session), "change", refuse)
-    law.value = "frictionless"  # as the page has it when somebody chose it
+    law.value = kind.shown = "frictionless"  # as the page has it when somebody chose it
     viewer.ask(lambda: viewer.change_part("friction", "frictionless"))
     wait(lambda: viewer.message)
     wait(lambda: law.value == "capstan")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -17,14 +17,7 @@ from notchflex.viewer.controls import POINTING, ControlRanges, Controls
 from notchflex.viewer.session import LoopHistory, Session
 from notchflex.workspaces import Workspace, workspace
 
-if TYPE_CHECKING:
-    import viser
-
-    from notchflex.viewer.scene import Scene, Shown
-
-# Lengths of the arrows of the handle and of the sensed force, and the size of a point of the cloud,
-# in lengths of the robot.
-_HANDLE, _ARROW, _POINT = 0.25, 0.3, 0.004
+_POINT = 0.004  # size of a point of the cloud, in lengths of the robot
 STATES = 6000  # of the cloud
 MAX_READINGS = 12
 # Of good sensors: most of the interval is what friction leaves open.
@@ -157,27 +150,28 @@ class SensedArrow:
     """
 
     def __init__(self, scene: Any, radius: float, longest: float, ask: Ask) -> None:
-        self._radius, self._longest = radius, longest
+        self._longest = longest
         self._background = Background(ask)
         self._wanted: Any = None
         self.sensed: SensedForce | None = None
+        # Below the tip, beside the arrows of the loads and of the handle.
+        self._start, self._bar, label = np.outer(_BELOW, [0.0, 0.0, -radius])
         nothing = np.zeros((1, 2, 3))
-        self._arrow = scene.add_arrows(
+        self._root = scene.add_frame("/sensed", show_axes=False, visible=False)
+        self._arrow: Any = scene.add_arrows(
             "/sensed/force", nothing, linear([GREEN]), shaft_radius=0.15 * radius,
             head_radius=0.32 * radius, head_length=0.8 * radius,
         )  # fmt: skip
-        self._interval = scene.add_line_segments(
+        self._interval: Any = scene.add_line_segments(
             "/sensed/interval", nothing, rgb(GREEN), thickness=0.2 * radius
         )
-        self._label = scene.add_label("/sensed/label", "", anchor="top-left")
-        self._nodes: list[Any] = [self._arrow, self._interval, self._label]
-        self._hide()
+        self._label = scene.add_label("/sensed/label", "", position=label, anchor="top-left")
 
     def update(self, session: Session, shown: bool, still: bool) -> None:
         """Show or hide the arrow; sense again where the robot stands still and has moved."""
         # Each solved state has its own path.
         if not shown or session.solved is not self._wanted:
-            self._hide()
+            self._root.visible, self.sensed, self._wanted = False, None, None
         if not shown or not still or session.solved is self._wanted:
             return
         self._wanted = solved = session.solved
@@ -192,36 +186,26 @@ class SensedArrow:
     @property
     def label(self) -> str:
         """The text that is shown; "" where there is none."""
-        return str(self._label.text) if self._label.visible else ""
+        return str(self._label.text) if self._root.visible else ""
 
     def remove(self) -> None:
         """Remove all of it."""
-        for node in self._nodes:
-            node.remove()
+        self._root.remove()
         self._wanted = None
-
-    def _hide(self) -> None:
-        self.sensed = self._wanted = None
-        for node in self._nodes:
-            node.visible = False
 
     def _show(self, solved: Any, force: SensedForce) -> None:
         if self._wanted is not solved:
             return  # the robot has moved on
         self.sensed = force
-        self._label.text, self._label.visible = text(force), True
-        # Below the tip, beside the arrows of the loads and of the handle.
-        below = solved.tip_position[0] - np.outer(_BELOW, [0.0, 0.0, self._radius])
-        start, bar, self._label.position = below
-        if not force.converged[-1]:
-            return
-        ends = np.abs([force.low[-1], force.high[-1], force.force[-1]])
-        scale = self._longest / max(float(ends.max()), _NONE)
-        arrow = np.stack([start, start + scale * force.vector[-1]])
-        self._arrow.points = arrow[None]
-        self._arrow.visible = bool(np.abs(force.vector[-1]).max() > _NONE)
-        self._interval.points = intervals(force, bar, scale)
-        self._interval.visible = True
+        self._label.text = text(force)
+        self._root.position, self._root.visible = solved.tip_position[0], True
+        self._arrow.visible = self._interval.visible = bool(force.converged[-1])
+        if force.converged[-1]:
+            ends = np.abs([force.low[-1], force.high[-1], force.force[-1]])
+            scale = self._longest / max(float(ends.max()), _NONE)
+            arrow = np.stack([self._start, self._start + scale * force.vector[-1]])
+            self._arrow.points = arrow[None]
+            self._interval.points = intervals(force, self._bar, scale)
 
 
 def turning_points(rows: Float[np.ndarray, "s k"]) -> Int[np.ndarray, " r"]:
@@ -262,39 +246,3 @@ def intervals(
     ends = np.stack([force.low[-1], force.high[-1]], axis=1)
     others = force.vector[-1] - force.force[-1][:, None] * force.directions
     return tip + scale * (others[:, None] + ends[..., None] * force.directions[:, None])
-
-
-class Overlays:
-    """Handle, cloud and sensed force of the robot of a scene; see `Shown`.
-
-    Args:
-        server: The server.
-        scene: The robot in it.
-        ask: Adds a task of the solver thread.
-        aim: Called with each place of the dragged handle; see `TipHandle`.
-    """
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        scene: Scene,
-        ask: Ask,
-        aim: Callable[[np.ndarray, bool], None],
-    ) -> None:
-        nodes, length = server.scene, scene.length
-        self.handle = TipHandle(nodes, _HANDLE * length, aim)
-        self.cloud = ReachableCloud(nodes, length, ask)
-        outer = scene.robot.tube.outer_radius
-        self.sensed = SensedArrow(nodes, outer, _ARROW * length, ask)
-
-    def update(self, session: Session, ends: ControlRanges, shown: Shown, still: bool) -> None:
-        """Move what is shown to the present state; `still`: the robot does not move on at once."""
-        self.handle.update(np.asarray(session.state.tip_position), shown.handle)
-        self.cloud.update(session.robot, session.controls, ends, shown.cloud)
-        self.sensed.update(session, shown.sensed, still)
-
-    def remove(self) -> None:
-        """Remove all of it."""
-        self.handle.node.remove()
-        self.cloud.remove()
-        self.sensed.remove()

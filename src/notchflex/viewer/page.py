@@ -17,7 +17,7 @@ from notchflex.viewer import saving
 from notchflex.viewer.controls import POINTING, UNITS, Controls, name_of
 from notchflex.viewer.readout import along_tendon, legend_html, loop, notice, readout
 from notchflex.viewer.session import SECTIONS, kinds, numbers
-from notchflex.viewer.tasks import PAUSE, Task
+from notchflex.viewer.tasks import PAUSE
 
 if TYPE_CHECKING:
     from notchflex.viewer.viewer import Viewer
@@ -27,42 +27,52 @@ _JUMP = 0.03  # a larger part of the slider at once was typed or clicked, not dr
 _DIGITS = 3  # of the smallest step that a field shows, at least
 
 
-class NumberField:
-    """A field of viser (`handle`); `act` gets a typed number in the solver thread, after a pause.
+class Input:
+    """A field, list or switch of viser (`handle`); `act` gets in the solver thread what is set.
 
     The event loop receives what a person sets, the solver thread shows the current value. A value
     from the page is therefore first queued and then noted as shown: `put`, which reads in the
     opposite order, cannot overwrite a number while it is being typed. viser's own `handle.value`
     changes earlier than that, so it is not compared.
+
+    A number that is typed waits for a `pause` [s]; `now` gets a value at once.
     """
 
-    def __init__(self, viewer: Viewer, handle: Any, act: Callable[[float], None]) -> None:
+    def __init__(
+        self,
+        viewer: Viewer,
+        handle: Any,
+        act: Callable[[Any], None],
+        pause: float = 0.0,
+        now: Callable[[Any], None] = lambda _: None,
+    ) -> None:
         self.viewer, self.handle, self.act = viewer, handle, act
-        self.shown = float(handle.value)
+        self.pause, self.now, self.shown = pause, now, handle.value
 
         @handle.on_update
         async def _(event: Any) -> None:
-            if event.client is not None:
-                self.changed(float(handle.value))
+            value = handle.value
+            if event.client is not None and value in getattr(handle, "options", (value,)):
+                self.changed(value)
 
-    def changed(self, value: float) -> None:
-        """Take in a number from the page."""
-        self.send(value, PAUSE)
+    def changed(self, value: Any) -> None:
+        """Take in a value from the page."""
+        self.send(value, self.pause, self.now)
 
-    def send(self, value: float, pause: float, now: Task | None = None) -> None:
-        """Queue a number for the solver thread."""
+    def send(self, value: Any, pause: float, now: Callable[[Any], None]) -> None:
+        """Queue a value for the solver thread."""
         act = self.act
-        self.viewer.tasks.add(lambda: act(value), self, pause, now)
+        self.viewer.tasks.add(lambda: act(value), self, pause, lambda: now(value))
         self.shown = value
 
-    def put(self, value: float) -> None:
-        """Show a number, unless one from the page waits."""
+    def put(self, value: Any) -> None:
+        """Show a value, unless one from the page waits."""
         shown = self.shown
-        if not self.viewer.tasks.has(self) and abs(shown - value) > 1e-9:
-            self.handle.value = self.shown = float(value)
+        if not self.viewer.tasks.has(self) and shown != value:
+            self.handle.value = self.shown = value
 
 
-class Slider(NumberField):
+class Slider(Input):
     """A slider for one of the `Controls.numbers`, in the unit of its label."""
 
     def __init__(self, viewer: Viewer, number: int, by: str = "") -> None:
@@ -81,44 +91,19 @@ class Slider(NumberField):
         handle.min, handle.max, handle.step = low, high, (high - low) / _FINE
         handle.precision = max(4, _DIGITS - math.floor(math.log10(high)))
 
-    def changed(self, value: float) -> None:
+    def changed(self, value: Any) -> None:
         """Take in a number; after a jump the robot holds at once: it may still be typed."""
-        low, high = float(self.handle.min), float(self.handle.max)
-        before = self.shown
+        low, high, before = self.handle.min, self.handle.max, self.shown
         if value == min(max(before, low), high) != before:
             self.shown = value  # when it is left, the page itself resets what was typed beyond
         elif abs(value - before) > _JUMP * (high - low):
-            self.send(value, PAUSE, lambda: self.viewer.targets.hold(self.number))
+            self.send(value, PAUSE, lambda _: self.viewer.targets.hold(self.number))
         else:
-            self.send(value, 0.0)
+            self.send(value, 0.0, self.now)
 
-    def put(self, value: float) -> None:
+    def put(self, value: Any) -> None:
         """Show a value within its ends, unless one from the page waits."""
-        super().put(min(max(float(value), float(self.handle.min)), float(self.handle.max)))
-
-
-class Dropdown:
-    """A list; `act` gets in the solver thread what a person selects of it, `now` does at once."""
-
-    def __init__(
-        self, viewer: Viewer, label: str, options: tuple[str, ...], act: Callable[[str], None],
-        value: str | None = None, *, now: Callable[[str], None] = lambda _: None,
-        hint: str | None = None,
-    ) -> None:  # fmt: skip
-        self.tasks = viewer.tasks
-        self.handle = viewer.server.gui.add_dropdown(label, options, initial_value=value, hint=hint)
-
-        @self.handle.on_update
-        async def _(event: Any) -> None:
-            value = str(self.handle.value)
-            if event.client is not None and value in self.handle.options:
-                self.tasks.add(lambda: act(value), self)
-                now(value)
-
-    def put(self, value: str) -> None:
-        """Show a selection, unless one from the page waits."""
-        if not self.tasks.has(self) and self.handle.value != value:
-            self.handle.value = value
+        super().put(min(max(float(value), self.handle.min), self.handle.max))
 
 
 def add_button(gui: Any, label: str, act: Callable[[Any], None], hint: str | None = None) -> None:
@@ -129,7 +114,7 @@ def add_button(gui: Any, label: str, act: Callable[[Any], None], hint: str | Non
         act(event.client)
 
 
-_BY = {by: f"{by} [{unit}]" for by, unit in UNITS.items()}
+_BY = {f"{by} [{unit}]": by for by, unit in UNITS.items()}
 _SHOWN = {
     "tendons": "tendons",
     "contacts": "contacts",
@@ -164,10 +149,8 @@ class LoadControls:
         with gui.add_folder("Tendons", order=1.0) as tendons:
             self._drives = [self._drive(tendon, count) for tendon in range(count)]
             names = tuple(str(tendon + 1) for tendon in range(count))
-            self.charted = Dropdown(
-                viewer, "charts show tendon", names, lambda name: viewer.page.chart(int(name) - 1)
-            )
-            self.charted.handle.visible = count > 1
+            tendon = gui.add_dropdown("charts show tendon", names, visible=count > 1)
+            self.charted = Input(viewer, tendon, lambda name: viewer.page.chart(int(name) - 1))
             for label, ask, act, hint in (
                 ("Play a cycle", viewer.ask, lambda: viewer.cycle(viewer.page.active),
                  "load and unload the tendon of the charts"),
@@ -177,40 +160,38 @@ class LoadControls:
                 add_button(gui, label, lambda _, ask=ask, act=act: ask(act), hint)
         with gui.add_folder("At the tip", order=2.0) as tip:
             self._at_tip = [Slider(viewer, number) for number in range(count, count + 4)]
-            self._pointing = Dropdown(
-                viewer, "tube points", tuple(POINTING), viewer.point, controls.pointing,
-                hint="a weight hangs down; the load history is repeated",
-            )  # fmt: skip
+            hint = "a weight hangs down; the load history is repeated"
+            pointing = gui.add_dropdown("tube points", tuple(POINTING), hint=hint)
+            self._pointing = Input(viewer, pointing, viewer.point)
         self.folders: list[Any] = [tendons, tip]
         self.follow(controls)
 
-    def _drive(self, tendon: int, count: int) -> tuple[Dropdown, Slider, NumberField]:
+    def _drive(self, tendon: int, count: int) -> tuple[Input, Slider, Input]:
         """Add a tendon by tension or stroke, its slider, and the end of the slider."""
-        viewer, of = self._viewer, f" {tendon + 1}" if count > 1 else ""
-        names = {label: by for by, label in _BY.items()}
+        viewer, gui = self._viewer, self._viewer.server.gui
+        of = f" {tendon + 1}" if count > 1 else ""
 
         def now(label: str) -> None:  # so that the next value belongs to the new choice
-            by = names[label]
-            slider.prescribe(by)
-            slider.put(viewer.session.where(tendon, by))
+            slider.prescribe(_BY[label])
+            slider.put(viewer.session.where(tendon, slider.by))
 
-        by = Dropdown(
-            viewer, f"tendon{of} by", tuple(names),
-            lambda label: viewer.drive_by(tendon, names[label]), now=now,
-        )  # fmt: skip
+        by = gui.add_dropdown(f"tendon{of} by", tuple(_BY))
         slider = Slider(viewer, tendon, viewer.session.controls.by[tendon])
-        end = viewer.server.gui.add_number(
+        end = gui.add_number(
             f"slider{of} to", float(slider.handle.max), hint="end of this slider", min=0.0
         )
-        stretch = NumberField(viewer, end, lambda end: viewer.stretch(tendon, slider.by, end))
-        return by, slider, stretch
+        return (
+            Input(viewer, by, lambda label: viewer.drive_by(tendon, _BY[label]), now=now),
+            slider,
+            Input(viewer, end, lambda end: viewer.stretch(tendon, slider.by, end), PAUSE),
+        )
 
     def follow(self, controls: Controls) -> None:
         """Show the settings."""
         pairs = zip(self._drives, controls.by, controls.value, strict=True)
-        for (dropdown, slider, end), by, value in pairs:
-            dropdown.put(_BY[by])
-            if dropdown.handle.value == _BY[by]:  # no other one waits
+        for (choice, slider, end), by, value in pairs:
+            choice.put(f"{by} [{UNITS[by]}]")
+            if _BY[choice.shown] == by:  # no other one waits
                 slider.prescribe(by)
                 slider.put(value)
             end.put(slider.handle.max)
@@ -224,25 +205,22 @@ class PartControls:
 
     def __init__(self, viewer: Viewer, section: str, order: float) -> None:
         self._viewer, self._section = viewer, section
-        self._fields: dict[str, NumberField] = {}
+        self._fields: dict[str, Input] = {}
         self.folder: Any = viewer.server.gui.add_folder(
             section.capitalize(), order=order, expand_by_default=section == "friction"
         )
-        robot = viewer.session.robot
         with self.folder:
-            self.kind = Dropdown(
-                viewer, "law", tuple(kinds(section)),
-                lambda kind: viewer.change_part(section, kind), getattr(robot, section).kind,
-            )  # fmt: skip
-        self.follow(robot)
+            laws = viewer.server.gui.add_dropdown("law", tuple(kinds(section)))
+        self.kind = Input(viewer, laws, lambda kind: viewer.change_part(section, kind))
+        self.follow(viewer.session.robot)
 
-    def _field(self, key: str, value: float, unit: str, hint: str) -> NumberField:
+    def _field(self, key: str, value: float, unit: str, hint: str) -> Input:
         viewer, name = self._viewer, f"{self._section}.{key}"
         label = "μ" if key == "coefficient" else key.replace("_", " ")
         label += f" [{unit}]" if unit else ""
         with self.folder:
             handle = viewer.server.gui.add_number(label, value, hint=hint)
-        return NumberField(viewer, handle, lambda value: viewer.change_number(name, value))
+        return Input(viewer, handle, lambda value: viewer.change_number(name, value), PAUSE)
 
     def follow(self, robot: Robot) -> None:
         """Show the kind and its numbers."""
@@ -270,8 +248,8 @@ def add_robot_folders(viewer: Viewer) -> list[Any]:
         add_button(gui, side, lambda _: viewer.ask(lambda: viewer.page.look(side=True)))
         add_button(gui, "View as at first", lambda _: viewer.ask(viewer.page.look))
     with gui.add_folder("Robot", order=6.0, expand_by_default=False) as robot:
-        ready = (_CHOOSE, *list_robots())
-        Dropdown(viewer, "ready robot", ready, lambda name: _load(viewer, name))
+        ready = gui.add_dropdown("ready robot", (_CHOOSE, *list_robots()))
+        Input(viewer, ready, lambda name: _load(viewer, name))
         file = gui.add_upload_button("Load a robot file", mime_type=".toml")
 
         @file.on_upload
@@ -279,25 +257,20 @@ def add_robot_folders(viewer: Viewer) -> list[Any]:
             sent = file.value
             viewer.ask(lambda: viewer.load(_robot(sent.name, sent.content)))
 
-    def save(sentence: str, send: Callable[[Any, Viewer], None]) -> Callable[[Any], None]:
-        def act(client: Any) -> None:
-            viewer.page.busy(sentence)
-            viewer.ask(lambda: send(client, viewer))
-            viewer.ask(viewer.page.update)
-
-        return act
-
     with gui.add_folder("Save", order=7.0, expand_by_default=False) as files:
-        for label, hint, sentence, send in (
-            ("Picture (PNG)", "with loads, loop, numbers and legend", "drawing the picture",
-             saving.send_picture),
-            ("Table (CSV)", "all steps, as notchflex simulate writes", "writing the table",
-             saving.send_table),
-            ("Robot file (TOML)", "with this friction and material", "writing the robot file",
-             saving.send_robot),
-        ):  # fmt: skip
-            add_button(gui, label, save(sentence, send), hint)
+        _add_save(viewer, "Picture (PNG)", saving.send_picture, "loads, loop, numbers and legend")
+        _add_save(viewer, "Table (CSV)", saving.send_table, "all steps, as notchflex simulate")
+        _add_save(viewer, "Robot file (TOML)", saving.send_robot, "with this friction and material")
     return [overlays, show, robot, files]
+
+
+def _add_save(viewer: Viewer, label: str, send: Callable[[Any, Viewer], None], hint: str) -> None:
+    def act(client: Any) -> None:
+        viewer.page.busy(f"preparing: {label}")
+        viewer.ask(lambda: send(client, viewer))
+        viewer.ask(viewer.page.update)
+
+    add_button(viewer.server.gui, label, act, hint)
 
 
 def _load(viewer: Viewer, name: str) -> None:
@@ -307,12 +280,7 @@ def _load(viewer: Viewer, name: str) -> None:
 
 def _add_switch(viewer: Viewer, name: str, label: str, hint: str | None = None) -> None:
     box = viewer.server.gui.add_checkbox(label, getattr(viewer.shown, name), hint=hint)
-
-    @box.on_update
-    async def _(event: Any) -> None:
-        if event.client is not None:
-            value = bool(box.value)
-            viewer.ask(lambda: viewer.show(name, value))
+    Input(viewer, box, lambda value: viewer.show(name, value))
 
 
 def _robot(name: str, content: bytes) -> Robot:

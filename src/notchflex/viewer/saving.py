@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex import InputError
-from notchflex.plotting import applied_loads, draw_panel, house_style, shape_at
+from notchflex.plotting import applied_loads, draw_marks, draw_panel, house_style, shape_at
 from notchflex.support import robot_text, write_path_csv
 from notchflex.viewer.colours import STRAIN, legend
 from notchflex.viewer.readout import loop, rows
@@ -63,7 +63,7 @@ def send_picture(client: viser.ClientHandle, viewer: Viewer) -> None:
     height, width = _SHAPE
     toward = client.camera.position - client.camera.look_at
     eye = viewer.scene.picture_eye(toward, _FOV, width / height)
-    handle = viewer.overlays.handle.node
+    handle = viewer.scene.handle.node
     try:
         handle.visible = False
         view = client.get_render(
@@ -104,26 +104,18 @@ def picture(session: Session, view: NDArray[np.uint8], tendon: int) -> bytes:
 
 def _write(axes: Axes, session: Session) -> None:
     """Write numbers and loads, and a legend of the colours."""
-    from matplotlib.lines import Line2D
-
     axes.set_axis_off()
     loads = [load.label for load in applied_loads(session.solved, 0, shape_at(session.solved, 0))]
     lines = [f"{label}: {value}" for _, label, value in rows(session)]
     lines.append(f"loads at the tip: {', '.join(loads) or 'none'}")
-    style: dict[str, Any] = {"fontsize": 9, "parse_math": False, "transform": axes.transAxes}
-    axes.text(0.0, 1.0, "\n".join(lines), va="top", **style)
-    ball: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 7}
-    handles = [
-        Line2D([], [], color=mark.colour, label=mark.name, **(ball if mark.marker else {}))
-        for mark in legend(session.robot)
-    ]
+    style: dict[str, Any] = {"parse_math": False, "transform": axes.transAxes}
+    axes.text(0.0, 1.0, "\n".join(lines), va="top", fontsize=9, **style)
+    draw_marks(axes, legend(session.robot))
     position: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, -0.02), "ncols": 2}
-    axes.legend(handles=handles, fontsize=8, handlelength=1.2, **position)
-    allowed = session.robot.material.allowed_strain
-    if allowed is None:
-        return
-    scale = axes.inset_axes((0.24, 0.44, 0.34, 0.035))
-    scale.imshow(np.linspace(0.0, 1.0, 64)[None], aspect="auto", cmap=STRAIN)
-    scale.set_axis_off()
-    for x, text in ((0.0, "notch strain   0"), (0.6, f"{100.0 * allowed:g} % allowed")):
-        axes.text(x, 0.457, text, va="center", fontsize=8, transform=axes.transAxes)
+    axes.legend(fontsize=8, handlelength=1.2, markerscale=2.0, **position)
+    if allowed := session.robot.material.allowed_strain:
+        scale = axes.inset_axes((0.0, 0.43, 0.34, 0.035))
+        scale.imshow(np.linspace(0.0, 1.0, 64)[None], cmap=STRAIN, aspect="auto")
+        scale.set_axis_off()
+        text = f"notch strain from 0 to {100.0 * allowed:g} % allowed"
+        axes.text(0.0, 0.475, text, va="bottom", fontsize=8, **style)

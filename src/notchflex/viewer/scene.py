@@ -5,6 +5,7 @@ All nodes are children of one node with the direction of the tube, in the frame 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,7 +27,9 @@ from notchflex.viewer.colours import (
     rgb,
     strain_colour,
 )
-from notchflex.viewer.controls import GRAVITY, POINTING, ControlRanges, Controls, round_up
+from notchflex.viewer.controls import GRAVITY, POINTING, ControlRanges, round_up
+from notchflex.viewer.overlays import Ask, ReachableCloud, SensedArrow, TipHandle
+from notchflex.viewer.session import Session
 
 if TYPE_CHECKING:
     import viser
@@ -114,7 +117,8 @@ def _axes(toward: Vector) -> tuple[Vector, Vector, Vector]:
 _FRAME, _TENDON, _CONTACT, _LIPS = 2.2, 0.09, 0.13, 0.2
 _CONTACT_AT, _LIPS_AT = 1.2, 1.55
 # In lengths of the robot.
-_ARROW, _SHORTEST = 0.35, 0.06
+_ARROW, _SHORTEST = 0.35, 0.06  # of a load
+_HANDLE, _SENSED = 0.25, 0.3
 _SMOOTH = np.radians(30.0)  # flatter edges than this are shaded as round
 _TRANSPARENT = 0.35
 # Directions of lights, and their intensities.
@@ -137,13 +141,28 @@ class Shown:
 
 
 class Scene:
-    """A robot under `/robot` in the scene of a viser server; `reach` gives the length of arrows."""
+    """A robot under `/robot` in the scene of a viser server, with handle, cloud and sensed force.
+
+    Args:
+        server: The server.
+        robot: The robot.
+        reach: Ends of the sliders; the length of arrows follows from them.
+        shown: What is visible.
+        ask: Adds a task of the solver thread.
+        aim: Called with each place of the dragged handle; see `TipHandle`.
+    """
 
     def __init__(
-        self, server: viser.ViserServer, robot: Robot, reach: ControlRanges, shown: Shown
+        self,
+        server: viser.ViserServer,
+        robot: Robot,
+        reach: ControlRanges,
+        shown: Shown,
+        ask: Ask,
+        aim: Callable[[Vector, bool], None],
     ) -> None:
         self.server, self.robot, self.reach, self.shown = server, robot, reach, shown
-        self.length = robot.geometry.length
+        self.length = length = robot.geometry.length
         self._outer = robot.tube.outer_radius
         self._solids = MovingSolids(robot, HELD * self._outer)
         self.grid_cell = round_up(0.05 * self.length)  # mm
@@ -152,7 +171,10 @@ class Scene:
             self._root = server.scene.add_frame(ROOT, show_axes=False)
             self._add_solids()
             self._add_marks()
-            size = 3.0 * self.length
+            self.handle = TipHandle(server.scene, _HANDLE * length, aim)
+            self.cloud = ReachableCloud(server.scene, length, ask)
+            self.sensed = SensedArrow(server.scene, self._outer, _SENSED * length, ask)
+            size = 3.0 * length
             self._grid = server.scene.add_grid(
                 "/grid", size, size, shadow_opacity=0.0, cell_size=self.grid_cell,
                 section_size=5.0 * self.grid_cell,
@@ -183,7 +205,7 @@ class Scene:
             name = f"{ROOT}/body_{number}"
             node = scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=metal)
             self._bodies.append(node)
-        self._flexures = [
+        self._flexures: list[Any] = [
             scene.add_mesh_simple(
                 f"{ROOT}/flexure_{number}", *surface, color=metal, flat_shading=True
             )
@@ -198,12 +220,12 @@ class Scene:
         nothing, geometry = np.zeros((1, 2, 3)), self.robot.geometry
         rest, tendons = geometry.shape(geometry.free_angle), range(self.robot.number_of_tendons)
         thick: dict[str, Any] = {"thickness": _TENDON * outer}
-        self._tendons = [
+        self._tendons: list[Any] = [
             scene.add_line_segments(f"{ROOT}/tendon_{tendon + 1}", nothing, rgb(TENDON), **thick)
             for tendon in tendons
         ]
         places = [rest.contacts(tendon) for tendon in tendons]
-        self._contacts = [
+        self._contacts: list[Any] = [
             scene.add_batched_meshes_simple(
                 f"{ROOT}/contacts_{number}", ball.vertices, ball.faces, lod="off",
                 batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1)),
@@ -219,7 +241,7 @@ class Scene:
             scene.add_frame(f"{ROOT}/{name}", axes_length=_FRAME * outer, axes_radius=0.05 * outer)
             for name in ("base", "tip")
         ]
-        self._arrows = scene.add_arrows(
+        self._arrows: Any = scene.add_arrows(
             f"{ROOT}/loads", nothing, linear([METAL]), shaft_radius=0.12 * outer,
             head_radius=0.32 * outer, head_length=0.8 * outer, visible=False,
         )  # fmt: skip
@@ -228,13 +250,14 @@ class Scene:
             for number in range(2)
         ]
 
-    def update(self, path: EquilibriumPath, controls: Controls) -> None:
-        """Move everything to the state of a path of one step."""
+    def update(self, session: Session, still: bool) -> None:
+        """Move everything to the state of a session; `still`: it does not move on at once."""
+        path, shown = session.solved, self.shown
         shape, flexures = self._solids.at(path)
         held = shape.position[:1] - [0.0, 0.0, HELD * self._outer]
         self._seen = np.concatenate([held, shape.position, shape.tip[None]])
         with self.server.atomic():
-            self._turn(controls.pointing)
+            self._turn(session.pointing)
             self._move_bodies(shape)
             allowed = self.robot.material.allowed_strain
             strains = path.peak_strain[0].tolist()
@@ -242,6 +265,9 @@ class Scene:
                 node.vertices, node.color = points, rgb(strain_colour(strain, allowed))
             self._move_marks(path, shape)
             self._move_loads(path, shape)
+            self.handle.update(path.tip_position[0], shown.handle)
+            self.cloud.update(session.robot, session.controls, self.reach, shown.cloud)
+            self.sensed.update(session, shown.sensed, still)
 
     def _turn(self, pointing: str) -> None:
         self._pose = Rotation.from_rotvec(POINTING[pointing]).as_matrix()
@@ -304,5 +330,5 @@ class Scene:
 
     def remove(self) -> None:
         """Remove all nodes."""
-        self._root.remove()
-        self._grid.remove()
+        for part in (self._root, self._grid, self.handle.node, self.cloud, self.sensed):
+            part.remove()

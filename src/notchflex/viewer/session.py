@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -185,16 +185,15 @@ def steer(
         return controls, away
     drive: Drive = TENSION if TENSION in controls.by else STROKE
     driven = [by == drive for by in controls.by]
-    load, none = controls.load(), [None] * len(driven)
-    load = replace(load, **{drive: none})
-    limits = [ends.ends(tendon, drive) for tendon in range(len(driven))]
+    load = replace(controls.load(), **{drive: [None] * len(driven)})
+    limits = zip(*(ends.ends(tendon, drive) for tendon in range(len(driven))), strict=True)
     reached = reach(
         session.robot,
         point,
         state=session.solved.state,
         load=load,
         drive=drive,
-        limits=Limits(**{drive: tuple(zip(*limits, strict=True))}),
+        limits=Limits(**cast(dict[str, Any], {drive: tuple(limits)})),
         approach="direct",
         search=_SEARCH,
     )

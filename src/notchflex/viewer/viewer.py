@@ -12,7 +12,6 @@ import numpy as np
 
 from notchflex import InputError, Robot
 from notchflex.viewer.controls import STRETCH, Controls, name_of, reach_of
-from notchflex.viewer.overlays import Overlays
 from notchflex.viewer.page import Page
 from notchflex.viewer.scene import Scene, Shown
 from notchflex.viewer.server import HOST, PORT, check_host, check_installed, serve
@@ -127,8 +126,7 @@ class Viewer:
 
     def _draw(self, moving: bool = False) -> None:
         """Move the robot, and update numbers and charts; while it moves, not at every step."""
-        self.scene.update(self.session.solved, self.session.controls)
-        self.overlays.update(self.session, self.reach, self.shown, still=not moving)
+        self.scene.update(self.session, still=not moving)
         now = time.monotonic()
         if not moving or now - self._updated > _TEXT:
             self._updated = now
@@ -263,14 +261,12 @@ class Viewer:
     def _reshape(self, robot: Robot) -> None:
         self.reach = self._first_reach = reach_of(robot)
         self.scene.remove()
-        self.overlays.remove()
         self._make_scene(robot)
         self.page.rebuild()
 
     def _make_scene(self, robot: Robot) -> None:
-        self.scene = Scene(self.server, robot, self.reach, self.shown)
-        self.overlays = Overlays(
-            self.server, self.scene, self.ask,
+        self.scene = Scene(
+            self.server, robot, self.reach, self.shown, self.ask,
             lambda point, last: self.tasks.add(lambda: self.steer(point, last), "aim"),
         )  # fmt: skip
 
