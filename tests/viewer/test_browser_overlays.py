@@ -96,8 +96,7 @@ def test_the_tip_follows_the_mouse_with_its_friction_history(visit, record_prope
     assert followed + again > 60  # of 80 places of the mouse
     assert rate > 15.0
     # Back at the first angles with less tension than on the way there: the loop shows both ways.
-    loop = visit.page.locator("svg[aria-label='total angle against tension'] path title")
-    assert loop.all_text_contents() == [LOADING, UNLOADING]
+    visit.loop_is("tension", LOADING, UNLOADING)
     tension = visit.viewer.session.history.loop(0)
     up = np.interp(np.radians(back["total_angle"]), *tension[: np.argmax(tension[:, 0])].T[::-1])
     assert back["tension_1"] < up - 0.05

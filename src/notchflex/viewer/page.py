@@ -295,7 +295,7 @@ def _robot(name: str, content: bytes) -> Robot:
 
 
 CHARTS_WIDTH, CONTROLS_WIDTH = 280, 290
-_ASPECT = 1.5  # width over height of a chart
+_ASPECT = 0.68  # height over width of a chart: so the page of viser takes it
 
 # viser's messages, such as that there is no graphics card, cover the scene until they are closed.
 # This makes them small, at the lower edge. Numbers and charts are grey while others are awaited.
