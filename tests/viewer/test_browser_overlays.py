@@ -9,6 +9,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.plotting import LOADING, UNLOADING
+from notchflex.viewer.overlays import text
 from visit import Visit, changed
 
 image = pytest.importorskip("matplotlib.image")
@@ -130,13 +131,14 @@ def test_the_cloud_and_the_sensed_force_come_and_go(visit):
     visit.type("force x [N]", "0.03")
     switch(visit, "sensed force")
     wait(lambda: viewer.session.controls.tip_force[0] == 0.03)
-    wait(lambda: viewer.scene.sensed.label.startswith("sensed x"))
+    wait(lambda: viewer.scene.sensed.sensed is not None)
     found = viewer.scene.sensed.sensed
+    assert text(found).startswith("sensed x")
     assert found.low[-1, 0] <= 0.03 <= found.high[-1, 0]
     switch(visit, "reachable cloud")
     switch(visit, "sensed force")
     wait(lambda: not len(viewer.scene.cloud.points))
-    wait(lambda: viewer.scene.sensed.label == "")
+    wait(lambda: viewer.scene.sensed.sensed is None)
     visit.no_notice()
     assert visit.errors == []
 

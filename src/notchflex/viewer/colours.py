@@ -61,6 +61,14 @@ def linear(codes: Iterable[str]) -> NDArray[np.uint8]:
     return np.round(255.0 * light).astype(np.uint8)
 
 
+def add_arrows(scene: Any, name: str, colour: str, radius: float) -> Any:
+    """Add arrows to a scene of viser, as thick as suits a tube of an outer radius [mm]."""
+    return scene.add_arrows(
+        name, np.zeros((1, 2, 3)), linear([colour]), shaft_radius=0.13 * radius,
+        head_radius=0.32 * radius, head_length=0.8 * radius,
+    )  # fmt: skip
+
+
 def strain_colour(strain: float, allowed: float | None) -> str:
     """Return the colour of a strain; `allowed` is the allowed one, if any is set."""
     if allowed is None or not np.isfinite(strain):

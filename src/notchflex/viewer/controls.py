@@ -172,19 +172,17 @@ def round_down(value: float) -> float:
 
 def _pulled(robot: Robot, tendon: int) -> tuple[float, float]:
     """Return tension and stroke at the ends of the sliders of a tendon, for the same bend."""
-    tension, drawn = FIRST, 0.0
-    while tension <= MOST:
+    tension, pulled, bent = FIRST, 0.0, False
+    while tension < MOST and not bent:
         solved = _stroke(robot, tendon, tension)
         if solved is None:
-            tension *= 0.5 if drawn > 0.0 else 1.0
+            tension *= 0.5 if pulled > 0.0 else 1.0
             break
-        drawn, bent = solved
-        if bent:
-            break
-        tension *= 2.0
-    end = round_up(ROOM * min(tension, MOST))
+        pulled, bent = solved
+        tension *= 1.0 if bent else 2.0
+    end = round_up(ROOM * tension)
     last, _ = _stroke(robot, tendon, end) or (0.0, False)
-    return end, round_down(last) if last > drawn else round_up(max(drawn, 1e-3))
+    return end, round_down(last) if last > pulled else round_up(max(pulled, 1e-3))
 
 
 def _stroke(robot: Robot, tendon: int, tension: float) -> tuple[float, bool] | None:

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from notchflex import InputError, Load, Robot
 from notchflex.plotting import BLUE, GREEN, ORANGE
 from notchflex.sensing import SensedForce, SensorNoise, sense
-from notchflex.viewer.colours import linear, rgb
+from notchflex.viewer.colours import add_arrows, rgb
 from notchflex.viewer.controls import POINTING, ControlRanges, Controls
 from notchflex.viewer.session import LoopHistory, Session
 from notchflex.workspaces import Workspace, workspace
@@ -156,14 +156,10 @@ class SensedArrow:
         self.sensed: SensedForce | None = None
         # Below the tip, beside the arrows of the loads and of the handle.
         self._start, self._bar, label = np.outer(_BELOW, [0.0, 0.0, -radius])
-        nothing = np.zeros((1, 2, 3))
         self._root = scene.add_frame("/sensed", show_axes=False, visible=False)
-        self._arrow: Any = scene.add_arrows(
-            "/sensed/force", nothing, linear([GREEN]), shaft_radius=0.15 * radius,
-            head_radius=0.32 * radius, head_length=0.8 * radius,
-        )  # fmt: skip
+        self._arrow = add_arrows(scene, "/sensed/force", GREEN, radius)
         self._interval: Any = scene.add_line_segments(
-            "/sensed/interval", nothing, rgb(GREEN), thickness=0.2 * radius
+            "/sensed/interval", np.zeros((1, 2, 3)), rgb(GREEN), thickness=0.2 * radius
         )
         self._label = scene.add_label("/sensed/label", "", position=label, anchor="top-left")
 
@@ -182,11 +178,6 @@ class SensedArrow:
                 lambda: sense(robot, tension, stroke, noise=NOISE, known=load),
                 lambda force: self._show(solved, force),
             )
-
-    @property
-    def label(self) -> str:
-        """The text that is shown; "" where there is none."""
-        return str(self._label.text) if self._root.visible else ""
 
     def remove(self) -> None:
         """Remove all of it."""

@@ -225,14 +225,13 @@ class PartControls:
     def follow(self, robot: Robot) -> None:
         """Show the kind and its numbers."""
         self.kind.put(getattr(robot, self._section).kind)
-        for field in self._fields.values():
-            field.handle.visible = False
-        for number in numbers(robot, self._section):
-            if number.key not in self._fields:
-                self._fields[number.key] = self._field(*number)
-            field = self._fields[number.key]
-            field.handle.visible = True
-            field.put(number.value)
+        shown = {number.key: number for number in numbers(robot, self._section)}
+        for key, number in shown.items():
+            if key not in self._fields:
+                self._fields[key] = self._field(*number)
+            self._fields[key].put(number.value)
+        for key, field in self._fields.items():
+            field.handle.visible = key in shown
 
 
 def add_robot_folders(viewer: Viewer) -> list[Any]:

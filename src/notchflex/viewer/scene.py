@@ -22,6 +22,7 @@ from notchflex.viewer.colours import (
     METAL,
     TENDON,
     UNKNOWN,
+    add_arrows,
     contact_colours,
     linear,
     rgb,
@@ -86,9 +87,8 @@ def first_eye(
     `turn` is the rotation of its base. With `side` it looks normal to the plane in which the robot
     bends, else a little from above.
     """
-    angle = np.radians(direction_deg)
+    angle, along = np.radians(direction_deg), np.array([0.0, 0.0, 1.0])
     across = np.array([np.cos(angle), np.sin(angle), 0.0])
-    along = np.array([0.0, 0.0, 1.0])
     # To either side it is about half as wide as it is long.
     corners = [across * x + along * z for x in (-0.2, 0.75) for z in (-0.15, 1.05)]
     toward = turn @ np.cross(across, along)
@@ -241,10 +241,7 @@ class Scene:
             scene.add_frame(f"{ROOT}/{name}", axes_length=_FRAME * outer, axes_radius=0.05 * outer)
             for name in ("base", "tip")
         ]
-        self._arrows: Any = scene.add_arrows(
-            f"{ROOT}/loads", nothing, linear([METAL]), shaft_radius=0.12 * outer,
-            head_radius=0.32 * outer, head_length=0.8 * outer, visible=False,
-        )  # fmt: skip
+        self._arrows = add_arrows(scene, f"{ROOT}/loads", METAL, outer)
         self._labels = [
             scene.add_label(f"{ROOT}/load_{number}", "", visible=False, anchor="bottom-center")
             for number in range(2)
