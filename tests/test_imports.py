@@ -86,7 +86,7 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
         "a fit tests its residuals when it is asked whether to trust it"
     ),
     ("designing.result", "designing.front"): _TYPE,
-    ("viewer.viewer", "viewer.page.page"): "the viewer makes its page; the page acts on the viewer",
+    ("viewer.viewer", "viewer.page"): "the viewer makes its page; the page acts on the viewer",
 }
 """Importer and imported, without `notchflex.`, and why the one may import the other."""
 

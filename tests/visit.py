@@ -134,6 +134,17 @@ class Visit:
             "() => document.querySelector('[data-name=notice]').innerText === ''"
         )
 
+    def loop_is(self, by, *names):
+        """Wait until the loop is against tension or stroke and has lines with names."""
+        self.page.wait_for_function(
+            """([by, names]) => {
+                const plot = document.querySelector('.js-plotly-plot');
+                return plot && plot.layout.xaxis.title.text.includes(by)
+                    && plot.data.map(line => line.name).join() === [...names, 'now'].join();
+            }""",
+            arg=[by, list(names)],
+        )
+
     def saved(self, button):
         """What a button sends to be saved: its name and its bytes."""
         if not self.page.get_by_role("button", name=button).is_visible():

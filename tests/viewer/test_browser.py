@@ -59,12 +59,11 @@ def test_a_slider_moved_is_a_wrist_bent_and_back_again_leaves_hysteresis(visit):
     # the wrist is about a twentieth of the picture, and leaves its place
     assert changed(straight, bent) > 0.01
     assert changed(bent, held) > 0.01
-    loop = visit.page.locator("svg[aria-label='total angle against tension'] path title")
-    assert loop.all_text_contents() == [LOADING, UNLOADING]
+    visit.loop_is("tension", LOADING, UNLOADING)
     visit.reset()
     assert visit.angle() == 0.0
     assert changed(straight, visit.picture()) < 0.004
-    assert loop.count() == 0
+    visit.loop_is("tension")
 
 
 def test_dragging_the_slider_with_the_mouse(visit):
@@ -81,8 +80,7 @@ def test_dragging_the_slider_with_the_mouse(visit):
     value = float(visit.slider().get_attribute("aria-valuenow"))
     assert value > 0.0
     assert visit.still()["tension_1"] == pytest.approx(value, abs=1e-3)
-    loop = visit.page.locator("svg[aria-label='total angle against tension'] path title")
-    assert loop.all_text_contents() == [LOADING, UNLOADING]  # it has been up
+    visit.loop_is("tension", LOADING, UNLOADING)  # it has been up
     visit.reset()
 
 

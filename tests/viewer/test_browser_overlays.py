@@ -9,6 +9,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.plotting import LOADING, UNLOADING
+from notchflex.viewer.overlays import text
 from visit import Visit, changed
 
 image = pytest.importorskip("matplotlib.image")
@@ -96,8 +97,7 @@ def test_the_tip_follows_the_mouse_with_its_friction_history(visit, record_prope
     assert followed + again > 60  # of 80 places of the mouse
     assert rate > 15.0
     # Back at the first angles with less tension than on the way there: the loop shows both ways.
-    loop = visit.page.locator("svg[aria-label='total angle against tension'] path title")
-    assert loop.all_text_contents() == [LOADING, UNLOADING]
+    visit.loop_is("tension", LOADING, UNLOADING)
     tension = visit.viewer.session.history.loop(0)
     up = np.interp(np.radians(back["total_angle"]), *tension[: np.argmax(tension[:, 0])].T[::-1])
     assert back["tension_1"] < up - 0.05
@@ -125,19 +125,20 @@ def test_a_saved_picture_is_without_the_arrows_to_drag(visit):
 def test_the_cloud_and_the_sensed_force_come_and_go(visit):
     viewer, plain = visit.viewer, visit.picture()
     switch(visit, "reachable cloud")
-    wait(lambda: len(viewer.overlays.cloud.points) > 1000)
+    wait(lambda: len(viewer.scene.cloud.points) > 1000)
     assert changed(plain, visit.picture()) > 0.003
     visit.set_tension(0.8)
     visit.type("force x [N]", "0.03")
     switch(visit, "sensed force")
     wait(lambda: viewer.session.controls.tip_force[0] == 0.03)
-    wait(lambda: viewer.overlays.sensed.label.startswith("sensed x"))
-    found = viewer.overlays.sensed.found
+    wait(lambda: viewer.scene.sensed.sensed is not None)
+    found = viewer.scene.sensed.sensed
+    assert text(found).startswith("sensed x")
     assert found.low[-1, 0] <= 0.03 <= found.high[-1, 0]
     switch(visit, "reachable cloud")
     switch(visit, "sensed force")
-    wait(lambda: not len(viewer.overlays.cloud.points))
-    wait(lambda: viewer.overlays.sensed.label == "")
+    wait(lambda: not len(viewer.scene.cloud.points))
+    wait(lambda: viewer.scene.sensed.sensed is None)
     visit.no_notice()
     assert visit.errors == []
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from notchflex.viewer.scene.scene import FOV, first_eye, framed
+from notchflex.viewer.scene import FOV, first_eye, framed
 
 
 def seen(eye, points, aspect, fov):

@@ -1,4 +1,4 @@
-"""The charts and tables of the page as text, read as a browser reads them."""
+"""The charts and tables of the page, read as a browser reads them."""
 
 import re
 from dataclasses import replace
@@ -8,68 +8,52 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting import Curve, Panel
-from notchflex.viewer import Session
-from notchflex.viewer.page.chart import chart, ticks
 from robots import ready
 
 pytest.importorskip("matplotlib")
+pytest.importorskip("plotly")
+
+from notchflex.plotting import COLOUR, Curve, Panel, chart_of
+from notchflex.viewer import Session
+from notchflex.viewer.colours import BEYOND, METAL, contact_colours, legend, strain_colour
+from notchflex.viewer.readout import along_tendon, legend_html, loop, readout
 
 
 def elements(text, name):
     return [one for one in ElementTree.fromstring(text).iter() if one.tag == name]
 
 
-@pytest.mark.parametrize("values", [[0.0], [0.3, 2.7], [-1.2, 0.4], [1e-4], [153.2], [1e4, 2e4]])
-def test_ticks_take_in_zero_and_all_values_in_round_steps(values):
-    found = ticks(values)
-    assert 3 <= len(found) <= 8
-    assert found[0] <= min(0.0, *values)
-    assert found[-1] >= max(0.0, *values)
-    assert 0.0 in found
-    assert np.diff(found) == pytest.approx(np.full(len(found) - 1, found[1] - found[0]))
-
-
-def test_a_chart_puts_points_where_its_ticks_say():
+def test_a_chart_has_its_points_and_its_labels_as_they_are():
     line = Curve([[0.0, 0.0], [1.0, 50.0], [2.0, 100.0]], "#123456", marker="o")
-    text = chart(Panel([line], "T < 3 [N]", "angle [deg]"), "loop")
-    labels = {one.text: one.attrib for one in elements(text, "text")}
-    assert "T < 3 [N]" in labels
-    assert "angle [deg]" in labels
-    dots = elements(text, "circle")
-    assert float(dots[2].attrib["cx"]) == pytest.approx(float(labels["2"]["x"]), abs=0.2)
-    assert float(dots[2].attrib["cy"]) == pytest.approx(float(labels["100"]["y"]) - 4.0, abs=0.2)
+    figure = chart_of(Panel([line], "T < 3 [N]", "angle [deg]"))
+    (trace,) = figure.data
+    assert trace.x.tolist() == [0.0, 1.0, 2.0]
+    assert trace.y.tolist() == [0.0, 50.0, 100.0]
+    assert figure.layout.xaxis.title.text == "T &lt; 3 [N]"
+    assert figure.layout.yaxis.title.text == "angle [deg]"
+    assert figure.layout.yaxis.rangemode == "tozero"
 
 
-def test_many_points_are_thinned_but_not_their_ends():
-    x = np.linspace(0.0, 1.0, 20_000)
-    text = chart(Panel([Curve(np.stack([x, x], axis=1), "#123456")], "x", "y"), "many")
-    way = next(one for one in elements(text, "path") if one.attrib.get("fill") == "none")
-    points = way.attrib["d"].lstrip("M").split("L")
-    assert len(points) == 1500
-    assert points[0] != points[-1]
-    assert len(text) < 50_000
+def names(panel):
+    return [mark.name for mark in panel.items]
 
 
 def test_the_loop_tells_loading_from_unloading_and_keeps_the_loop_before():
-    from notchflex.viewer.page.chart import loop_chart, tendon_chart
-
     session = Session(ready("A"))
+    assert names(loop(session, 0)) == ["now"]
     for tension in (1.0, 2.0, 1.0):
         session.go(session.controls.with_tendon(0, "tension", tension))
-    ways = [one.text for one in elements(loop_chart(session, 0), "title")]
-    assert ways == ["loading", "unloading"]
+    assert names(loop(session, 0)) == ["loading", "unloading", "now"]
     session.change(ready("A").with_value("friction.coefficient", 0.05))
-    ways = [one.text for one in elements(loop_chart(session, 0), "title")]
-    assert ways == ["before the change", "loading", "unloading"]
-    along = tendon_chart(session, 0)
-    assert "span tension [N]" in [one.text for one in elements(along, "text")]
-    assert len(elements(along, "circle")) == 9  # two edges a notch, but the last one is fixed
+    assert names(loop(session, 0)) == ["before the change", "loading", "unloading", "now"]
+    along = along_tendon(session, 0)
+    assert along.y_label == "span tension [N]"
+    contacts = [len(mark.rows) for mark in along.items[1:]]
+    assert sum(contacts) == 9  # two edges a notch, but the last one is fixed
 
 
 def test_colours_of_contacts_and_strains():
     from notchflex.plotting import BLUE, GREEN, GREY, VERMILLION
-    from notchflex.viewer.scene.marks import BEYOND, METAL, contact_colours, strain_colour
 
     robot = ready("A").with_value("friction.wrap", "geometric")
     session = Session(robot)
@@ -81,9 +65,10 @@ def test_colours_of_contacts_and_strains():
     assert seen[0] == {BLUE}
     assert GREEN in seen[1]
     assert seen[2] == {VERMILLION}
-    assert strain_colour(None) == METAL
-    assert strain_colour(1.0) == strain_colour(-1.0) != strain_colour(0.9)
-    assert strain_colour(1.5) == strain_colour(-1.01) == BEYOND != strain_colour(1.0)
+    assert strain_colour(0.5, None) == METAL
+    assert strain_colour(0.08, 0.08) == strain_colour(-0.08, 0.08) != strain_colour(0.07, 0.08)
+    assert strain_colour(0.12, 0.08) == strain_colour(-0.081, 0.08) == BEYOND
+    assert strain_colour(0.08, 0.08) != BEYOND
 
 
 def cells(text):
@@ -95,8 +80,6 @@ def cells(text):
 
 
 def test_the_table_tells_units_strain_and_closed_notches():
-    from notchflex.viewer.page.readout import readout
-
     session = Session(ready("A"))
     session.go(session.controls.with_tendon(0, "tension", 0.5))
     text = readout(session)
@@ -114,8 +97,6 @@ def test_the_table_tells_units_strain_and_closed_notches():
 
 
 def test_a_strain_without_a_limit_says_so():
-    from notchflex.viewer.page.readout import legend_html, readout
-
     robot = ready("A")
     robot = robot.replace(material=replace(robot.material, allowed_strain=None))
     session = Session(robot)
@@ -126,8 +107,6 @@ def test_a_strain_without_a_limit_says_so():
 
 @pytest.mark.parametrize("name", ["A", "gao2017"])
 def test_no_sign_before_a_zero(name):
-    from notchflex.viewer.page.readout import readout
-
     robot = ready(name) if name == "A" else nf.load_robot(name)
     found = cells(readout(Session(robot)))
     for one in ("tension_1", "stroke_1", "total_angle", "tip_position"):
@@ -135,20 +114,15 @@ def test_no_sign_before_a_zero(name):
 
 
 def test_every_colour_means_one_thing():
-    from notchflex.plotting import COLOUR
-    from notchflex.viewer.page.readout import BALL, entries
-
-    told = entries(ready("A"))
-    balls = [one.colour for one in told if one.mark == BALL]
+    told = legend(ready("A"))
+    balls = [one.colour for one in told if one.marker]
     assert len(set(balls)) == len(balls)
-    tendon = next(one.colour for one in told if one.text == "tendon")
+    tendon = next(one.colour for one in told if one.name == "tendon")
     assert tendon not in balls
     assert tendon not in COLOUR.values()
 
 
 def test_by_stroke_the_loop_is_drawn_against_stroke():
-    from notchflex.viewer.page.chart import loop, loop_chart
-
     session = Session(ready("A"))
     for stroke in (0.0, 1.0, 2.0, 1.5):
         session.go(session.controls.with_tendon(0, "stroke", stroke))
@@ -156,6 +130,5 @@ def test_by_stroke_the_loop_is_drawn_against_stroke():
     assert found.x_label == "tendon stroke [mm]"
     assert found.items[-1].rows[:, 0].tolist() == pytest.approx([1.5])
     assert max(line.rows[:, 0].max() for line in found.items) == pytest.approx(2.0)
-    assert "total angle against stroke" in loop_chart(session, 0)
     session.go(session.controls.with_tendon(0, "tension", float(session.state.tension[0])))
     assert loop(session, 0).x_label == "tendon tension [N]"

@@ -38,7 +38,7 @@ def unmeasured(tmp_path):
 
 def test_points_are_dragged_then_fitted_then_accepted(unmeasured, capsys):
     """All that the buttons do, without a browser."""
-    from notchflex.viewer.correction.correction import LEFT_OUT, Correction
+    from notchflex.viewer.correction import LEFT_OUT, Correction
 
     page = Correction(unmeasured, port=18700)
     for action in (page.accept, page.moved):  # a refused photograph is not accepted
@@ -68,7 +68,7 @@ def test_points_are_dragged_then_fitted_then_accepted(unmeasured, capsys):
 
 def test_what_was_accepted_before_ctrl_c_is_kept(unmeasured, monkeypatch, tmp_path, capsys):
     """The first photograph was accepted, the second was shown: one row is written, code 130."""
-    from notchflex.viewer.correction.correction import NOT_LOOKED_AT, Correction
+    from notchflex.viewer.correction import NOT_LOOKED_AT, Correction
 
     fitted = measure_picture(cluttered(), chain_table(ROBOT), "wrist", chain=BY_HAND)
 
@@ -117,7 +117,7 @@ def test_the_verb_refuses_what_has_no_page(tmp_path, capsys):
 @pytest.mark.nightly
 def test_in_a_browser(browser, unmeasured):
     """A point follows the mouse; the buttons fit, accept and leave out."""
-    from notchflex.viewer.correction.correction import Correction
+    from notchflex.viewer.correction import Correction
 
     correction = Correction(unmeasured, port=18720)
     results = []

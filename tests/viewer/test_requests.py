@@ -160,13 +160,16 @@ def test_the_viewer_is_served_so_and_takes_no_path_from_a_page(tmp_path, monkeyp
 def test_a_list_takes_only_what_is_in_it():
     from types import SimpleNamespace
 
-    from notchflex.viewer.page.folders import Dropdown
+    from notchflex.viewer.page import Input
+    from notchflex.viewer.tasks import Tasks
 
     chosen, listeners = [], []
     handle = SimpleNamespace(value="a", options=("a", "b"), on_update=listeners.append)
-    gui = SimpleNamespace(add_dropdown=lambda *_, **__: handle)
-    Dropdown(gui, "ready robot", ("a", "b"), chosen.append)
+    tasks = Tasks()
+    Input(SimpleNamespace(tasks=tasks), handle, chosen.append)
     for value in ("b", "/etc/passwd"):
         handle.value = value
         asyncio.run(listeners[0](SimpleNamespace(client=1)))
+        while (task := tasks.take()) is not None:
+            task()
     assert chosen == ["b"]

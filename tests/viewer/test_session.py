@@ -10,7 +10,7 @@ import pytest
 import notchflex as nf
 from notchflex.viewer import Controls, Session
 from notchflex.viewer.controls import reach_of
-from notchflex.viewer.page.saving import table_bytes
+from notchflex.viewer.saving import table_bytes
 from notchflex.viewer.session import kinds, numbers, with_kind
 from robots import ready
 

@@ -68,12 +68,12 @@ def test_solids_are_sent_once_and_moved():
         nodes = {name: id(node) for name, node in scene._handle_from_node_name.items()}
         assert sum("/body_" in name for name in nodes) == 6
         place = viewer.scene._bodies[-1].position.copy()
-        viewer.set(0, 1.0, "tension [N]")
+        viewer.set(0, 1.0, "tension")
         while (controls := viewer.targets.next()) is not None:
             viewer.advance(controls)
         assert {name: id(node) for name, node in scene._handle_from_node_name.items()} == nodes
         assert np.linalg.norm(viewer.scene._bodies[-1].position - place) > 1.0
         tip = viewer.session.state.tip_position
-        assert viewer.scene._tip_frame.position == pytest.approx(tip, abs=1e-6)
+        assert viewer.scene._frames[1].position == pytest.approx(tip, abs=1e-6)
     finally:
         viewer.server.stop()

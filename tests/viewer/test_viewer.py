@@ -75,7 +75,7 @@ def reached(viewer, value):
 )
 def test_a_robot_that_is_refused_is_told_and_leaves_the_one_before(start, change, words):
     viewer = start(nf.load_robot("pacheco2021-a"))
-    viewer.ask(lambda: viewer.set(0, 0.5, "tension [N]"))
+    viewer.ask(lambda: viewer.set(0, 0.5, "tension"))
     wait(lambda: reached(viewer, 0.5))
     robot, angle = viewer.session.robot, float(viewer.session.state.total_angle)
     viewer.ask(lambda: viewer.change(change(viewer.session.robot)))
@@ -84,23 +84,24 @@ def test_a_robot_that_is_refused_is_told_and_leaves_the_one_before(start, change
     assert "bug" not in viewer.message
     assert viewer.session.robot is viewer.scene.robot is robot
     assert float(viewer.session.state.total_angle) == angle
-    viewer.ask(lambda: viewer.set(0, 0.6, "tension [N]"))
+    viewer.ask(lambda: viewer.set(0, 0.6, "tension"))
     wait(lambda: reached(viewer, 0.6))
     assert viewer.message == ""
 
 
 def test_a_law_that_is_refused_leaves_the_law_before_on_the_page_too(start, monkeypatch):
     viewer = start(nf.load_robot("pacheco2021-a"))
-    viewer.ask(lambda: viewer.set(0, 0.5, "tension [N]"))
+    viewer.ask(lambda: viewer.set(0, 0.5, "tension"))
     wait(lambda: reached(viewer, 0.5))
     robot, angle = viewer.session.robot, float(viewer.session.state.total_angle)
-    law = viewer.page.parts["friction"].kind.handle
+    kind = viewer.page.parts["friction"].kind
+    law = kind.handle
 
     def refuse(*_, **__):
         raise nf.InputError("this law does not fit these notches")
 
     monkeypatch.setattr(type(viewer.session), "change", refuse)
-    law.value = "frictionless"  # as the page has it when somebody chose it
+    law.value = kind.shown = "frictionless"  # as the page has it when somebody chose it
     viewer.ask(lambda: viewer.change_part("friction", "frictionless"))
     wait(lambda: viewer.message)
     wait(lambda: law.value == "capstan")
@@ -117,7 +118,7 @@ def test_corner_friction_by_the_chord_on_arc_notches_never_spoils_the_viewer(sta
     """An arc notch has no strip, whose chord counts: the robot is refused or is solved."""
     robot = robot_from_text(TWO_ARCS)
     viewer = start(robot, read=lambda: robot_from_text(TWO_ARCS + 'turning = "chord"\n'))
-    viewer.ask(lambda: viewer.set(0, 0.1, "tension [N]"))
+    viewer.ask(lambda: viewer.set(0, 0.1, "tension"))
     wait(lambda: reached(viewer, 0.1))
     viewer.ask(viewer.reload)
     wait(lambda: viewer.message or viewer.original is not robot)
@@ -132,14 +133,14 @@ def test_corner_friction_by_the_chord_on_arc_notches_never_spoils_the_viewer(sta
 
 def test_a_number_beyond_its_slider_is_set_to_the_end_and_told(start):
     viewer = start(nf.load_robot("pacheco2021-a"))
-    viewer.ask(lambda: viewer.set(0, 1e9, "tension [N]"))
+    viewer.ask(lambda: viewer.set(0, 1e9, "tension"))
     wait(lambda: viewer.note)
     assert "1e+09 N is outside" in viewer.note
     assert viewer.targets.end.value == (3.0,)
-    viewer.ask(lambda: viewer.set(0, -1.0, "tension [N]"))
+    viewer.ask(lambda: viewer.set(0, -1.0, "tension"))
     wait(lambda: "-1 N" in viewer.note)
     assert viewer.targets.end.value == (0.0,)
-    viewer.ask(lambda: viewer.set(4, 1e6, "hung weight [g]"))
+    viewer.ask(lambda: viewer.set(4, 1e6))
     wait(lambda: "hung weight" in viewer.note)
     assert viewer.targets.end.tip_mass == viewer.reach.mass
     viewer.ask(lambda: viewer.stretch(0, "tension", 1e9))
@@ -151,7 +152,7 @@ def test_a_number_beyond_its_slider_is_set_to_the_end_and_told(start):
 
 def test_friction_that_is_changed_on_the_way_does_not_end_the_way(start):
     viewer = start(nf.load_robot("pacheco2021-a"))
-    viewer.ask(lambda: viewer.set(0, 1.5, "tension [N]"))
+    viewer.ask(lambda: viewer.set(0, 1.5, "tension"))
     viewer.ask(lambda: viewer.change_number("friction.coefficient", 0.1))
     wait(lambda: reached(viewer, 1.5))
     assert viewer.session.robot.friction.coefficient == 0.1
@@ -159,7 +160,7 @@ def test_friction_that_is_changed_on_the_way_does_not_end_the_way(start):
 
 def test_what_is_done_again_can_be_stopped(start):
     viewer = start(nf.load_robot("pacheco2021-a"))
-    viewer.ask(lambda: viewer.set(0, 1.0, "tension [N]"))
+    viewer.ask(lambda: viewer.set(0, 1.0, "tension"))
     wait(lambda: reached(viewer, 1.0))
     count = len(viewer.session.history)
     viewer.interrupted.set()

@@ -2,10 +2,12 @@
 
 from notchflex.export.export import Exported, export_robot
 from notchflex.export.formats import DeckOptions, PatternOptions, SimulatorOptions, SolidOptions
+from notchflex.export.solids import MovingSolids
 
 __all__ = [
     "DeckOptions",
     "Exported",
+    "MovingSolids",
     "PatternOptions",
     "SimulatorOptions",
     "SolidOptions",

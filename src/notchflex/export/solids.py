@@ -11,7 +11,8 @@ of the straight solid, refined, so that the surface stays closed.
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import lru_cache, partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation, Slerp
 
-from notchflex import InputError, Robot, RobotShape, __version__
+from notchflex import EquilibriumPath, InputError, Robot, RobotShape, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject
 from notchflex.plotting import fair_growth, prism, shape_at, shape_from_angles, tube_wall
@@ -38,6 +39,10 @@ _FEWEST_SIDES, _MAX_SIDES = 48, 2000  # flat sides of the tube
 _FEWEST_SIDES_OF_CHANNELS = 24
 REACH = 2.0
 """How far a cutting solid reaches, in outer radii."""
+_COARSE, _COARSEST = 3e-3, 0.05
+"""Distance of the flat sides of a scene from the round surface, in outer radii and in mm."""
+_STEPS_OF_SCENES = 6
+_ROUNDING_OF_ZONES = 1e-6  # mm
 _PIECES = 16
 """Sections of the model's flexures at least, between which points are interpolated."""
 _STEPS = 10
@@ -214,15 +219,15 @@ class DeformationMap:
     Attributes:
         zones: Where the flexures lie, base to tip.
         bodies: Rotations and displacements of the bodies from the straight tube, (n + 1, 3, 4).
+        shape: The shape of the state.
     """
 
     def __init__(self, subject: Subject, cuts: RobotCuts) -> None:
         """Take the shapes of the straight tube and of the state."""
-        path, geometry = subject.path, subject.robot.geometry
-        level, free = "tendons" if path is None else path.chain.level, geometry.free_angle
-        rest = shape_from_angles(subject.robot, 0.0 * free, _PIECES, level)
-        bent = (
-            shape_from_angles(subject.robot, free, _PIECES)
+        path, robot = subject.path, subject.robot
+        rest = _straight(robot, "tendons" if path is None else path.chain.level)
+        self.shape = bent = (
+            shape_from_angles(robot, robot.geometry.free_angle, _PIECES)
             if path is None
             else shape_at(path, subject.step, _PIECES)
         )
@@ -238,6 +243,11 @@ class DeformationMap:
             inside = (along >= zone.start) & (along <= zone.end)
             new[inside] = zone.moved(points[inside])
         return new
+
+
+@lru_cache(maxsize=8)
+def _straight(robot: Robot, level: str) -> RobotShape:
+    return shape_from_angles(robot, 0.0 * robot.geometry.free_angle, _PIECES, level)
 
 
 def _moved(poses: Points, points: Points) -> Points:
@@ -306,6 +316,68 @@ def bent_solid(straight: Manifold, motion: DeformationMap, cuts: RobotCuts) -> M
     )
 
 
+class MovingSolids:
+    """The bodies and flexures of a robot as closed surfaces, for a scene in which they move.
+
+    A surface is its vertices [mm], (v, 3), and corners of triangles, counter-clockwise as seen from
+    outside, (f, 3). Bodies are in their own frames and keep their shape; flexures are straight and
+    change theirs, but keep their triangles.
+
+    Args:
+        robot: The robot.
+        shank: Uncut tube on the base side [mm].
+
+    Attributes:
+        bodies: Surfaces of the bodies, base first.
+        flexures: Surfaces of the flexures, base to tip.
+
+    Raises:
+        InputError: No solid of a cut is known.
+
+    Example:
+        >>> from notchflex import Load, load_robot, simulate
+        >>> robot = load_robot("pacheco2021-a")
+        >>> solids = MovingSolids(robot)
+        >>> shape, flexures = solids.at(simulate(robot, Load(tension=1.0)))
+        >>> len(shape.position), len(flexures), flexures[0].shape == solids.flexures[0][0].shape
+        (6, 5, True)
+    """
+
+    def __init__(self, robot: Robot, shank: float = 0.0) -> None:
+        self._cuts = cuts = cuts_of(robot, shank)
+        chord = min(_COARSE * cuts.tube.outer_radius, _COARSEST)
+        solid = straight_solid(robot, cuts, SolidOptions(chord=chord))
+        zones = DeformationMap(Subject(robot), cuts).zones
+        # Faces of cuts lie at the ends of the zones; of them nothing goes with the flexures.
+        ends = [(zone.start + _ROUNDING_OF_ZONES, zone.end - _ROUNDING_OF_ZONES) for zone in zones]
+        knots = [cuts.start, *(end for pair in ends for end in pair), cuts.end]
+        parts = [
+            solid.trim_by_plane((0.0, 0.0, 1.0), low).trim_by_plane((0.0, 0.0, -1.0), -high)
+            for low, high in pairwise(knots)
+        ]
+        places = _straight(robot, "tendons").position
+        self.bodies = [
+            (points - place, faces)
+            for (points, faces), place in zip(map(_surface, parts[::2]), places, strict=True)
+        ]
+        self.flexures = [
+            _surface(part.refine_to_length(float(np.ptp(zone.places)) / _STEPS_OF_SCENES))
+            for part, zone in zip(parts[1::2], zones, strict=True)
+        ]
+
+    def at(self, path: EquilibriumPath, step: int = 0) -> tuple[RobotShape, list[Points]]:
+        """Return the shape at a step of a path, and the vertices of the flexures there."""
+        motion = DeformationMap(Subject(path.robot, path, step), self._cuts)
+        pairs = zip(motion.zones, self.flexures, strict=True)
+        return motion.shape, [zone.moved(points) for zone, (points, _) in pairs]
+
+
+def _surface(solid: Manifold) -> tuple[Points, NDArray[np.int64]]:
+    """Return vertices and triangles of a solid."""
+    mesh = solid.to_mesh64()
+    return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64)
+
+
 def stl_solid(subject: Subject, options: SolidOptions) -> Document:
     """Make the solid of a robot as STL, straight as it is cut or bent as its state is.
 
@@ -340,8 +412,6 @@ def _save(digest: str, solid: Manifold, file: Path) -> None:
     from trimesh import Trimesh
     from trimesh.exchange.stl import export_stl
 
-    mesh = solid.to_mesh64()
-    points = np.asarray(mesh.vert_properties)[:, :3]
-    surface = Trimesh(points, np.asarray(mesh.tri_verts, int), process=False)
+    surface = Trimesh(*_surface(solid), process=False)
     head = f"notchflex {__version__}, robot {digest}, mm".encode("ascii").ljust(80)
     file.write_bytes(head + export_stl(surface)[len(head) :])

@@ -69,12 +69,13 @@ from notchflex.plotting.style import (
 )
 from notchflex.plotting.usual import picture, plot_on_axes
 from notchflex.plotting.with_matplotlib import draw_marks, draw_panel
+from notchflex.plotting.with_plotly import chart_of
 
 __all__ = [
     "BLACK", "BLUE", "COLOUR", "GREEN", "GREY", "HELD", "INK", "LETTER", "LOADING", "MM", "ORANGE",
     "PURPLE", "SKY", "TEXT", "UNLOADING", "VERMILLION", "AppliedLoad", "Curve", "Mark", "Panel",
     "Picture", "applied_loads", "batch_picture", "bending_plane", "beside_picture", "body_corners",
-    "branches", "calibration_picture", "comparison_figure", "comparison_picture",
+    "branches", "calibration_picture", "chart_of", "comparison_figure", "comparison_picture",
     "dimensioned_figure", "dots", "draw_marks", "draw_panel", "draw_row", "fair_growth",
     "following_picture", "friction_picture", "house_style", "label", "line", "lips", "notch_rows",
     "paper", "path_figure", "path_picture", "picture", "plot_on_axes", "prism", "project", "save",

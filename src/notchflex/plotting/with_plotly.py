@@ -102,6 +102,28 @@ def save_html(picture: Sheet, target: str | FilePath) -> None:
     write_text(target, text.replace("<head>", head, 1))
 
 
+def chart_of(panel: Panel) -> Any:
+    """Return a panel in the plane alone, small, as a figure of plotly whose axes include 0.
+
+    Example:
+        >>> from notchflex.plotting import line
+        >>> figure = chart_of(Panel([line([0.0, 2.0], [0.0, 90.0], "#0072B2")], "x", "y"))
+        >>> figure.layout.xaxis.title.text
+        'x'
+    """
+    import plotly.graph_objects as go
+
+    layout: Layout = {
+        "template": "none", "font": {"size": 10}, "showlegend": False, "hovermode": "closest",
+        "margin": {"t": 8, "r": 10, "b": 38, "l": 46},
+    }  # fmt: skip
+    for name in panel.axes:
+        title = {"text": for_browser(getattr(panel, f"{name}_label")), "standoff": 6}
+        layout[f"{name}axis"] = {"title": title, "rangemode": "tozero", "nticks": 6}
+    traces = [trace for mark in panel.items for trace in _traces(mark, panel, {}, layout)]
+    return go.Figure(traces, layout)
+
+
 def _add_axes(panel: Panel, axes: Any, number: str, layout: Layout) -> Layout:
     """Add the axes of a panel where matplotlib has them; return where its traces belong."""
     box = axes.get_position()

@@ -15,6 +15,8 @@ import numpy as np
 from notchflex import Load, Robot, solve
 
 TENSION, STROKE = "tension", "stroke"
+UNITS = {TENSION: "N", STROKE: "mm"}
+_AT_TIP = (("force x", "N"), ("force y", "N"), ("force z", "N"), ("hung weight", "g"))
 
 # Rotation vectors [rad] of the tube, whose axis is z of the world at first. Sideways the robot lies
 # along -x, so that notches of direction 0 lift it when they bend.
@@ -84,6 +86,13 @@ class Controls:
     def same_kind(self, other: Controls) -> bool:
         """Return whether other settings can be approached in small steps."""
         return (self.by, self.pointing) == (other.by, other.pointing)
+
+
+def name_of(number: int, by: str, count: int) -> tuple[str, str]:
+    """Return name and unit of one of the `Controls.numbers` of a robot with `count` tendons."""
+    if number >= count:
+        return _AT_TIP[number - count]
+    return f"{by} {number + 1}" if count > 1 else by, UNITS[by]
 
 
 # Tensions are doubled from 1/64 N until the robot is well bent; a slider has half as much more.
@@ -163,19 +172,17 @@ def round_down(value: float) -> float:
 
 def _pulled(robot: Robot, tendon: int) -> tuple[float, float]:
     """Return tension and stroke at the ends of the sliders of a tendon, for the same bend."""
-    tension, drawn = FIRST, 0.0
-    while tension <= MOST:
+    tension, pulled, bent = FIRST, 0.0, False
+    while tension < MOST and not bent:
         solved = _stroke(robot, tendon, tension)
         if solved is None:
-            tension *= 0.5 if drawn > 0.0 else 1.0
+            tension *= 0.5 if pulled > 0.0 else 1.0
             break
-        drawn, bent = solved
-        if bent:
-            break
-        tension *= 2.0
-    end = round_up(ROOM * min(tension, MOST))
+        pulled, bent = solved
+        tension *= 1.0 if bent else 2.0
+    end = round_up(ROOM * tension)
     last, _ = _stroke(robot, tendon, end) or (0.0, False)
-    return end, round_down(last) if last > drawn else round_up(max(drawn, 1e-3))
+    return end, round_down(last) if last > pulled else round_up(max(pulled, 1e-3))
 
 
 def _stroke(robot: Robot, tendon: int, tension: float) -> tuple[float, bool] | None:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 HOST, PORT = "127.0.0.1", 8080
 INSTALL = "pip install 'notchflex[viewer]'"
-NEEDED = ("viser", "trimesh", "manifold3d", "matplotlib")
+NEEDED = ("viser", "trimesh", "manifold3d", "matplotlib", "plotly")
 
 
 def check_installed() -> None:
@@ -51,25 +51,16 @@ def check_installed() -> None:
         )
 
 
-def is_this_machine_only(host: str) -> bool:
-    """Return whether only programs on this machine can reach a host.
+def exposed(host: str) -> str:
+    """Return a warning if other machines can reach a host; else "".
 
     Example:
-        >>> is_this_machine_only("127.0.0.1"), is_this_machine_only("0.0.0.0")
-        (True, False)
+        >>> exposed("127.0.0.1"), exposed("0.0.0.0")[:28]
+        ('', 'the viewer serves on 0.0.0.0')
     """
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
-
-
-def exposed(host: str) -> str:
-    """Return a warning if other machines can reach a host; else ""."""
-    if is_this_machine_only(host):
-        return ""
+    with contextlib.suppress(ValueError):
+        if host == "localhost" or ipaddress.ip_address(host).is_loopback:
+            return ""
     return (
         f"the viewer serves on {host}, not on {HOST} alone, and without encryption: whoever reads "
         "the network or the printed address can use it"

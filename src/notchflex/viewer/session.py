@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -13,7 +13,6 @@ from notchflex import (
     Equilibrium,
     EquilibriumPath,
     InputError,
-    Load,
     Robot,
     list_robots,
     load_robot,
@@ -23,7 +22,7 @@ from notchflex.control import Limits, TargetSearch, reach
 from notchflex.control.limits import Drive
 from notchflex.robot.part import unit_of
 from notchflex.support import Friction, Material, fields_of, is_list, kinds_of, to_table
-from notchflex.viewer.controls import POINTING, STROKE, TENSION, ControlRanges, Controls
+from notchflex.viewer.controls import STROKE, TENSION, ControlRanges, Controls
 
 
 @dataclass
@@ -163,21 +162,9 @@ class Session:
 _SEARCH = TargetSearch(tolerance=1e-3, solves=8)
 
 
-class Steered(NamedTuple):
-    """Settings that bring the tip to a point, or next to it.
-
-    Attributes:
-        controls: The settings.
-        error: Distance of the tip from the point, mm.
-        reached: Whether the tip is there.
-    """
-
-    controls: Controls
-    error: float
-    reached: bool
-
-
-def steer(session: Session, ends: ControlRanges, point: Float[np.ndarray, " 3"]) -> Steered:
+def steer(
+    session: Session, ends: ControlRanges, point: Float[np.ndarray, " 3"]
+) -> tuple[Controls, float]:
     """Find settings of the tendons that bring the tip to a point, within their sliders.
 
     Tendons that are pulled by tension are driven, all others held; where there are none, all
@@ -188,41 +175,31 @@ def steer(session: Session, ends: ControlRanges, point: Float[np.ndarray, " 3"])
         session: The robot in its present state, with its friction history.
         ends: Ends of the sliders.
         point: Where the tip is to be, in the world, mm.
+
+    Returns:
+        The settings, and the distance of the tip from the point there, mm.
     """
-    controls, robot = session.controls, session.robot
+    controls, numbers = session.controls, session.controls.numbers
     away = float(np.linalg.norm(session.solved.tip_position - point))
     if away <= _SEARCH.tolerance:
-        return Steered(controls, away, True)
+        return controls, away
     drive: Drive = TENSION if TENSION in controls.by else STROKE
     driven = [by == drive for by in controls.by]
-    held = [None if free else value for free, value in zip(driven, controls.value, strict=True)]
-    none = [None] * len(held)
-    load = Load(
-        tension=none if drive == TENSION else held,
-        stroke=held if drive == TENSION else none,
-        tip_force=controls.tip_force,
-        tip_mass=controls.tip_mass,
-        base_rotation=POINTING[session.pointing],
-    )
-    low, high = zip(*(ends.ends(tendon, drive) for tendon in range(len(held))), strict=True)
-    limits = Limits(tension=(low, high)) if drive == TENSION else Limits(stroke=(low, high))
-    state = session.solved.state
+    load = replace(controls.load(), **{drive: [None] * len(driven)})
+    limits = zip(*(ends.ends(tendon, drive) for tendon in range(len(driven))), strict=True)
     reached = reach(
-        robot,
+        session.robot,
         point,
-        state=state,
+        state=session.solved.state,
         load=load,
         drive=drive,
-        limits=limits,
+        limits=Limits(**cast(dict[str, Any], {drive: tuple(limits)})),
         approach="direct",
         search=_SEARCH,
     )
-    path = reached.following.load
-    values = (path.tension if drive == TENSION else path.stroke)[-1]
-    numbers = controls.numbers
-    count = len(held)
-    numbers[:count] = np.where(driven, values, numbers[:count])
-    return Steered(controls.with_numbers(numbers), reached.error, reached.reached)
+    values = getattr(reached.following.load, drive)[-1]
+    numbers[: len(driven)] = np.where(driven, values, controls.value)
+    return controls.with_numbers(numbers), reached.error
 
 
 SECTIONS: dict[str, type] = {"friction": Friction, "material": Material}

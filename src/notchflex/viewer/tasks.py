@@ -11,17 +11,14 @@ is. Other numbers keep theirs, in the order in which they were set.
 from __future__ import annotations
 
 import time
-import traceback
-from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from threading import Condition, Event, RLock
+from threading import Condition, RLock
 
 import numpy as np
 
-from notchflex import InputError
 from notchflex.viewer.controls import Controls
 
 Task = Callable[[], None]
@@ -72,53 +69,6 @@ class Tasks:
                 if until <= now:
                     return None
                 self._changed.wait(until - now)
-
-
-class TaskLoop(ABC):
-    """One thread that does tasks until it is stopped, and shows what fails.
-
-    Attributes:
-        tasks: What it has to do.
-        interrupted: Set to stop what takes long.
-    """
-
-    def __init__(self) -> None:
-        self.tasks = Tasks()
-        self.interrupted = Event()
-        self._stopped = Event()
-
-    def ask(self, task: Task) -> None:
-        """Add a task of the solver thread; any thread may call this."""
-        self.tasks.add(task)
-
-    def interrupt(self, task: Task) -> None:
-        """Stop what takes long and add a task; any thread may call this."""
-        self.interrupted.set()
-        self.ask(task)
-
-    def run(self) -> None:
-        """Take turns until `stop` is called."""
-        while not self._stopped.is_set():
-            try:
-                self.turn()
-            except InputError as problem:
-                self.fail(str(problem))
-            except Exception as problem:
-                traceback.print_exc()
-                self.fail(f"this is a bug in notchflex, please report it: {problem!r}")
-
-    def stop(self) -> None:
-        """End `run`; any thread may call this."""
-        self._stopped.set()
-        self.ask(lambda: None)
-
-    @abstractmethod
-    def turn(self) -> None:
-        """Do all tasks that are ready, or wait for one."""
-
-    @abstractmethod
-    def fail(self, sentence: str) -> None:
-        """Show what failed."""
 
 
 class WatchedFile:

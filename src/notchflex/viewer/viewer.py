@@ -3,34 +3,39 @@
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Callable
 from pathlib import Path as FilePath
+from threading import Event
 
 import numpy as np
 
 from notchflex import InputError, Robot
-from notchflex.viewer.controls import STRETCH, Controls, reach_of
-from notchflex.viewer.overlays.overlays import Overlays
-from notchflex.viewer.page.page import Page
-from notchflex.viewer.page.readout import beyond
-from notchflex.viewer.scene.scene import Scene, Shown
+from notchflex.viewer.controls import STRETCH, Controls, name_of, reach_of
+from notchflex.viewer.page import Page
+from notchflex.viewer.scene import Scene, Shown
 from notchflex.viewer.server import HOST, PORT, check_host, check_installed, serve
 from notchflex.viewer.session import Session, steer, with_kind
-from notchflex.viewer.tasks import TargetQueue, TaskLoop, WatchedFile
+from notchflex.viewer.tasks import TargetQueue, Task, Tasks, WatchedFile
 
 # A browser does not show more steps a second than this.
 MAX_STEPS = 60.0
-# Intervals in which charts and numbers are updated, and in which the file is checked [s].
-_TEXT, _LOOK = 0.1, 0.5
+# Intervals in which numbers and charts are updated while the robot moves, and in which the file is
+# checked [s].
+_TEXT, _CHARTS, _LOOK = 0.1, 0.5, 0.5
 # Distance of the tip from its target that is worth a note, in outer radii.
 _SEEN = 0.05
 
 
-class Viewer(TaskLoop):
+class Viewer:
     """A robot in the browser, with sliders for its loads.
 
     It is solved at rest and served on a host and a port, or the next free one. `read` reads the
     robot again after its file was saved.
+
+    Attributes:
+        tasks: What the thread that solves has to do.
+        interrupted: Set to stop what takes long.
 
     Raises:
         InputError: The extra `viewer` is not installed, or nothing can be served there.
@@ -45,9 +50,10 @@ class Viewer(TaskLoop):
         host: str = HOST,
         port: int = PORT,
     ) -> None:
-        super().__init__()
         check_installed()
         check_host(host, port)
+        self.tasks = Tasks()
+        self.interrupted, self._stopped = Event(), Event()
         self.original = robot
         self.session = Session(robot)
         self.reach = self._first_reach = reach_of(robot)
@@ -59,23 +65,44 @@ class Viewer(TaskLoop):
         self._playing = False
         self._read = read
         self._file = WatchedFile(file) if file is not None and read is not None else None
-        self._looked, self._updated = 0.0, 0.0
+        self._looked = self._updated = self._charted = 0.0
         self.server, self.address = serve(host, port)
         self._make_scene(robot)
         self.page = Page(self)
-        self._draw(update=True)
+        self._draw()
 
     @property
     def goal(self) -> Controls:
         """The settings that the sliders show: the last target, or, in a cycle, the current one."""
         return self.session.controls if self._playing and len(self.targets) else self.targets.end
 
+    def ask(self, task: Task) -> None:
+        """Add a task of the solver thread; any thread may call this."""
+        self.tasks.add(task)
+
+    def interrupt(self, task: Task) -> None:
+        """Stop what takes long and add a task; any thread may call this."""
+        self.interrupted.set()
+        self.ask(task)
+
+    def stop(self) -> None:
+        """End `run`; any thread may call this."""
+        self._stopped.set()
+        self.ask(lambda: None)
+
     def run(self) -> None:
         """Solve and draw until `stop` is called."""
-        super().run()
+        while not self._stopped.is_set():
+            try:
+                self._turn()
+            except InputError as problem:
+                self._fail(str(problem))
+            except Exception as problem:
+                traceback.print_exc()
+                self._fail(f"this is a bug in notchflex, please report it: {problem!r}")
         self.server.stop()
 
-    def turn(self) -> None:
+    def _turn(self) -> None:
         """Do all tasks and one step toward the next target, or wait for a task."""
         started = time.monotonic()
         if started - self._looked > _LOOK:
@@ -84,13 +111,9 @@ class Viewer(TaskLoop):
                 self.reload()
         while (task := self.tasks.take(0.0 if len(self.targets) else _LOOK)) is not None:
             task()
-        controls = self.targets.next()
-        if controls is None:
-            return
-        self.advance(controls)
-        rest = 1.0 / MAX_STEPS - (time.monotonic() - started)
-        if rest > 0.0:
-            time.sleep(rest)
+        if (controls := self.targets.next()) is not None:
+            self.advance(controls)
+            time.sleep(max(0.0, 1.0 / MAX_STEPS - (time.monotonic() - started)))
 
     def advance(self, controls: Controls, *, goes_on: bool = False) -> None:
         """Solve a setting and draw the result; `goes_on`: another one follows at once."""
@@ -99,33 +122,44 @@ class Viewer(TaskLoop):
         if reason := self.session.go(controls):
             self.targets.clear(self.session.controls)
             self.message = f"Not reached: {reason}"
-        moving = goes_on or len(self.targets) > 0
-        self._draw(update=not moving or time.monotonic() - self._updated > _TEXT, moving=moving)
+        self._draw(moving=goes_on or len(self.targets) > 0)
 
-    def _draw(self, update: bool, moving: bool = False) -> None:
-        """Move the robot; with `update` also update numbers and charts."""
-        self.scene.update(self.session.solved, self.session.controls)
-        self.overlays.update(self.session, self.reach, self.shown, still=not moving)
-        if update:
-            self._updated = time.monotonic()
-            self.page.update()
+    def _draw(self, moving: bool = False) -> None:
+        """Move the robot, and update numbers and charts; while it moves, not at every step."""
+        self.scene.update(self.session, still=not moving)
+        now = time.monotonic()
+        if not moving or now - self._updated > _TEXT:
+            self._updated = now
+            charts = not moving or now - self._charted > _CHARTS
+            self._charted = now if charts else self._charted
+            self.page.update(charts)
 
-    def _quiet(self) -> None:
-        """Clear message and note."""
+    def _begin(self) -> None:
+        """Begin something else: clear message and note, end a cycle."""
         self.message = self.note = ""
+        self._playing = False
 
-    def set(self, number: int, value: float, label: str) -> None:
+    def set(self, number: int, value: float, by: str = "") -> None:
         """Set one of the `Controls.numbers` from the current state, within its slider.
 
-        `label` is that of the slider, with the unit in brackets.
+        A tendon by tension or stroke; nothing happens if it goes by the other one.
         """
-        low, high = self.reach.ends(number, self.session.controls.command(number))
+        count = len(self.session.controls.by)
+        if by != self.session.controls.command(number):
+            return  # prescribing it failed, and the page said why
+        low, high = self.reach.ends(number, by)
         kept = min(max(value, low), high)
-        self._playing = False
-        self._quiet()
+        self._begin()
         if kept != value:
-            self.note = beyond(label, value, (low, high), number < len(self.session.controls.by))
+            name, unit = name_of(number, by, count)
+            remedy = "; change the end under 'slider to'" if by and value > high else ""
+            self.note = (
+                f"{name}: {value:g} {unit} is outside its slider, from {low:g} to {high:g} {unit}. "
+                f"It is set to {kept:g} {unit}{remedy}."
+            )
         self.targets.set_number(number, kept)
+        if number < count and number != self.page.active:
+            self.page.chart(number)
         self.page.follow()
 
     def steer(self, point: np.ndarray, last: bool = True) -> None:
@@ -133,18 +167,16 @@ class Viewer(TaskLoop):
 
         `last`: no other point follows at once.
         """
-        self._playing = False
-        self._quiet()
-        steered = steer(self.session, self.reach, point)
-        if steered.error > _SEEN * self.session.robot.tube.outer_radius:
-            self.note = f"Out of reach: the tip stays {steered.error:.2g} mm away."
-        self.targets.clear(steered.controls)
-        self.advance(steered.controls, goes_on=not last)
+        self._begin()
+        controls, error = steer(self.session, self.reach, point)
+        if error > _SEEN * self.session.robot.tube.outer_radius:
+            self.note = f"Out of reach: the tip stays {error:.2g} mm away."
+        self.targets.clear(controls)
+        self.advance(controls, goes_on=not last)
 
     def drive_by(self, tendon: int, by: str) -> None:
         """Prescribe the tension or the stroke of a tendon (from 0) from now on; nothing moves."""
-        self._playing = False
-        self._quiet()
+        self._begin()
         goal = self.session.controls.with_tendon(tendon, by, self.session.where(tendon, by))
         self.targets.clear(goal)
         self.advance(goal)
@@ -152,7 +184,7 @@ class Viewer(TaskLoop):
 
     def cycle(self, tendon: int) -> None:
         """Load a tendon (from 0) to the end of its slider and unload it."""
-        self._quiet()
+        self._begin()
         self.targets.hold(tendon)
         most = self.reach.ends(tendon, self.session.controls.command(tendon))[1]
         for value in (0.0, most, 0.0):
@@ -169,21 +201,27 @@ class Viewer(TaskLoop):
     def reset(self) -> None:
         """Return to the robot at rest without history."""
         self.session.reset()
-        self._quiet()
+        self._begin()
         self.targets.clear()
         self._restart()
 
-    def _restart(self) -> None:
-        """Continue from the current state of the session to the targets that are left."""
+    def _restart(self, reason: str = "") -> None:
+        """Continue from the current state of the session to the targets that are left.
+
+        They are dropped for a reason why the state was not reached.
+        """
+        if reason:
+            self.message = f"Not reached: {reason}"
+            self.targets.clear()
         controls = self.session.controls
         self.interrupted.clear()
         self.targets.stride = self.reach.stride(controls.by)
         self.targets.restart(controls)
-        self._draw(update=True)
+        self._draw()
 
     def point(self, pointing: str) -> None:
         """Change the direction of the tube and repeat the load history."""
-        self._repeated(self.session.change(pointing=pointing, go_on=self._go_on))
+        self._restart(self.session.change(pointing=pointing, go_on=self._go_on))
         self.page.look()
 
     def change(self, robot: Robot) -> None:
@@ -195,14 +233,14 @@ class Viewer(TaskLoop):
             InputError: The robot cannot be solved; the one before stays.
         """
         old = self.session.robot
-        self._quiet()
+        self.message = self.note = ""
         self.page.busy("preparing the robot")
         reason = self.session.change(robot, go_on=self._go_on)
         if (old.tube, old.notch, old.tendon) != (robot.tube, robot.notch, robot.tendon):
             self._reshape(robot)
         self.scene.robot = robot
         self.page.name()
-        self._repeated(reason)
+        self._restart(reason)
 
     def change_part(self, section: str, kind: str) -> None:
         """Change the kind of friction or material of the robot."""
@@ -218,39 +256,28 @@ class Viewer(TaskLoop):
         if name == "handle" and value:  # what is compiled now does not hold up the first drag
             self.page.busy("preparing to follow: compiled once, which takes seconds")
             steer(self.session, self.reach, self.session.state.tip_position)
-            self.page.follow()
-        self._draw(update=False)
-
-    def _repeated(self, reason: str) -> None:
-        if reason:
-            self.message = f"Not reached: {reason}"
-            self.targets.clear()
-        self._restart()
+        self._draw()
 
     def _reshape(self, robot: Robot) -> None:
         self.reach = self._first_reach = reach_of(robot)
         self.scene.remove()
-        self.overlays.remove()
         self._make_scene(robot)
         self.page.rebuild()
 
     def _make_scene(self, robot: Robot) -> None:
-        self.scene = Scene(self.server, robot, self.reach, self.shown)
-        self.overlays = Overlays(
-            self.server, self.session, self.scene.length, self.ask,
+        self.scene = Scene(
+            self.server, robot, self.reach, self.shown, self.ask,
             lambda point, last: self.tasks.add(lambda: self.steer(point, last), "aim"),
         )  # fmt: skip
 
-    def load(self, robot: Robot, file: WatchedFile | None = None) -> None:
+    def load(self, robot: Robot) -> None:
         """Begin again with another robot; the former file is no longer watched."""
         self.page.busy("preparing the robot")
-        session = Session(robot, self.session.pointing)
-        self.session, self.original = session, robot
-        self._file = file
-        self._quiet()
+        self.session = Session(robot, self.session.pointing)
+        self.original, self._file = robot, None
+        self._begin()
+        self.targets.clear(self.session.controls)
         self._reshape(robot)
-        self.targets.clear(session.controls)
-        self.page.rebuild()
         self._restart()
         self.page.look()
 
@@ -260,7 +287,7 @@ class Viewer(TaskLoop):
         try:
             robot = self._read()
         except InputError as problem:
-            self.fail(f"The file was saved, but cannot be used: {problem}")
+            self._fail(f"The file was saved, but cannot be used: {problem}")
             return
         self.change(robot)
         self.original = robot
@@ -272,7 +299,7 @@ class Viewer(TaskLoop):
         now = abs(self.targets.end.value[tendon]) if is_commanded else 0.0
         low, high = max(now, first / STRETCH), first * STRETCH
         kept = min(max(end, low), high)
-        self._quiet()
+        self.message = self.note = ""
         if kept != end:
             self.note = f"The end of the slider must lie between {low:g} and {high:g}."
         self.reach = self.scene.reach = self.reach.stretched(tendon, by, kept)
@@ -285,7 +312,7 @@ class Viewer(TaskLoop):
             self.page.busy(f"repeating the load history: step {done} of {of}")
         return not self.interrupted.is_set()
 
-    def fail(self, sentence: str) -> None:
+    def _fail(self, sentence: str) -> None:
         """Show what failed."""
         self.message = sentence
         self.page.update()

@@ -211,7 +211,7 @@ def _corrected(
     Returns:
         What was accepted, and whether every photograph was looked at.
     """
-    from notchflex.viewer.correction.correction import Correction
+    from notchflex.viewer import Correction
 
     page = Correction(photographs, port=port, **options)
     terminal.note(f"correct the fits on {page.address} (Ctrl+C ends, what was accepted is written)")

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex import InputError
-from notchflex.plotting import applied_loads, draw_panel, house_style, shape_at
+from notchflex.plotting import applied_loads, draw_marks, draw_panel, house_style, shape_at
 from notchflex.support import robot_text, write_path_csv
-from notchflex.viewer.page.chart import loop
-from notchflex.viewer.page.readout import BALL, entries, rows, strain_scale
-from notchflex.viewer.scene.scene import quaternions
+from notchflex.viewer.colours import STRAIN, legend
+from notchflex.viewer.readout import loop, rows
+from notchflex.viewer.scene import quaternion
 from notchflex.viewer.session import Session
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ _SIZE, _DOTS = (12.0, 7.5), 160  # inches, dots per inch
 _SHAPE = (1080, 1050)  # pixels of the view of the robot, height and width
 
 
-def _send(client: viser.ClientHandle, name: str, ending: str, content: bytes) -> None:
-    plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+def _send(client: viser.ClientHandle, viewer: Viewer, ending: str, content: bytes) -> None:
+    plain = re.sub(r"[^a-z0-9]+", "-", viewer.session.robot.name.lower()).strip("-")
     client.send_file_download(f"{plain or 'robot'}.{ending}", content, save_immediately=True)
 
 
@@ -46,13 +46,12 @@ def table_bytes(session: Session) -> bytes:
 
 def send_table(client: viser.ClientHandle, viewer: Viewer) -> None:
     """Send all steps as a CSV table."""
-    _send(client, viewer.session.robot.name, "csv", table_bytes(viewer.session))
+    _send(client, viewer, "csv", table_bytes(viewer.session))
 
 
 def send_robot(client: viser.ClientHandle, viewer: Viewer) -> None:
     """Send the robot as a robot file."""
-    robot = viewer.session.robot
-    _send(client, robot.name, "toml", robot_text(robot).encode())
+    _send(client, viewer, "toml", robot_text(viewer.session.robot).encode())
 
 
 def send_picture(client: viser.ClientHandle, viewer: Viewer) -> None:
@@ -64,13 +63,13 @@ def send_picture(client: viser.ClientHandle, viewer: Viewer) -> None:
     height, width = _SHAPE
     toward = client.camera.position - client.camera.look_at
     eye = viewer.scene.picture_eye(toward, _FOV, width / height)
-    handle = viewer.overlays.handle
+    handle = viewer.scene.handle.node
     try:
-        handle.show(False)
+        handle.visible = False
         view = client.get_render(
             height,
             width,
-            wxyz=quaternions(eye.rotation[None])[0],
+            wxyz=quaternion(eye.rotation),
             position=eye.position,
             fov=_FOV,
             transport_format="png",
@@ -81,9 +80,8 @@ def send_picture(client: viser.ClientHandle, viewer: Viewer) -> None:
             "the browser sent no picture; bring its window to the front"
         ) from None
     finally:
-        handle.show(viewer.shown.handle)
-    content = picture(viewer.session, view, viewer.page.loads.active)
-    _send(client, viewer.session.robot.name, "png", content)
+        handle.visible = viewer.shown.handle
+    _send(client, viewer, "png", picture(viewer.session, view, viewer.page.active))
 
 
 def picture(session: Session, view: NDArray[np.uint8], tendon: int) -> bytes:
@@ -106,28 +104,18 @@ def picture(session: Session, view: NDArray[np.uint8], tendon: int) -> bytes:
 
 def _write(axes: Axes, session: Session) -> None:
     """Write numbers and loads, and a legend of the colours."""
-    from matplotlib.colors import ListedColormap
-    from matplotlib.lines import Line2D
-
     axes.set_axis_off()
-    loads = [one.label for one in applied_loads(session.solved, 0, shape_at(session.solved, 0))]
-    lines = [f"{row.label}: {row.value}" for row in rows(session)]
+    loads = [load.label for load in applied_loads(session.solved, 0, shape_at(session.solved, 0))]
+    lines = [f"{label}: {value}" for _, label, value in rows(session)]
     lines.append(f"loads at the tip: {', '.join(loads) or 'none'}")
-    style: dict[str, Any] = {"fontsize": 9, "parse_math": False, "transform": axes.transAxes}
-    axes.text(0.0, 1.0, "\n".join(lines), va="top", **style)
-    ball = {"linestyle": "none", "marker": "o", "markersize": 7}
-    handles: list[Line2D] = []
-    for colour, mark, text in entries(session.robot):
-        shape: dict[str, Any] = ball if mark == BALL else {}
-        handles.append(Line2D([], [], color=colour, label=text, **shape))
+    style: dict[str, Any] = {"parse_math": False, "transform": axes.transAxes}
+    axes.text(0.0, 1.0, "\n".join(lines), va="top", fontsize=9, **style)
+    draw_marks(axes, legend(session.robot))
     position: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, -0.02), "ncols": 2}
-    axes.legend(handles=handles, fontsize=8, handlelength=1.2, **position)
-    allowed = session.robot.material.allowed_strain
-    if allowed is None:
-        return
-    scale = axes.inset_axes((0.24, 0.44, 0.34, 0.035))
-    colours = ListedColormap(strain_scale(64))
-    scale.imshow(np.linspace(0.0, 1.0, 64)[None], aspect="auto", cmap=colours)
-    scale.set_axis_off()
-    for x, text in ((0.0, "notch strain   0"), (0.6, f"{100.0 * allowed:g} % allowed")):
-        axes.text(x, 0.457, text, va="center", fontsize=8, transform=axes.transAxes)
+    axes.legend(fontsize=8, handlelength=1.2, markerscale=2.0, **position)
+    if allowed := session.robot.material.allowed_strain:
+        scale = axes.inset_axes((0.0, 0.43, 0.34, 0.035))
+        scale.imshow(np.linspace(0.0, 1.0, 64)[None], cmap=STRAIN, aspect="auto")
+        scale.set_axis_off()
+        text = f"notch strain from 0 to {100.0 * allowed:g} % allowed"
+        axes.text(0.0, 0.475, text, va="bottom", fontsize=8, **style)

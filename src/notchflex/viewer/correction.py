@@ -8,8 +8,12 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from html import escape
+from typing import Any
 
+import cv2
 import numpy as np
+import viser
+from numpy.typing import NDArray
 
 from notchflex import InputError
 from notchflex.photographs.board import Board
@@ -18,12 +22,114 @@ from notchflex.photographs.judging import UNCERTAINTY
 from notchflex.photographs.measure import checked_uncertainty, measure_picture
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.photographs.outline import straight_chain
+from notchflex.photographs.overlay import LONGEST
 from notchflex.photographs.reading import read_photograph
 from notchflex.photographs.sighting import Ruler
-from notchflex.viewer.correction.picture_plane import PicturePlane
-from notchflex.viewer.page.readout import notice
+from notchflex.viewer.readout import notice
+from notchflex.viewer.scene import CameraPose, framed
 from notchflex.viewer.server import HOST, PORT, check_host, check_installed, serve
 from notchflex.viewer.tasks import Tasks
+
+Numbers = NDArray[np.float64]
+
+_ROOT = "/photograph"
+_WIDE = 10.0  # of the longer side, in lengths of the scene
+# x to the right, y down and z away from the eye, as in photographs, which stand in the plane x-z.
+_STANDING = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
+_BEFORE = 0.02  # how far in front of the photograph lines are drawn
+_POINT, _LINE = 0.025, 3.0
+_ARROW = 0.6  # not of the chain: a fit to the wrong thing may be too small to be seized
+_FOUND, _MISSED, _CHAIN = (60, 200, 60), (255, 140, 40), (0, 114, 178)
+
+
+class PicturePlane:
+    """A photograph, standing upright, and what is drawn over it.
+
+    Args:
+        server: The server.
+        picture: Blue, green and red, (height, width, 3).
+        chain: Points of the chain, px, (n + 2, 2).
+        dragged: Called in the event loop after a point was moved.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        picture: NDArray[np.uint8],
+        chain: Numbers,
+        dragged: Callable[[], None],
+    ) -> None:
+        height, width = picture.shape[:2]
+        self._scene, self._middle = server.scene, np.array([width - 1.0, height - 1.0]) / 2.0
+        self._pixel = _WIDE / max(width, height)
+        self._size = self._pixel * np.array([width, height])
+        factor = min(1.0, LONGEST / max(width, height))
+        small = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        self._root = self._scene.add_frame(_ROOT, wxyz=_STANDING, show_axes=False)
+        self._scene.add_image(
+            f"{_ROOT}/picture", np.ascontiguousarray(small[..., ::-1]), *self._size,
+            jpeg_quality=90, cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+        self._handles = [self._handle(number, dragged) for number in range(len(chain))]
+        self.chain = chain
+
+    def _handle(self, number: int, dragged: Callable[[], None]) -> Any:
+        handle = self._scene.add_transform_controls(
+            f"{_ROOT}/point_{number}", scale=_ARROW, active_axes=(True, True, False),
+            disable_rotations=True, depth_test=False,
+        )  # fmt: skip
+
+        @handle.on_update
+        async def _(_event: Any) -> None:
+            dragged()
+
+        return handle
+
+    @property
+    def chain(self) -> Numbers:
+        """Points of the chain as they were dragged, px, (n + 2, 2)."""
+        positions = np.array([handle.position[:2] for handle in self._handles])
+        return positions / self._pixel + self._middle
+
+    @chain.setter
+    def chain(self, points: Numbers) -> None:
+        for node, position in zip(self._handles, self._placed(points), strict=True):
+            node.position = position
+        self.draw_chain()
+
+    def draw_chain(self) -> None:
+        """Draw lines between the points of the chain."""
+        points = self._placed(self.chain)
+        pairs = np.stack([points[:-1], points[1:]], axis=1)
+        self._scene.add_line_segments(
+            f"{_ROOT}/chain", pairs, _CHAIN, thickness=_LINE, thickness_units="screen"
+        )
+
+    def draw_outline(self, photograph: MeasuredPhotograph) -> None:
+        """Draw a fitted outline: green points lie on an edge, orange ones on none."""
+        within = np.abs(photograph.outline - self._middle).max(axis=1, initial=0.0) < 1e4
+        colours = np.where(photograph.seen[within][:, None], _FOUND, _MISSED).astype(np.uint8)
+        self._scene.add_point_cloud(
+            f"{_ROOT}/outline", self._placed(photograph.outline[within]), colours,
+            point_size=_POINT, point_shape="circle", precision="float32",
+            point_shading="flat",
+        )  # fmt: skip
+
+    def eye(self, aspect: float) -> CameraPose:
+        """Return a camera that shows all of the photograph, of a width over height."""
+        x, z = 0.5 * self._size
+        corners = np.array([[-x, 0.0, -z], [x, 0.0, z]])
+        return framed(corners, np.array([0.0, -1.0, 0.0]), aspect, room=1.05)
+
+    def remove(self) -> None:
+        """Remove all of it."""
+        self._root.remove()
+
+    def _placed(self, points: Numbers) -> Numbers:
+        """Return points of the photograph (px) in its plane, in front of it."""
+        flat = self._pixel * (points - self._middle)
+        return np.concatenate([flat, np.full((len(flat), 1), -_BEFORE)], axis=1)
+
 
 LEFT_OUT = "left out by hand"
 NOT_LOOKED_AT = "not looked at before the page was ended"
@@ -41,7 +147,7 @@ class Correction:
     fit is refused can be left out, but not accepted.
 
     Args:
-        found: What was measured without corrections.
+        measured: What was measured without corrections.
         scale: Pixels of the photographs per mm, as for `measure`.
         board: Board beside the robot, as for `measure`.
         uncertainty_deg: Standard deviations that are allowed, as for `measure`.
@@ -64,7 +170,7 @@ class Correction:
     ) -> None:
         check_installed()
         check_host(host, port)
-        self.found, self.number = measured, 0
+        self._measured, self.number = measured, 0
         self._ruler = Ruler(scale, board)
         self._uncertainty = checked_uncertainty(uncertainty_deg)
         self.results = list(measured.photographs)
@@ -76,14 +182,10 @@ class Correction:
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
         gui.set_panel_label(measured.robot.name)
         self._notice, self._text = gui.add_html(""), gui.add_html("")
-        self._refit = gui.add_button("Refit")
-        self._accept = gui.add_button("Accept")
-        self._leave_out = gui.add_button("Leave out", color="gray")
-        self._look = gui.add_button("Look straight", color="gray")
-        self._refit.on_click(lambda _: self._ask(self.refit))
-        self._accept.on_click(lambda _: self._ask(self.accept))
-        self._leave_out.on_click(lambda _: self._ask(self.leave_out))
-        self._look.on_click(lambda _: self._ask(self.look))
+        self._button("Refit", self.refit)
+        self._accept = self._button("Accept", self.accept)
+        self._button("Leave out", self.leave_out, "gray")
+        self._button("Look straight", self.look, "gray")
         gui.add_html(f"<p style='margin: 0 1em; font-size: 12px'>{_HELP}</p>")
         self._show()
 
@@ -104,14 +206,12 @@ class Correction:
                     task()
         except KeyboardInterrupt:
             # A fit of the photograph that is shown was not accepted.
-            self.results[self.number :] = [
-                MeasuredPhotograph.refused(one.source, self._table.notches, NOT_LOOKED_AT)
-                for one in self.results[self.number :]
-            ]
+            for number in range(self.number, len(self.results)):
+                self._refuse(number, NOT_LOOKED_AT)
         finally:
             with contextlib.redirect_stdout(io.StringIO()):  # a CSV may go there
                 self.server.stop()
-        return replace(self.found, photographs=tuple(self.results))
+        return replace(self._measured, photographs=tuple(self.results))
 
     def refit(self) -> None:
         """Fit again, from the points as they were dragged."""
@@ -140,11 +240,12 @@ class Correction:
 
     def leave_out(self) -> None:
         """Refuse the photograph, and go on to the next one."""
-        now = self.results[self.number]
-        self.results[self.number] = MeasuredPhotograph.refused(
-            now.source, self._table.notches, LEFT_OUT
-        )
+        self._refuse(self.number, LEFT_OUT)
         self._next()
+
+    def _refuse(self, number: int, reason: str) -> None:
+        source = self.results[number].source
+        self.results[number] = MeasuredPhotograph.refused(source, self._table.notches, reason)
 
     def look(self) -> None:
         """Move the camera of every browser in front of the photograph."""
@@ -158,10 +259,14 @@ class Correction:
         self.plane.draw_chain()
         self._update()
 
-    def _ask(self, action: Callable[[], None]) -> None:
-        """Act on the photograph that is shown now; not on the next one after a second click."""
-        number = self.number
-        self._tasks.add(lambda: action() if number == self.number else None)
+    def _button(self, label: str, action: Callable[[], None], color: Any = None) -> Any:
+        button = self.server.gui.add_button(label, color=color)
+        button.on_click(lambda _: self._ask(action, self.number))
+        return button
+
+    def _ask(self, action: Callable[[], None], number: int, key: str | None = None) -> None:
+        """Act on one photograph; not on the next one after a second click."""
+        self._tasks.add(lambda: action() if number == self.number else None, key)
 
     def _next(self) -> None:
         self.plane.remove()
@@ -176,11 +281,9 @@ class Correction:
         height, width = self.picture.shape[:2]
         chain = now.chain if len(now.chain) else straight_chain(self._table, width, height)
         number = self.number
-
-        def dragged() -> None:
-            self._tasks.add(lambda: self.moved() if number == self.number else None, "drag")
-
-        self.plane = PicturePlane(self.server, self.picture, chain, dragged)
+        self.plane = PicturePlane(
+            self.server, self.picture, chain, lambda: self._ask(self.moved, number, "drag")
+        )
         self._dragged, self.message = False, ""
         eye, camera = self.plane.eye(4.0 / 3.0), self.server.initial_camera
         camera.position, camera.look_at = eye.position, eye.target
@@ -194,13 +297,12 @@ class Correction:
         self._accept.disabled = self._dragged or not now.measured
 
 
-def _described(one: MeasuredPhotograph, number: int, of: int) -> str:
-    lines = [f"<b>{escape(one.source)}</b> ({number} of {of})"]
-    if one.reason:
-        lines.append(f"refused: {escape(one.reason)}")
-    for notch, (angle, spread) in enumerate(
-        zip(np.degrees(one.notch_angle), np.degrees(one.notch_angle_deviation), strict=True), 1
-    ):
+def _described(photograph: MeasuredPhotograph, number: int, of: int) -> str:
+    lines = [f"<b>{escape(photograph.source)}</b> ({number} of {of})"]
+    if photograph.reason:
+        lines.append(f"refused: {escape(photograph.reason)}")
+    columns = np.degrees([photograph.notch_angle, photograph.notch_angle_deviation])
+    for notch, (angle, spread) in enumerate(columns.T.tolist(), start=1):
         if math.isfinite(angle):
             lines.append(
                 f"notch {notch}: <span data-name='angle_{notch}'>{angle:.2f}</span> "

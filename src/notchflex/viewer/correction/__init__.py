@@ -1,1 +1,0 @@
-"""A page in the browser on which fits to photographs are corrected by hand."""

@@ -1,1 +1,0 @@
-"""Overlays of the robot: a handle at the tip, the reachable cloud, the sensed force."""

@@ -1,1 +1,0 @@
-"""The page: controls, charts, legend, readout."""
