@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 from harness import options, show, timed, trials
-from judge import plain, wrong
+from random_robots.judge import plain, wrong
 
 import notchflex as nf
 

@@ -1,6 +1,6 @@
 """Small loads on a single notch, against the textbook: cantilevers in bending and torsion.
 
-python benchmarks/robustness.py --only compliance --count 12
+python benchmarks/robustness.py compliance
 """
 
 from __future__ import annotations

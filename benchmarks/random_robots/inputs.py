@@ -1,6 +1,6 @@
 """Unusable values in robots and loads: each must be refused by `InputError`, or taken.
 
-python benchmarks/robustness.py --only inputs --count 2000
+python benchmarks/robustness.py inputs
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 import notchflex as nf
 
-from .by_form import VARIANTS, make_loads, make_robot, tables_of
+from .robots import VARIANTS, make_loads, make_robot, tables_of
 
 ODD: list[Any] = [0, -1, 1e-300, 1e300, -1e300, float("nan"), float("inf"), -float("inf"), True]
 ODD += [None, "1", "", "arc", [], [1.0], {}, (0.0, 0.0), 2**70, 1e-9, 1e9, 0.5, np.float32(2), "é"]
@@ -71,7 +71,7 @@ def failed(seed: int, count: int) -> bool:
             ended["refused"] += 1
         except Exception as error:  # whatever it is, it is a finding
             last = traceback.extract_tb(error.__traceback__)[-1]
-            ours = "by_form" in last.filename
+            ours = "robots.py" in last.filename
             ours |= isinstance(error, TypeError) and "keyword" in str(error)
             kind = f"{type(error).__name__}: {error}"[:150]
             kind = "not for the library" if ours else kind

@@ -1,6 +1,6 @@
 """Spoil one quantity of a good result at a time: the checks must find every one.
 
-python benchmarks/robustness.py --only spoiled
+python benchmarks/robustness.py spoiled
 """
 
 from __future__ import annotations

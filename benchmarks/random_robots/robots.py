@@ -1,7 +1,9 @@
-"""Random robots by form: `draw(seed, number)`, with a random history of loads each.
+"""Random robots: `draw(seed, number)`, with a random history of loads each.
 
 Sixteen draws after one another share a form (notches, laws, tendons, number of steps, what acts
-from outside), each with its own sizes and its own history. Tables have the keys of robot files;
+from outside), each with its own sizes and its own history. Half of the forms have the laws of the
+papers; the others are what a drawing of the tube gives: elastic ends, elastic closing, nitinol
+with and without hysteresis, a table of stress over strain. Tables have the keys of robot files;
 lengths in mm, forces in N, angles of robots in degrees. Some draws are no robots and are refused.
 """
 
@@ -21,7 +23,12 @@ from .sections import section_of
 Table = dict[str, Any]
 VARIANTS = 16
 NOTCHES = {"arc": nf.ArcNotch, "strip": nf.StripNotch, "u-link": nf.ULink}
-MATERIALS = {"linear": nf.Linear, "superelastic": nf.Superelastic}
+MATERIALS = {
+    "linear": nf.Linear,
+    "superelastic": nf.Superelastic,
+    "nitinol": nf.Nitinol,
+    "stress-strain": nf.StressStrain,
+}
 FRICTIONS = {"capstan": nf.Capstan, "corner": nf.Corner, "frictionless": nf.Frictionless}
 
 
@@ -78,6 +85,25 @@ def draw_notch(random: np.random.Generator, kind: str, tube: Table) -> Table:
     return notch
 
 
+def as_drawn(random: np.random.Generator, notches: list[Table], tube: Table) -> None:
+    """Let the tube make the notches: elastic ends and lips; of half of the robots usual sizes."""
+    usual, radius = random.random() < 0.5, tube["outer_diameter"] / 2
+    closing = pick(random, elastic=1, rigid=1)
+    depth_at = pick(random, outer=2, mid_wall=1, inner=1)
+    for notch in notches:
+        if notch["kind"] != "arc":
+            notch["ends"] = "elastic"
+            continue
+        notch |= {"ends": "shell", "closing": closing}
+        if usual:
+            notch["depth"] = radius * random.uniform(1.5, 1.8)
+            notch["uncut_length"] = radius * random.uniform(0.8, 3.0)
+        # Read at another surface the edges of some cuts would not meet the tube.
+        across = abs(notch["depth"] - radius) < 0.9 * tube["inner_diameter"] / 2
+        if notch["cut"] == "on-axis" and across:
+            notch["depth_at"] = depth_at
+
+
 def draw_notches(random: np.random.Generator, tube: Table, planar: bool) -> list[Table]:
     """Return the notches: of one kind or mixed, equal or each its own."""
     family = pick(random, arc=5, strip=2, u_link=2, mixed=3)
@@ -88,7 +114,7 @@ def draw_notches(random: np.random.Generator, tube: Table, planar: bool) -> list
         if kind == "u-link" and notches and notches[-1]["kind"] == "u-link":
             kind = "arc"  # rows side by side would have to share a slot
         notch = draw_notch(random, kind, tube)
-        left = count - sum(other.get("repeat", 1) for other in notches)
+        left = count - sum(before.get("repeat", 1) for before in notches)
         equal = left if random.random() < 0.4 or count > 12 else 1
         if family == "mixed":
             equal = int(random.integers(1, min(4, left) + 1))
@@ -150,23 +176,69 @@ def draw_tendons(random: np.random.Generator, robot: Table, planar: bool) -> lis
     return tendons
 
 
-def draw_material(random: np.random.Generator) -> Table:
+def draw_material(random: np.random.Generator, from_drawing: bool) -> Table:
     """Return a polymer, steel or nitinol."""
-    table: Table = {"kind": "linear", "elastic_modulus": between_decades(random, 100, 2e5)}
-    if random.random() < 0.5:
-        first = between_decades(random, 0.002, 0.04)
+    weights = {"linear": 1.0, "superelastic": 1.0}
+    if from_drawing:
+        weights = {"linear": 1.0, "superelastic": 0.5, "nitinol": 2.0, "stress_strain": 0.5}
+    kind = pick(random, **weights)
+    modulus = between_decades(random, 100, 2e5)
+    begin = between_decades(random, 0.002, 0.04)
+    table: Table = {"kind": kind, "elastic_modulus": modulus}
+    if kind == "superelastic":
         table |= {
-            "kind": "superelastic",
-            "superelastic_modulus": table["elastic_modulus"] * random.uniform(0.02, 0.6),
-            "transition_strain": first,
-            "plastic_strain": first * random.uniform(1.5, 10),
-            "plastic_modulus": table["elastic_modulus"] * random.uniform(0.01, 0.3),
+            "superelastic_modulus": modulus * random.uniform(0.02, 0.6),
+            "transition_strain": begin,
+            "plastic_strain": begin * random.uniform(1.5, 10),
+            "plastic_modulus": modulus * random.uniform(0.01, 0.3),
         }
+    elif kind == "nitinol":
+        stress = begin * modulus
+        table |= {"plateau_stress": stress, "plateau_modulus": modulus * random.uniform(0.01, 0.5)}
+        table["compression_ratio"] = float(random.choice([1.0, random.uniform(1.0, 1.6)]))
+        if random.random() < 0.6:
+            table["unloading_stress"] = stress * random.uniform(0.05, 0.95)
+        if random.random() < 0.3:
+            table["transformation_strain"] = begin + random.uniform(0.02, 0.06)
+    elif kind == "stress-strain":
+        del table["elastic_modulus"]
+        table |= draw_curve(random, modulus, begin, "")
+        if random.random() < 0.5:
+            table |= draw_curve(random, modulus, begin * random.uniform(0.8, 1.6), "compression_")
     if random.random() < 0.5:
         table["poisson_ratio"] = random.uniform(0.0, 0.49)
     if random.random() < 0.4:
         table["density"] = between_decades(random, 500, 10000)
     return table
+
+
+def draw_curve(random: np.random.Generator, modulus: float, begin: float, prefix: str) -> Table:
+    """Return a curve of stress over strain of two to seven pieces, which may stiffen again."""
+    count = int(random.integers(1, 7))
+    strain = begin + np.append(0.0, np.cumsum(random.uniform(0.004, 0.02, count)))
+    slope = modulus * np.exp(random.uniform(np.log(0.012), np.log(1.2), count))
+    stress = modulus * begin + np.append(0.0, np.cumsum(np.diff(strain) * slope))
+    return {f"{prefix}strain": strain.tolist(), f"{prefix}stress": stress.tolist()}
+
+
+def elastic_modulus(material: Table) -> float:
+    """Return Young's modulus, MPa: of a curve, that of its first piece."""
+    if material["kind"] == "stress-strain":
+        return material["stress"][0] / material["strain"][0]
+    return material["elastic_modulus"]
+
+
+def softened(material: Table, strain: float) -> float:
+    """Return stress at a strain over what Young's modulus alone would give, about."""
+    modulus = elastic_modulus(material)
+    if material["kind"] == "nitinol":
+        begin, beyond = material["plateau_stress"] / modulus, material["plateau_modulus"]
+    elif material["kind"] == "stress-strain":
+        begin, last = material["strain"][0], material["strain"][-1]
+        beyond = (material["stress"][-1] - material["stress"][0]) / (last - begin)
+    else:
+        return 1.0
+    return min(1.0, (begin + beyond / modulus * (strain - begin)) / strain)
 
 
 def draw_friction(random: np.random.Generator) -> Table:
@@ -196,29 +268,34 @@ def varied(random: np.random.Generator, robot: Table) -> None:
                 part[key] *= size * random.uniform(0.97, 1.03)
         if "axial_stiffness" in part:
             part["axial_stiffness"] *= size**2
-    for part, keys in (("material", ("elastic_modulus",)), ("friction", ("coefficient",))):
-        for key in keys:
-            if key in robot[part]:
-                robot[part][key] *= random.uniform(0.3, 1.5)
+    stiffer, rougher = random.uniform(0.3, 1.5, 2)
+    for key, value in robot["material"].items():
+        if key.endswith(("modulus", "stress")):
+            robot["material"][key] = np.multiply(value, stiffer).tolist()
+    if "coefficient" in robot["friction"]:
+        robot["friction"]["coefficient"] *= rougher
 
 
 def reference(robot: Table, notch: Table) -> tuple[float, float, float]:
     """Return stiffness (N mm), a large angle and the lever (mm) of a notch, roughly."""
-    tube, modulus = robot["tube"], robot["material"]["elastic_modulus"]
+    tube, material = robot["tube"], robot["material"]
     outer, inner = tube["outer_diameter"] / 2, tube["inner_diameter"] / 2
     if notch["kind"] == "arc":
         left = section_of(notch["cut"], outer, inner, notch["depth"])
-        centroid, second = left.centroid, left.weak
-        angle = min(notch["height"] / (outer + centroid), 0.8)
-        return modulus * second / notch["height"], angle, outer * 0.9 + centroid
-    width = notch.get("wall_width") or 2 * (outer - inner)
-    thickness = notch["strip_thickness"]
-    second = width * thickness**3 / 12
-    if notch["kind"] == "strip":
-        length = notch.get("strip_length") or outer + inner
-        return modulus * second / length, min(notch["height"] / (2 * outer), 0.5), 0.5 * length
-    length = notch["strip_length"] + 2 * notch["slot_radius"]
-    return modulus * second / length, min(notch["slot_radius"] / outer, 0.3), 0.8 * outer
+        length, second, fibre = notch["height"], left.weak, left.spine
+        angle = min(length / (outer + left.centroid), 0.8)
+        lever = outer * 0.9 + left.centroid
+    else:
+        fibre = notch["strip_thickness"] / 2
+        second = (notch.get("wall_width") or 2 * (outer - inner)) * 2 * fibre**3 / 3
+        if notch["kind"] == "strip":
+            length = notch.get("strip_length") or outer + inner
+            angle, lever = min(notch["height"] / (2 * outer), 0.5), 0.5 * length
+        else:
+            length = notch["strip_length"] + 2 * notch["slot_radius"]
+            angle, lever = min(notch["slot_radius"] / outer, 0.3), 0.8 * outer
+    modulus = elastic_modulus(material) * softened(material, angle * fibre / length)
+    return modulus * second / length, angle, lever
 
 
 def draw_course(random: np.random.Generator, steps: int, both_signs: bool) -> np.ndarray:
@@ -330,8 +407,8 @@ def scaled(load: Table, factor: float) -> Table:
         load["tip_mass"] = load["tip_mass"] * abs(factor)
     if "body_forces" in load:
         load["body_forces"] = [
-            one | {"force": one["force"] * factor, "moment": one["moment"] * factor}
-            for one in load["body_forces"]
+            part | {"force": part["force"] * factor, "moment": part["moment"] * factor}
+            for part in load["body_forces"]
         ]
     return load
 
@@ -389,14 +466,18 @@ def tables_of(seed: int, number: int) -> tuple[Table, list[Table], str]:
     tube = draw_tube(of_form)
     robot: Table = {"name": f"draw {seed}-{number}", "tube": tube}
     robot["notch"] = draw_notches(of_form, tube, planar)
-    robot["material"] = draw_material(of_form)
+    from_drawing = bool(of_form.random() < 0.5)
+    if from_drawing:
+        as_drawn(of_form, robot["notch"], tube)
+    robot["material"] = draw_material(of_form, from_drawing)
     robot["friction"] = draw_friction(of_form)
     robot["tendon"] = draw_tendons(of_form, robot, planar)
     frame = draw_frame(of_form, len(robot["tendon"]))
     if number % VARIANTS:
         varied(random, robot)
     kinds = "+".join(sorted({notch["kind"] for notch in robot["notch"]}))
-    form = f"{kinds} {'planar' if planar else 'spatial'}"
+    form = f"{kinds} {'planar' if planar else 'spatial'} {robot['material']['kind']}"
+    form += " elastic ends" if from_drawing else ""
     return robot, draw_history(random, robot, planar, tension_scale(robot), frame), form
 
 
@@ -426,6 +507,6 @@ def make_loads(rows: list[Table]) -> tuple[nf.Load, ...]:
     """Return the loads of tables."""
     loads = []
     for row in rows:
-        forces = [nf.BodyForce(**one) for one in row.get("body_forces", [])]
+        forces = [nf.BodyForce(**force) for force in row.get("body_forces", [])]
         loads.append(nf.Load(**{**row, "body_forces": forces}))
     return tuple(loads)
