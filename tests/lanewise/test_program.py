@@ -11,7 +11,7 @@ from lanewise.ir import graph
 from notchflex._jax import jax, jnp
 
 # Fewer than a vector's lanes, as many, more, and several vectors.
-SIZES = (1, 2, 3, 8, 13, 27, 40)
+SIZES = (1, 3, 8, 27)
 ROUNDING = 1e-13
 
 
@@ -152,21 +152,6 @@ def test_loops_that_others_do_not_change_stand_before_them(size):
             return total, (of_vector[1][1], of_row[0])
 
         return jax.lax.scan(step, jnp.zeros((size, 2)), few[:3])
-
-    check(function, given(size), long=(size, size + 1))
-
-
-@pytest.mark.parametrize("size", SIZES)
-def test_swapping_what_is_carried(size):
-    def function(vector):
-        table, _ = parted(vector, size)
-
-        def swapped(_, state):
-            first, second, last = state
-            return second, first, jnp.concatenate([second[1:], last[:1]])
-
-        start = (table[:, 0, 0], table[:, 1, 0], table[:, 2, 0])
-        return jax.lax.fori_loop(0, 3, swapped, start)
 
     check(function, given(size), long=(size, size + 1))
 
