@@ -182,3 +182,11 @@ def test_works_are_those_of_paths(wrist):
     np.testing.assert_allclose(each["tendon_work"], half, atol=1e-12)
     with refused("UNKNOWN_NAME", "dissipation"):
         nf.differentiable(wrist, path, ["notch.depth"], outputs=["dissipation"])
+
+
+@pytest.mark.parametrize("given", [1, None])
+def test_what_is_no_batch_of_paths(wrist, given):
+    with refused(ErrorCode.WRONG_TYPE):
+        nf.simulate_batch(wrist, given)
+    with refused(ErrorCode.WRONG_TYPE):
+        nf.simulate_batch(given, nf.pull(0.0, 1.0, steps=2))

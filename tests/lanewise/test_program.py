@@ -277,20 +277,6 @@ def test_loops_along_the_lanes(size):
     check(lambda x: eliminated(x, size, 3), vector, long=(size, size + 1))
 
 
-def test_loops_along_the_lanes_copy_no_single_entries():
-    """What rows a loop reads and writes as they are: no loop for each entry of its matrices."""
-
-    def loops(width):
-        def function(vector):
-            _, products, chosen, _ = eliminated(vector, 27, width)
-            return jnp.sum(products, axis=(1, 2)), chosen
-
-        text = lower(function, [np.ones(27 * width**2)], (27, 28))[0].text
-        return text.count(" = phi ")
-
-    assert loops(2) == loops(4)
-
-
 def test_arrays_that_are_read_only_or_empty():
     made, _ = program(lambda x, y: (2.0 * x, y + 1.0), [np.ones(3), np.ones(0)], ())
     fixed = np.arange(3.0)

@@ -21,7 +21,7 @@ def digests(forms: str, count: int, seed: int) -> str:
 
 @pytest.mark.parametrize(
     ("forms", "count", "orders"),
-    [("6", 4, 2), pytest.param("0123456789", 60, 3, marks=pytest.mark.nightly)],
+    [("1", 4, 2), pytest.param("0123456789", 60, 3, marks=pytest.mark.nightly)],
 )
 def test_results_are_equal_to_the_bit_in_any_order(forms, count, orders):
     first = digests(forms, count, 0)

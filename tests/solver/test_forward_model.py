@@ -11,8 +11,6 @@ import notchflex as nf
 from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.slopes import changes, derivatives
 from notchflex.analysis.tangent import Change, PathTangents, path_gradient
-from notchflex.mechanics.chain import assemble
-from notchflex.solver.programs.prepare import PreparedChain
 
 
 def shaken(path: nf.EquilibriumPath) -> Change:
@@ -64,20 +62,6 @@ def test_many_numbers_take_the_adjoint_and_few_the_tangents(margin):
     here = 0.7 + 3e-3
     expected = (at(here + width) - at(here - width)) / (2.0 * width)
     margin.within("against differences", float(reverse[3]) / expected - 1.0, 1e-5)
-
-
-def test_other_laws_make_the_chain_that_is_assembled_anew(margin):
-    robot = nf.load_robot("liu2022")
-    values = {"material.elastic_modulus": 7e3, "friction.coefficient": 0.21}
-    model = ForwardModel(robot, nf.pull(1.0, 1.0, steps=1))
-    other = robot.with_values(values)
-    found, expected = model._prepared(other), PreparedChain(assemble(other))
-    for made, assembled in ((found, expected), (found.long, expected.long)):
-        finite = np.isfinite(assembled.vector)
-        np.testing.assert_array_equal(made.vector[~finite], assembled.vector[~finite])
-        size = np.abs(assembled.vector[finite]).max()
-        margin.within("chain", (made.vector[finite] - assembled.vector[finite]) / size, 1e-14)
-        assert made.static_structure is assembled.static_structure
 
 
 def test_rows_from_rest_do_not_know_of_each_other(margin):

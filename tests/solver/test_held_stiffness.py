@@ -80,6 +80,7 @@ def test_as_by_dense_differentiation(name, margin):
     assert path.stable.tolist() == ((smallest > 0.0) & (sign > 0.0)).tolist()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("strokes", [[0.3, 0.3, 0.3, 0.3], [0.3001, 0.3, 0.3001, 0.3]])
 def test_strokes_that_depend_on_each_other_fix_no_tensions(strokes):
     # The fourth stroke follows from three: 0.1 um more on two of them changes the tensions wholly.
@@ -95,6 +96,7 @@ def test_strokes_that_depend_on_each_other_fix_no_tensions(strokes):
     assert "axial_stiffness" in warning
 
 
+@pytest.mark.nightly
 def test_tensions_are_determined_by_stretch_or_where_no_more_strokes_hold_than_are_independent():
     robot = nf.load_robot("two-axis-wrist")
     tendons = tuple(dataclasses.replace(one, axial_stiffness=500.0) for one in robot.tendon)

@@ -109,21 +109,6 @@ def test_coarse_steps_that_end_elsewhere_are_warned_of():
         assert warned[off > 1.0].all(), number
 
 
-def test_snaps_are_kept_in_files(cycle, tmp_path):
-    nf.save_path(cycle, tmp_path / "cycle.json")
-    np.testing.assert_array_equal(nf.read_path(tmp_path / "cycle.json").snap, cycle.snap)
-
-
-def test_no_snap_without_elastic_ends():
-    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 3.0, steps=5))
-    assert not path.snap.any()
-
-
-def test_no_work_is_gained(cycle):
-    work = np.trapezoid(cycle.tension[:, 0], cycle.stroke[:, 0])
-    assert work > 0.0
-
-
 def test_a_stroke_passes_the_limit_point(cycle):
     most = float(cycle.stroke[:, 0].max())
     path = nf.simulate(wrist(), nf.stroke_path(0.0, most, steps=121))

@@ -11,7 +11,7 @@ from loads import strokes, tensions
 from oracles.wrist import SPECIMENS, WRISTS
 from robots import of_wrist, ready, specimen
 
-ANGLE = 1e-9  # rad
+ANGLE = 2e-11  # rad
 # Base tension at which the last notch closes [N] (tests/reference/pacheco_closing.csv).
 LAST_CLOSING = {"A": 2.1329, "B": 1.872, "C": 2.309}
 BELOW = np.array([0.0, 0.02, 0.2, 0.45, 0.6, 0.75, 0.85, 0.93, 0.97, 0.999])
@@ -75,22 +75,6 @@ def test_drawn_and_let_go_in_small_steps(name, wrap, part, margin):
         tension = brentq(missing, 0.0, peak, args=(history, stroke), xtol=1e-15)
         angle = wrist.march([*history, tension])[-1].angle
         margin.within("angles", path.notch_angle[step] - angle, ANGLE, "rad")
-
-
-def test_elastic_tendon_reaches_beyond_the_last_closing(margin):
-    robot = ready("A").with_value("tendon[1].axial_stiffness", 500.0)
-    robot = robot.with_value("tendon[1].free_length", 300.0)
-    pulled = nf.simulate(robot, tensions([1.0, 2.0, 2.6]))
-    assert pulled.closed[-1].all()
-    drawn = nf.simulate(robot, strokes(pulled.stroke))
-    assert drawn.converged.all(), drawn.reason
-    margin.within("angles", drawn.notch_angle - pulled.notch_angle, ANGLE, "rad")
-    margin.within("tension", drawn.tension - pulled.tension, 1e-11, "N")
-    stiff = nf.simulate(ready("A"), tensions(pulled.tension))
-    # 300 mm under 1 N stretch by 0.6 mm; what lies in the wrist adds less than 10 mm to that.
-    longer = (pulled.stroke - stiff.stroke) / pulled.tension
-    assert (longer > 300 / 500).all()
-    assert (longer < 310 / 500).all()
 
 
 @pytest.mark.nightly

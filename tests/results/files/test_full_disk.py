@@ -159,3 +159,15 @@ def test_a_pipe_with_a_writer_is_read(pipe, monkeypatch, slow):
     writer.start()
     assert nf.load_robot(pipe) == wrist
     writer.join()
+
+
+@pytest.mark.parametrize("name", ["a\0b", "a\x1b[31mb", "a\nb"])
+def test_names_hold_no_control_characters(name):
+    wrist = nf.load_robot("pacheco2021-a")
+    with refused("INVALID_ROBOT", "name", "control characters"):
+        wrist.replace(name=name)
+
+
+def test_a_deviation_that_tells_nothing_is_refused():
+    with refused("OUT_OF_RANGE", "stroke of SensorNoise"):
+        nf.SensorNoise(stroke=1e155)

@@ -204,3 +204,10 @@ def test_a_missing_library_is_told_with_its_command(loop, tmp_path, monkeypatch,
     with refused(ErrorCode.MISSING_PACKAGE, module, "pip install 'notchflex[data]'"):
         nf.save_path(loop, tmp_path / f"a{suffix}")
     assert not list(tmp_path.iterdir())
+
+
+def test_other_suffixes_are_refused(loop, tmp_path):
+    with refused(ErrorCode.FILE_FORMAT):
+        nf.save_path(loop, tmp_path / "a.xlsx")
+    with refused(ErrorCode.FILE_FORMAT):
+        nf.read_path(tmp_path / "a")
