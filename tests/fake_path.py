@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex import Equilibrium, load_robot
+from notchflex import Equilibrium, bodies_from_angles, load_robot, tip_from_angles
 from notchflex.loads.load import NOTHING
 from notchflex.mechanics.chain import assemble
 
@@ -76,7 +76,7 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
     stiffness = np.linspace(1.0, 1.1, n)
     angle = np.minimum(np.radians(18.0) * lag[:, None] / stiffness, CLOSING)
     closed = angle >= CLOSING
-    pose = [_chain(robot, row) for row in angle]
+    position, rotation = bodies_from_angles(robot, angle)
     good = np.arange(count) < count - failed
     spans = np.full((count, 1, 2 * n), np.nan)
     spans[:] = tension[:, None, None] * np.exp(-0.03 * np.arange(2 * n))
@@ -90,10 +90,10 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
         "notch_angle": angle,
         "total_angle": angle.sum(axis=1),
         "tip_axis_angle": np.arccos(np.cos(angle.sum(axis=1))),
-        "tip_position": np.array([p[-1] + r[-1] @ [0, 0, 1.2] for p, r in pose]),
-        "tip_rotation": np.array([r[-1] for _, r in pose]),
-        "body_position": np.array([p for p, _ in pose]),
-        "body_rotation": np.array([r for _, r in pose]),
+        "tip_position": tip_from_angles(robot, angle)[0],
+        "tip_rotation": rotation[:, -1],
+        "body_position": position,
+        "body_rotation": rotation,
         "span_tension": spans,
         "notch_moment": 1.38 * tension[:, None] * np.ones(n),
         "outer_strain": angle * 0.1235 / 0.8,
@@ -130,18 +130,3 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
         "snap": np.zeros((count, n), int),
     }
     return FakePath(robot, columns)
-
-
-def _chain(robot: Any, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return position and rotation of every body for angles in one plane, x toward the bend."""
-    position, rotation = [np.zeros(3)], [np.eye(3)]
-    length = robot.tube.base_length
-    for notch, angle in zip(robot.notches, angles, strict=True):
-        arc = notch.height - CENTROID * angle
-        c, s = np.cos(angle), np.sin(angle)
-        over = angle if angle > 1e-9 else 1.0
-        step = arc * np.array([(1 - c) / over, 0.0, s / over if angle > 1e-9 else 1.0])
-        position.append(position[-1] + rotation[-1] @ (step + np.array([0.0, 0.0, length])))
-        rotation.append(rotation[-1] @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
-        length = notch.uncut_length
-    return np.array(position), np.array(rotation)

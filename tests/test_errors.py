@@ -29,9 +29,9 @@ def made_without_code(file: Path) -> list[int]:
     return lines
 
 
-@pytest.mark.parametrize("file", SOURCES, ids=lambda file: str(file.relative_to(ROOT / "src")))
-def test_every_input_error_has_a_code(file):
-    assert made_without_code(file) == [], "raise InputError.OUT_OF_RANGE(...) or another code"
+def test_every_input_error_has_a_code():
+    for file in SOURCES:
+        assert made_without_code(file) == [], f"raise InputError.OUT_OF_RANGE(...) in {file}"
 
 
 def test_codes_and_ways_to_raise_them_are_the_same():
@@ -40,6 +40,7 @@ def test_codes_and_ways_to_raise_them_are_the_same():
             for cls in (InputError, RobotFileError):
                 error = getattr(cls, code.name)("message")
                 assert (type(error), error.code, str(error)) == (cls, code, "message")
+                assert code.remedy
     assert InputError("message").code is nf.ErrorCode.INVALID_INPUT
 
 
@@ -72,36 +73,6 @@ def test_the_page_is_what_the_codes_give():
 @pytest.fixture(scope="module")
 def wrist():
     return nf.load_robot("pacheco2021-a")
-
-
-@pytest.mark.parametrize(
-    ("code", "call"),
-    [
-        ("UNKNOWN_NAME", lambda wrist: nf.load_robot("no-such-robot")),
-        ("UNKNOWN_NAME", lambda wrist: nf.solve_batch(wrist, nf.Load(1.0), outputs=["bend"])),
-        ("UNKNOWN_NAME", lambda wrist: nf.solve(wrist, nf.Load(1.0)).quantity("tip_positon")),
-        ("OUT_OF_RANGE", lambda wrist: nf.Load(tension=-1.0) and nf.solve(wrist, nf.Load(-1.0))),
-        ("NOT_FINITE", lambda wrist: nf.tip_from_angles(wrist, [[float("nan")] * 5])),
-        ("WRONG_SHAPE", lambda wrist: nf.tip_from_angles(wrist, [[0.1] * 4])),
-        ("WRONG_TYPE", lambda wrist: nf.solve("wrist", nf.Load(1.0))),
-        ("CONFLICT", lambda wrist: nf.solve(wrist, nf.Load(tension=1.0, stroke=1.0))),
-        ("FILE_NOT_FOUND", lambda wrist: nf.load_robot("nowhere/robot.toml")),
-        ("FILE_FORMAT", lambda wrist: nf.read_path("table.csv")),
-        ("INVALID_ROBOT", lambda wrist: wrist.replace(name="")),
-    ],
-)
-def test_what_a_mistake_is_called(wrist, code, call):
-    with pytest.raises(nf.InputError) as caught:
-        call(wrist)
-    assert caught.value.code.name == code
-    assert caught.value.code.remedy
-
-
-def test_a_state_of_another_robot(wrist):
-    state = nf.solve(wrist, nf.Load(1.0)).state
-    with pytest.raises(nf.InputError) as caught:
-        nf.solve(nf.load_robot("pacheco2021-b"), nf.Load(1.0), from_state=state)
-    assert caught.value.code is nf.ErrorCode.STATE_OF_ANOTHER_ROBOT
 
 
 def test_failures_have_a_code(wrist, tmp_path):
@@ -145,3 +116,27 @@ def test_a_stroke_across_slack_names_the_constant_loss():
         assert path.reason_code == ["LOSS_LEAVES_SLACK"]
         assert "135 N over all edges of tendon 1" in path.reason[0]  # 9 edges
         assert "command a tension" in path.reason[0]
+
+
+@pytest.mark.parametrize(
+    ("code", "call"),
+    [
+        ("UNKNOWN_NAME", lambda wrist: nf.load_robot("no-such-robot")),
+        ("UNKNOWN_NAME", lambda wrist: nf.solve_batch(wrist, nf.Load(1.0), outputs=["bend"])),
+        ("UNKNOWN_NAME", lambda wrist: nf.solve(wrist, nf.Load(1.0)).quantity("tip_positon")),
+        ("OUT_OF_RANGE", lambda wrist: nf.Load(tension=-1.0) and nf.solve(wrist, nf.Load(-1.0))),
+        ("NOT_FINITE", lambda wrist: nf.tip_from_angles(wrist, [[float("nan")] * 5])),
+        ("WRONG_SHAPE", lambda wrist: nf.tip_from_angles(wrist, [[0.1] * 4])),
+        ("WRONG_SHAPE", lambda wrist: nf.solve(wrist, nf.Load((1.0, 2.0)))),
+        ("WRONG_TYPE", lambda wrist: nf.solve("wrist", nf.Load(1.0))),
+        ("CONFLICT", lambda wrist: nf.solve(wrist, nf.Load(tension=1.0, stroke=1.0))),
+        ("FILE_NOT_FOUND", lambda wrist: nf.load_robot("nowhere/robot.toml")),
+        ("FILE_FORMAT", lambda wrist: nf.read_path("table.csv")),
+        ("INVALID_ROBOT", lambda wrist: wrist.replace(name="")),
+    ],
+)
+def test_what_a_mistake_is_called(wrist, code, call):
+    with pytest.raises(nf.InputError) as caught:
+        call(wrist)
+    assert caught.value.code.name == code
+    assert caught.value.code.remedy

@@ -112,10 +112,6 @@ def test_version():
     assert f"version: {nf.__version__}\n" in citation
 
 
-def test_typed():
-    assert (FOLDER / "py.typed").is_file()
-
-
 def processor_time(code: str) -> float:
     """Seconds of processor time that code takes, the best of three: the machine may be busy."""
     code = f"import time; start = time.process_time(); {code}; print(time.process_time() - start)"
@@ -136,11 +132,6 @@ def test_robots_are_quick_and_do_without_jax():
     assert processor_time(use) < 0.5
     code = f"{use}; import sys; print({{'jax', 'jaxlib', 'numpy', 'scipy'}} & set(sys.modules))"
     assert python(code) == "set()"
-
-
-def test_64_bit_floats_are_switched_on_by_the_package():
-    code = "from notchflex._jax import jnp; print(jnp.ones(1).dtype)"
-    assert python(code) == "float64"
 
 
 def test_jax_adds_up_right():

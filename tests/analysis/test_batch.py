@@ -25,7 +25,7 @@ def test_loads_of_one_robot(wrist, margin):
     assert told[-1] == (70, 70)
 
 
-@pytest.mark.parametrize("steps", [4, 5, 6])
+@pytest.mark.parametrize("steps", [5, 6])
 def test_as_many_steps_as_flexures_or_bodies(wrist: nf.Robot, steps: int) -> None:
     """What lies along the steps is not taken for what lies along the chain."""
     paths = [nf.pull(0.0, 1.0 + 0.1 * number, steps=steps) for number in range(9)]
@@ -36,7 +36,7 @@ def test_as_many_steps_as_flexures_or_bodies(wrist: nf.Robot, steps: int) -> Non
 
 def test_paths_remember(wrist, margin):
     paths = [nf.pull(0.0, top, steps=5).release() for top in (1.0, 1.5, 2.0)]
-    names = ("total_angle", "contact_log_ratio", "iterations", "converged")
+    names = ("total_angle", "contact_log_ratio", "dissipation", "tendon_work", "converged")
     found = nf.simulate_batch(wrist, paths, outputs=names)
     assert set(found) == set(names)
     assert found["converged"].all()
@@ -51,7 +51,7 @@ def test_robots_of_one_form_and_of_others(wrist, margin):
     robots = [*deeper, nf.load_robot("pacheco2021-b"), nf.load_robot("pacheco2021-c")]
     tensions = np.array([0.5, 1.0, 1.5, 0.7, 0.4])
     loads = [nf.Load(tension=float(tension)) for tension in tensions]
-    found = nf.solve_batch(robots, loads, outputs=("notch_angle", "total_angle"))
+    found = nf.solve_batch(robots, loads)
     for row, (robot, load) in enumerate(zip(robots, loads, strict=True)):
         alone = nf.solve(robot, load)
         count = robot.number_of_notches
@@ -82,8 +82,7 @@ def test_what_makes_no_batch(wrist, robots, loads, outputs, code, said):
         nf.solve_batch(given, loads, outputs=outputs)
 
 
-@pytest.mark.parametrize("rows", [1, 7, 64, 65, 600, 1030])
-@pytest.mark.parametrize("cores", [1, 3])
+@pytest.mark.parametrize(("rows", "cores"), [(1, 3), (7, 3), (65, 1), (1030, 3)])
 def test_rows_come_back_in_order_however_they_are_cut(wrist, rows, cores):
     loads, seen = nf.pull(0.1, 2.0 if rows > 1 else 0.1, steps=rows), []
     found = nf.solve_batch(wrist, loads, cores=cores, progress=lambda *done: seen.append(done))
@@ -97,19 +96,6 @@ def test_rows_come_back_in_order_however_they_are_cut(wrist, rows, cores):
     assert len(seen) >= min(cores, -(-rows // 8))
 
 
-def test_cores_may_be_any_whole_number(wrist):
-    found = nf.solve_batch(wrist, nf.pull(0.0, 1.0, steps=2), cores=np.array(2))
-    assert found["converged"].all()
-
-
-@pytest.mark.parametrize("given", [1, None])
-def test_what_is_no_batch_of_paths(wrist, given):
-    with refused(ErrorCode.WRONG_TYPE):
-        nf.simulate_batch(wrist, given)
-    with refused(ErrorCode.WRONG_TYPE):
-        nf.simulate_batch(given, nf.pull(0.0, 1.0, steps=2))
-
-
 @pytest.mark.parametrize(
     ("cores", "code"),
     [(0, "OUT_OF_RANGE"), (-2, "OUT_OF_RANGE"), (1.5, "WRONG_TYPE"), (True, "WRONG_TYPE")],
@@ -119,17 +105,11 @@ def test_cores_that_there_cannot_be(wrist, cores, code):
         nf.solve_batch(wrist, nf.pull(0.0, 1.0, steps=2), cores=cores)
 
 
-def test_paths_of_unlike_lengths(wrist):
-    with refused(ErrorCode.WRONG_SHAPE):
-        nf.simulate_batch(wrist, [nf.pull(0, 1, steps=2), nf.pull(0, 1, steps=3)])
-
-
 @pytest.mark.parametrize(
     "load",
     [
         nf.Load(tension=2.4),
-        pytest.param(nf.Load(tension=1.5, tip_force=(0.02, 0.0, -0.01)), marks=pytest.mark.nightly),
-        nf.Load(stroke=0.7),
+        pytest.param(nf.Load(stroke=0.7, tip_force=(0.02, 0.0, -0.01)), marks=pytest.mark.nightly),
     ],
 )
 def test_robots_of_unlike_length(wrist, load, margin):
@@ -155,7 +135,7 @@ def test_robots_of_unlike_length(wrist, load, margin):
         np.testing.assert_array_equal(own, values, err_msg=name)
     assert np.isnan(found["notch_angle"][0, 2:]).all()
     assert np.isnan(found["body_position"][0, 3:]).all()
-    margin.within("tip", found["tip_position"][1] - nf.solve(robots[1], load).tip_position, 1e-9)
+    margin.within("tip", found["tip_position"][1] - nf.solve(robots[1], load).tip_position, 1e-12)
 
 
 @pytest.mark.nightly
@@ -183,17 +163,12 @@ def test_an_unknown_output_is_an_input_error_that_names_what_there_is():
     assert batch.get("angle") is None
 
 
-def test_an_empty_batch_cannot_be_drawn():
-    with pytest.raises(nf.InputError) as problem:
-        nf.plot(nf.Batch({}))
-    assert problem.value.code is ErrorCode.NO_DATA
-
-
 def test_works_are_those_of_paths(wrist):
     path = nf.pull(0.0, 0.8, steps=4).release()
     paths, names = [path, nf.pull(0.0, 1.0, steps=4).release()], ("dissipation", "tendon_work")
-    batch = nf.simulate_batch(wrist, paths, outputs=[*names, "total_angle"])
-    assert set(batch) == {*names, "total_angle", "converged"}
+    outputs = ("total_angle", "contact_log_ratio", *names)  # as in the test of memory
+    batch = nf.simulate_batch(wrist, paths, outputs=outputs)
+    assert set(batch) == {*outputs, "converged"}
     for row, load in enumerate(paths):
         single = nf.simulate(wrist, load)
         for name in names:
@@ -207,3 +182,11 @@ def test_works_are_those_of_paths(wrist):
     np.testing.assert_allclose(each["tendon_work"], half, atol=1e-12)
     with refused("UNKNOWN_NAME", "dissipation"):
         nf.differentiable(wrist, path, ["notch.depth"], outputs=["dissipation"])
+
+
+@pytest.mark.parametrize("given", [1, None])
+def test_what_is_no_batch_of_paths(wrist, given):
+    with refused(ErrorCode.WRONG_TYPE):
+        nf.simulate_batch(wrist, given)
+    with refused(ErrorCode.WRONG_TYPE):
+        nf.simulate_batch(given, nf.pull(0.0, 1.0, steps=2))

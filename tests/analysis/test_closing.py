@@ -64,31 +64,6 @@ def test_failures_beside_a_closing_cost_a_trial(failing):
     assert tension == pytest.approx(roots, rel=1e-10)
 
 
-def test_a_kink_where_false_position_crawls():
-    """The overlap of a notch that closes falls back to a lower slope: 100 trials were too few."""
-    root = np.array([1.2699152222578])
-
-    def overlap(tension, _asked):
-        steep, flat = 1.63 * (tension - root), 0.6 * (tension - root)
-        return np.where(tension > root, flat, np.where(tension < 0.9, 0.97 * tension - 1.23, steep))
-
-    tension, status = closing_tensions(overlap, np.array([1.66]))
-    assert list(status) == ["closes"]
-    assert tension == pytest.approx(root, rel=1e-10)
-
-
-@pytest.mark.parametrize("slope", [1e-4, 1e-2, 10.0, 1e4])
-def test_closings_take_few_solves(slope):
-    counts = []
-
-    def overlap(tension, _asked):
-        counts.append(1)
-        return np.where(tension > 1.27, slope, 1.0) * (tension - 1.27)
-
-    closing_tensions(overlap, np.array([1.66]))
-    assert len(counts) <= 70
-
-
 def test_what_is_not_found_is_told_from_never():
     roots = np.array([1.0, 1000.0, 2.0, 1000.0])
     own = np.array([False, False, False, True])
@@ -102,12 +77,6 @@ def test_what_is_not_found_is_told_from_never():
     tension, status = closing_tensions(overlap, np.ones(4))
     assert list(status) == ["closes", "never", "not found", "not found"]
     assert np.isfinite(tension).tolist() == [True, False, False, False]
-
-
-def test_a_robot_whose_solver_always_fails_has_no_closing_found():
-    tension, status = closing_tensions(lambda tension, _: np.full(len(tension), np.nan), np.ones(2))
-    assert list(status) == ["not found"] * 2
-    assert np.isnan(tension).all()
 
 
 def test_slots_that_never_close_and_those_that_do():

@@ -62,12 +62,6 @@ def test_cuts_stand_where_the_notches_do(wrist: nf.Robot):
     assert depth == pytest.approx(wrist.notches[0].depth, abs=1e-12)
 
 
-def test_walls_of_slots_from_alternate_sides():
-    robot = nf.load_robot("gao2017")
-    right, left = robot.geometry.walls(0.0), robot.geometry.walls(180.0)
-    assert [one is None for one in right[1:-1]] == [one is not None for one in left[1:-1]]
-
-
 def test_arrays_cannot_be_written_to_and_are_not_sent_to_other_processes(wrist: nf.Robot):
     geometry = wrist.geometry
     assert wrist.geometry is geometry

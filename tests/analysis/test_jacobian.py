@@ -15,21 +15,16 @@ from notchflex.robot.value_names import number_at
 from refusals import refused
 
 LOOP = nf.pull(0.4, 1.2, steps=2).release()
+WEIGHTS = {"total_angle": 1.0, "tip_position": 0.0}
 NUMBERS = ("notch.depth", "notch[2].height", "friction.coefficient")
 LOADS = {
     "pacheco2021-a": nf.Load(tension=1.0),
-    "pacheco2021-b": nf.Load(tension=0.8),
-    "pacheco2021-c": nf.Load(tension=0.8),
+    "pacheco2021-c-true": nf.Load(tension=0.8),
     "gao2017": nf.Load(tension=6.0),
     "liu2022": nf.Load(tension=1.0),
     "two-axis-wrist": nf.Load(tension=[0.1, 0.05, 0.0, 0.0]),
     "york2015": nf.Load(tension=1.0),
 }
-READY = [
-    name + more
-    for name in LOADS
-    for more in (("", "-specimen", "-true") if name.startswith("pacheco") else ("",))
-]
 
 
 def wrist() -> nf.Robot:
@@ -71,10 +66,9 @@ def numbers_of(robot: nf.Robot) -> Iterator[str]:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("name", READY)
-def test_slopes_by_every_number_of_every_ready_robot(name, margin):
+@pytest.mark.parametrize(("name", "load"), LOADS.items())
+def test_slopes_by_every_number_of_a_ready_robot(name, load, margin):
     robot = nf.load_robot(name)
-    load = LOADS[name.removesuffix("-specimen").removesuffix("-true")]
     outputs = ("total_angle", "tip_position")
     path = nf.simulate(robot, [load])
     assert path.converged.all()
@@ -89,7 +83,7 @@ def test_slopes_by_every_number_of_every_ready_robot(name, margin):
         names = [number for number in names if number not in turns]
     assert len(names) > 8
     slopes = path.jacobian(names, outputs)
-    gradient = path.gradient({"total_angle": 1.0})
+    gradient = path.gradient(WEIGHTS)
     backwards = gradient.by(names)
     for column, number in enumerate(names):
         at = number_at(robot, number)
@@ -118,7 +112,7 @@ def test_slopes_of_a_path_are_those_of_the_function(margin):
         columns.append(np.asarray(expected[name]["tension"]).reshape(*shape, -1))
         margin.within(name, slopes[name] - np.concatenate(columns, axis=-1), 1e-12)
     weights = np.arange(12.0).reshape(4, 3)
-    gradient = path.gradient({"tip_position": weights})
+    gradient = path.gradient({"total_angle": 0.0, "tip_position": weights})
     by_names = np.einsum("sa,sak->k", weights, slopes["tip_position"])
     margin.within("gradient", gradient.by([*NUMBERS, "tension"]) / by_names - 1.0, 1e-11)
     assert gradient["tension"].shape == (4, 1)
@@ -126,10 +120,11 @@ def test_slopes_of_a_path_are_those_of_the_function(margin):
     assert "pacheco" in repr(gradient).lower()
 
 
+@pytest.mark.nightly
 def test_slopes_by_loads_of_the_tip(margin):
     push = {"tip_force": (0.02, 0.01, 0.0), "tip_moment": (0.0, 0.1, 0.0)}
     path = nf.simulate(wrist(), nf.pull(0.5, 0.8, steps=2).loaded(**push))
-    slopes = path.jacobian(list(push), "tip_position")["tip_position"]
+    slopes = path.jacobian(list(push))["tip_position"]
     assert slopes.shape == (2, 3, 12)
     for number, (name, vector) in enumerate(push.items()):
         for axis in range(3):
@@ -155,10 +150,10 @@ def test_weight_of_bodies_counts_in_gradients(margin):
             lambda value, name=name: nf.simulate(wrist().with_value(name, value), load).total_angle,
             number_at(wrist(), name),
         )[0]
-        forward = path.jacobian(name, "total_angle")["total_angle"][0, 0]
-        backward = path.gradient({"total_angle": 1.0})[name]
+        forward = path.jacobian(name)["total_angle"][0, 0]
+        backward = path.gradient(WEIGHTS)[name]
         margin.within(f"{name}, forward", forward / expected - 1.0, 1e-6)
-        margin.within(f"{name}, backward", backward / forward - 1.0, 1e-10)
+        margin.within(f"{name}, backward", backward / forward - 1.0, 1e-13)
 
 
 @pytest.mark.parametrize(
@@ -170,7 +165,7 @@ def test_weight_of_bodies_counts_in_gradients(margin):
         (lambda path: path.jacobian("stroke"), "NO_DATA"),
         (lambda path: path.gradient({"total_angle": np.ones(7)}), "WRONG_SHAPE"),
         (lambda path: path.gradient({"total_angle": "much"}), "WRONG_SHAPE"),
-        (lambda path: path.gradient({"total_angle": 1.0})["notch.deph"], "UNKNOWN_NAME"),
+        (lambda path: path.gradient(WEIGHTS)["notch.deph"], "UNKNOWN_NAME"),
     ],
 )
 def test_what_has_no_slope_is_refused(call, code):
@@ -206,7 +201,7 @@ def test_closing_tensions_and_angles_have_slopes(margin):
 
 
 def test_maps_of_jax_are_equal_to_loops(margin):
-    outputs = ("total_angle", "tip_position", "converged", "iterations")
+    outputs = ("total_angle", "tip_position", "converged")
     bend = nf.differentiable(wrist(), LOOP, [*NUMBERS, "tension"], outputs=outputs)
     random = np.random.default_rng(0)
     rows = {
@@ -223,7 +218,7 @@ def test_maps_of_jax_are_equal_to_loops(margin):
         found = bend(values)
         return found["tip_position"][-1, 2] + found["total_angle"][1]
 
-    for kind, derivative in (("grad", jax.grad), ("jacfwd", jax.jacfwd), ("jacrev", jax.jacrev)):
+    for kind, derivative in (("grad", jax.grad), ("jacfwd", jax.jacfwd)):
         several = jax.jit(jax.vmap(derivative(height)))(rows)
         by_row = [derivative(height)(values) for values in single]
         for name in rows:
@@ -238,7 +233,7 @@ def test_maps_of_jax_are_equal_to_loops(margin):
 def test_nested_maps_and_rows_without_results():
     bend = nf.differentiable(
         wrist(), nf.pull(1.0, 1.0, steps=1), ["notch.depth", "tension"],
-        outputs=("total_angle", "converged"),
+        outputs=("total_angle", "tip_position", "converged"),
     )  # fmt: skip
 
     def angle(depth, tension):
@@ -258,7 +253,7 @@ def test_nested_maps_and_rows_without_results():
 
 
 def test_rows_that_fail_are_nan_alone():
-    outputs = ("total_angle", "converged")
+    outputs = ("total_angle", "tip_position", "converged")
     draw = nf.differentiable(
         wrist(), nf.stroke_path(0.2, 0.4, steps=2), ["stroke"], outputs=outputs
     )
@@ -275,7 +270,7 @@ def test_what_acts_on_bodies_is_mapped_too(margin):
     """Forces at the tip are rows of one robot; numbers of a robot that weighs something are not."""
     load = nf.pull(0.5, 0.5, steps=1).loaded(tip_force=(0.01, 0.0, 0.0))
     for names in (["tip_force"], ["tip_force", "notch.depth"]):
-        push = nf.differentiable(wrist(), load, names, outputs=("tip_position",))
+        push = nf.differentiable(wrist(), load, names)
         forces = np.array([[[0.01, 0.0, 0.0]], [[0.0, 0.02, 0.01]]])
 
         def tip(force, push=push):
@@ -285,12 +280,12 @@ def test_what_acts_on_bodies_is_mapped_too(margin):
         margin.within(f"{names}", jax.jit(jax.vmap(tip))(forces) - alone, 1e-12)
         by = jax.vmap(jax.grad(tip))(forces)
         expected = np.stack([jax.grad(tip)(force) for force in forces])
-        margin.within(f"slopes, {names}", by - expected, 1e-10)
+        margin.within(f"slopes, {names}", by - expected, 2e-12)
 
 
 def test_a_product_of_jacobian_and_transpose(margin):
     """What is linear in its tangents can be transposed and differentiated by them."""
-    bend = nf.differentiable(wrist(), LOOP, ["tension"], outputs=("tip_position",))
+    bend = nf.differentiable(wrist(), LOOP, ["tension"])
     start = bend.start["tension"]
 
     def tips(tension):

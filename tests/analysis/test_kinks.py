@@ -18,6 +18,7 @@ TWO = nf.load_robot("pacheco2021-a").replace(
 )
 TENSION = (0.4, 0.8, 0.8, 0.6)
 LOADS = [nf.Load(tension=value) for value in TENSION]
+USUAL = ("total_angle", "tip_position")
 
 
 def test_contacts_that_nothing_moved_are_at_a_switch():
@@ -43,7 +44,7 @@ def test_away_from_switches_there_is_none():
 
 
 def test_both_sides_of_a_kink_and_the_one_that_jax_gives():
-    bend = nf.differentiable(TWO, LOADS, ["tension"], outputs=("total_angle", "converged"))
+    bend = nf.differentiable(TWO, LOADS, ["tension"], outputs=(*USUAL, "converged"))
     assert {one.step for one in bend.kinks()} == {2}
     slopes = jax.jacfwd(lambda values: bend(values)["total_angle"])(bend.start)["tension"][..., 0]
     for load in range(4):
@@ -70,7 +71,7 @@ def test_a_direction_that_changes_nothing_is_refused():
 
 def test_robots_of_one_form_share_a_program():
     """Every call of `differentiable` compiled a program of its own."""
-    first = nf.differentiable(TWO, LOADS[:2], ["notch.depth"], outputs=("total_angle",))
+    first = nf.differentiable(TWO, LOADS[:2], ["notch.depth"])
     first()
     jax.grad(lambda values: first(values)["total_angle"][-1])(first.start)
     before = len(Native.programs)
@@ -80,7 +81,6 @@ def test_robots_of_one_form_share_a_program():
         other,
         loads,
         ["material.elastic_modulus"],
-        outputs=("total_angle",),
         settings=nf.Settings(max_iterations=50),
     )
     angle = second()["total_angle"]
@@ -88,17 +88,3 @@ def test_robots_of_one_form_share_a_program():
     assert len(Native.programs) == before
     expected = nf.simulate(other, loads).total_angle
     assert np.asarray(angle) == pytest.approx(expected, rel=1e-11)
-
-
-@pytest.mark.nightly
-def test_both_sides_by_the_force_at_one_step():
-    """The force of the last step alone: the contacts let go on one side only."""
-    loads = [nf.Load(tension=value, tip_force=(0.02, 0.0, 0.0)) for value in TENSION[:3]]
-    bend = nf.differentiable(TWO, loads, ["tip_force"], outputs=("total_angle",))
-    assert {(one.step, one.kind) for one in bend.kinks()} == {(2, "contact")}
-    force = np.zeros((3, 3))
-    force[2, 0] = 1.0
-    below, above = bend.one_sided({"tip_force": force})
-    assert below["total_angle"][:2] == pytest.approx(0.0, abs=1e-9)
-    assert below["total_angle"][2] == pytest.approx(0.0, abs=1e-4)
-    assert above["total_angle"][2] == pytest.approx(0.6087, abs=1e-3)

@@ -99,7 +99,7 @@ def test_the_law_is_a_part_of_the_band(wrist: nf.Robot):
     linear = {one.value: one.sd for one in tolerances_of(true.replace(material=LINEAR))[0]}
     assert linear["notch.stiffness_factor"] == "1.4 %"
     assert not any("stiffness_factor" in one.value for one in tolerances_of(wrist)[0])
-    bands = nf.uncertain(true, nf.Load(tension=1.0), draws=80, outputs=("total_angle",))
+    bands = nf.uncertain(true, nf.Load(tension=1.0), draws=40, outputs=("total_angle",))
     assert 0.0 < bands.variance_shares("total_angle", 0)["law"] < 0.2
 
 
@@ -109,7 +109,7 @@ def test_notches_that_deviate_together_count_once():
     sizes = {"notch.depth": 0.005, "material.elastic_modulus": "5 %"}
     load = nf.Load(tension=0.5)
     shares = [
-        nf.uncertain(robot, load, sizes, draws=120, outputs=("total_angle",)).variance_shares(
+        nf.uncertain(robot, load, sizes, draws=40, outputs=("total_angle",)).variance_shares(
             "total_angle", 0
         )["cuts"]
         for robot in (true, true.with_value("notch[2].depth", true.notch[0].depth + 1e-6))

@@ -40,10 +40,8 @@ def within(margin, what: str, computed: np.ndarray, expected: np.ndarray, path):
     [
         ("pacheco2021-a", ("depth", "height"), ("tube.inner_diameter", "material.density"), PULL),
         ("pacheco2021-a", ("uncut_length",), ("friction.coefficient", "material.density"), HEAVY),
-        ("liu2022", ("strip_thickness",), ("tube.base_length", "material.poisson_ratio"), PULL),
-        ("two-axis-wrist", ("depth",), ("tendon[2].radius",), PULL),
         pytest.param(
-            "pacheco2021-a-true", ("height", "uncut_length"), ("material.elastic_modulus",), PULL,
+            "liu2022", ("strip_thickness",), ("tube.base_length", "material.poisson_ratio"), PULL,
             marks=LONG,
         ),
         pytest.param("gao2017", ("strip_thickness",), ("tendon[1].radius",), PULL, marks=LONG),
@@ -85,16 +83,13 @@ def test_a_direction_is_differentiated_by_differences(margin):
         margin.within(name, (slope - expected) / np.abs(expected).max(), 1e-5)
 
 
-@pytest.mark.parametrize(
-    ("key", "tip"), [("depth", 0.0), pytest.param("direction_deg", 0.002, marks=LONG)]
-)
-def test_a_number_of_all_notches_and_that_of_one(key, tip, margin):
+def test_a_number_of_all_notches_and_that_of_one(margin):
     """The notch with a name of its own does not move with the others."""
-    robot, load = nf.load_robot("pacheco2021-a"), PULL.loaded(tip_force=(0.0, tip, 0.0))
-    names = [f"notch.{key}", f"notch[2].{key}"]
+    robot, load = nf.load_robot("pacheco2021-a"), PULL
+    names = ["notch.depth", "notch[2].depth"]
     path = nf.simulate(robot, load)
-    by = path.jacobian(names, "tip_position")["tip_position"][0].T
-    at, width = number_at(robot, f"notch.{key}"), 1e-4
+    by = path.jacobian(names)["tip_position"][0].T
+    at, width = number_at(robot, "notch.depth"), 1e-4
     for number, slope in enumerate(by):
         ends = []
         for side in (1.0, -1.0):
@@ -111,7 +106,8 @@ def test_a_number_at_the_end_of_its_range():
     bend = nf.differentiable(robot, PULL, ["friction.coefficient"])
     by = jax.grad(lambda at: bend(at)["total_angle"][0])(bend.start)["friction.coefficient"]
     path = nf.simulate(robot, PULL)
-    own = path.gradient({"total_angle": 1.0})["friction.coefficient"]
+    weights = {"total_angle": 1.0, "tip_position": 0.0}
+    own = path.gradient(weights)["friction.coefficient"]
     assert by == pytest.approx(own, rel=1e-13)
     width = 1e-5
     more = nf.simulate(robot.with_value("friction.coefficient", width), PULL).total_angle[0]

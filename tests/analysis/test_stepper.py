@@ -15,7 +15,6 @@ from refusals import refused
 OUTPUTS = ("tip_position", "tip_rotation", "total_angle", "span_tension", "contact_state", "stroke")
 WRIST = nf.load_robot("pacheco2021-a")
 TWO_AXES = nf.load_robot("two-axis-wrist")
-CORNER = WRIST.with_values({"friction.kind": "corner", "friction.coefficient": 0.2})
 LOSSY = WRIST.with_value("friction.constant_loss", 0.01)
 PUSHED = nf.Load(tip_force=(0.02, 0.01, 0.0), base_rotation=(0.3, -0.5, 0.2), tip_mass=2.0)
 WAY = np.array([[0.5], [1.1], [0.9], [0.3], [0.7], [0.0], [0.4]])
@@ -25,7 +24,6 @@ CASES = {
     "by tension": (WRIST, "tension", nf.Load(), WAY),
     "pushed, turned": (WRIST, "tension", PUSHED, WAY),
     "by stroke": (WRIST, "stroke", nf.Load(), 0.6 * WAY),
-    "corners": (CORNER, "tension", nf.Load(), WAY),
     "constant loss": (LOSSY, "tension", nf.Load(), WAY),
     "mixed": (
         TWO_AXES,
@@ -90,10 +88,8 @@ def test_jacobian_is_that_of_central_differences(case, margin):
                 margin.within(name, error / max(1.0, np.nanmax(np.abs(slopes))), 1e-6)
 
 
-@pytest.mark.parametrize("case", ["by tension", pytest.param("corners", marks=nightly)])
-def test_dead_band_is_that_of_bisection(case, margin):
-    stepper, way = made(case)
-    for step in states_along(stepper, way)[:5]:
+def test_dead_band_is_that_of_bisection(stepper, margin):
+    for step in states_along(stepper, WAY)[:5]:
         here, drive = step.values["total_angle"], step.drives[0]
         for edge, far in zip(step.dead_band[0], (0.5, 2.0), strict=True):
             still, moved = drive, far * drive
@@ -103,7 +99,7 @@ def test_dead_band_is_that_of_bisection(case, margin):
                 still, moved = (middle, moved) if abs(there - here) < 1e-9 else (still, middle)
             margin.within("edge", edge - still, 1e-7, "N")
         assert np.ptp(step.dead_band) > 0.01 * drive
-    by_stroke = nf.Stepper(WRIST, "total_angle", drives="stroke")
+    by_stroke = nf.Stepper(WRIST, OUTPUTS, drives="stroke", jacobian=True)
     assert by_stroke.dead_band(step.state).tolist() == [[[step.values["stroke"][0]] * 2]][0]
 
 
@@ -131,7 +127,7 @@ def test_rows_are_single_robots(stepper, margin):
         for name, values in step.values.items():
             margin.within(name, values - np.stack([one.values[name] for one in rows]), 1e-12)
         for name, values in step.jacobian.items():
-            margin.within(name, values - np.stack([one.jacobian[name] for one in rows]), 1e-10)
+            margin.within(name, values - np.stack([one.jacobian[name] for one in rows]), 1e-12)
         bands = np.stack([one.dead_band for one in rows])
         margin.within("dead band", step.dead_band - bands, 1e-12, "N")
         states, singles = step.state, [one.state for one in rows]
@@ -171,8 +167,8 @@ def test_steps_start_from_saved_states(tmp_path, stepper, margin):
         margin.within("path", later.path(step.before, [0.8]).stroke - expected.stroke, 1e-12, "mm")
 
 
-def test_ten_thousand_steps_take_no_more_memory(stepper):
-    state, drives = stepper.rest(), np.abs(np.sin(np.arange(10_000.0)))[:, None]
+def test_thousands_of_steps_take_no_more_memory(stepper):
+    state, drives = stepper.rest(), np.abs(np.sin(np.arange(3_000.0)))[:, None]
     tracemalloc.start()
     try:
         for number, drive in enumerate(drives):

@@ -138,17 +138,3 @@ def test_slopes_that_nobody_knows_are_not_told(wrist):
     assert np.isfinite(response.path.tip_position).all()
     assert np.isnan(response.jacobian).all()
     assert np.isnan(response.compliance).all()
-
-
-@pytest.mark.nightly
-def test_without_friction_a_load_may_be_cut(wrist, margin):
-    smooth = wrist.with_value("friction.kind", "frictionless")
-    response = nf.tip_response(smooth, HARD)
-    assert response.path.run.substeps[0] > 2
-    width = 1e-5
-    loads = [nf.pull(t, t, steps=1) for t in (0.122 + 0.5 * width, 0.122 - 0.5 * width)]
-    push = HARD.external[0].tip_force
-    ends = [nf.simulate(smooth, load.loaded(tip_force=push))[0] for load in loads]
-    expected = pose_slope(*ends, width)
-    own = response.jacobian[0, :, 0]
-    margin.within("jacobian", (own - expected) / np.abs(own).max(), 1e-6)

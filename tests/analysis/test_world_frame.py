@@ -17,7 +17,7 @@ from refusals import refused
 IN_WORLD = tuple(name for name in OUTPUTS if name in REGISTERED and REGISTERED[name].in_world)
 WRIST = nf.load_robot("pacheco2021-a")
 SEEDS = pytest.mark.parametrize(
-    "seed", [1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(2, 26))]
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (2, 3))]
 )
 
 
@@ -42,7 +42,9 @@ def test_all_agree(wrist: nf.Robot, seed: int):
     path = nf.simulate(wrist, loads).raise_if_failed()
     rows = nf.simulate_batch(wrist, [loads, loads], outputs=IN_WORLD)
     bands = nf.uncertain(wrist, loads, draws=2, tolerances=(), outputs=("tip_position",))
-    at_once = nf.differentiable(wrist, loads, "notch.depth", outputs=("tip_position",))
+    at_once = nf.differentiable(
+        wrist, loads, "notch.depth", outputs=("total_angle", "tip_position")
+    )
     external = replace(loads[0], tension=None)
     stepper = nf.Stepper(wrist, IN_WORLD, loads=external)
     driven = stepper.step(stepper.rest(), loads.tension[0]).values

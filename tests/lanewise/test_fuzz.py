@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 
 from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code
 from lanewise._jax import jax, jnp
-from random_operations import DENORMAL, SPECIAL, Value, run
-from random_programs import Drawing, numbers
+from random_programs import DENORMAL, SPECIAL, Drawing, Value, numbers, run
 
 TINY = 2.0**-1022
 X86 = platform.machine().lower() in ("x86_64", "amd64")
@@ -165,7 +164,7 @@ def test_random_programs(data):
 
 
 @pytest.mark.nightly
-@settings(few, max_examples=2_000)
+@settings(few, max_examples=700)
 @given(st.data())
 def test_very_many_random_programs(data):
     check(data)

@@ -11,7 +11,7 @@ from lanewise.ir import graph
 from notchflex._jax import jax, jnp
 
 # Fewer than a vector's lanes, as many, more, and several vectors.
-SIZES = (1, 2, 3, 8, 13, 27, 40)
+SIZES = (1, 3, 8, 27)
 ROUNDING = 1e-13
 
 
@@ -156,21 +156,6 @@ def test_loops_that_others_do_not_change_stand_before_them(size):
     check(function, given(size), long=(size, size + 1))
 
 
-@pytest.mark.parametrize("size", SIZES)
-def test_swapping_what_is_carried(size):
-    def function(vector):
-        table, _ = parted(vector, size)
-
-        def swapped(_, state):
-            first, second, last = state
-            return second, first, jnp.concatenate([second[1:], last[:1]])
-
-        start = (table[:, 0, 0], table[:, 1, 0], table[:, 2, 0])
-        return jax.lax.fori_loop(0, 3, swapped, start)
-
-    check(function, given(size), long=(size, size + 1))
-
-
 @pytest.mark.parametrize("size", [3, 13])
 def test_picking_and_putting(size):
     def function(vector):
@@ -290,20 +275,6 @@ def eliminated(vector, size, width):
 def test_loops_along_the_lanes(size):
     vector = np.random.default_rng(size).normal(size=9 * size)
     check(lambda x: eliminated(x, size, 3), vector, long=(size, size + 1))
-
-
-def test_loops_along_the_lanes_copy_no_single_entries():
-    """What rows a loop reads and writes as they are: no loop for each entry of its matrices."""
-
-    def loops(width):
-        def function(vector):
-            _, products, chosen, _ = eliminated(vector, 27, width)
-            return jnp.sum(products, axis=(1, 2)), chosen
-
-        text = lower(function, [np.ones(27 * width**2)], (27, 28))[0].text
-        return text.count(" = phi ")
-
-    assert loops(2) == loops(4)
 
 
 def test_arrays_that_are_read_only_or_empty():

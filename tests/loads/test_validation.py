@@ -83,11 +83,3 @@ def test_paths_take_one_load_per_step(external):
 def test_paths_take_as_many_as_steps():
     with refused("WRONG_SHAPE", "external", "2 entries", "1 steps"):
         nf.LoadPath([[1.0]], [[NAN]], external=[ExternalLoad(), ExternalLoad()])
-
-
-def test_arrays_are_taken_and_equal_loads_found_equal():
-    one = nf.Load(tip_force=np.array([0, 1, 2]), tip_mass=np.float32(2.0))
-    other = nf.Load(tip_force=[0.0, 1.0, 2.0], tip_mass=2)
-    assert one == other
-    assert hash(one.external) == hash(other.external)
-    assert repr(one) == "Load(tip_force=(0.0, 1.0, 2.0), tip_mass=2.0)"

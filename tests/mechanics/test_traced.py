@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._arrays import Decisions, decide
+from notchflex._arrays import Decisions
 from notchflex.mechanics.chain import assemble
 from notchflex.robot.part import unchecked
 
@@ -25,7 +25,6 @@ def robots():
     return {
         "wrist": wrist,
         "off-axis": wrist.with_value("notch.cut", "off-axis"),
-        "different notches": wrist.with_values({"notch[2].depth": 1.39, "notch[4].height": 0.7}),
         "nitinol": wrist.replace(material=NITINOL),
         "two axes": nf.load_robot("two-axis-wrist"),
         "links": links,
@@ -85,10 +84,8 @@ CASES = [
     ("strips", {}),
     ("nitinol", {}),
     *(
-        pytest.param(name, options, marks=LONG)
-        for name in robots()
-        for options in ({}, SPACE)
-        if name not in ("wrist", "strips", "nitinol") or options
+        pytest.param(name, SPACE, marks=LONG)
+        for name in ("off-axis", "two axes", "links", "elastic links", "elastic strips")
     ),
 ]
 
@@ -121,15 +118,3 @@ def test_arrays_and_slopes(name, options, margin):
     arrays, slopes = np.max(errors, axis=0)
     margin.within("arrays", arrays, 1e-12)
     margin.within("slopes", slopes, 1e-6)
-
-
-def test_numbers_that_decide_otherwise_say_so():
-    def build(value):
-        return decide(value > 1.0), decide(value > 0.0)
-
-    with Decisions().deciding() as example:
-        assert build(0.5) == (False, True)
-    with Decisions(tuple(example.made)).deciding() as decisions:
-        assert build(np.array(2.0)) == (False, True)
-    assert list(map(bool, decisions.alike)) == [False, True]
-    assert build(2.0) == (True, True)

@@ -117,12 +117,3 @@ def test_a_load_path_of_one_kind():
     assert np.isnan(nf.LoadPath(stroke=[[1.0], [2.0]]).tension).all()
     with refused("NO_DATA", "tension"):
         nf.LoadPath()
-
-
-def test_rows_that_fail_hold_no_numbers():
-    """A stroke that no tension reaches: `converged` is there although it is not named."""
-    wrist = nf.load_robot("pacheco2021-a")
-    batch = nf.solve_batch(wrist, nf.stroke_path(0.0, 5.0, steps=6), outputs=("total_angle",))
-    assert set(batch) == {"total_angle", "converged"}
-    assert not batch["converged"].all()
-    assert (np.isnan(batch["total_angle"]) == ~batch["converged"]).all()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from notchflex.results.quantities import QUANTITIES, span_names, units
+from notchflex.results.quantities import QUANTITIES, span_names
 
 
 @pytest.mark.parametrize("part", ["key", "column"])
@@ -72,15 +72,5 @@ def test_headers_are_those_of_measured_data():
     assert QUANTITIES["total_angle"].header() == "total_deg"
 
 
-def test_axis_label_has_symbol_and_unit():
-    assert QUANTITIES["tension"].label == "tendon tension $T$ [N]"
-    assert QUANTITIES["closed"].label == "closed"
-
-
 def test_spans_alternate_from_base_to_tip():
     assert span_names(6) == ["proximal", "gap_1", "body_1", "gap_2", "body_2", "gap_3"]
-
-
-def test_units_are_told_for_keys():
-    assert units()["tendon_stroke_mm"] == "mm"
-    assert "closed" not in units()

@@ -64,12 +64,6 @@ def test_help_has_unit_shape_and_text():
     assert "NaN beyond the end of a tendon." in nf.EquilibriumPath.span_tension.__doc__
 
 
-def test_type_checkers_know_the_kinds():
-    kinds = {"total_angle": "Number", "tip_position": "Array", "reason": "Text", "stable": "Flag"}
-    for name, kind in kinds.items():
-        assert type(getattr(nf.EquilibriumPath, name)).__name__ == kind
-
-
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_values_are_what_the_registry_says(path, name):
     sizes = {"t": 1, "n": 5, "bodies": 6, "3": 3, "spans": 10, "contacts": 9}

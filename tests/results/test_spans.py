@@ -5,9 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 import notchflex as nf
-from fake_path import fake_path
 from notchflex.mechanics.chain import assemble
-from notchflex.results.quantities import QUANTITIES, holds, spans_of
+from notchflex.results.quantities import spans_of
 
 
 @pytest.mark.parametrize(
@@ -22,11 +21,3 @@ def test_a_tendon_that_ends_earlier_has_fewer():
     robot = nf.load_robot("liu2022").with_value("tendon[2].end_body", 3)
     path = SimpleNamespace(chain=assemble(robot))
     assert [spans_of(path, tendon) for tendon in (0, 1)] == [14, 6]
-
-
-def test_optional_quantities_need_a_number():
-    path = fake_path(2)
-    assert not holds(path, QUANTITIES["chord_angle"])
-    path.columns["chord_angle"][0, 2] = 0.1
-    assert holds(path, QUANTITIES["chord_angle"])
-    assert not holds(SimpleNamespace(), QUANTITIES["tension"])

@@ -25,11 +25,6 @@ def file(tmp_path, chain):
     return path
 
 
-def test_a_saved_state_is_read_back(file, chain):
-    assert State.load(file).robot == "wrist"
-    State.load(file).fitted(chain)
-
-
 @pytest.mark.parametrize("name", ["missing/state.json", ".", "null\0"])
 def test_states_that_cannot_be_written(tmp_path, chain, name):
     with refused(ErrorCode.FILE_UNWRITABLE):
@@ -80,10 +75,3 @@ def test_missing_parts_are_damage(file, key):
     file.write_text(json.dumps(content))
     with refused(ErrorCode.FILE_DAMAGED):
         State.load(file)
-
-
-def test_another_robot_is_told(file):
-    robot = nf.load_robot("pacheco2021-a")
-    two = assemble(robot.replace(tendon=robot.tendon * 2))
-    with refused(ErrorCode.STATE_OF_ANOTHER_ROBOT):
-        State.load(file).fitted(two)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._summary import Summary, course
+from notchflex._summary import course
 
 
 @pytest.fixture(scope="module")
@@ -86,12 +86,6 @@ def test_loads_and_their_steps():
         path[8]
 
 
-def test_the_load_of_a_state_solves_to_that_state(wrist):
-    path = nf.solve_each(wrist, nf.pull(0.5, 1.0, steps=2).loaded(tip_force=(0.0, 0.0, 0.02)))
-    again = nf.solve(wrist, path[1].load)
-    np.testing.assert_allclose(again.notch_angle, path.notch_angle[1], rtol=0.0, atol=1e-9)
-
-
 def test_a_batch_says_rows_ranges_and_units(wrist):
     found = nf.solve_batch(wrist, nf.pull(0.0, 2.0, steps=5))
     lines = repr(found).splitlines()
@@ -111,8 +105,3 @@ def test_a_state_to_continue_from_and_closing(loop, wrist):
 def test_a_series_that_turns_often_shows_its_range():
     assert course(np.tile([0.0, 1.0], 9)) == "between 0 and 1"
     assert course([0.0, np.nan, 2.0, 2.0, -1.0]) == "0 to 2 to -1"
-
-
-def test_a_summary_without_rows():
-    assert Summary("Nothing").text == "Nothing"
-    assert "<table>" in Summary("Nothing").html

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import inspect
-from typing import Annotated
 
 import pytest
 
 import notchflex as nf
-from notchflex.robot.part import Float, part, quantity
 
 
 @pytest.mark.parametrize("kind", [nf.Tube, nf.Tendon, nf.ArcNotch, nf.Capstan, nf.Robot])
@@ -24,15 +22,3 @@ def test_a_quantity_is_a_property_with_its_documentation():
     tension = inspect.getattr_static(nf.EquilibriumPath, "tension")
     assert isinstance(tension, property)
     assert "Tendon tension, N" in (tension.__doc__ or "")
-
-
-def test_an_angle_may_have_a_bound_above_zero():
-    @part
-    class Tilted:
-        """A part of one angle."""
-
-        tilt_deg: Annotated[Float, quantity("deg", "tilt", above=0)]
-
-    assert Tilted(3.0).tilt_deg == 3.0
-    with pytest.raises(nf.InputError, match="tilt_deg"):
-        Tilted(0.0)

@@ -89,14 +89,6 @@ def test_set_repairs_an_invalid_file(tmp_path, capsys):
     assert "`tube` is missing" in capsys.readouterr().err
 
 
-def test_set_may_take_back_what_would_warn(tmp_path, capsys):
-    file = tmp_path / "gpa.toml"
-    file.write_text(robot_text(WRIST).replace("elastic_modulus = 10000.0", "elastic_modulus = 10"))
-    settings = ["--set", "material.elastic_modulus=10000"]
-    assert run(["show", str(file), "--quiet", *settings]) == 0
-    assert "Warning" not in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("load", "name", "meant"),
     [
@@ -115,29 +107,6 @@ def test_loads_in_another_unit_are_asked_about(load, name, meant):
         nf.solve(WRIST, load)
     (message,) = [one.message for one in given]
     assert (message.name, message.meant) == (name, pytest.approx(meant))
-
-
-@pytest.mark.parametrize(
-    ("values", "name"),
-    [
-        ({"tube.inner_diameter": 1.7}, "tube.inner_diameter"),
-        ({"tube.inner_diameter": -0.1}, "tube.inner_diameter"),
-        ({"tendon.radius": 0.9}, "tendon[1].radius"),
-        ({"tendon.end_body": 9}, "tendon[1].end_body"),
-        ({"notch.depth": 1.7}, "notch[1].depth"),
-        ({"notch.height": 0.0}, "notch[1].height"),
-        ({"notch.uncut_length": -1.0}, "notch[1].uncut_length"),
-        ({"material.poisson_ratio": 0.7}, "material.poisson_ratio"),
-        ({"friction.coefficient": -0.1}, "friction.coefficient"),
-    ],
-)
-def test_what_is_impossible_is_one_sentence(values, name, capsys):
-    (key, value), *_ = values.items()
-    assert run(["show", "pacheco2021-a", "--set", f"{key}={value}"]) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert len(told.err.strip().splitlines()) == 1
-    assert f"`{name}`" in told.err
 
 
 def test_new_asks_about_what_remains(tmp_path, monkeypatch, capsys):

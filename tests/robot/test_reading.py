@@ -79,36 +79,21 @@ def changed(old: str, new: str) -> str:
 OUTSIDE = [
     # what stands in the file, and what the message must hold
     (("depth = 1.4", "depth = 1.62"), ["`notch[1].depth`", "1.62 mm", "less than the outer diam"]),
-    (("depth = 1.4", "depth = 0"), ["`notch[1].depth`", "0 mm", "greater than 0 mm"]),
     (("depth = 1.3", "depth = -1.3"), ["`notch[4].depth`", "table number 2", "greater than 0"]),
-    (("depth = 1.3", "depth = 2"), ["`notch[4].depth`", "less than the outer diameter"]),
     (("inner_diameter = 1.40", "inner_diameter = 1.62"), ["`tube.inner_diameter`", "1.62 mm"]),
-    (("inner_diameter = 1.40", "inner_diameter = 2"), ["`tube.inner_diameter`", "less than"]),
-    (("outer_diameter = 1.62", "outer_diameter = -1"), ["`tube.outer_diameter`", "-1 mm"]),
     (("radius = 0.70", "radius = 0.9"), ["`tendon[1].radius`", "outside the wall", "0.81 mm"]),
-    (("radius = 0.70", "radius = 0"), ["`tendon[1].radius`", "greater than 0 mm"]),
     (("radius = 0.70", "radius = 0.7\nend_body = 5"), ["`tendon[1].end_body`", "1 to 4"]),
-    (("radius = 0.70", "radius = 0.7\nend_body = 0"), ["`tendon[1].end_body`", "at least 1"]),
-    (("radius = 0.70", "radius = 0.7\nfree_length = -1"), ["`tendon[1].free_length`", "-1 mm"]),
     (("radius = 0.70", "radius = 0.7\naxial_stiffness = -1"), ["`tendon[1].axial_stiffness`"]),
-    (("radius = 0.70", "radius = 0.7\naxial_stiffness = nan"), ["`tendon[1].axial_stiffness`"]),
-    (("height = 0.8", "height = -0.8"), ["`notch[1].height`", "-0.8 mm", "greater than 0"]),
-    (("uncut_length = 1.2", "uncut_length = -1"), ["`notch[1].uncut_length`", "at least 0 mm"]),
     (("repeat = 3", "repeat = 0"), ["`notch[1].repeat`", "at least 1"]),
     (("repeat = 3", "repeat = 2.5"), ["`notch[1].repeat`", "a whole number"]),
     (("repeat = 3", "precurvature_deg = 60"), ["`notch[1].precurvature_deg`", "closes at"]),
-    (("= 10000", "= -10000"), ["`material.elastic_modulus`", "-10000 MPa", "greater than 0"]),
     (("= 10000", "= nan"), ["`material.elastic_modulus`", "nan", "finite number"]),
-    (("= 10000", "= inf"), ["`material.elastic_modulus`", "inf", "finite number"]),
-    (("= 3000", "= -3000"), ["`material.superelastic_modulus`", "-3000 MPa"]),
     (("= 0.028", "= 2.8"), ["`material.transition_strain`", "at most 0.5", "0.04 is 4 %"]),
     (("= 0.028", "= 0.2"), ["`material.plastic_strain`", "transition strain"]),
     (("coefficient = 0.13", "coefficient = -0.1"), ["`friction.coefficient`", "at least 0"]),
-    (("coefficient = 0.13", "coefficient = nan"), ["`friction.coefficient`", "nan"]),
     # wrong types
     (("depth = 1.4", 'depth = "1.4"'), ["`notch[1].depth`", '"1.4" (text)', "without quotes"]),
     (("depth = 1.4", "depth = true"), ["`notch[1].depth`", "true", "a number in mm"]),
-    (("depth = 1.4", "depth = [1.4]"), ["`notch[1].depth`", "a list", "a number in mm"]),
     (("depth = 1.4", "depth = 1979-05-27"), ["`notch[1].depth`", "a number in mm"]),
     (('name = "test"', "name = 5"), ["`name`", "text in quotes"]),
     (('name = "test"', 'name = ""'), ["`name`", "not be empty"]),
@@ -116,16 +101,12 @@ OUTSIDE = [
     # words
     (('"on-axis"', '"onaxis"'), ["`notch[1].cut`", '"on-axis"', '"off-axis"', "did you mean"]),
     (('kind = "capstan"', 'kind = "capstn"'), ["`friction.kind`", "did you mean `capstan`"]),
-    (('kind = "superelastic"', 'kind = "x"'), ["`material.kind`", '"linear", "nitinol"']),
     (('kind = "arc"', 'kind = "v"'), ["`notch[1].kind`", '"arc", "strip", "u-link"']),
     (("coefficient = 0.13", 'coefficient = 0.1\nwrap = "x"'), ["`friction.wrap`", "whole-before"]),
-    (("radius = 0.70", 'radius = 0.70\npath = "arc"'), ["`tendon[1].path`", '"wall-arc"']),
     (("radius = 0.70", 'radius = 0.70\npath = "straight-ded"'), ["mean `straight-dead`?"]),
     # unknown keys
     (("depth = 1.4", "dept = 1.4"), ["`notch[1].dept`", "did you mean `depth`?", "Allowed: kind"]),
-    (("radius = 0.70", "radius = 0.70\ncolour = 1"), ["`tendon[1].colour`", "Allowed: radius"]),
     (("[friction]", "[frction]"), ["`frction`", "did you mean `friction`?"]),
-    (("elastic_modulus = 1", "elasticmodulus = 1"), ["`material.elasticmodulus`"]),
     # missing keys
     (('cut = "on-axis"\n', ""), ["`notch[1].cut` is missing", "annular sector", "annular segment"]),
     (("elastic_modulus = 10000\n", ""), ["`material.elastic_modulus` is missing", "[MPa]"]),
@@ -135,7 +116,6 @@ OUTSIDE = [
     ),
     (("[[tendon]]\nradius = 0.70\n", ""), ["`tendon` is missing", "[[tendon]]"]),
     (("[[tendon]]", "[tendon]"), ["`tendon`", "a table", "[[tendon]]"]),
-    (("[[tendon]]\nradius = 0.70\n", "[tendon]\n"), ["`tendon`", "[[tendon]]"]),
 ]
 
 
@@ -182,11 +162,6 @@ def test_toml_syntax_is_named_with_its_line(read, text: str, line: str):
     assert len(str(caught.value).splitlines()) == 1
 
 
-def test_no_robot_at_all(read):
-    with refused("INVALID_ROBOT", "`name`", error=nf.RobotFileError):
-        read("")
-
-
 @pytest.mark.parametrize("name", [None, b"wrist.toml", 3])
 def test_what_names_no_robot(name):
     """A TypeError before."""
@@ -226,11 +201,6 @@ def test_a_file_in_the_working_folder_needs_no_ending(tmp_path: Path, monkeypatc
     (tmp_path / "mine").write_text(GOOD)
     monkeypatch.chdir(tmp_path)
     assert nf.load_robot("mine").name == "test"
-
-
-def test_errors_are_value_errors():
-    assert issubclass(nf.RobotFileError, nf.InputError)
-    assert issubclass(nf.InputError, ValueError)
 
 
 def test_numbers_of_numpy_are_numbers():

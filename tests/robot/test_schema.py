@@ -1,16 +1,9 @@
 """The JSON Schema of robot files."""
 
-import json
-
 import pytest
 
 import notchflex as nf
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
-
-
-def test_it_is_json():
-    text = json.dumps(nf.json_schema(), allow_nan=False)
-    assert json.loads(text) == nf.json_schema()
 
 
 def test_what_a_file_must_hold():

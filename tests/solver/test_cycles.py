@@ -108,7 +108,7 @@ TENSION = st.floats(0.0, 1.5)
 FORCE = st.floats(-0.05, 0.05)
 
 
-@settings(max_examples=300)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(TENSION, TENSION, FORCE), min_size=1, max_size=8))
 def test_random_histories_converge(robot, history) -> None:
     loads = [

@@ -81,7 +81,7 @@ def test_loading_to_3_newton(wrap, margin):
     assert lost.sum() > 0.1 * work
 
 
-@pytest.mark.parametrize("steps", [1, 2, 3, 7, 40])
+@pytest.mark.parametrize("steps", [1, 7])
 @pytest.mark.parametrize("wrap", ["whole-before", "geometric"])
 def test_linear_range_at_any_step(wrap, steps, margin):
     """Up to 0.9 N every notch of wrist A is linear, and the trapezoid exact."""
@@ -99,7 +99,7 @@ def test_partial_loops_in_the_linear_range_at_any_step(margin):
     margin.within("balance", (work - stored(path, -1) - lost) / work, 1e-12)
 
 
-@pytest.mark.parametrize("turns", [[3.0, 0.0], [2.5, 1.0, 1.5, 0.0], [2.0, 0.5, 1.5, 0.0]], ids=str)
+@pytest.mark.parametrize("turns", [[3.0, 0.0], [2.0, 0.5, 1.5, 0.0]], ids=str)
 @pytest.mark.parametrize("wrap", ["whole-before", "geometric"])
 def test_loop_from_rest_to_rest(wrap, turns, margin):
     path = simulate(with_friction(wrap), legs(turns, FINE / 3))
@@ -126,16 +126,6 @@ def check_loop(path: nf.EquilibriumPath, start: int, margin) -> None:
     reported = path.dissipation[-1, 0] - path.dissipation[start, 0]
     margin.within("reported dissipation", (reported - lost) / lost.sum(), 1e-11)
     assert (reported > -ROUNDING).all()
-
-
-@pytest.mark.parametrize("turns", [[3.0, 0.0], [2.0, 0.5, 1.5, 0.0]], ids=str)
-def test_half_the_friction_changes_the_loss(turns, margin):
-    lost = [
-        friction_work(simulate(with_friction("whole-before", mu), legs(turns, 10))).sum()
-        for mu in (0.13, 0.065)
-    ]
-    margin.note(f"half the coefficient loses {lost[1] / lost[0]:.3f} of the whole")
-    assert 0.4 < lost[1] / lost[0] < 0.8
 
 
 def test_without_friction_nothing_is_lost(margin):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,10 +11,6 @@ import notchflex as nf
 from notchflex.analysis.forward_model import ForwardModel
 from notchflex.analysis.slopes import changes, derivatives
 from notchflex.analysis.tangent import Change, PathTangents, path_gradient
-from notchflex.mechanics.chain import assemble
-from notchflex.solver.programs.prepare import PreparedChain
-
-LOOP = nf.pull(0.3, 1.2, steps=3).release()
 
 
 def shaken(path: nf.EquilibriumPath) -> Change:
@@ -31,7 +26,6 @@ def shaken(path: nf.EquilibriumPath) -> Change:
 @pytest.mark.parametrize(
     ("name", "load", "outputs"),
     [
-        ("pacheco2021-a", LOOP, ("tip_position", "notch_angle", "contact_slid")),
         ("pacheco2021-a", nf.stroke_path(0.1, 0.5, steps=3), ("tip_position", "span_tension")),
         ("gao2017", nf.pull(2.0, 5.0, steps=2), ("total_angle", "body_rotation")),
     ],
@@ -47,26 +41,6 @@ def test_adjoint_is_the_transpose_of_the_tangents(name, load, outputs, margin):
         moved = PathTangents(path, outputs).along([change])[0]
     expected = sum(float(np.nansum(moved[one] * weights[one])) for one in outputs)
     margin.within("adjoint", found / expected - 1.0, 1e-11)
-
-
-@pytest.mark.nightly
-def test_gradient_in_the_world_of_a_turned_base(margin):
-    load = replace(nf.pull(0.5, 1.0, steps=2), base_rotation=np.array([0.3, 0.2, -0.1]))
-    path = nf.simulate(nf.load_robot("pacheco2021-a"), load)
-    weights = {"tip_position": np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]])}
-    change = shaken(path)
-    moved = PathTangents(path, ("tip_position",)).along([change])[0]["tip_position"][1]
-    expected = float(moved @ weights["tip_position"][1])
-    margin.within("gradient", path_gradient(path, weights).along(change) / expected - 1.0, 1e-11)
-
-
-def test_a_step_that_failed_later_does_not_matter():
-    path = nf.simulate(nf.load_robot("pacheco2021-a"), [nf.Load(tension=1.0), nf.Load(stroke=40.0)])
-    assert path.converged.tolist() == [True, False]
-    change = shaken(path)
-    first, second = (path_gradient(path, {"total_angle": row}).along(change) for row in np.eye(2))
-    assert np.isfinite(first)
-    assert np.isnan(second)
 
 
 @pytest.mark.nightly
@@ -88,24 +62,6 @@ def test_many_numbers_take_the_adjoint_and_few_the_tangents(margin):
     here = 0.7 + 3e-3
     expected = (at(here + width) - at(here - width)) / (2.0 * width)
     margin.within("against differences", float(reverse[3]) / expected - 1.0, 1e-5)
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["pacheco2021-a", pytest.param("gao2017", marks=pytest.mark.nightly), "liu2022"],
-)
-def test_other_laws_make_the_chain_that_is_assembled_anew(name, margin):
-    robot = nf.load_robot(name)
-    values = {"material.elastic_modulus": 7e3, "friction.coefficient": 0.21}
-    model = ForwardModel(robot, nf.pull(1.0, 1.0, steps=1))
-    other = robot.with_values(values)
-    found, expected = model._prepared(other), PreparedChain(assemble(other))
-    for made, assembled in ((found, expected), (found.long, expected.long)):
-        finite = np.isfinite(assembled.vector)
-        np.testing.assert_array_equal(made.vector[~finite], assembled.vector[~finite])
-        size = np.abs(assembled.vector[finite]).max()
-        margin.within("chain", (made.vector[finite] - assembled.vector[finite]) / size, 1e-14)
-        assert made.static_structure is assembled.static_structure
 
 
 def test_rows_from_rest_do_not_know_of_each_other(margin):

@@ -17,24 +17,18 @@ from notchflex.solver.residual import Iterate, command_residual, evaluate
 TIP = {"tip_force": (0.02, 0.0, -0.01), "tip_moment": (0.0, 0.05, 0.0)}
 SIDE = {"tip_force": (0.02, 0.01, -0.01), "following": True, "gravity": (1.0, 2.0, 3.0)}
 CASES = {
-    "wrist": ("pacheco2021-a", nf.Load(tension=1.5), 0.05),
     "wrist by stroke": ("pacheco2021-a", nf.Load(stroke=1.0), 0.05),
-    "wrist, loaded": ("pacheco2021-a", nf.Load(tension=1.0, **TIP), 0.05),
     "wrist in space": ("pacheco2021-a", nf.Load(tension=1.0, **SIDE), 0.05),
     "strips": ("liu2022", nf.Load(tension=5.0), 0.02),
-    "wrist in space, held": ("pacheco2021-a", nf.Load(tension=1.0, tip_force=(0, 0.02, 0)), 0.05),
     "links, following": ("gao2017", nf.Load(tension=6.0, following=True, **TIP), 0.01),
-    "links, loaded": ("gao2017", nf.Load(tension=6.0, **TIP), 0.01),
     "two axes": ("two-axis-wrist", nf.Load(tension=[0.5, None, 0.2], stroke=[None, 0.1]), 0.05),
 }
 
 
-# Those that take longest to compile and differ least from the others.
-QUICK = ("wrist", "wrist by stroke")
-
-
 @pytest.mark.parametrize(
-    "case", [pytest.param(one, marks=[pytest.mark.nightly] * (one not in QUICK)) for one in CASES]
+    "case",
+    # The others take long to compile.
+    [pytest.param(one, marks=[pytest.mark.nightly] * (one != "wrist by stroke")) for one in CASES],
 )
 def test_it_is_the_dense_step(case: str, margin) -> None:
     name, load, size = CASES[case]

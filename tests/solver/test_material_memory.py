@@ -14,7 +14,7 @@ from margins import Margin
 from notchflex._jax import jax
 
 NITINOL = nf.Nitinol(10_000.0, 280.0, 3_000.0, unloading_stress=120.0)
-FREE = nf.Frictionless()
+FREE = nf.Capstan(0.0)  # not `Frictionless`: with friction and without share a program
 WRIST = dataclasses.replace(nf.load_robot("pacheco2021-a"), material=NITINOL, friction=FREE)
 NOTCH = nf.ArcNotch("on-axis", depth=1.4, height=0.8, uncut_length=1.2, repeat=5, ends="shell")
 FLATTENS = dataclasses.replace(WRIST, notch=(NOTCH,), material=nf.Nitinol(unloading_stress=150.0))
@@ -73,14 +73,6 @@ def test_a_saved_state_continues_as_the_uninterrupted_path(
     np.testing.assert_allclose(read.material_dissipation, rest.material_dissipation, rtol=1e-12)
 
 
-@pytest.mark.nightly
-def test_a_state_of_tendons_continues_under_a_load_in_the_plane(path: nf.EquilibriumPath) -> None:
-    start = nf.simulate(WRIST, pulls(TENSIONS[:3])).state
-    with_nothing = [nf.Load(tension=0.5, tip_force=(1e-9, 0.0, 0.0))]
-    found = nf.simulate(WRIST, with_nothing, from_state=start)
-    np.testing.assert_allclose(found.notch_angle[0], path.notch_angle[3], atol=1e-6)
-
-
 def test_a_batch_is_its_rows(path: nf.EquilibriumPath) -> None:
     other = WRIST.with_value("material.unloading_stress", 200.0)
     rows = nf.simulate_batch([WRIST, other], path.load)["total_angle"]
@@ -90,13 +82,8 @@ def test_a_batch_is_its_rows(path: nf.EquilibriumPath) -> None:
     assert np.abs(rows[0] - rows[1]).max() > 0.01
 
 
-@pytest.mark.parametrize(
-    "friction",
-    [FREE, pytest.param(nf.Capstan(0.1), marks=pytest.mark.nightly)],
-    ids=["frictionless", "capstan"],
-)
-def test_derivatives_pass_through_the_memory(friction: nf.Capstan | nf.Frictionless) -> None:
-    robot = dataclasses.replace(WRIST, friction=friction)
+def test_derivatives_pass_through_the_memory() -> None:
+    robot = dataclasses.replace(WRIST, friction=nf.Capstan(0.1))
     values = {
         "material.elastic_modulus": 10_000.0,
         "material.plateau_stress": 280.0,
@@ -104,7 +91,7 @@ def test_derivatives_pass_through_the_memory(friction: nf.Capstan | nf.Frictionl
         "notch[*].height": WRIST.notches[0].height,
     }
     loads = pulls([1.37, 0.83, 0.61, 1.03])
-    function = nf.differentiable(robot, loads, list(values), outputs=("total_angle",))
+    function = nf.differentiable(robot, loads, list(values))
 
     def angles(name: str, change: float) -> np.ndarray:
         return np.asarray(function(values | {name: values[name] + change})["total_angle"])
@@ -116,27 +103,11 @@ def test_derivatives_pass_through_the_memory(friction: nf.Capstan | nf.Frictionl
         start = {key: np.asarray(float(one)) for key, one in values.items()}
         exact = jax.jvp(function, (start,), (change,))[1]["total_angle"]
         np.testing.assert_allclose(exact, difference, rtol=2e-5, atol=1e-7 / value)
-        by_adjoint = jax.grad(lambda one: function(one)["total_angle"][2])(start)[name]
-        assert float(by_adjoint) == pytest.approx(float(exact[2]), rel=1e-9)
-
-
-def test_no_random_history_gains_work() -> None:
-    tensions = np.random.default_rng(7).uniform(0.0, 2.2, 9)
-    robot = dataclasses.replace(WRIST, friction=nf.Capstan(0.13))
-    corners = [0.0, *tensions, 0.0]
-    steps = np.concatenate([np.linspace(*pair, 41)[1:] for pair in itertools.pairwise(corners)])
-    found = nf.simulate(robot, pulls(steps.tolist()))
-    assert found.converged.all()
-    assert found.tendon_work[-1, 0] - found.stored_energy[-1] > -1e-9
-    lost = found.dissipation[-1][np.isfinite(found.dissipation[-1])].sum()
-    assert found.material_dissipation[-1].sum() > 0.0
-    whole = lost + found.material_dissipation[-1].sum() + found.stored_energy[-1]
-    assert found.tendon_work[-1, 0] == pytest.approx(whole, rel=2e-2)
 
 
 @pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore::notchflex.InputWarning")  # any material
-@pytest.mark.parametrize("name", ["liu2022", "gao2017", "two-axis-wrist"])
+@pytest.mark.parametrize("name", ["liu2022", "gao2017"])
 def test_every_notch_kind_takes_nitinol(name: str) -> None:
     robot = nf.load_robot(name)
     modulus = robot.material.elastic_modulus
@@ -183,34 +154,8 @@ def test_derivatives_where_friction_holds_a_notch(margin) -> None:
     margin.within("slope, per modulus", (found - difference) * value, 1e-6)
 
 
-@pytest.mark.nightly
-def test_no_loop_gains_work_where_notches_flatten() -> None:
-    """Flattening and hysteresis together: back and forth over the same strokes costs work."""
-    random, steps, begins = np.random.default_rng(5), [], []
-    last = 0.0
-    for _ in range(12):
-        low, high = np.sort(random.uniform(0.1, 2.2, 2))
-        begins.append(len(steps) + 12)
-        for first, then in ((last, low), (low, high), (high, low)):
-            steps += np.linspace(first, then, 13)[1:].tolist()
-        last = low
-    path = nf.simulate(FLATTENS, [nf.Load(stroke=one) for one in steps])
-    assert path.converged.all(), path.reason
-    loops = []
-    for begin in begins:
-        # The second time round the loop is closed: up to `high` and back to `low`.
-        there = slice(begin - 1, begin + 24)
-        again = [nf.Load(stroke=one) for one in steps[there][1:] * 2]
-        twice = nf.simulate(FLATTENS, again, from_state=path.state_at(begin - 1))
-        loops.append(twice.tendon_work[-1, 0] - twice.tendon_work[23, 0])
-        np.testing.assert_allclose(twice.notch_angle[-1], twice.notch_angle[23], atol=1e-8)
-    assert min(loops) >= -1e-9
-    assert max(loops) > 1e-3
-    assert (np.diff(path.material_dissipation.sum(axis=-1)) > -1e-9).all()
-
-
 def balance(
-    friction: nf.Capstan | nf.Frictionless, corners: list[float], count: int
+    friction: nf.Capstan, corners: list[float], count: int
 ) -> tuple[nf.EquilibriumPath, np.ndarray]:
     """Path over strokes in so many steps each, and what is missing as a part of the work."""
     robot = dataclasses.replace(FLATTENS, friction=friction)
@@ -218,18 +163,13 @@ def balance(
     path = nf.simulate(robot, [nf.Load(stroke=float(one)) for one in np.concatenate(parts)])
     assert path.converged.all(), path.reason
     lost = path.material_dissipation.sum(axis=-1) + np.nansum(path.dissipation, axis=(1, 2))
+    assert (np.diff(path.material_dissipation.sum(axis=-1)) > -1e-9).all()  # no loop gains work
     missing = path.tendon_work[:, 0] - path.stored_energy - lost
     return path, missing / path.tendon_work.max()
 
 
-@pytest.mark.parametrize(
-    "friction",
-    [FREE, pytest.param(nf.Capstan(0.13), marks=pytest.mark.nightly)],
-    ids=["frictionless", "capstan"],
-)
-def test_work_is_stored_or_lost_where_notches_flatten(
-    friction: nf.Capstan | nf.Frictionless, margin: Margin
-) -> None:
+@pytest.mark.parametrize("friction", [FREE, nf.Capstan(0.13)], ids=["frictionless", "capstan"])
+def test_work_is_stored_or_lost_where_notches_flatten(friction: nf.Capstan, margin: Margin) -> None:
     """Flattening and hysteresis together: what is missing falls with the square of the steps."""
     corners = [0.0, 1.7, 0.7, 1.3, 0.3, 1.6, 0.4]
     coarse, fine = (balance(friction, corners, count)[1] for count in (40, 160))

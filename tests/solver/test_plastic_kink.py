@@ -44,11 +44,3 @@ def test_the_state_on_the_plateau_is_an_equilibrium() -> None:
     moment = np.asarray(section.second_moment_weak)[:, 0] / edge * stress
     pulled = state.span_tension[0, 1::2] * lever
     assert moment == pytest.approx(pulled, rel=1e-11)
-
-
-def test_without_friction_the_plateau_is_crossed() -> None:
-    """Without friction nothing but the hardening itself resists there."""
-    smooth = YORK.replace(friction=nf.Frictionless())
-    path = nf.solve_each(smooth, loads(2.4, 3.6, 500))
-    assert path.converged.all()
-    assert (np.diff(path.total_angle) >= -1e-9).all()

@@ -23,12 +23,6 @@ def test_failure_is_data_with_the_last_good_state(wrist: nf.Robot) -> None:
         path.raise_if_failed()
 
 
-def test_after_a_failure_nothing_is_tried(wrist: nf.Robot) -> None:
-    path = nf.simulate(wrist, [nf.Load(stroke=4.2), nf.Load(tension=1.0)])
-    assert "not tried, because step 1" in path.reason[1]
-    assert path.iterations[1] == 0
-
-
 def test_an_elastic_tendon_can_be_drawn_on_when_all_is_closed(wrist: nf.Robot) -> None:
     robot = wrist.with_value("tendon.axial_stiffness", 500.0)
     state = nf.solve(robot, nf.Load(stroke=4.5)).raise_if_failed()
@@ -47,19 +41,6 @@ def test_a_slack_tendon_does_not_push(wrist: nf.Robot) -> None:
     np.testing.assert_allclose(path.total_angle[[0, 2]], 0.0, atol=1e-9)
 
 
-def test_state_is_saved_and_continued_from(wrist: nf.Robot, tmp_path: Path) -> None:
-    whole = nf.simulate(wrist, nf.pull(0.0, 2.5, steps=11).release())
-    half = nf.simulate(wrist, nf.pull(0.0, 2.5, steps=11))
-    half.state.save(tmp_path / "state.json")
-    back = nf.LoadPath(whole.load.tension[11:], whole.load.stroke[11:])
-    for state in (half.state, nf.State.load(tmp_path / "state.json")):
-        rest = nf.simulate(wrist, back, from_state=state)
-        np.testing.assert_allclose(rest.notch_angle, whole.notch_angle[11:], atol=1e-10)
-        np.testing.assert_allclose(
-            rest.dissipation[-1], whole.dissipation[-1] - whole.dissipation[10], atol=1e-10
-        )
-
-
 def test_a_state_of_another_robot_is_refused(wrist: nf.Robot, tmp_path: Path) -> None:
     state = nf.solve(wrist, nf.Load(tension=1.0)).state
     other = nf.load_robot("pacheco2021-c")
@@ -73,33 +54,6 @@ def test_a_state_of_another_robot_is_refused(wrist: nf.Robot, tmp_path: Path) ->
     (tmp_path / "text.json").write_text("no state")
     with refused("FILE_UNREADABLE", "text.json"):
         nf.State.load(tmp_path / "text.json")
-
-
-@pytest.mark.parametrize(
-    ("load", "code", "name"),
-    [
-        (nf.Load, "WRONG_TYPE", "load"),
-        (nf.Load(tension=(1.0, 2.0)), "WRONG_SHAPE", "tension"),
-        (nf.Load(tension=-1.0), "OUT_OF_RANGE", "-1 N"),
-        (nf.Load(tension=1.0, stroke=1.0), "CONFLICT", "tension and stroke"),
-    ],
-)
-def test_loads_that_are_none(wrist: nf.Robot, load: object, code: str, name: str) -> None:
-    with refused(code, name):
-        nf.simulate(wrist, [load])  # type: ignore[list-item]
-
-
-@pytest.mark.parametrize(
-    ("values", "code"),
-    [
-        ({"tension": "1"}, "WRONG_TYPE"),
-        ({"tension": float("nan")}, "NOT_FINITE"),
-        ({"base_rotation": (0.0, 1.0)}, "NOT_FINITE"),
-    ],
-)
-def test_a_load_checks_its_numbers(values: dict, code: str) -> None:
-    with refused(code, next(iter(values))):
-        nf.Load(**values)
 
 
 def test_solve_each_is_solve_of_each(wrist: nf.Robot) -> None:
@@ -136,11 +90,11 @@ def test_a_new_load_or_robot_of_the_same_shape_needs_no_new_program(wrist: nf.Ro
 @pytest.mark.nightly
 def test_wrists_of_one_to_forty_notches_share_four_programs(wrist: nf.Robot) -> None:
     programs = set()
-    for notches in (1, 3, 7, 8, 15, 16, 24, 31, 32, 40):
+    for notches in (1, 7, 8, 24, 40):
         longer = wrist.replace(notch=wrist.notches[:1] * notches, tendon=(nf.Tendon(0.7),))
         state = nf.solve(longer, nf.Load(tension=0.3)).raise_if_failed()
         programs.add(state.path.prepared.long.static_structure)
-        if notches in (1, 8, 24, 40):  # against a program without added flexures, compiled for each
+        if notches in (8, 40):  # against a program without added flexures, compiled for each
             alone = nf.solve_batch(longer, [nf.Load(tension=0.3)])
             assert state.total_angle == pytest.approx(alone["total_angle"][0], abs=1e-12)
     assert len(programs) <= 4
@@ -164,15 +118,8 @@ def test_kinematic_model_tells_the_stroke_it_loses(wrist: nf.Robot) -> None:
         nf.equal_stroke(wrist, np.array([np.nan]))
 
 
-@pytest.mark.parametrize("steps", [5, 31, 200])
-def test_stroke_turned_round(wrist: nf.Robot, steps: int) -> None:
-    path = nf.simulate(wrist, nf.stroke_path(0.0, 3.6, steps=steps).release()).raise_if_failed()
-    np.testing.assert_allclose(path.stroke, path.commanded_stroke, atol=1e-12)
-    assert path.stable.all()
-
-
 @pytest.mark.filterwarnings("ignore::notchflex.InputWarning")  # 162 mm wide
-@pytest.mark.parametrize("scale", [0.1, 4.0, 100.0])
+@pytest.mark.parametrize("scale", [0.1, 100.0])
 def test_a_robot_of_another_size_bends_alike(wrist: nf.Robot, scale: float) -> None:
     scaled = nf.Robot(
         name="scaled",
@@ -190,12 +137,6 @@ def test_a_robot_of_another_size_bends_alike(wrist: nf.Robot, scale: float) -> N
     np.testing.assert_allclose(other.tension, path.tension * scale**2, rtol=1e-8, atol=1e-9)
 
 
-def test_partial_reversals_are_stable(wrist: nf.Robot) -> None:
-    loads = [nf.Load(tension=value) for value in (0, 1, 2, 3, 1, 1.2, 1.1)]
-    path = nf.simulate(wrist, loads)
-    assert path.stable.all()
-
-
 def test_a_stroke_far_too_long_says_so(wrist: nf.Robot) -> None:
     with pytest.warns(nf.InputWarning, match="`stroke`"):
         assert "every notch closed" in nf.solve(wrist, nf.Load(stroke=1e6)).reason
@@ -207,14 +148,6 @@ def test_a_tendon_without_lever_is_not_converged_in_silence(wrist: nf.Robot) -> 
     state = nf.solve(robot, nf.Load(stroke=1.0))
     assert not state.converged
     assert state.reason
-
-
-@pytest.mark.filterwarnings("ignore::notchflex.InputWarning")  # more than one turn
-def test_whole_turns_of_the_base_are_none(wrist: nf.Robot, margin) -> None:
-    still = nf.solve(wrist, nf.Load(tension=1.0)).tip_position
-    for turns in (1.0, 2.0, 5.0):
-        state = nf.solve(wrist, nf.Load(tension=1.0, base_rotation=(2.0 * np.pi * turns, 0.0, 0.0)))
-        margin.within("tip", state.tip_position - still, 1e-12, "mm")
 
 
 def test_the_base_stretches_too(wrist: nf.Robot) -> None:
@@ -229,26 +162,6 @@ def test_precurvature_past_closing_is_refused(wrist: nf.Robot) -> None:
         nf.solve(wrist.with_value("notch.precurvature_deg", 40.0), nf.Load(tension=1.0))
 
 
-@pytest.mark.nightly
-def test_modes_that_fill_up_are_no_modes_of_the_robot() -> None:
-    # Arcs have fewer modes than strips; what holds the missing ones has a stiffness of 1.
-    strip = nf.StripNotch(height=3.5, strip_thickness=1.5, depth=6.9)
-    arc = nf.ArcNotch("on-axis", 5.0, 4.0, uncut_length=4.0)
-    robot = nf.load_robot("liu2022").replace(
-        notch=(strip, arc), tendon=(nf.Tendon(4.0, path="straight"),), friction=nf.Frictionless()
-    )
-    path = nf.simulate(robot, nf.Load(tension=0.0))
-    chain = path.chain
-    real = [
-        stiffness[np.ix_(idle == 0.0, idle == 0.0)]
-        for stiffness, idle in zip(chain.elastic, chain.rods.padding_mask, strict=True)
-    ]
-    assert (np.asarray(chain.rods.padding_mask) > 0.0).any()
-    smallest = min(np.linalg.eigvalsh(stiffness).min() for stiffness in real)
-    assert smallest > 2.0
-    assert path.smallest_eigenvalue[0] == pytest.approx(smallest, rel=1e-9)
-
-
 @pytest.mark.filterwarnings("ignore::notchflex.InputWarning")  # 100 MPa
 def test_a_notch_that_would_pass_through_itself_is_no_answer():
     # Draw 1191 of seed 5 of benchmarks/robustness.py in short: far more load than a notch can bear
@@ -258,8 +171,8 @@ def test_a_notch_that_would_pass_through_itself_is_no_answer():
         tube=nf.Tube(2.0, 1.8),
         notch=(nf.ArcNotch("on-axis", 1.6, 3.0, uncut_length=1.0, repeat=2),),
         tendon=(nf.Tendon(0.9),),
-        material=nf.Linear(100.0),
-        friction=nf.Frictionless(),
+        material=nf.Superelastic(100.0, 100.0, 0.028),
+        friction=nf.Capstan(0.0),
     )
     for moment in (20.0, 200.0):
         state = nf.solve(robot, nf.Load(tip_moment=(0.0, -moment, 0.0)))

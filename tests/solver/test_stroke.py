@@ -11,7 +11,7 @@ from loads import strokes, tensions
 from oracles.wrist import SPECIMENS, WRISTS
 from robots import of_wrist, ready, specimen
 
-ANGLE = 1e-9  # rad
+ANGLE = 2e-11  # rad
 # Base tension at which the last notch closes [N] (tests/reference/pacheco_closing.csv).
 LAST_CLOSING = {"A": 2.1329, "B": 1.872, "C": 2.309}
 BELOW = np.array([0.0, 0.02, 0.2, 0.45, 0.6, 0.75, 0.85, 0.93, 0.97, 0.999])
@@ -53,9 +53,9 @@ def test_stroke_given_on_the_way_back(wrap, margin):
     margin.within("angles", drawn.notch_angle - pulled.notch_angle, ANGLE, "rad")
 
 
-@pytest.mark.parametrize("part", [0.5, 0.8, 0.95, 0.99])
+@pytest.mark.parametrize("part", [0.5, 0.99])
 @pytest.mark.parametrize("wrap", ["geometric", "whole-before"])
-@pytest.mark.parametrize("name", ["A", "A specimen", "B", "C"])
+@pytest.mark.parametrize("name", ["A", "C specimen"])
 def test_drawn_and_let_go_in_small_steps(name, wrap, part, margin):
     """At the turn the tension jumps, while nothing moves: every contact turns round at once."""
     wrist = (SPECIMENS[name[0]] if name.endswith("specimen") else WRISTS[name]).with_(wrap=wrap)
@@ -75,49 +75,6 @@ def test_drawn_and_let_go_in_small_steps(name, wrap, part, margin):
         tension = brentq(missing, 0.0, peak, args=(history, stroke), xtol=1e-15)
         angle = wrist.march([*history, tension])[-1].angle
         margin.within("angles", path.notch_angle[step] - angle, ANGLE, "rad")
-
-
-@pytest.mark.parametrize("name", "ABC")
-def test_beyond_the_last_closing_a_stroke_fixes_no_tension(name):
-    closed = nf.solve(ready(name), nf.Load(tension=2.5))
-    assert closed.closed.all()
-    for excess in (1e-3, 0.5):
-        state = nf.solve(ready(name), nf.Load(stroke=float(closed.stroke[0]) + excess))
-        assert not state.converged
-        assert "every notch closed" in state.reason
-
-
-def test_path_stops_being_good_where_the_last_notch_closes():
-    full = float(nf.solve(ready("A"), nf.Load(tension=2.5)).stroke[0])
-    stroke = np.array([0.25, 0.5, 0.75, 0.99, 1.01, 1.2]) * full
-    path = nf.simulate(ready("A"), strokes(stroke))
-    assert path.converged.tolist() == [True, True, True, True, False, False]
-    assert path.reason[:4] == [""] * 4
-    assert "every notch closed" in path.reason[4]
-    assert path.reason[5], "the step after the failed one says nothing"
-
-
-def test_elastic_tendon_reaches_beyond_the_last_closing(margin):
-    robot = ready("A").with_value("tendon[1].axial_stiffness", 500.0)
-    robot = robot.with_value("tendon[1].free_length", 300.0)
-    pulled = nf.simulate(robot, tensions([1.0, 2.0, 2.6]))
-    assert pulled.closed[-1].all()
-    drawn = nf.simulate(robot, strokes(pulled.stroke))
-    assert drawn.converged.all(), drawn.reason
-    margin.within("angles", drawn.notch_angle - pulled.notch_angle, ANGLE, "rad")
-    margin.within("tension", drawn.tension - pulled.tension, 1e-11, "N")
-    stiff = nf.simulate(ready("A"), tensions(pulled.tension))
-    # 300 mm under 1 N stretch by 0.6 mm; what lies in the wrist adds less than 10 mm to that.
-    longer = (pulled.stroke - stiff.stroke) / pulled.tension
-    assert (longer > 300 / 500).all()
-    assert (longer < 310 / 500).all()
-
-
-def test_no_stroke_leaves_the_tendon_slack(margin):
-    state = nf.solve(ready("A"), nf.Load(stroke=0.0))
-    assert state.converged, state.reason
-    margin.within("tension", state.tension, 1e-12, "N")
-    margin.within("angles", state.notch_angle, 1e-12, "rad")
 
 
 @pytest.mark.nightly

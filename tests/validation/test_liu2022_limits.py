@@ -11,7 +11,7 @@ import pytest
 from liu2022 import STEPS, liu, pulled
 from oracles.strip import Strip, march, solve_notch
 
-ANGLE, FORCE, GAP = 1e-7, 1e-8, 2e-6  # rad; tension relative to the pull; mm
+ANGLE, FORCE, GAP = 1e-10, 1e-9, 2e-6  # rad; tension relative to the pull; mm
 FAR_ANGLE, LIP_FORCE = 3e-7, 1e-5  # rad, N; up to 40 N
 FAR = np.linspace(0.0, 40.0, STEPS + 1)[1:]  # N
 

@@ -1,6 +1,18 @@
-"""`notchflex compare` prints Table 4 of Pacheco et al. 2021 (BibTeX in test_pacheco2021_table4.py).
+"""`notchflex compare` prints Table 4 of Pacheco et al. 2021, the model against measured angles.
 
-Measured angles are read from ../shared/data.
+Measured angles are read from ../shared/data. The paper's model is the specimen's: unrounded
+constants (the authors' set 196) and notches that are bent when free. Its "experimental" tip is
+the forward kinematics of the measured angles.
+
+@article{pacheco2021beyond,
+  author  = {Pacheco, Nicholas E. and Gafford, Joshua B. and Atalla, Mostafa A. and
+             Webster, Robert J. III and Fichera, Loris},
+  title   = {Beyond Constant Curvature: A New Mechanics Model for Unidirectional Notched-Tube
+             Continuum Wrists},
+  journal = {Journal of Medical Robotics Research},
+  volume  = {6}, number = {1-2}, pages = {2140004}, year = {2021},
+  doi     = {10.1142/s2424905x21400043}
+}
 """
 
 from __future__ import annotations

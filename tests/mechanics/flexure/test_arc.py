@@ -6,22 +6,15 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import legvander
 from scipy.integrate import cumulative_simpson
+from scipy.linalg import expm
 
 import notchflex as nf
-from notchflex._jax import jax
-from notchflex.mechanics.contact import SpineContact
 from notchflex.mechanics.cuts import SECTION_OF_CUT
-from notchflex.mechanics.flexure import Rod, fibre_stretch, relative_pose, rod, with_level
-from notchflex.mechanics.flexure import flexure_state as plain_flexure_state
-from notchflex.mechanics.material import section_law
+from notchflex.mechanics.flexure import Rod, relative_pose, rod, with_level
 from notchflex.mechanics.motion import Motion
-from twists import exponential
-
-flexure_state = jax.jit(plain_flexure_state, static_argnames="with_pose")
 
 GAUSS = np.polynomial.legendre.leggauss(7)[0]
 TUBE = nf.Tube(1.62, 1.40)
-LAW = section_law(nf.Linear(10000.0))
 
 
 def notch(direction: float = 0.0, precurvature: float = 0.0) -> nf.ArcNotch:
@@ -40,16 +33,13 @@ def under_tendons(direction: float = 0.0, precurvature: float = 0.0) -> Rod:
     return with_level(rod(notch(direction, precurvature), TUBE), "tendons")
 
 
-def pose_and_twist(shape: Rod, modes: np.ndarray) -> tuple[Motion, np.ndarray]:
-    state = flexure_state(shape, LAW, (), modes, with_pose=True)
-    return state.pose, np.asarray(state.twist)
-
-
-def lip_gap(shape: Rod, theta: float) -> float:
-    state = flexure_state(shape, LAW, (), np.array([theta]), with_pose=False)
-    ones, across = np.ones(1), np.asarray(shape.closure)[None]
-    natural = fibre_stretch(across) @ (shape.length @ shape.reference_strain)
-    return float(SpineContact(ones, ones, natural, across).cross(shape, state, None).gap[0])
+def exponential(twist: np.ndarray) -> Motion:
+    """Motion by following a constant twist (angular, linear), by SciPy's matrix exponential."""
+    matrix = np.zeros((4, 4))
+    matrix[:3, :3] = np.cross(twist[:3], np.eye(3)).T  # its columns are angular x e_i
+    matrix[:3, 3] = twist[3:]
+    moved = expm(matrix)
+    return Motion(moved[:3, :3], moved[:3, 3])  # pyright: ignore[reportArgumentType]
 
 
 def pacheco_notch(theta: float, centroid: float, height: float = 0.8) -> np.ndarray:
@@ -64,8 +54,8 @@ def pacheco_notch(theta: float, centroid: float, height: float = 0.8) -> np.ndar
     return turned
 
 
-@pytest.mark.parametrize("theta", [0.0, 1e-7, 0.1, 0.5, -0.3])
-@pytest.mark.parametrize("direction", [0.0, 90.0, 217.0])
+@pytest.mark.parametrize("theta", [0.0, 0.5, -0.3])
+@pytest.mark.parametrize("direction", [0.0, 217.0])
 def test_pose_is_eq_1(theta: float, direction: float) -> None:
     shape = under_tendons(direction)
     pose = relative_pose(shape, np.array([theta]))
@@ -76,59 +66,6 @@ def test_pose_is_eq_1(theta: float, direction: float) -> None:
     expected = about @ expected @ about.T
     np.testing.assert_allclose(pose.rotation, expected[:3, :3], atol=1e-15)
     np.testing.assert_allclose(pose.translation, expected[:3, 3], atol=1e-15)
-
-
-def test_lips_meet_at_the_closing_angle() -> None:
-    shape = under_tendons()
-    closing = 0.8 / (0.81 + float(shape.end_offset[0]))
-    assert lip_gap(shape, closing) == pytest.approx(0.0, abs=1e-15)
-    # The gap is the distance of the lips, found again from the pose of the distal body.
-    theta = 0.2
-    pose = relative_pose(shape, np.array([theta]))
-    lip = np.array([0.81, 0.0, 0.0])
-    chord = float(np.linalg.norm(pose.point(lip) - lip))
-    arc = chord * (theta / 2) / np.sin(theta / 2)
-    assert lip_gap(shape, theta) == pytest.approx(arc, rel=1e-12)
-
-
-def test_precurvature_is_there_without_moment() -> None:
-    shape = under_tendons(precurvature=5.0)
-    state = flexure_state(shape, LAW, (), np.zeros(1), with_pose=False)
-    assert float(state.bend[1]) == pytest.approx(np.radians(5.0))
-    np.testing.assert_array_equal(state.internal, 0.0)
-
-
-def test_moment_is_stiffness_times_elastic_angle() -> None:
-    shape = under_tendons(precurvature=5.0)
-    state = flexure_state(shape, LAW, (), np.array([0.1]), with_pose=False)
-    expected = 10000.0 * 5.816412685e-4 / 0.8 * 0.1
-    assert float(state.internal[0]) == pytest.approx(expected, rel=1e-9)
-
-
-def test_twist_is_the_finite_difference_of_the_pose() -> None:
-    shape = under_tendons(40.0)
-    modes, step = np.array([0.3]), 1e-6
-    pose, twist = pose_and_twist(shape, modes)
-    ahead, behind = (relative_pose(shape, modes + sign * step) for sign in (1, -1))
-    turning = np.asarray(pose.rotation).T @ (ahead.rotation - behind.rotation) / (2 * step)
-    moving = np.asarray(pose.rotation).T @ (ahead.translation - behind.translation) / (2 * step)
-    np.testing.assert_allclose(
-        twist[:, 0], [turning[2, 1], turning[0, 2], turning[1, 0], *moving], atol=1e-9
-    )
-
-
-def test_twist_of_all_modes_is_the_finite_difference_of_the_pose() -> None:
-    shape = rod(notch(40.0, 3.0), TUBE, refinement=1)
-    modes, step = 0.2 * np.cos(np.arange(shape.modes)), 1e-6
-    pose, twist = pose_and_twist(shape, modes)
-    for mode in range(shape.modes):
-        by = step * np.eye(shape.modes)[mode]
-        ahead, behind = (relative_pose(shape, modes + sign * by) for sign in (1, -1))
-        turning = np.asarray(pose.rotation).T @ (ahead.rotation - behind.rotation) / (2 * step)
-        moving = np.asarray(pose.rotation).T @ (ahead.translation - behind.translation) / (2 * step)
-        np.testing.assert_allclose(
-            twist[:, mode], [turning[2, 1], turning[0, 2], turning[1, 0], *moving], atol=1e-9
-        )
 
 
 def test_pose_of_changing_strain_is_that_of_many_short_pieces() -> None:
@@ -148,14 +85,6 @@ def test_pose_of_changing_strain_is_that_of_many_short_pieces() -> None:
     found = relative_pose(shape, modes)
     np.testing.assert_allclose(found.rotation, pose.rotation, atol=3e-8)
     np.testing.assert_allclose(found.translation, pose.translation, atol=3e-8)
-
-
-def test_fibre_stretch_is_pachecos_wall_arc() -> None:
-    shape = under_tendons()
-    arm, theta = 0.70 + float(shape.end_offset[0]), 0.25
-    strain = shape.reference_strain + shape.basis @ np.array([theta])
-    length = shape.length @ strain @ np.asarray(fibre_stretch(np.array([arm, 0.0])))
-    assert float(length) == pytest.approx(0.8 - theta * arm, rel=1e-14)
 
 
 def pulled_by_a_straight_tendon(tension: float, arm: float, height: float = 0.8) -> float:
@@ -193,8 +122,3 @@ def test_refinement_adds_modes_under_a_straight_tendon(refinement: int, within: 
     )
     state = nf.solve(robot, nf.Load(tension=1.4), refinement=refinement)
     assert abs(state.total_angle - pulled_by_a_straight_tendon(1.4, 0.60)) < within
-
-
-def test_nothing_else_is_a_notch() -> None:
-    with pytest.raises(TypeError, match=r"rod\.register"):
-        rod(nf.Frictionless(), TUBE)

@@ -17,15 +17,6 @@ STRIP = nf.StripNotch(0.7, 0.3, 1.3, uncut_length=1.2)
 LINK = nf.ULink(0.08, 0.2, 0.6, "away")
 
 
-class Unknown:
-    """A description whose fibres nobody stated."""
-
-
-def test_unknown_kinds_are_refused_by_name() -> None:
-    with pytest.raises(TypeError, match=r"type Unknown.*@section_fibres\.register"):
-        with_fibres(rod(ARC, TUBE), Unknown(), TUBE)
-
-
 @pytest.mark.parametrize("notch", [STRIP, LINK], ids=["strip", "link"])
 def test_fibres_of_strips_are_those_of_a_rectangle(notch: nf.StripNotch | nf.ULink) -> None:
     section = with_fibres(rod(notch, TUBE), notch, TUBE).section

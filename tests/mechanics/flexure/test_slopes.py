@@ -32,7 +32,6 @@ def robot(name: str) -> nf.Robot:
 @pytest.mark.parametrize(
     ("name", "flat"),
     [
-        ("pacheco2021-a", True),
         ("pacheco2021-a", False),
         ("gao2017", True),
         ("liu2022", True),
@@ -41,8 +40,6 @@ def robot(name: str) -> nf.Robot:
             pytest.param(*case, marks=pytest.mark.nightly)
             for case in [
                 ("gao2017", False),
-                ("liu2022", False),
-                ("small strips", True),
                 ("small strips", False),
             ]
         ),

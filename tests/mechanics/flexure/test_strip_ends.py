@@ -22,7 +22,7 @@ PLANE = ("rx", "uy", "uz")
 LIU = {"rx": 0.00588327, "uy": 0.005093919, "uz": 0.01923623}
 LIU_PULLED = {"rotation": 0.02353681, "gap": 0.1133988}  # by 1 N of cable, rad and mm
 GAO = {"rx": 2.741072e-3, "uy": 2.909225e-4, "uz": 2.625105e-3, "uy_uz": -3.480495e-4}
-GAO_SIDEWAYS = {"ux": 2.243258e-3, "ry": 3.827097e-4, "rz": 9.271828e-5, "ry_rz": 3.893311e-5}
+GAO |= {"ux": 2.243258e-3, "ry": 3.827097e-4, "rz": 9.271828e-5, "ry_rz": 3.893311e-5}
 
 
 def liu(
@@ -90,16 +90,6 @@ def errors(rows: Sequence[Mapping[str, Any]], inside: bool) -> np.ndarray:
     return 100.0 * np.array(made)
 
 
-def test_the_cells_repeat_the_full_meshes(margin: Margin) -> None:
-    """Our cells against the finer full meshes; of Liu's bodies the cell holds less."""
-    for name, value in LIU.items():
-        error = STRIPS[0][f"EC_{name}_{name}"] / (1000.406 * value) - 1.0
-        margin.within(f"strip, {name}", 100.0 * error, 1.5, "%")
-    for name, value in (GAO | GAO_SIDEWAYS).items():
-        key = f"EC_{name}" if "_" in name else f"EC_{name}_{name}"
-        margin.within(f"link, {name}", 100.0 * (LINKS[0][key] / (22000.0 * value) - 1.0), 0.6, "%")
-
-
 @pytest.mark.nightly
 def test_liu_and_gao_at_small_loads(margin: Margin) -> None:
     found = compliance(liu(), nf.Tube(10.0, 6.0), 1000.406, 0.4)
@@ -108,8 +98,6 @@ def test_liu_and_gao_at_small_loads(margin: Margin) -> None:
     link = nf.ULink(0.275, 0.70, 2.0, "toward", ends="elastic")
     found = compliance(link, nf.Tube(5.99, 4.0), 22000.0)
     for name, value in GAO.items():
-        margin.within(f"link, {name}", 100.0 * (entry(found, name) / value - 1.0), 2.0, "%")
-    for name, value in GAO_SIDEWAYS.items():
         margin.within(f"link, {name}", 100.0 * (entry(found, name) / value - 1.0), 2.0, "%")
 
 
@@ -181,23 +169,6 @@ def test_validity_names_each_range() -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("direction", [0.0, 35.0, 180.0])
-def test_the_frame_turns_with_the_notch(direction: float) -> None:
-    """The compliance along the strip turns with it, and halves of a row mirror each other."""
-    tube, turn = nf.Tube(10.0, 6.0), np.radians(direction)
-    plain = compliance(liu(), tube)
-    turned = compliance(liu(direction_deg=direction), tube)
-    side = np.array([np.cos(turn), np.sin(turn), 0.0])
-    np.testing.assert_allclose(side @ turned[:3, :3] @ side, plain[0, 0], rtol=1e-12)
-    one, other = (
-        compliance(nf.ULink(0.275, 0.7, 2.0, hand, ends="elastic"), nf.Tube(5.99, 4.0))
-        for hand in ("away", "toward")
-    )
-    mirror = np.diag([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
-    np.testing.assert_allclose(one, mirror @ other @ mirror, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.nightly
 @pytest.mark.parametrize(("name", "tensions"), [("liu2022", (6.0, 0.0)), ("gao2017", (8.0,))])
 def test_robots_with_friction_and_loads(name: str, tensions: tuple[float, ...]) -> None:
     robot = nf.load_robot(name).with_values({"notch[*].ends": "elastic"})
@@ -213,16 +184,3 @@ def test_robots_with_friction_and_loads(name: str, tensions: tuple[float, ...]) 
     # The base carries what acts at the tip.
     force = -path.quantity("base_force")  # that of the base on the robot, turned round
     np.testing.assert_allclose(force[:, :2], np.tile(sideways[:2], (3, 1)), atol=1e-6)
-
-
-def test_rigid_ends_stay_as_they_were() -> None:
-    """The paper's rods do not know of elastic ends: no part of the walls is added."""
-    for notch, tube in (
-        (nf.StripNotch(3.5, 1.5, 6.9), nf.Tube(10.0, 6.0)),
-        (nf.ULink(0.275, 0.7, 2.0, "away"), nf.Tube(5.99, 4.0)),
-    ):
-        assert not notch.has_elastic_ends
-        assert rod(notch, tube).section.ends is None
-    below, above = nf.StripNotch(3.5, 1.5, 6.9).openings(None, None)
-    assert (below.leaves, below.enters, above.leaves, above.enters) == (0.0, 0.0, 3.5, 3.5)
-    assert below.leaves_rise == above.enters_rise == 0.0

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from notchflex import ULink
 from notchflex.mechanics.flexure.u_link import CurvedEnd, Link
 from reference_data import reference
 
@@ -28,44 +26,6 @@ def test_curved_end(margin):
     wanted = np.split(table[:, 1:], np.cumsum([value.shape[1] for value in found.values()])[:-1], 1)
     for (what, value), column in zip(found.items(), wanted, strict=True):
         margin.within(what, value - column, 1e-10)
-
-
-def test_it_begins_square_to_the_cut():
-    heading = END.heading(0.0)
-    across = END.outer_edge(0.0) - END.inner_edge(0.0)
-    assert np.dot(across, [np.cos(heading), np.sin(heading)]) == pytest.approx(0.0, abs=1e-15)
-    assert heading == pytest.approx(0.5 * np.pi - END.angle, abs=1e-15)
-
-
-def test_the_description_has_the_same_width():
-    notch = ULink(0.275, 0.70, 2.0, "away")
-    assert notch.end_width == pytest.approx(END.outer_length, rel=1e-14)
-    assert notch.span == pytest.approx(-2.0 * LINK.course(0.0).along, rel=1e-14)
-
-
-def test_places_are_arc_lengths(margin):
-    t = np.linspace(0.0, 1.0, 11)
-    margin.within("t", END.at_length(END.length(t)) - t, 1e-14)
-
-
-def at(place):
-    """The middle line at arc lengths."""
-    joint = LINK.end.length()
-    return LINK.course(np.interp(place, [0.0, joint, LINK.length - joint, LINK.length], range(4)))
-
-
-def test_heading_and_curvature_are_derivatives(margin):
-    # Not at the joints, where the curvature jumps.
-    place = np.linspace(0.01, LINK.length - 0.01, 60)
-    joint = LINK.end.length()
-    clear = np.minimum(abs(place - joint), abs(LINK.length - joint - place)) > 1e-4
-    place, step = place[clear], 1e-5
-    ahead, behind = at(place + step), at(place - step)
-    along, above = ahead.along - behind.along, ahead.above - behind.above
-    margin.within("speed", np.hypot(along, above) / (2.0 * step) - 1.0, 1e-9)
-    margin.within("heading", np.arctan2(above, along) - at(place).heading, 1e-9)
-    turning = (ahead.heading - behind.heading) / (2.0 * step)
-    margin.within("curvature", turning - at(place).curvature, 1e-8)
 
 
 def test_half_a_turn_takes_the_link_to_itself(margin):

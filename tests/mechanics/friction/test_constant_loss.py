@@ -55,26 +55,7 @@ def test_tension_stays_locked_in_when_the_base_is_let_go(path: nf.EquilibriumPat
     np.testing.assert_allclose(behind[1], ratio[1] * LOSS + LOSS, atol=1e-8)
 
 
-def test_without_turning_a_pull_loses_the_same_at_every_contact() -> None:
-    law = friction_law(nf.Capstan(0.0, constant_loss=LOSS))
-    tension = jnp.array([[1.0, 0.5], [0.5, 0.2]])
-    limits = law.limits(0.0 * tension, tension, jnp.ones((2, 2)))
-    behind = (tension + law.offset()) * jnp.exp(-limits) - law.offset()
-    np.testing.assert_allclose(behind, tension - LOSS, rtol=1e-14)
-
-
-def test_no_loss_is_the_plain_law() -> None:
-    turning = jnp.array([[0.1, 0.4], [0.4, 0.1]])
-    plain, zero = (friction_law(nf.Capstan(MU, constant_loss=loss)) for loss in (None, 0.0))
-    tension = jnp.array([[0.0, 1.0], [1.0, 0.0]])
-    for sign in (-1.0, 1.0):
-        expected, found = (
-            law.limits(turning, tension, sign * jnp.ones((2, 2))) for law in (plain, zero)
-        )
-        np.testing.assert_allclose(found, expected, atol=1e-15)  # rounding of exp and log
-
-
-@pytest.mark.parametrize("tension", [0.0, 1e-12, 0.5 * LOSS, LOSS, 2.0 * LOSS, 1e6])
+@pytest.mark.parametrize("tension", [0.0, LOSS, 2.0 * LOSS])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_slopes_are_finite_at_every_tension(tension: float, sign: float) -> None:
     law = friction_law(nf.Capstan(MU, constant_loss=LOSS))
@@ -91,11 +72,11 @@ def test_slopes_are_finite_at_every_tension(tension: float, sign: float) -> None
         np.testing.assert_allclose(slopes[1][0], (high - low) / (2 * step), rtol=1e-6)
 
 
-LONG = [pytest.param(name, marks=pytest.mark.nightly) for name in ("two-axis-wrist", "liu2022")]
+LONG = pytest.param("two-axis-wrist", marks=pytest.mark.nightly)
 
 
-@pytest.mark.parametrize("name", ["pacheco2021-a", *LONG])
-@pytest.mark.parametrize("first", ["force", "stroke", "together"])
+@pytest.mark.parametrize("name", ["pacheco2021-a", LONG])
+@pytest.mark.parametrize("first", ["force", "stroke"])
 def test_loads_of_every_kind_are_solved_from_rest(name: str, first: str) -> None:
     robot = nf.load_robot(name).replace(friction=nf.Capstan(MU, constant_loss=0.02))
     none = (None,) * (robot.number_of_tendons - 1)
@@ -103,7 +84,6 @@ def test_loads_of_every_kind_are_solved_from_rest(name: str, first: str) -> None
     begins = {
         "force": nf.Load(tip_force=force),
         "stroke": nf.Load(stroke=(0.1, *none)),
-        "together": nf.Load(tension=(0.4, *none), tip_force=force),
     }
     loads = [begins[first], nf.Load(tension=(0.5, *none), tip_force=force), nf.Load(), nf.Load()]
     path = nf.simulate(robot, loads)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -34,19 +33,6 @@ def test_each_edge_has_its_own_turning() -> None:
     np.testing.assert_allclose(np.exp(-np.asarray(exit_bound)), ratio, rtol=1e-14)
 
 
-def test_a_small_turning_is_a_capstan() -> None:
-    turning = np.array([1e-4, 1e-4])
-    corner = friction_law(nf.Corner(0.3)).bounds(turning)
-    np.testing.assert_allclose(corner, 0.3 * turning, rtol=1e-8)
-
-
-def test_no_friction_holds_nothing_at_any_turning() -> None:
-    law = friction_law(nf.Corner(0.0))
-    turning = np.array([[0.0, 3.0], [np.pi, 1.0]])
-    np.testing.assert_array_equal(law.bounds(turning), 0.0)
-    assert np.all(law.valid(turning))
-
-
 def test_the_limit() -> None:
     law = friction_law(nf.Corner(0.8))
     limit = 2 * np.arctan(1 / 0.8)
@@ -60,18 +46,3 @@ def test_the_limit() -> None:
     assert float(bound[-1]) > 20.0  # the tension falls to nothing
     slope = jax.vmap(jax.grad(law.bounds))(jnp.asarray(turning))
     assert np.all(np.isfinite(slope))
-
-
-def test_derivative_at_straight() -> None:
-    law = friction_law(nf.Corner(0.4))
-    slope = jax.jit(jax.grad(law.bounds))(0.0)
-    np.testing.assert_allclose(slope, 0.4, rtol=1e-15)
-
-
-@pytest.mark.parametrize("friction", [nf.Frictionless(), nf.Capstan(2.0)])
-def test_other_laws_hold_everywhere(friction) -> None:
-    turning = np.linspace(0.0, np.pi, 14).reshape(7, 2)
-    law = friction_law(friction)
-    valid = jax.jit(lambda law, turning: law.valid(turning))(law, turning)
-    assert valid.shape == (7,)
-    assert np.all(valid)

@@ -113,14 +113,3 @@ def test_energy_has_the_derivatives_by_the_ends(name: str, margin: Margin) -> No
     step = 1e-6
     difference = (stored(step) - stored(-step)) / (2.0 * step)
     margin.within("derivative", float(jax.jit(jax.grad(stored))(0.0) - difference), 1e-8)
-
-
-@pytest.mark.nightly
-def test_a_small_hysteresis_approaches_none() -> None:
-    near = section_law(dataclasses.replace(NITINOL, unloading_stress=349.999))
-    none = section_law(dataclasses.replace(NITINOL, unloading_stress=None))
-    memory = near.rest(SECTION)
-    for curvature in np.linspace(0.0, 0.9, 91)[1:]:
-        memory = respond(near, bending(curvature), SECTION, memory).memory
-    held = float(energy(near, bending(0.9), SECTION, memory))
-    assert held == pytest.approx(float(energy(none, bending(0.9), SECTION, ())), rel=1e-5)

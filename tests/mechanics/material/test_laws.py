@@ -80,24 +80,3 @@ def test_energy_is_the_work_of_the_moment(law: SectionLaw, curvature: float) -> 
     work = quad(moment, 0.0, curvature, points=inside or None, epsabs=1e-13, epsrel=1e-12)[0]
     stored = energy(law, np.array([0.0, curvature, 0.0, 0.0, 0.0, 0.0]), SECTION, ())
     assert float(stored) == pytest.approx(work, rel=1e-9)
-
-
-def test_stiffness_is_the_tangent_at_rest_and_symmetric(law: SectionLaw) -> None:
-    stiffness = np.asarray(law.stiffness(SECTION))
-    np.testing.assert_allclose(stiffness, tangent(law, np.zeros(6), SECTION), rtol=1e-12)
-    np.testing.assert_allclose(stiffness, stiffness.T)
-    assert (np.linalg.eigvalsh(stiffness) > 0.0).all()
-
-
-def test_a_force_through_the_shear_centre_does_not_twist(law: SectionLaw) -> None:
-    force = 0.3
-    # A force along y at x = -shear_centre has the moment (x e_x) x (F e_y) = -shear_centre F e_z.
-    resultants = np.array([0.0, 0.0, -SECTION.shear_centre * force, 0.0, force, 0.0])
-    strain = np.linalg.solve(np.asarray(law.stiffness(SECTION)), resultants)
-    assert strain[2] == pytest.approx(0.0, abs=1e-12)
-    assert strain[4] > 0.0
-
-
-def test_nothing_else_is_a_material() -> None:
-    with pytest.raises(TypeError, match=r"section_law\.register"):
-        section_law(nf.Frictionless())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -12,35 +11,12 @@ from scipy.optimize import brentq
 
 import notchflex as nf
 from fibre_sections import ENDS, bending, energy, fine_fibres, moment, respond, section
-from notchflex.mechanics.cuts import sector_fibres, segment_fibres
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
-from notchflex.mechanics.section import FIBRES, Points, gauss_rule
 from refusals import refused
 
 STRAIGHT = dataclasses.replace(ENDS, odd=0.0, even=0.0)
 BILINEAR = nf.Nitinol(42000.0, 350.0, 6000.0, compression_ratio=1.3)
 HYSTERETIC = dataclasses.replace(BILINEAR, unloading_stress=150.0)
-
-
-@pytest.mark.parametrize("depth", [0.05, 0.4, 0.81, 1.2, 1.40, 1.55])
-@pytest.mark.parametrize("fibres", [sector_fibres, segment_fibres])
-def test_fibres_make_up_the_section(fibres: Callable[..., Points], depth: float) -> None:
-    make = nf.annular_sector if fibres is sector_fibres else nf.annular_segment
-    own, (arm, area) = make(0.81, 0.70, depth), fibres(0.81, 0.70, depth)
-    assert (area > 0.0).all()
-    assert area.sum() == pytest.approx(float(own.area), rel=1e-4)
-    assert area @ arm / area.sum() == pytest.approx(float(own.centroid), rel=1e-4)
-    second = area @ (arm - float(own.centroid)) ** 2
-    assert second == pytest.approx(float(own.second_moment_weak), rel=1e-3)
-
-
-def test_fibres_keep_the_polynomials_of_the_section() -> None:
-    strips = sector_fibres(0.81, 0.70, 1.40)
-    arm, area = gauss_rule(*strips, FIBRES)
-    for degree in range(2 * FIBRES):
-        expected = strips[1] @ strips[0] ** degree
-        assert area @ arm**degree == pytest.approx(expected, rel=1e-12)
-    assert (area > 0.0).all()
 
 
 def stress(strain: np.ndarray) -> np.ndarray:

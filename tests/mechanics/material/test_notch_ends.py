@@ -12,7 +12,6 @@ from scipy.optimize import brentq
 import notchflex as nf
 from fibre_sections import PLAIN, tangent
 from notchflex._jax import jax
-from notchflex.mechanics.flexure import rod, stack
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
 
 ENDS = NotchEnds(
@@ -89,19 +88,6 @@ def test_tangents_and_energies_of_a_notch_are_those_of_its_moment(law: SectionLa
         assert float(energy(law, bending(curvature), SECTION)) == pytest.approx(work, rel=error)
 
 
-def test_derivatives_by_the_ends_are_those_of_the_solution() -> None:
-    step = 1e-6
-    for name in ("weak", "odd", "even", "material_share"):
-
-        def at(change: float, name: str = name) -> FibreSection:
-            ends = dataclasses.replace(ENDS, **{name: getattr(ENDS, name) + change})
-            return dataclasses.replace(SECTION, ends=ends)
-
-        slope = jax.jacrev(lambda by, at=at: respond(SUPERELASTIC, bending(0.8), at(by)))(0.0)
-        ahead, behind = (moment(SUPERELASTIC, 0.8, at(change)) for change in (step, -step))
-        assert float(slope[1]) == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6)
-
-
 def test_without_flattening_the_energy_is_exact_beyond_the_plateau_too() -> None:
     section = dataclasses.replace(SECTION, ends=dataclasses.replace(ENDS, odd=0.0, even=0.0))
     step = 1e-5
@@ -123,17 +109,3 @@ def test_ends_divide_the_stiffness_in_every_direction() -> None:
     assert compliance == pytest.approx(0.6)
     assert (np.linalg.eigvalsh(soft) > 0.0).all()
     np.testing.assert_allclose(soft, tangent(LINEAR, np.zeros(6), SECTION), rtol=1e-12)
-
-
-def test_rigid_ends_stand_beside_those_of_another_flexure() -> None:
-    notch = nf.ArcNotch("on-axis", 1.40, 0.8, uncut_length=1.2)
-    plain = rod(notch, nf.Tube(1.62, 1.40))
-    nodes = len(plain.length)
-    ends = NotchEnds(*(np.full(nodes, number) for number in dataclasses.astuple(ENDS)))
-    soft = dataclasses.replace(plain, section=dataclasses.replace(plain.section, ends=ends))
-    both = stack([plain, soft]).section
-    assert both.softens
-    assert both.ends is not None
-    np.testing.assert_array_equal(both.ends.weak[:, 0], [0.0, 0.6])
-    one = dataclasses.replace(plain.section, ends=both.ends)
-    assert not dataclasses.replace(one, ends=NotchEnds()).softens

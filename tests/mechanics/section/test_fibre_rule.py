@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from numpy.polynomial import legendre
 
-from lanewise import Program, lower, machine_code
 from notchflex._arrays import Decisions
 from notchflex.mechanics.cuts import cut_fibres, sector_fibres, segment_fibres
 from notchflex.mechanics.section import FIBRES, gauss_rule, two_walls_fibres
 
 STRIPS = {"on-axis": sector_fibres, "off-axis": segment_fibres}
-COUNTS = [FIBRES * refined for refined in (1, 2, 3, 4)]
-TUBES = [(0.81, 0.70), (1.0, 0.25), (1.0, 0.5), (1.0, 0.97), (1.0, 0.995)]
-DEPTHS = np.array([0.005, 0.05, 0.3, 0.6, 1.0, 1.4, 1.8, 1.9])  # over the outer radius
+COUNTS = [FIBRES, 3 * FIBRES]
+TUBES = [(0.81, 0.70), (1.0, 0.25), (1.0, 0.995)]
+DEPTHS = np.array([0.005, 0.3, 1.0, 1.4, 1.9])  # over the outer radius
 
 
 def sections(cut, count):
@@ -109,22 +108,3 @@ def test_slopes_are_those_of_differences(cut, margin):
         margin.within("numbers, of height and area", (value - plain) / size, 1e-13)
         errors.append((slope - wanted) * step / size)
     margin.within("slopes by steps, of height and area", errors, 2e-10)
-
-
-@pytest.mark.parametrize("cut", STRIPS)
-@pytest.mark.parametrize("depth", [*DEPTHS, 1.0 + 0.7 / 0.81, 1.0 - 0.7 / 0.81, 1.95])
-def test_slopes_are_numbers(cut, depth):
-    row = np.r_[0.81, 0.70, 0.81 * depth, 0.3, -0.4, 0.5]
-    assert np.isfinite(jax.jit(both(cut, row))(row)).all()
-
-
-@pytest.mark.parametrize("cut", STRIPS)
-def test_compiled_by_lanewise(cut, margin):
-    every = rows(cut, 16)
-    traced = both(cut, every[0])
-    program, _ = lower(traced, [every[0]], (), (True,))
-    compiled = Program(machine_code(program.text, 2), program.sizes, program.memory, (True,))
-    computed = np.asarray(compiled([every])[0]).reshape(len(every), 2, 2, FIBRES)
-    wanted = np.array(jax.jit(jax.vmap(traced))(every))
-    size = np.abs(wanted).max(-1, keepdims=True)
-    margin.within("rule and slopes", (computed - wanted) / size, 1e-9)

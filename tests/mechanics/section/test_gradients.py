@@ -9,10 +9,9 @@ import pytest
 
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.cuts import annular_sector, annular_segment
-from notchflex.mechanics.section import Section
 
 SECTIONS = {"on-axis": annular_sector, "off-axis": annular_segment}
-TUBES = [(0.81, 0.70), (1.0, 0.25), (1.0, 0.5), (1.0, 0.97), (1.0, 0.995)]
+TUBES = [(0.81, 0.70), (1.0, 0.25), (1.0, 0.995)]
 
 
 def stacked(cut):
@@ -69,35 +68,3 @@ def test_against_differences(cut, outer, inner, margin):
         scale = np.abs(wanted) + 1e-3 * np.abs(here) / outer
         error = (np.asarray(slope) - wanted) / scale
         margin.within(f"{cut} {outer} {inner}: slope {i}, relative", error, 1e-6)
-
-
-@pytest.mark.parametrize("cut", ["on-axis", pytest.param("off-axis", marks=pytest.mark.nightly)])
-def test_reverse_mode(cut):
-    depth = jnp.asarray([0.05, 0.11, 0.7, 1.4, 1.51, 1.6])
-    backward = jax.vmap(jax.jacrev(stacked(cut), argnums=2), in_axes=(None, None, 0))
-    forward = jax.vmap(jax.jacfwd(stacked(cut), argnums=2), in_axes=(None, None, 0))
-    slopes = backward(0.81, 0.70, depth)
-    assert np.all(np.isfinite(slopes))
-    np.testing.assert_allclose(slopes, forward(0.81, 0.70, depth), rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize("cut", SECTIONS)
-def test_arrays_of_any_shape(cut):
-    depth = jnp.linspace(0.05, 1.6, 6).reshape(2, 3)
-    whole = SECTIONS[cut](0.81, 0.70, depth)
-    mapped = jax.jit(jax.vmap(jax.vmap(lambda g: SECTIONS[cut](0.81, 0.70, g))))(depth)
-    assert isinstance(whole, Section)
-    for one, other in zip(whole, mapped, strict=True):
-        assert one.shape == (2, 3)
-        assert one.dtype == jnp.float64
-        np.testing.assert_allclose(one, other, rtol=1e-13)
-
-
-@pytest.mark.parametrize("cut", SECTIONS)
-def test_numbers_and_traced_numbers_agree(cut):
-    # Plain numbers are worked out by NumPy, traced ones by JAX.
-    depth = np.r_[np.linspace(0.01, 1.61, 33), 0.81, 0.11, 1.51]
-    plain = SECTIONS[cut](0.81, 0.70, depth)
-    traced = jax.jit(SECTIONS[cut])(0.81, 0.70, depth)
-    for one, other in zip(plain, traced, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-11)

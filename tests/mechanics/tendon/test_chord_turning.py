@@ -1,7 +1,6 @@
 """Corner friction that turns with chords, on notches that have none."""
 
 import numpy as np
-import pytest
 
 import notchflex as nf
 
@@ -27,20 +26,3 @@ def test_arcs_turn_with_the_body():
     assert np.array_equal(chord.notch_angle, slope.notch_angle)
     changed = arcs(nf.Corner(0.1)).with_value("friction.turning", "chord")
     assert nf.solve(changed, nf.Load(tension=1.0)).converged
-
-
-@pytest.mark.nightly
-def test_beside_strips_arcs_still_turn_with_the_body():
-    """A tendon that ends before the strip meets arcs alone."""
-    strip = nf.load_robot("liu2022").notch[0]
-    assert isinstance(strip, nf.StripNotch)
-    liu = nf.load_robot("liu2022")
-    arc = nf.ArcNotch("off-axis", depth=7.0, height=2.0, uncut_length=1.0, repeat=2)
-    mixed = liu.replace(
-        notch=(arc, strip), tendon=(nf.Tendon(liu.tendon[0].radius, path="straight", end_body=2),)
-    )
-    angles = [
-        nf.solve(mixed.with_value("friction.turning", turning), nf.Load(tension=0.5)).notch_angle
-        for turning in ("chord", "slope")
-    ]
-    assert np.array_equal(*angles)

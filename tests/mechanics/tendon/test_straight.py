@@ -83,14 +83,3 @@ def test_release_comes_back_with_friction() -> None:
     heat = np.nansum(path.dissipation[-1])
     assert heat == pytest.approx(path.tendon_work[-1, 0], rel=1e-3)
     assert (path.dissipation[-1, 0] > -1e-9).all()
-
-
-def test_an_end_body_on_the_way_leaves_the_rest_straight() -> None:
-    robot = wrist(4, nf.Capstan(0.2)).replace(
-        tendon=(nf.Tendon(0.70, end_body=2, path="straight"),)
-    )
-    state = nf.solve(robot, nf.Load(tension=1.0)).raise_if_failed()
-    assert (state.notch_angle[:2] > 0.01).all()
-    np.testing.assert_allclose(state.notch_angle[2:], 0.0, atol=1e-12)
-    assert np.isnan(state.span_tension[0, 4:]).all()
-    assert not np.isnan(state.span_tension[0, :4]).any()

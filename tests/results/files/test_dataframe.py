@@ -1,7 +1,6 @@
 """Data frames of polars and pandas, and data sets without the solver's inside."""
 
 import csv
-import importlib.util
 
 import numpy as np
 import pytest
@@ -31,20 +30,6 @@ def test_columns_and_rows_are_those_of_the_csv(path, tmp_path, library):
     assert frame["notch_1_closed"].to_list() == path.closed[:, 0].tolist()
 
 
-def test_polars_is_the_default(path):
-    assert type(path.to_dataframe()).__module__.startswith("polars")
-
-
-@pytest.mark.parametrize("library", ["polars", "pandas"])
-def test_a_missing_library_is_named(path, monkeypatch, library):
-    real = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name: None if name == library else real(name)
-    )
-    with refused("MISSING_PACKAGE", library, "pip install 'notchflex[data]'"):
-        path.to_dataframe(library)
-
-
 def test_other_libraries_are_refused(path):
     with refused(ErrorCode.UNKNOWN_NAME):
         path.to_dataframe("arrow")
@@ -57,12 +42,6 @@ def test_a_data_set_has_the_quantities_and_nothing_else(path):
     sizes = {"step", "tendon", "notch", "body", "axis", "row", "span", "contact"}
     assert set(data.dims) == sizes
     assert "facts" not in data.attrs
-
-
-def test_a_data_set_alone_is_no_path(path, tmp_path):
-    path.to_xarray().to_netcdf(tmp_path / "only.nc", engine="h5netcdf")
-    with refused(ErrorCode.FILE_FORMAT):
-        nf.read_path(tmp_path / "only.nc")
 
 
 def test_a_netcdf_file_shows_the_quantities_first(path, tmp_path):

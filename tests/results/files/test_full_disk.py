@@ -37,7 +37,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
 """
 
 
-@pytest.mark.parametrize("name", ["p.nc", "p.parquet", "p.json"])
+@pytest.mark.parametrize("name", ["p.nc", "p.parquet"])
 def test_a_file_that_does_not_fit_is_one_sentence(tmp_path, name):
     """A limit of the size of files stands for a full disk: writing fails in the middle."""
     pytest.importorskip("resource", reason="there is no limit of the size of files here")
@@ -62,14 +62,9 @@ sys.exit(run(["export", "pacheco2021-a", sys.argv[1], sys.argv[2]]))
 """
 
 
-STEP = pytest.param("step", marks=pytest.mark.nightly)
-
-
-@pytest.mark.parametrize("suffix", ["dxf", "svg", "pdf", "stl", "inp", "mjcf", STEP])
+@pytest.mark.parametrize("suffix", ["pdf", "stl"])
 def test_an_export_that_does_not_fit_is_one_sentence(tmp_path, suffix):
     pytest.importorskip("resource", reason="there is no limit of the size of files here")
-    if suffix == "step":
-        pytest.importorskip("build123d", reason="pip install 'notchflex[cad]'")
     file = tmp_path / f"wrist.{suffix}"
     file.write_bytes(b"old")
     # The cache of the tests, which no user has, would not fit either.
@@ -89,7 +84,7 @@ def test_an_export_that_does_not_fit_is_one_sentence(tmp_path, suffix):
     assert file.read_bytes() == b"old"
 
 
-@pytest.mark.parametrize("times", [2, pytest.param(100, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("times", [2, pytest.param(20, marks=pytest.mark.nightly)])
 def test_what_killed_processes_leave_is_swept(wrist, tmp_path, times, monkeypatch):
     file, other, random_ = tmp_path / "p.json", tmp_path / "other" / "p.json", random.Random(3)
     other.parent.mkdir()
@@ -119,13 +114,6 @@ def test_the_file_of_a_process_that_writes_is_kept(tmp_path, monkeypatch):
             other.write_text("b")
         temporary.write_text("a")
     assert sorted(os.listdir(tmp_path)) == ["a.txt", "b.txt"]
-
-
-@pytest.mark.parametrize("name", ["a\0b", "a\x1b[31mb", "a\nb"])
-def test_names_hold_no_control_characters(name):
-    wrist = nf.load_robot("pacheco2021-a")
-    with refused("INVALID_ROBOT", "name", "control characters"):
-        wrist.replace(name=name)
 
 
 def test_a_file_without_an_end_is_not_read_for_ever():
@@ -171,6 +159,13 @@ def test_a_pipe_with_a_writer_is_read(pipe, monkeypatch, slow):
     writer.start()
     assert nf.load_robot(pipe) == wrist
     writer.join()
+
+
+@pytest.mark.parametrize("name", ["a\0b", "a\x1b[31mb", "a\nb"])
+def test_names_hold_no_control_characters(name):
+    wrist = nf.load_robot("pacheco2021-a")
+    with refused("INVALID_ROBOT", "name", "control characters"):
+        wrist.replace(name=name)
 
 
 def test_a_deviation_that_tells_nothing_is_refused():

@@ -130,12 +130,6 @@ def test_data_set_has_names_and_units(loop):
     np.testing.assert_array_equal(one["notch_angle"], loop.notch_angle[2])
 
 
-def test_one_state_is_no_path(loop, tmp_path):
-    loop[2].to_xarray().to_netcdf(tmp_path / "one.nc", engine="h5netcdf")
-    with refused(ErrorCode.FILE_FORMAT):
-        nf.read_path(tmp_path / "one.nc")
-
-
 def test_a_document_whose_steps_were_changed_is_refused(loop, tmp_path):
     file = tmp_path / "loop.json"
     nf.save_path(loop, file)
@@ -197,13 +191,6 @@ def test_rubbish_is_told_in_a_sentence(tmp_path, suffix):
             read(file)
 
 
-def test_other_suffixes_are_refused(loop, tmp_path):
-    with refused(ErrorCode.FILE_FORMAT):
-        nf.save_path(loop, tmp_path / "a.xlsx")
-    with refused(ErrorCode.FILE_FORMAT):
-        nf.read_path(tmp_path / "a")
-
-
 @pytest.mark.parametrize(
     ("suffix", "module"), [(".nc", "xarray"), (".nc", "h5py"), (".parquet", "polars")]
 )
@@ -217,3 +204,10 @@ def test_a_missing_library_is_told_with_its_command(loop, tmp_path, monkeypatch,
     with refused(ErrorCode.MISSING_PACKAGE, module, "pip install 'notchflex[data]'"):
         nf.save_path(loop, tmp_path / f"a{suffix}")
     assert not list(tmp_path.iterdir())
+
+
+def test_other_suffixes_are_refused(loop, tmp_path):
+    with refused(ErrorCode.FILE_FORMAT):
+        nf.save_path(loop, tmp_path / "a.xlsx")
+    with refused(ErrorCode.FILE_FORMAT):
+        nf.read_path(tmp_path / "a")

@@ -54,11 +54,6 @@ def test_picture_without_matplotlib_tells_what_to_install(tmp_path, monkeypatch)
         check_picture(str(tmp_path / "a.png"), "--plot")
 
 
-def test_a_null_character_in_a_name_is_told(tmp_path):
-    with refused(ErrorCode.FILE_UNWRITABLE, "null"):
-        write_text(tmp_path / "a\0.json", "{}")
-
-
 def test_read_only_files_and_folders(tmp_path, monkeypatch):
     file = tmp_path / "a.json"
     file.write_text("old")

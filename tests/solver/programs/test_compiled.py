@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._jax import jax, jnp
+from notchflex._jax import jnp
 from notchflex.solver.programs import compiled as backend
 from notchflex.solver.programs import store
 from notchflex.solver.programs.compiled import Native, Packed
@@ -40,16 +40,6 @@ def test_xla_finds_the_same(wrist, monkeypatch, margin):
     again = nf.simulate(wrist, loads[1])
     prepare.cache_clear()
     margin.within("XLA against our program", alone.total_angle - again.total_angle, 1e-12, "rad")
-
-
-@pytest.mark.nightly
-def test_it_runs_without_compiling(wrist):
-    load = nf.Load(tension=0.2)
-    with jax.disable_jit():
-        plain = nf.solve(wrist.replace(friction=nf.Frictionless()), load).total_angle
-    assert plain == pytest.approx(
-        nf.solve(wrist.replace(friction=nf.Frictionless()), load).total_angle, abs=1e-12
-    )
 
 
 def test_what_cannot_be_read_goes_to_xla():

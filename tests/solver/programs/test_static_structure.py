@@ -1,14 +1,11 @@
 """What programs know of a chain beforehand: nothing is lost, and dimensions are no part of it."""
 
 import numpy as np
-import pytest
 
 import notchflex as nf
-from notchflex._jax import jax
 from notchflex.analysis.solve import prepare_for
 from notchflex.loads.load_path import load_path
-from notchflex.solver.programs.prepare import PreparedChain, prepare
-from notchflex.solver.programs.static_structure import without_rounding
+from notchflex.solver.programs.prepare import PreparedChain
 
 LOADS = {
     "pacheco2021-a": nf.Load(tension=1.0),
@@ -20,21 +17,6 @@ LOADS = {
 
 def ready(robot: nf.Robot, load: nf.Load) -> PreparedChain:
     return prepare_for(robot, load_path(load, robot.number_of_tendons))
-
-
-@pytest.mark.parametrize("name", LOADS)
-def test_the_chain_comes_back(name: str) -> None:
-    own = ready(nf.load_robot(name), LOADS[name])
-    assert own.static_structure.size < own.chain_layout.size
-    for unpacked in (own.static_structure.unpack(own.dynamic_vector), _traced(own)):
-        layout = own.chain_layout
-        expected = layout.unpack(without_rounding(layout, own.vector))
-        for one, leaf in zip(*map(jax.tree.leaves, (unpacked, expected)), strict=True):
-            np.testing.assert_allclose(one, leaf, rtol=0.0, atol=1e-14)
-
-
-def _traced(own: PreparedChain) -> object:
-    return jax.jit(own.static_structure.unpack)(own.dynamic_vector)
 
 
 def test_dimensions_do_not_change_the_form() -> None:
@@ -52,17 +34,6 @@ def test_rounding_does_not_change_the_form() -> None:
     own = ready(links, load).static_structure
     other = {"notch.strip_thickness": 0.7003, "tube.inner_diameter": 4.0007}
     assert ready(links.with_values(other), load).static_structure is own
-
-
-def test_a_structure_depends_on_the_chain_alone():
-    """Robots that were prepared before change nothing, and equal structures are one object."""
-    wrist, load = nf.load_robot("two-axis-wrist"), LOADS["two-axis-wrist"]
-    alone = ready(wrist, load)
-    shorter = ready(wrist.with_value("tendon[1].end_body", 5), load)
-    assert shorter.chain_layout is alone.chain_layout
-    assert shorter.static_structure is not alone.static_structure
-    prepare.cache_clear()
-    assert ready(wrist, load).static_structure is alone.static_structure
 
 
 def test_robots_that_differ_share_few_structures() -> None:

@@ -13,25 +13,6 @@ import pytest
 from notchflex.solver.programs.compiled import on_cores
 
 
-def test_results_come_in_order_of_the_pieces() -> None:
-    def slow_at_first(piece: int) -> int:
-        time.sleep(0.05 if piece == 0 else 0.0)
-        return piece * piece
-
-    assert list(on_cores(slow_at_first, range(6), 3)) == [0, 1, 4, 9, 16, 25]
-
-
-def test_the_same_threads_work_again() -> None:
-    def thread(_piece: int) -> int:
-        time.sleep(0.01)
-        return threading.get_ident()
-
-    first, second = (set(on_cores(thread, range(8), 2)) for _ in range(2))
-    assert first == second
-    assert len(first) == 2
-    assert threading.get_ident() not in first
-
-
 def test_after_a_failure_nothing_more_is_begun() -> None:
     begun: list[int] = []
 
