@@ -224,7 +224,12 @@ class Calibration:
     @property
     def values(self) -> dict[str, float]:
         """Fitted values, in the units of the robot file."""
-        return self._by_name(self.best.values)
+        return self._by_name(self.estimate)
+
+    @property
+    def estimate(self) -> Vector:
+        """The same in the order of `names`, (k,)."""
+        return self.best.values[: len(self.names)]
 
     def _by_name(self, values: Vector) -> dict[str, float]:
         return dict(zip(self.names, values.tolist(), strict=True))
@@ -273,19 +278,24 @@ class Calibration:
     @cached_property
     def robots(self) -> dict[str, Robot]:
         """The robots with the fitted constants."""
-        constants = (*self.problem.unknowns, *self.drawing)
-        values = [*self.best.values, *self.deviations_of_drawing.values()]
+        varied, values = self.problem.varied, self.best.values
         return {
-            label: with_numbers(robot, values_set(label, constants, values))
+            label: with_numbers(robot, values_set(label, varied, values))
             for label, robot in self.problem.samples.robots.items()
         }
 
     @property
     def drawing(self) -> tuple[Unknown, ...]:
         """What deviates from the drawings, starting at what the data tell."""
-        total = (self.problem.means + self.reached.deviations).tolist()
-        pairs = zip(self.problem.drawing, total, strict=True)
+        deviations = self.best.values[len(self.names) :].tolist()
+        pairs = zip(self.problem.drawing, deviations, strict=True)
         return tuple(replace(unknown, start=deviation) for unknown, deviation in pairs)
+
+    @property
+    def _unlikely(self) -> Vector:
+        """Deviations from the drawing less their means."""
+        means = [unknown.prior[0] for unknown in self.drawing if unknown.prior is not None]
+        return self.best.values[len(self.names) :] - means
 
     @property
     def deviations_of_drawing(self) -> dict[str, float]:
@@ -346,7 +356,7 @@ class Calibration:
         """
         is_known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
         scaled = self.residuals.values[is_known] / self.noise.deviation[is_known]
-        squares = np.sum(scaled**2) + np.sum(self.reached.deviations**2)
+        squares = np.sum(scaled**2) + np.sum(self._unlikely**2)
         return float(squares) / self._left if self._left > 0 else float("nan")
 
     @property
@@ -367,8 +377,8 @@ class Calibration:
         counts = np.isfinite(self.noise.deviation)
         share = np.where(self.noise.estimated, self.freedom / self.counted, 1.0)
         noise = (self.noise.deviation * np.sqrt(share))[counts]
-        spread = self.residuals.spread[counts]
-        scaled = (self.residuals.values[counts] - spread @ self.reached.deviations) / noise
+        spread = self.residuals.slopes[counts, len(self.names) :]
+        scaled = (self.residuals.values[counts] - spread @ self._unlikely) / noise
         spread = spread / noise[:, None]
         inner = np.eye(spread.shape[1]) + spread.T @ spread
         along = spread.T @ scaled
@@ -471,17 +481,27 @@ class Calibration:
         wider = self.by_pulls.wider
         return self.covariance_by_rows * np.outer(wider, wider)
 
-    @cached_property
+    @property
     def covariance_by_rows(self) -> Matrix:
         """Covariance of the constants if all rows were independent."""
         if self.is_likelihood and self.tells_no_noise:
             return np.diag(np.full(len(self.names), np.inf))
+        return self._of_constants(self.covariance_of_all)
+
+    @cached_property
+    def covariance_of_all(self) -> Matrix:
+        """The same with what deviates from the drawing."""
         if self.huber:
             contributions = self.reached.contributions
             factor = self.noise.counted / max(self.freedom, 1)
             scatter = factor * contributions.T @ contributions + self.reached.scatter
             return sandwich(self.reached.second_derivatives, scatter)
         return inverse_of(self.reached.curvature) * self.widened**2
+
+    def _of_constants(self, covariance: Matrix) -> Matrix:
+        """Covariance of the constants, whatever deviates from the drawing."""
+        size = len(self.names)
+        return covariance[:size, :size]
 
     @cached_property
     def by_pulls(self) -> ByPulls:
@@ -494,10 +514,10 @@ class Calibration:
         """
         cost, size = self.reached, len(self.names)
         labels, pull = np.unique(self.residuals.pull, return_inverse=True)
-        gradients, depends = np.zeros((2, len(labels), size))
+        gradients, depends = np.zeros((2, len(labels), len(self.best.values)))
         np.add.at(gradients, pull, cost.contributions)
         np.logical_or.at(depends, pull, self.residuals.slopes != 0.0)
-        pulls = depends.sum(axis=0).astype(int)
+        pulls = depends.sum(axis=0).astype(int)[:size]
         if len(labels) < 2:
             ones = np.ones(size)
             return ByPulls(np.full((size, size), np.nan), pulls, ones, np.zeros(size, bool), ones)
@@ -509,8 +529,12 @@ class Calibration:
         few = np.sqrt(np.maximum(pulls, 1) / np.maximum(pulls - 1, 1))
         few *= np.sqrt(max(rows - 1, 1) / max(rows - size, 1))
         hessian = cost.second_derivatives
-        of_pulls = sandwich(hessian, gradients.T @ gradients) * np.outer(few, few)
-        covariance = of_pulls + sandwich(hessian, cost.scatter)
+        of_pulls, of_priors = (
+            self._of_constants(sandwich(hessian, scatter))
+            for scatter in (gradients.T @ gradients, cost.scatter)
+        )
+        of_pulls *= np.outer(few, few)
+        covariance = of_pulls + of_priors
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.diag(covariance) / np.diag(of_pulls)
             freedom = np.nan_to_num(np.maximum(pulls - 1, 1) * share**2, nan=1.0)

@@ -154,16 +154,16 @@ def sample_posterior(
             kernel, num_warmup=warm_up, num_samples=draws, num_chains=1, progress_bar=False
         )
         key = jax.random.PRNGKey(seed + chain)
-        start = 0.5 * jax.random.normal(key, (len(found.names),))
+        start = 0.5 * jax.random.normal(key, (len(found.best.values),))
         sampler.run(key, init_params=start, extra_fields=("diverging",))
         positions.append(np.asarray(sampler.get_samples()))
         divergent += int(np.sum(sampler.get_extra_fields()["diverging"]))
         if progress is not None:
             progress("drawing", chain + 1, chains)
     # Farther from the fit if whole pulls differ.
-    spread = np.linalg.cholesky(found.covariance_by_rows)
-    values = found.best.values + found.by_pulls.wider * (np.stack(positions) @ spread.T)
-    values = np.clip(values, found.problem.lower, found.problem.upper)
+    moved = (np.stack(positions) @ _spread(found).T)[..., : len(found.names)]
+    limits = [(unknown.lower, unknown.upper) for unknown in found.problem.unknowns]
+    values = np.clip(found.estimate + found.by_pulls.wider * moved, *np.transpose(limits))
     effective, r_hat = (
         {name: float(of(values[..., number])) for number, name in enumerate(found.names)}
         for of in (diagnostics.effective_sample_size, diagnostics.split_gelman_rubin)
@@ -187,10 +187,15 @@ def _check(calibration: Calibration) -> None:
         )
 
 
+def _spread(calibration: Calibration) -> Float[np.ndarray, "k k"]:
+    """Root of the covariance by rows of all that is varied."""
+    return np.linalg.cholesky(calibration.covariance_of_all)
+
+
 def _potential(calibration: Calibration) -> Callable[[jax.Array], jax.Array]:
     """Minus the logarithm of the posterior, in the units of the fit's own spread."""
     problem, best = calibration.problem, calibration.best.values
-    spread = np.linalg.cholesky(calibration.covariance_by_rows)
+    spread = _spread(calibration)
     shape, temper = jax.ShapeDtypeStruct((1 + len(best),), float), calibration.widened**2
 
     def value_and_gradient(position: np.ndarray) -> np.ndarray:

@@ -149,9 +149,6 @@ class Residuals:
         point: Point in space, for coordinates; of its own for each other number.
         rows: Number of rows measured of that robot.
         given: Standard deviation given with the measurement; NaN if there is none.
-        spread: Derivatives by deviations from the drawing, in standard deviations of their
-            tolerances, (R, m).
-        expected: The mean of these deviations times `spread`, (R,) or 0.
     """
 
     values: Numbers
@@ -165,8 +162,6 @@ class Residuals:
     point: Integers
     rows: Integers
     given: Numbers
-    spread: Numbers
-    expected: Numbers | float = 0.0
 
     def __len__(self) -> int:
         """Number of measured numbers."""
@@ -279,25 +274,17 @@ class Samples:
                 slopes.append(by_all)
         if self.failed:
             return None
-        off = np.concatenate(residuals)
-        none = np.zeros((len(off), 0))
-        return Residuals(off, np.concatenate(slopes), **self._layout, spread=none)
+        return Residuals(np.concatenate(residuals), np.concatenate(slopes), **self._layout)
 
-    def deviated(self, deviations: Sequence[Unknown]) -> Samples:
-        """Return the same measurements of robots that deviate from their drawings.
-
-        Raises:
-            InputError: A robot cannot.
-        """
-        robots = {label: deviated(robot, label, deviations) for label, robot in self.robots.items()}
-        every = tuple(replace(sample, robot=robots[sample.label]) for sample in self.every)
-        return replace(self, every=every)
+    def of_unknowns(self, unknowns: tuple[Unknown, ...]) -> Samples:
+        """Return the same measurements as a function of other constants."""
+        every = tuple(replace(sample, unknowns=unknowns) for sample in self.every)
+        return replace(self, every=every, unknowns=unknowns)
 
     def slopes_of(self, more: Unknown, values: Numbers) -> Numbers | None:
         """Return derivatives by one more constant at values of the others; None without any."""
-        both = (*self.unknowns, more)
-        every = tuple(replace(sample, unknowns=both) for sample in self.every)
-        residuals = Samples(every, both).residuals(np.append(values, more.start))
+        both = self.of_unknowns((*self.unknowns, more))
+        residuals = both.residuals(np.append(values, more.start))
         if residuals is None or not np.isfinite(residuals.slopes[:, -1]).all():
             return None
         return residuals.slopes[:, -1]
