@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.optimize import brentq
 from scipy.stats import chi2, t
 
 from notchflex import InputError, Robot, Settings
@@ -36,8 +37,9 @@ LEVEL = 0.95
 NO_SOLUTION = "the model has no solution that far"
 """Why an end is open that the data may well set."""
 
-# How near the root of the rise must be to its target (of about 2), and how many tries to get there.
-_CLOSE, _TRIES = 0.005, 12
+# How near the root of the rise must be to its target (of about 2); farther on than this part of it
+# the root is no line.
+_CLOSE, _STEEP = 0.005, 4.0
 # So many estimated half-widths away the data still set no end.
 _MAX_HALF_WIDTHS = 50.0
 # Probability below which noise does not explain the misfit: the model misses something.
@@ -104,41 +106,35 @@ class Profile:
         best, estimate = reached(self.best), float(self.best.values[self.number])
         sizes, plain = unit_free(best.curvature)
         inverse = np.linalg.pinv(plain, rcond=1e-10, hermitian=True)
-        variance = max(inverse[self.number, self.number], 1e-12)
+        deviation = np.sqrt(max(inverse[self.number, self.number], 1e-12)) / sizes[self.number]
         target, most, sign = np.sqrt(rise), abs(limit - estimate), 1.0 if side == "above" else -1.0
-        guess = min(target * np.sqrt(variance) / sizes[self.number], _MAX_HALF_WIDTHS * scale)
-        inner, outer = (0.0, 0.0), (np.inf, np.inf)
-        reach, start = guess, self.best.values
-        for _ in range(_TRIES):
-            at_limit, reach = reach >= most, min(reach, most)
-            if reach == 0.0:
+        guess = min(target * deviation, _MAX_HALF_WIDTHS * scale)
+        farthest = min(most, _MAX_HALF_WIDTHS * max(scale, guess))
+        roots, start = {0.0: 0.0}, self.best.values
+
+        def excess(reach: float) -> float:
+            nonlocal start
+            if reach not in roots:
+                value = limit if reach == most else float(estimate + sign * reach)
+                minimum = self.held(value, start)
+                roots[reach] = np.inf  # without a robot, or a solution, the end must be nearer
+                if minimum.cost is not None:
+                    start = minimum.values
+                    points[value] = max(2.0 * (minimum.cost.value - best.value), 0.0)
+                    roots[reach] = np.sqrt(points[value])
+            off = min(roots[reach], _STEEP * target) - target
+            return off if abs(off) > _CLOSE * target else 0.0
+
+        inner, reach = 0.0, min(guess, farthest)
+        while excess(reach) < 0.0:
+            if reach == farthest:
                 return None, ""
-            value = limit if at_limit else float(estimate + sign * reach)
-            minimum = self.held(value, start)
-            root = np.inf  # without a robot, or a solution, that far the end must be nearer
-            if minimum.cost is not None:
-                start = minimum.values
-                points[value] = max(2.0 * (minimum.cost.value - best.value), 0.0)
-                root = np.sqrt(points[value])
-            if abs(root - target) < _CLOSE * target:
-                return value, ""
-            if root > target:
-                outer = (reach, root)
-            elif at_limit:
-                return None, ""
-            else:
-                inner = (reach, root)
-            if np.isfinite(outer[0]):
-                share = (target - inner[1]) / (outer[1] - inner[1])
-                share = min(max(share, 0.05), 0.95) if np.isfinite(outer[1]) else 0.5
-                reach = inner[0] + share * (outer[0] - inner[0])
-            elif reach >= _MAX_HALF_WIDTHS * max(scale, guess):
-                return None, ""
-            else:
-                reach *= min(max(1.1 * target / max(root, 1e-300), 1.2), 4.0)
-        if np.isinf(outer[1]):
+            inner, growth = reach, 1.1 * target / max(roots[reach], 1e-300)
+            reach = min(reach * min(max(growth, 1.2), 4.0), farthest)
+        reach = float(brentq(excess, inner, reach, xtol=0.5 * _CLOSE * reach))
+        if not any(target * (1.0 - _CLOSE) <= root < np.inf for root in roots.values()):
             return None, NO_SOLUTION
-        return float(estimate + sign * reach), ""
+        return limit if reach == most else float(estimate + sign * reach), ""
 
 
 class ByPulls(NamedTuple):
@@ -336,11 +332,6 @@ class Calibration:
     def huber(self) -> float | None:
         """From where on residuals count less: then intervals follow from the scatter of rows."""
         return getattr(self.problem.objective, "huber", None)
-
-    @property
-    def is_robust(self) -> bool:
-        """Whether outliers count less."""
-        return self.huber is not None
 
     @property
     def tells_no_noise(self) -> bool:

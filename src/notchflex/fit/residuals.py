@@ -11,8 +11,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from notchflex import EquilibriumPath, InputError, LoadPath, Robot, Settings
-from notchflex._jax import constant
-from notchflex.analysis import axis_places, points_on_axis
+from notchflex.analysis import axis_places, axis_points
 from notchflex.analysis.kinematics import axis_point_changes
 from notchflex.fit.constants import SENSOR, Unknown, values_set, with_numbers
 from notchflex.fit.measurements.measurements import (
@@ -84,9 +83,9 @@ class Sample:
         if self.own_unknowns:
             slopes = derivatives(path, self._changes(path, load, numbers), solved)
         if bodies:
-            places = axis_places(self.robot, self.measured.axis_at)
             poses, moves = ([arrays[name] for name in bodies] for arrays in (modelled, slopes))
-            modelled["axis_points"] = np.asarray(points_on_axis(places, *map(constant, poses)))
+            places = axis_places(self.robot, self.measured.axis_at)
+            modelled["axis_points"] = axis_points(path, self.measured.axis_at)
             slopes["axis_points"] = axis_point_changes(places, poses, moves)
         return rows(path.converged), {
             name: misfit(name, array, rows(modelled[output]), rows(slopes[output], axis=1))
@@ -195,7 +194,7 @@ def misfit(
         vector = turned.as_rotvec()
         spin = slopes @ np.swapaxes(values, -1, -2)
         turn = np.stack([spin[..., 2, 1], spin[..., 0, 2], spin[..., 1, 0]], axis=-1)
-        by_turn = np.linalg.inv(np.asarray(left_slope(constant(vector))))
+        by_turn = np.linalg.inv(np.asarray(left_slope(vector)))
         off = np.where(np.isnan(observed), np.nan, vector)
         return off, np.einsum("pij,kpj->kpi", by_turn, turn)
     off = (reading(name, values) - observed).reshape(len(observed), -1)

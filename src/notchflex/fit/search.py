@@ -212,7 +212,7 @@ class FitProblem:
         whole.samples = self.samples.of_unknowns((*self.unknowns, *self.drawing))
         residuals = whole.samples.residuals(np.append(values, np.zeros(len(self.drawing))))
         slopes = np.full((1, len(whole.varied)), np.nan) if residuals is None else residuals.slopes
-        is_known = np.isfinite(slopes).all(axis=0)[len(self.unknowns) :]
+        is_known = np.isfinite(slopes[:, len(self.unknowns) :]).all(axis=0)
         whole.drawing = tuple(np.array(self.drawing, object)[is_known])
         whole.samples = self.samples.of_unknowns((*self.unknowns, *whole.drawing))
         return whole
