@@ -131,7 +131,8 @@ class Profile:
                 return None, ""
             inner, growth = reach, 1.1 * target / max(roots[reach], 1e-300)
             reach = min(reach * min(max(growth, 1.2), 4.0), farthest)
-        reach = float(brentq(excess, inner, reach, xtol=0.5 * _CLOSE * reach))
+        end: Any = brentq(excess, inner, reach, xtol=0.5 * _CLOSE * reach)
+        reach = float(end)
         if not any(target * (1.0 - _CLOSE) <= root < np.inf for root in roots.values()):
             return None, NO_SOLUTION
         return limit if reach == most else float(estimate + sign * reach), ""
