@@ -510,9 +510,6 @@ class Calibration:
         np.add.at(gradients, pull, cost.contributions)
         np.logical_or.at(depends, pull, self.residuals.slopes != 0.0)
         pulls = depends.sum(axis=0).astype(int)[:size]
-        if len(labels) < 2:
-            ones = np.ones(size)
-            return ByPulls(np.full((size, size), np.nan), pulls, ones, np.zeros(size, bool), ones)
         # Only priors keep the gradients of the pulls from adding up to zero. The same share of each
         # leaves what no pull tells, such as forces and moduli that grow together, out of the
         # scatter.
@@ -526,7 +523,7 @@ class Calibration:
             for scatter in (gradients.T @ gradients, cost.scatter)
         )
         of_pulls *= np.outer(few, few)
-        covariance = of_pulls + of_priors
+        covariance = of_pulls + of_priors if len(labels) > 1 else np.nan * of_pulls
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.diag(covariance) / np.diag(of_pulls)
             freedom = np.nan_to_num(np.maximum(pulls - 1, 1) * share**2, nan=1.0)

@@ -104,11 +104,11 @@ def residual_tests(found: Calibration) -> ResidualTests | None:
         label: deviated(robot, label, found.drawing) for label, robot in samples.robots.items()
     }
     data = {label: samples.of_robot(label) for label in robots}
-    drawn = Samples.of(robots, data, found.problem.unknowns, found.settings)
+    as_found = Samples.of(robots, data, found.problem.unknowns, found.settings)
     tests = [
         Missing(one.name, *regression.chance(slopes[:, None] / noise))
-        for one in _candidates(drawn)
-        if (slopes := drawn.slopes_of(one, found.estimate)) is not None
+        for one in _candidates(as_found)
+        if (slopes := as_found.slopes_of(one, found.estimate)) is not None
     ]
     known = [test for test in tests if np.isfinite(test.chance)]
     known.sort(key=lambda test: test.chance)
