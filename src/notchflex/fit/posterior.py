@@ -113,7 +113,8 @@ def sample_posterior(
 ) -> Posterior:
     """Draw constants from their posterior.
 
-    The prior is uniform within the constants' limits, but for priors that were given. If the model
+    The prior is uniform within the constants' limits, but for priors that were given. What deviates
+    from the drawing follows the constants as it most likely does (Laplace). If the model
     misses more than noise explains, the misfit counts less, as in the fit's intervals; if whole
     pulls differ by more than their rows do, the draws are spread about the fit by as much (the
     adjustment of Shaby 2014).
@@ -154,14 +155,14 @@ def sample_posterior(
             kernel, num_warmup=warm_up, num_samples=draws, num_chains=1, progress_bar=False
         )
         key = jax.random.PRNGKey(seed + chain)
-        start = 0.5 * jax.random.normal(key, (len(found.best.values),))
+        start = 0.5 * jax.random.normal(key, (len(found.names),))
         sampler.run(key, init_params=start, extra_fields=("diverging",))
         positions.append(np.asarray(sampler.get_samples()))
         divergent += int(np.sum(sampler.get_extra_fields()["diverging"]))
         if progress is not None:
             progress("drawing", chain + 1, chains)
     # Farther from the fit if whole pulls differ.
-    moved = (np.stack(positions) @ _spread(found).T)[..., : len(found.names)]
+    moved = np.stack(positions) @ _spread(found)[: len(found.names)].T
     limits = [(unknown.lower, unknown.upper) for unknown in found.problem.unknowns]
     values = np.clip(found.estimate + found.by_pulls.wider * moved, *np.transpose(limits))
     effective, r_hat = (
@@ -187,23 +188,25 @@ def _check(calibration: Calibration) -> None:
         )
 
 
-def _spread(calibration: Calibration) -> Float[np.ndarray, "k k"]:
-    """Root of the covariance by rows of all that is varied."""
-    return np.linalg.cholesky(calibration.covariance_of_all)
+def _spread(calibration: Calibration) -> Float[np.ndarray, "n k"]:
+    """Root of the covariance of the constants; what deviates from the drawing follows them."""
+    root = np.linalg.cholesky(calibration.covariance_by_rows)
+    return np.linalg.solve(root, calibration.covariance_of_all[: len(root)]).T
 
 
 def _potential(calibration: Calibration) -> Callable[[jax.Array], jax.Array]:
     """Minus the logarithm of the posterior, in the units of the fit's own spread."""
     problem, best = calibration.problem, calibration.best.values
     spread = _spread(calibration)
-    shape, temper = jax.ShapeDtypeStruct((1 + len(best),), float), calibration.widened**2
+    shape = jax.ShapeDtypeStruct((1 + spread.shape[1],), float)
+    temper = calibration.widened**2
 
     def value_and_gradient(position: np.ndarray) -> np.ndarray:
         values = best + spread @ np.asarray(position, float)
         inside = (values >= problem.lower).all() and (values <= problem.upper).all()
         cost = problem(values) if inside else None
         if cost is None:
-            return np.concatenate([[np.inf], np.zeros(len(values))])
+            return np.concatenate([[np.inf], np.zeros(spread.shape[1])])
         return np.concatenate([[cost.value], spread.T @ cost.gradient]) / temper
 
     def forward(position: jax.Array) -> tuple[jax.Array, jax.Array]:
