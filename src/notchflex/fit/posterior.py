@@ -114,10 +114,10 @@ def sample_posterior(
     """Draw constants from their posterior.
 
     The prior is uniform within the constants' limits, but for priors that were given. What deviates
-    from the drawing follows the constants as it most likely does (Laplace). If the model
-    misses more than noise explains, the misfit counts less, as in the fit's intervals; if whole
-    pulls differ by more than their rows do, the draws are spread about the fit by as much (the
-    adjustment of Shaby 2014).
+    from the drawing follows the constants as it most likely does (Laplace). If the model misses
+    more than noise explains, the misfit counts less, as in the fit's intervals; if whole pulls
+    differ by more than their rows do, the draws are spread about the fit by as much (the adjustment
+    of Shaby 2014).
 
     Args:
         found: A fit by `LeastSquares`.
@@ -197,17 +197,21 @@ def _spread(calibration: Calibration) -> Float[np.ndarray, "n k"]:
 def _potential(calibration: Calibration) -> Callable[[jax.Array], jax.Array]:
     """Minus the logarithm of the posterior, in the units of the fit's own spread."""
     problem, best = calibration.problem, calibration.best.values
-    spread = _spread(calibration)
-    shape = jax.ShapeDtypeStruct((1 + spread.shape[1],), float)
-    temper = calibration.widened**2
+    spread, count = _spread(calibration), len(calibration.names)
+    shape, temper = jax.ShapeDtypeStruct((1 + count,), float), calibration.widened**2
 
     def value_and_gradient(position: np.ndarray) -> np.ndarray:
         values = best + spread @ np.asarray(position, float)
         inside = (values >= problem.lower).all() and (values <= problem.upper).all()
         cost = problem(values) if inside else None
         if cost is None:
-            return np.concatenate([[np.inf], np.zeros(spread.shape[1])])
-        return np.concatenate([[cost.value], spread.T @ cost.gradient]) / temper
+            return np.concatenate([[np.inf], np.zeros(count)])
+        # The likeliest deviations are a step of Newton's method away.
+        gradient, curvature = cost.gradient, cost.curvature
+        columns = np.column_stack([curvature[count:, :count], gradient[count:]])
+        follow = np.linalg.solve(curvature[count:, count:], columns).T @ gradient[count:]
+        slopes = spread[:count].T @ (gradient[:count] - follow[:-1])
+        return np.concatenate([[cost.value - 0.5 * follow[-1]], slopes]) / temper
 
     def forward(position: jax.Array) -> tuple[jax.Array, jax.Array]:
         both = jax.pure_callback(value_and_gradient, shape, position, vmap_method="sequential")
