@@ -197,7 +197,8 @@ def test_likelihood_integrates_deviations_from_the_drawing_out():
     found = calibrate(WRIST, untold, FOUR[:2], starts=1, intervals=False)
     assert found.drawing
     assert not found.noise.is_known
-    spread, moved = found.residuals.spread, found.reached.deviations
+    spread = found.residuals.slopes[:, 2:]
+    moved = np.array([one.start - one.prior[0] for one in found.drawing])
     scale = np.sqrt(found.freedom / found.counted) * found.noise.deviation
     covariance = np.diag(scale**2) + spread @ spread.T
     before = found.residuals.values - spread @ moved

@@ -9,6 +9,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.fit import (
+    Constant,
     LeastSquares,
     Measurements,
     calibrate,
@@ -17,7 +18,7 @@ from notchflex.fit import (
     diagnosis,
     simulate_measurements,
 )
-from notchflex.fit.search import minimise
+from notchflex.robot.value_names import number_at
 
 WRIST = nf.load_robot("pacheco2021-a")
 MODULUS, FRICTION = NAMES = ("material.elastic_modulus", "friction.coefficient")
@@ -83,21 +84,12 @@ def test_outliers_widen_intervals_of_hubers_objective_less():
 
 
 def test_priors_are_a_marginal_likelihood():
-    """Profiled deviations give the quadratic form of the covariance that they add to the noise."""
+    """Covariance of the constants where that of the deviations is added to the noise."""
     found = fit(priors=True)
-    problem = found.problem
-    problem = problem.linearised(found.best.values, np.zeros(len(problem.drawing)))
-    cost = problem(found.best.values)
-    residuals = problem.samples.residuals(found.best.values)
-    spread = np.stack(
-        [problem.samples.slopes_of(one, found.best.values) for one in problem.drawing], axis=1
-    )
+    slopes, spread = np.split(found.residuals.slopes, [2], axis=1)
     covariance = np.diag(found.noise.deviation**2) + spread @ spread.T
-    off = residuals.values + spread @ problem.means
-    assert 2.0 * cost.value == pytest.approx(off @ np.linalg.solve(covariance, off), rel=1e-9)
-    slopes = residuals.slopes
-    curvature = slopes.T @ np.linalg.solve(covariance, slopes)
-    np.testing.assert_allclose(cost.curvature, curvature, rtol=1e-7)
+    information = slopes.T @ np.linalg.solve(covariance, slopes)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(information), rtol=1e-7)
 
 
 def test_pulls_shifted_as_wholes_are_judged_by_pulls():
@@ -125,21 +117,21 @@ def test_a_share_of_all_is_100_percent():
     assert "by about 100 %" in advice
 
 
-def test_intervals_linearise_deviations_from_the_drawing_where_they_end():
-    """As by repeating it until it settles; linearised at the estimate alone it is 20 % too high."""
-    nitinol = {"kind": "nitinol", "elastic_modulus": 36e3, "plateau_stress": 350.0}
-    wrist = nf.load_robot("pacheco2021-a").replace(material={**nitinol, "plateau_modulus": 6e3})
-    seen = simulate_measurements(
-        wrist, nf.pull(0.2, 2.4, steps=12).release(), deviation={"notch_angle": 0.017}, seed=3
-    )
-    found = calibrate(wrist, seen, NAMES, starts=1, intervals=False)
-    name, problem = "material.elastic_modulus", found.problem
-    value = 0.75 * found.values[name]
-    once = found.profile(name).held(value, found.best.values)
-    settled = once
-    lower, upper = (np.array([value, limit[1]]) for limit in (problem.lower, problem.upper))
-    for _ in range(4):
-        linearised = problem.linearised(settled.values, problem.means + settled.cost.deviations)
-        settled = minimise(linearised, settled.values, lower, upper)
-    rise = [2.0 * (one.cost.value - found.cost) for one in (once, settled)]
-    assert rise[0] == pytest.approx(rise[1], rel=0.05)
+@pytest.mark.parametrize(
+    ("name", "other"), [("material.transition_strain", FRICTION), (MODULUS, FRICTION)]
+)
+def test_intervals_of_a_robot_that_deviates_by_many_tolerances(name, other):
+    """Fits with one constant held at an end miss by as much more as chance allows."""
+    deep = WRIST.with_value("notch.depth", 1.46)
+    noise = {"notch_angle": 0.003}
+    seen = simulate_measurements(deep, nf.pull(0.2, 1.8, steps=6), deviation=noise, seed=1)
+    found = calibrate(WRIST, seen, (name, other), starts=1)
+    assert found.deviations_of_drawing["notch.depth"] > 2.0
+    interval = found.intervals[name]
+    assert interval.lower < number_at(WRIST, name) < interval.upper
+    half = 0.5 * (interval.upper - interval.lower)
+    assert half == pytest.approx(1.96 * found.deviations[name], rel=0.05)
+    for end in (interval.lower, interval.upper):
+        held = Constant(name, end * (1.0 - 1e-4), end * (1.0 + 1e-4))
+        again = calibrate(WRIST, seen, (held, other), starts=1, intervals=False)
+        assert 2.0 * (again.cost - found.cost) == pytest.approx(3.8415, rel=0.02)

@@ -18,8 +18,6 @@ from notchflex.pieces import PieceFolder
 
 # How often noise and constants are estimated from each other.
 _ROUNDS = 10
-# Standard deviations by which the constants may still move in the last round.
-_SETTLED = 0.05
 
 Measured = Measurements | Sequence[Measurements]
 
@@ -50,8 +48,8 @@ def calibrate(
         objective: `LeastSquares()` by default, `SumOfRobotErrors()` (Pacheco 2021, eq. 17) or
             `SumOfDistances()` (Gao 2017, eq. 27).
         priors: Whether what is not fitted may deviate from the robot files within their
-            tolerances, or those that `uncertain` assumes (linearised; of `LeastSquares` only, and
-            not if robots have constants of their own, `each:`).
+            tolerances, or those that `uncertain` assumes (of `LeastSquares` only, and not if
+            robots have constants of their own, `each:`).
         starts: Number of starting points; the first is the robots as they are. The misfit has
             kinks where notches close and laws of materials begin, and so shallow minima.
         seed: Seed of the starting points.
@@ -189,28 +187,22 @@ def _no_start(samples: Samples) -> InputError:
 
 
 def _with_noise(problem: FitProblem, best: Minimum) -> tuple[FitProblem, Minimum]:
-    """Estimate unknown noise and deviations from the drawing, and fit again, until all agree."""
+    """Fit what deviates from the drawing too, and again with the noise that each fit leaves."""
     robust = getattr(problem.objective, "huber", None) is not None
-    deviations = np.zeros(len(problem.drawing))
+    if problem.drawing:
+        problem = problem.with_drawing(best.values)
+        best = problem.minimum(np.append(best.values, np.zeros(len(problem.drawing))))
     for _ in range(_ROUNDS):
         noise = problem.noise
-        if noise is None or (noise.is_known and not problem.drawing):
+        if noise is None or noise.is_known:
             break
         residuals = reached(best).residuals
         problem.noise = noise_left(noise, residuals, len(problem.unknowns), robust=robust)
-        settled = np.allclose(problem.noise.deviation, noise.deviation, rtol=1e-3, atol=0.0)
-        if problem.drawing:
-            linearised = problem.linearised(best.values, deviations)
-            if linearised is None:
-                break
-            problem = linearised
         again = problem.minimum(best.values)
         if again.cost is None:
             break
-        moved = again.values - best.values
-        settled &= float(moved @ again.cost.curvature @ moved) < _SETTLED**2
-        best, deviations = again, problem.means + again.cost.deviations
-        if settled:
+        best = again
+        if np.allclose(problem.noise.deviation, noise.deviation, rtol=1e-3, atol=0.0):
             break
     return problem, best
 

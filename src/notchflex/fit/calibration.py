@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.optimize import brentq
 from scipy.stats import chi2, t
 
 from notchflex import InputError, Robot, Settings
@@ -36,8 +37,9 @@ LEVEL = 0.95
 NO_SOLUTION = "the model has no solution that far"
 """Why an end is open that the data may well set."""
 
-# How near the root of the rise must be to its target (of about 2), and how many tries to get there.
-_CLOSE, _TRIES = 0.005, 12
+# How near the root of the rise must be to its target (of about 2); farther on than this part of it
+# the root is no line.
+_CLOSE, _STEEP = 0.005, 4.0
 # So many estimated half-widths away the data still set no end.
 _MAX_HALF_WIDTHS = 50.0
 # Probability below which noise does not explain the misfit: the model misses something.
@@ -104,41 +106,36 @@ class Profile:
         best, estimate = reached(self.best), float(self.best.values[self.number])
         sizes, plain = unit_free(best.curvature)
         inverse = np.linalg.pinv(plain, rcond=1e-10, hermitian=True)
-        variance = max(inverse[self.number, self.number], 1e-12)
+        deviation = np.sqrt(max(inverse[self.number, self.number], 1e-12)) / sizes[self.number]
         target, most, sign = np.sqrt(rise), abs(limit - estimate), 1.0 if side == "above" else -1.0
-        guess = min(target * np.sqrt(variance) / sizes[self.number], _MAX_HALF_WIDTHS * scale)
-        inner, outer = (0.0, 0.0), (np.inf, np.inf)
-        reach, start = guess, self.best.values
-        for _ in range(_TRIES):
-            at_limit, reach = reach >= most, min(reach, most)
-            if reach == 0.0:
+        guess = min(target * deviation, _MAX_HALF_WIDTHS * scale)
+        farthest = min(most, _MAX_HALF_WIDTHS * max(scale, guess))
+        roots, start = {0.0: 0.0}, self.best.values
+
+        def excess(reach: float) -> float:
+            nonlocal start
+            if reach not in roots:
+                value = limit if reach == most else float(estimate + sign * reach)
+                minimum = self.held(value, start)
+                roots[reach] = np.inf  # without a robot, or a solution, the end must be nearer
+                if minimum.cost is not None:
+                    start = minimum.values
+                    points[value] = max(2.0 * (minimum.cost.value - best.value), 0.0)
+                    roots[reach] = np.sqrt(points[value])
+            off = min(roots[reach], _STEEP * target) - target
+            return off if abs(off) > _CLOSE * target else 0.0
+
+        inner, reach = 0.0, min(guess, farthest)
+        while excess(reach) < 0.0:
+            if reach == farthest:
                 return None, ""
-            value = limit if at_limit else float(estimate + sign * reach)
-            minimum = self.held(value, start)
-            root = np.inf  # without a robot, or a solution, that far the end must be nearer
-            if minimum.cost is not None:
-                start = minimum.values
-                points[value] = max(2.0 * (minimum.cost.value - best.value), 0.0)
-                root = np.sqrt(points[value])
-            if abs(root - target) < _CLOSE * target:
-                return value, ""
-            if root > target:
-                outer = (reach, root)
-            elif at_limit:
-                return None, ""
-            else:
-                inner = (reach, root)
-            if np.isfinite(outer[0]):
-                share = (target - inner[1]) / (outer[1] - inner[1])
-                share = min(max(share, 0.05), 0.95) if np.isfinite(outer[1]) else 0.5
-                reach = inner[0] + share * (outer[0] - inner[0])
-            elif reach >= _MAX_HALF_WIDTHS * max(scale, guess):
-                return None, ""
-            else:
-                reach *= min(max(1.1 * target / max(root, 1e-300), 1.2), 4.0)
-        if np.isinf(outer[1]):
+            inner, growth = reach, 1.1 * target / max(roots[reach], 1e-300)
+            reach = min(reach * min(max(growth, 1.2), 4.0), farthest)
+        end: Any = brentq(excess, inner, reach, xtol=0.5 * _CLOSE * reach)
+        reach = float(end)
+        if not any(target * (1.0 - _CLOSE) <= root < np.inf for root in roots.values()):
             return None, NO_SOLUTION
-        return float(estimate + sign * reach), ""
+        return limit if reach == most else float(estimate + sign * reach), ""
 
 
 class ByPulls(NamedTuple):
@@ -224,7 +221,12 @@ class Calibration:
     @property
     def values(self) -> dict[str, float]:
         """Fitted values, in the units of the robot file."""
-        return self._by_name(self.best.values)
+        return self._by_name(self.estimate)
+
+    @property
+    def estimate(self) -> Vector:
+        """The same in the order of `names`, (k,)."""
+        return self.best.values[: len(self.names)]
 
     def _by_name(self, values: Vector) -> dict[str, float]:
         return dict(zip(self.names, values.tolist(), strict=True))
@@ -273,19 +275,24 @@ class Calibration:
     @cached_property
     def robots(self) -> dict[str, Robot]:
         """The robots with the fitted constants."""
-        constants = (*self.problem.unknowns, *self.drawing)
-        values = [*self.best.values, *self.deviations_of_drawing.values()]
+        varied, values = self.problem.varied, self.best.values
         return {
-            label: with_numbers(robot, values_set(label, constants, values))
+            label: with_numbers(robot, values_set(label, varied, values))
             for label, robot in self.problem.samples.robots.items()
         }
 
     @property
     def drawing(self) -> tuple[Unknown, ...]:
         """What deviates from the drawings, starting at what the data tell."""
-        total = (self.problem.means + self.reached.deviations).tolist()
-        pairs = zip(self.problem.drawing, total, strict=True)
+        deviations = self.best.values[len(self.names) :].tolist()
+        pairs = zip(self.problem.drawing, deviations, strict=True)
         return tuple(replace(unknown, start=deviation) for unknown, deviation in pairs)
+
+    @property
+    def _unlikely(self) -> Vector:
+        """Deviations from the drawing less their means."""
+        means = [unknown.prior[0] for unknown in self.drawing if unknown.prior is not None]
+        return self.best.values[len(self.names) :] - means
 
     @property
     def deviations_of_drawing(self) -> dict[str, float]:
@@ -328,11 +335,6 @@ class Calibration:
         return getattr(self.problem.objective, "huber", None)
 
     @property
-    def is_robust(self) -> bool:
-        """Whether outliers count less."""
-        return self.huber is not None
-
-    @property
     def tells_no_noise(self) -> bool:
         """Whether the noise is unknown, and no number is left over to estimate it."""
         return not self.noise.is_known and self.freedom <= 0
@@ -346,7 +348,7 @@ class Calibration:
         """
         is_known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
         scaled = self.residuals.values[is_known] / self.noise.deviation[is_known]
-        squares = np.sum(scaled**2) + np.sum(self.reached.deviations**2)
+        squares = np.sum(scaled**2) + np.sum(self._unlikely**2)
         return float(squares) / self._left if self._left > 0 else float("nan")
 
     @property
@@ -367,8 +369,8 @@ class Calibration:
         counts = np.isfinite(self.noise.deviation)
         share = np.where(self.noise.estimated, self.freedom / self.counted, 1.0)
         noise = (self.noise.deviation * np.sqrt(share))[counts]
-        spread = self.residuals.spread[counts]
-        scaled = (self.residuals.values[counts] - spread @ self.reached.deviations) / noise
+        spread = self.residuals.slopes[counts, len(self.names) :]
+        scaled = (self.residuals.values[counts] - spread @ self._unlikely) / noise
         spread = spread / noise[:, None]
         inner = np.eye(spread.shape[1]) + spread.T @ spread
         along = spread.T @ scaled
@@ -471,17 +473,27 @@ class Calibration:
         wider = self.by_pulls.wider
         return self.covariance_by_rows * np.outer(wider, wider)
 
-    @cached_property
+    @property
     def covariance_by_rows(self) -> Matrix:
         """Covariance of the constants if all rows were independent."""
         if self.is_likelihood and self.tells_no_noise:
             return np.diag(np.full(len(self.names), np.inf))
+        return self._of_constants(self.covariance_of_all)
+
+    @cached_property
+    def covariance_of_all(self) -> Matrix:
+        """The same with what deviates from the drawing."""
         if self.huber:
             contributions = self.reached.contributions
             factor = self.noise.counted / max(self.freedom, 1)
             scatter = factor * contributions.T @ contributions + self.reached.scatter
             return sandwich(self.reached.second_derivatives, scatter)
         return inverse_of(self.reached.curvature) * self.widened**2
+
+    def _of_constants(self, covariance: Matrix) -> Matrix:
+        """Covariance of the constants, whatever deviates from the drawing."""
+        size = len(self.names)
+        return covariance[:size, :size]
 
     @cached_property
     def by_pulls(self) -> ByPulls:
@@ -494,13 +506,10 @@ class Calibration:
         """
         cost, size = self.reached, len(self.names)
         labels, pull = np.unique(self.residuals.pull, return_inverse=True)
-        gradients, depends = np.zeros((2, len(labels), size))
+        gradients, depends = np.zeros((2, len(labels), len(self.best.values)))
         np.add.at(gradients, pull, cost.contributions)
         np.logical_or.at(depends, pull, self.residuals.slopes != 0.0)
-        pulls = depends.sum(axis=0).astype(int)
-        if len(labels) < 2:
-            ones = np.ones(size)
-            return ByPulls(np.full((size, size), np.nan), pulls, ones, np.zeros(size, bool), ones)
+        pulls = depends.sum(axis=0).astype(int)[:size]
         # Only priors keep the gradients of the pulls from adding up to zero. The same share of each
         # leaves what no pull tells, such as forces and moduli that grow together, out of the
         # scatter.
@@ -509,8 +518,12 @@ class Calibration:
         few = np.sqrt(np.maximum(pulls, 1) / np.maximum(pulls - 1, 1))
         few *= np.sqrt(max(rows - 1, 1) / max(rows - size, 1))
         hessian = cost.second_derivatives
-        of_pulls = sandwich(hessian, gradients.T @ gradients) * np.outer(few, few)
-        covariance = of_pulls + sandwich(hessian, cost.scatter)
+        of_pulls, of_priors = (
+            self._of_constants(sandwich(hessian, scatter))
+            for scatter in (gradients.T @ gradients, cost.scatter)
+        )
+        of_pulls *= np.outer(few, few)
+        covariance = of_pulls + of_priors if len(labels) > 1 else np.nan * of_pulls
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.diag(covariance) / np.diag(of_pulls)
             freedom = np.nan_to_num(np.maximum(pulls - 1, 1) * share**2, nan=1.0)

@@ -10,8 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from notchflex import InputError, Robot
-from notchflex.analysis.draws import moments, sources_of, tolerances_of
-from notchflex.support import described_at, number_at, numbers_at
+from notchflex.support import (
+    described_at,
+    moments,
+    number_at,
+    numbers_at,
+    sources_of,
+    tolerances_of,
+)
 
 
 @dataclass(frozen=True)

@@ -71,8 +71,8 @@ def _sentences(calibration: Calibration) -> Iterator[str]:
     yield from _not_trusted(calibration)
     for number, sample in enumerate(calibration.problem.samples.every):
         yield from _branches(calibration, number, sample.measured)
-    values, slopes = calibration.best.values.tolist(), calibration.reached.gradient
-    for unknown, value, slope in zip(calibration.problem.unknowns, values, slopes, strict=True):
+    values, slopes = calibration.estimate.tolist(), calibration.reached.gradient
+    for unknown, value, slope in zip(calibration.problem.unknowns, values, slopes, strict=False):
         yield from _limits(unknown, value, slope)
         yield from _far(unknown, value)
     if not calibration.tells_no_noise:

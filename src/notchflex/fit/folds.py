@@ -110,7 +110,7 @@ def updated(
     held = [
         RobotNumber(label, number.path, number.base + number.slope * value, 0.0)
         for unknown, value in zip(
-            calibration.problem.unknowns, calibration.best.values.tolist(), strict=True
+            calibration.problem.unknowns, calibration.estimate.tolist(), strict=True
         )
         if unknown.shared
         for number in unknown.of(label, robot).sets
@@ -158,7 +158,7 @@ def prior_of(unknown: Unknown, calibration: Calibration) -> tuple[float, float]:
     of_specimens = [
         constant.path == unknown.path and constant.each for constant in calibration.problem.unknowns
     ]
-    values = calibration.best.values[of_specimens]
+    values = calibration.estimate[of_specimens]
     if unknown.prior is not None:
         mean, size = unknown.prior
         variance = np.diag(calibration.covariance)[of_specimens]
@@ -376,7 +376,7 @@ class _Blind(NamedTuple):
         samples = Samples.of(
             {self.label: robot}, {self.label: part}, tuple(constants), self.fit.settings
         )
-        return samples.residuals(np.append(self.fit.best.values, own))
+        return samples.residuals(np.append(self.fit.estimate, own))
 
     def fold(self, name: str, whole: Calibration) -> Fold:
         """Predict the part; constants of its robot alone by what is known of them."""

@@ -116,10 +116,11 @@ def next_measurement(
     narrower = np.full((len(path), len(found.names)), np.nan)
     volume = np.full(len(path), np.nan)
     before = found.reached.curvature / found.widened**2
-    width, size = _widths(before)
+    count = len(found.names)
+    width, size = _widths(before, count)
     for row, step in enumerate(steps):
         slopes = scaled[residuals.row == row]
-        width_after, size_after = _widths(before + slopes.T @ slopes)
+        width_after, size_after = _widths(before + slopes.T @ slopes, count)
         narrower[step], volume[step] = width_after / width, np.exp(size_after - size)
     return NextMeasurement(
         label, path, narrower, volume, found.names, tuple(narrow), np.isfinite(volume)
@@ -167,19 +168,19 @@ def _solved(
             "candidates", loads[np.array(steps)], labels, True, values, axis_at=axis_at
         )
         robots = {label: calibration.given[label]}
-        candidates = Samples.of(robots, {label: [rows]}, calibration.problem.unknowns)
+        candidates = Samples.of(robots, {label: [rows]}, calibration.problem.varied)
         if (residuals := candidates.residuals(calibration.best.values)) is not None:
             return residuals, steps
     raise InputError.NOT_CONVERGED("none of the candidates has a solution; give smaller loads")
 
 
-def _widths(information: Float[np.ndarray, "k k"]) -> tuple[Vector, float]:
-    """Widths of the constants, and the logarithm of the k-th root of the volume of their region.
+def _widths(information: Float[np.ndarray, "n n"], count: int) -> tuple[Vector, float]:
+    """Widths of the first k constants, and the logarithm of the k-th root of their region's volume.
 
     A constant without information is very wide.
     """
     size = np.sqrt(np.maximum(np.diag(information), 1e-12))
     values, vectors = np.linalg.eigh(information / np.outer(size, size))
     values = np.maximum(values, 1e-12)
-    width = np.sqrt(np.sum(vectors**2 / values, axis=1)) / size
-    return width, float(-np.mean(0.5 * np.log(values) + np.log(size)))
+    covariance = ((vectors / values) @ vectors.T / np.outer(size, size))[:count, :count]
+    return np.sqrt(np.diag(covariance)), 0.5 * float(np.linalg.slogdet(covariance)[1]) / count

@@ -26,8 +26,6 @@ Vector = Float[np.ndarray, " k"]
 _FIRST_NOISE = {"deg": float(np.radians(1.0)), "mm": 0.1, "N": 0.01}
 # Nothing is measured better than this part of that; else an exact fit would have no noise at all.
 _LEAST_NOISE = 1e-9
-# How often outliers are weighed anew while deviations from the drawing are found.
-_REWEIGHTED = 100
 
 
 class Cost(NamedTuple):
@@ -37,10 +35,8 @@ class Cost(NamedTuple):
         value: Its value, 0 or more.
         gradient: Its derivatives.
         curvature: Approximate second derivatives, positive semidefinite.
-        residuals: The residuals it is made of, less what deviations from the drawing explain.
-        contributions: What each residual adds to the gradient; the deviations from the drawing
-            make the best of it.
-        deviations: The deviations, in standard deviations, less their means, (m,).
+        residuals: The residuals it is made of.
+        contributions: What each residual adds to the gradient.
         scatter: Covariance of the gradient that priors stand for.
         hessian: Second derivatives, if they are known better than `curvature`.
     """
@@ -50,7 +46,6 @@ class Cost(NamedTuple):
     curvature: Float[np.ndarray, "k k"]
     residuals: Any = None
     contributions: Numbers = np.zeros((0, 0))
-    deviations: Numbers = np.zeros(0)
     scatter: Any = 0.0
     hessian: Any = None
 
@@ -125,46 +120,19 @@ class LeastSquares:
 
     def cost(self, residuals: Residuals, noise: Numbers) -> Cost:
         """Return half the sum of squares, or of Huber's function."""
-        slopes, spread = (one / noise[:, None] for one in (residuals.slopes, residuals.spread))
-        expected = (residuals.values + residuals.expected) / noise
-        most = self.huber or np.inf
-        deviations, scaled = np.zeros(spread.shape[1]), expected
-        for _ in range(_REWEIGHTED):  # least squares, reweighted (Holland and Welsch 1977)
-            before, deviations = deviations, -_best(spread, _weight(scaled, most), expected)
-            scaled = expected + spread @ deviations
-            if self.huber is None or np.allclose(before, deviations, rtol=0.0, atol=1e-10):
-                break
+        slopes, scaled = residuals.slopes / noise[:, None], residuals.values / noise
+        most, size = self.huber or np.inf, np.abs(scaled)
         clipped = np.clip(scaled, -most, most)
-        misfit = np.sum(np.abs(clipped) * (np.abs(scaled) - 0.5 * np.abs(clipped)))
-        left = residuals.values + residuals.expected + residuals.spread @ deviations
-        # The deviations follow the constants: what remains of the slopes, and of the curvature.
-        weight = _weight(scaled, most)
-        follow = slopes - spread @ _best(spread, weight, slopes)
-        quadratic = (np.abs(scaled) <= most).astype(float)
-        turned = _best(spread, quadratic, slopes)
-        remaining = slopes - spread @ turned
+        # Weights with which squares are Huber's function (Holland and Welsch 1977).
+        weight = np.minimum(1.0, most / np.maximum(size, 1e-300))
         return Cost(
-            float(misfit + 0.5 * deviations @ deviations),
+            float(np.sum(np.abs(clipped) * (size - 0.5 * np.abs(clipped)))),
             slopes.T @ clipped,
-            (slopes * weight[:, None]).T @ follow,
-            replace(residuals, values=left),
-            remaining * clipped[:, None],
-            deviations,
-            turned.T @ turned,
-            (slopes * quadratic[:, None]).T @ remaining,
+            (slopes * weight[:, None]).T @ slopes,
+            residuals,
+            slopes * clipped[:, None],
+            hessian=slopes[size <= most].T @ slopes[size <= most],
         )
-
-
-def _weight(scaled: Numbers, most: float) -> Numbers:
-    """Weights with which squares are Huber's function."""
-    return np.minimum(1.0, most / np.maximum(np.abs(scaled), 1e-300))
-
-
-def _best(spread: Numbers, weight: Numbers, values: Numbers) -> Numbers:
-    """Deviations of unit variance that explain values best, by weighted least squares."""
-    root = np.sqrt(weight)
-    axes, sizes, turn = np.linalg.svd(spread * root[:, None], full_matrices=False)
-    return turn.T @ ((axes * sizes / (1.0 + sizes**2)).T @ (root * values.T).T)
 
 
 class _SumOfNorms:

@@ -113,10 +113,11 @@ def sample_posterior(
 ) -> Posterior:
     """Draw constants from their posterior.
 
-    The prior is uniform within the constants' limits, but for priors that were given. If the model
-    misses more than noise explains, the misfit counts less, as in the fit's intervals; if whole
-    pulls differ by more than their rows do, the draws are spread about the fit by as much (the
-    adjustment of Shaby 2014).
+    The prior is uniform within the constants' limits, but for priors that were given. What deviates
+    from the drawing follows the constants as it most likely does (Laplace). If the model misses
+    more than noise explains, the misfit counts less, as in the fit's intervals; if whole pulls
+    differ by more than their rows do, the draws are spread about the fit by as much (the adjustment
+    of Shaby 2014).
 
     Args:
         found: A fit by `LeastSquares`.
@@ -161,9 +162,9 @@ def sample_posterior(
         if progress is not None:
             progress("drawing", chain + 1, chains)
     # Farther from the fit if whole pulls differ.
-    spread = np.linalg.cholesky(found.covariance_by_rows)
-    values = found.best.values + found.by_pulls.wider * (np.stack(positions) @ spread.T)
-    values = np.clip(values, found.problem.lower, found.problem.upper)
+    moved = np.stack(positions) @ _spread(found)[: len(found.names)].T
+    limits = [(unknown.lower, unknown.upper) for unknown in found.problem.unknowns]
+    values = np.clip(found.estimate + found.by_pulls.wider * moved, *np.transpose(limits))
     effective, r_hat = (
         {name: float(of(values[..., number])) for number, name in enumerate(found.names)}
         for of in (diagnostics.effective_sample_size, diagnostics.split_gelman_rubin)
@@ -187,19 +188,30 @@ def _check(calibration: Calibration) -> None:
         )
 
 
+def _spread(calibration: Calibration) -> Float[np.ndarray, "n k"]:
+    """Root of the covariance of the constants; what deviates from the drawing follows them."""
+    root = np.linalg.cholesky(calibration.covariance_by_rows)
+    return np.linalg.solve(root, calibration.covariance_of_all[: len(root)]).T
+
+
 def _potential(calibration: Calibration) -> Callable[[jax.Array], jax.Array]:
     """Minus the logarithm of the posterior, in the units of the fit's own spread."""
     problem, best = calibration.problem, calibration.best.values
-    spread = np.linalg.cholesky(calibration.covariance_by_rows)
-    shape, temper = jax.ShapeDtypeStruct((1 + len(best),), float), calibration.widened**2
+    spread, count = _spread(calibration), len(calibration.names)
+    shape, temper = jax.ShapeDtypeStruct((1 + count,), float), calibration.widened**2
 
     def value_and_gradient(position: np.ndarray) -> np.ndarray:
         values = best + spread @ np.asarray(position, float)
         inside = (values >= problem.lower).all() and (values <= problem.upper).all()
         cost = problem(values) if inside else None
         if cost is None:
-            return np.concatenate([[np.inf], np.zeros(len(values))])
-        return np.concatenate([[cost.value], spread.T @ cost.gradient]) / temper
+            return np.concatenate([[np.inf], np.zeros(count)])
+        # The likeliest deviations are a step of Newton's method away.
+        gradient, curvature = cost.gradient, cost.curvature
+        columns = np.column_stack([curvature[count:, :count], gradient[count:]])
+        follow = np.linalg.solve(curvature[count:, count:], columns).T @ gradient[count:]
+        slopes = spread[:count].T @ (gradient[:count] - follow[:-1])
+        return np.concatenate([[cost.value - 0.5 * follow[-1]], slopes]) / temper
 
     def forward(position: jax.Array) -> tuple[jax.Array, jax.Array]:
         both = jax.pure_callback(value_and_gradient, shape, position, vmap_method="sequential")

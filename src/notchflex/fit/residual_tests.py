@@ -21,6 +21,7 @@ from notchflex import InputError
 from notchflex.fit.calibration import Calibration
 from notchflex.fit.constants import SENSOR, Unknown, numbers_set, unknowns
 from notchflex.fit.measurements.measurements import NOTCH_ANGLES
+from notchflex.fit.residuals import Samples, deviated
 from notchflex.robot.part import unit_of
 from notchflex.support import fields_of
 
@@ -98,10 +99,16 @@ def residual_tests(found: Calibration) -> ResidualTests | None:
         centred = np.where(of_notches, part - 0.5 * part.max(), 0.0)
         trend = np.stack([centred, centred * _load(found)], axis=1)
         notches = regression.chance(trend / noise)[-1]
+    samples = found.problem.samples
+    robots = {
+        label: deviated(robot, label, found.drawing) for label, robot in samples.robots.items()
+    }
+    data = {label: samples.of_robot(label) for label in robots}
+    as_found = Samples.of(robots, data, found.problem.unknowns, found.settings)
     tests = [
         Missing(one.name, *regression.chance(slopes[:, None] / noise))
-        for one in _candidates(found)
-        if (slopes := found.problem.samples.slopes_of(one, found.best.values)) is not None
+        for one in _candidates(as_found)
+        if (slopes := as_found.slopes_of(one, found.estimate)) is not None
     ]
     known = [test for test in tests if np.isfinite(test.chance)]
     known.sort(key=lambda test: test.chance)
@@ -120,7 +127,7 @@ class _Regression(NamedTuple):
         priors = [
             (number, value - one.prior[0], one.prior[1])
             for number, (one, value) in enumerate(
-                zip(calibration.problem.unknowns, calibration.best.values, strict=True)
+                zip(calibration.problem.varied, calibration.best.values, strict=True)
             )
             if one.prior is not None
         ]
@@ -129,16 +136,12 @@ class _Regression(NamedTuple):
         group = np.unique(groups, axis=1, return_inverse=True)[1].ravel()
         several = len(np.unique(residuals.pull)) > 1
         shifts = np.eye(group.max() + 1)[group] if several else np.zeros((len(group), 0))
-        spread, count = residuals.spread, residuals.slopes.shape[1]
-        columns = np.concatenate([residuals.slopes, spread, shifts], axis=1) / noise[:, None]
-        unit = np.eye(columns.shape[1])
-        deviations = unit[count : count + spread.shape[1]]
-        below = unit[constants.astype(int)] / sizes[:, None]
+        columns = np.concatenate([residuals.slopes, shifts], axis=1) / noise[:, None]
+        below = np.eye(columns.shape[1])[constants.astype(int)] / sizes[:, None]
         most = calibration.huber or np.inf
         scaled = np.clip(residuals.values / noise, -most, most)
-        rows = [np.where(np.isfinite(noise), scaled, 0.0), calibration.reached.deviations]
-        basis = _orthonormal(np.concatenate([columns, deviations, below]))
-        left = np.concatenate([*rows, off / sizes])
+        basis = _orthonormal(np.concatenate([columns, below]))
+        left = np.concatenate([np.where(np.isfinite(noise), scaled, 0.0), off / sizes])
         return cls(left - basis @ (basis.T @ left), basis)
 
     @property
@@ -210,9 +213,9 @@ def _neighbours(calibration: Calibration) -> tuple[np.ndarray, np.ndarray]:
     return order[:-1][follow], order[1:][follow]
 
 
-def _candidates(calibration: Calibration) -> list[Unknown]:
+def _candidates(samples: Samples) -> list[Unknown]:
     """All constants that could be fitted besides."""
-    robots = calibration.problem.samples.robots
+    robots = samples.robots
     names = ["tube.inner_diameter"]
     for robot in robots.values():
         for part, prefix, units in (
@@ -223,7 +226,7 @@ def _candidates(calibration: Calibration) -> list[Unknown]:
             for name, field in fields_of(type(part)).items():
                 if unit_of(field) in units and name not in _NO_CANDIDATES:
                     names.append(f"{prefix}.{name}")
-    fitted = numbers_set(robots, calibration.problem.unknowns)
+    fitted = numbers_set(robots, samples.unknowns)
     candidates: list[Unknown] = []
     for name in dict.fromkeys([*names, *SENSOR]):
         try:

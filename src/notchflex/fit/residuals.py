@@ -11,8 +11,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from notchflex import EquilibriumPath, InputError, LoadPath, Robot, Settings
-from notchflex._jax import constant
-from notchflex.analysis import axis_places, points_on_axis
+from notchflex.analysis import axis_places, axis_points
 from notchflex.analysis.kinematics import axis_point_changes
 from notchflex.fit.constants import SENSOR, Unknown, values_set, with_numbers
 from notchflex.fit.measurements.measurements import (
@@ -84,9 +83,9 @@ class Sample:
         if self.own_unknowns:
             slopes = derivatives(path, self._changes(path, load, numbers), solved)
         if bodies:
-            places = axis_places(self.robot, self.measured.axis_at)
             poses, moves = ([arrays[name] for name in bodies] for arrays in (modelled, slopes))
-            modelled["axis_points"] = np.asarray(points_on_axis(places, *map(constant, poses)))
+            places = axis_places(self.robot, self.measured.axis_at)
+            modelled["axis_points"] = axis_points(path, self.measured.axis_at)
             slopes["axis_points"] = axis_point_changes(places, poses, moves)
         return rows(path.converged), {
             name: misfit(name, array, rows(modelled[output]), rows(slopes[output], axis=1))
@@ -149,9 +148,6 @@ class Residuals:
         point: Point in space, for coordinates; of its own for each other number.
         rows: Number of rows measured of that robot.
         given: Standard deviation given with the measurement; NaN if there is none.
-        spread: Derivatives by deviations from the drawing, in standard deviations of their
-            tolerances, (R, m).
-        expected: The mean of these deviations times `spread`, (R,) or 0.
     """
 
     values: Numbers
@@ -165,8 +161,6 @@ class Residuals:
     point: Integers
     rows: Integers
     given: Numbers
-    spread: Numbers
-    expected: Numbers | float = 0.0
 
     def __len__(self) -> int:
         """Number of measured numbers."""
@@ -200,7 +194,7 @@ def misfit(
         vector = turned.as_rotvec()
         spin = slopes @ np.swapaxes(values, -1, -2)
         turn = np.stack([spin[..., 2, 1], spin[..., 0, 2], spin[..., 1, 0]], axis=-1)
-        by_turn = np.linalg.inv(np.asarray(left_slope(constant(vector))))
+        by_turn = np.linalg.inv(np.asarray(left_slope(vector)))
         off = np.where(np.isnan(observed), np.nan, vector)
         return off, np.einsum("pij,kpj->kpi", by_turn, turn)
     off = (reading(name, values) - observed).reshape(len(observed), -1)
@@ -279,25 +273,17 @@ class Samples:
                 slopes.append(by_all)
         if self.failed:
             return None
-        off = np.concatenate(residuals)
-        none = np.zeros((len(off), 0))
-        return Residuals(off, np.concatenate(slopes), **self._layout, spread=none)
+        return Residuals(np.concatenate(residuals), np.concatenate(slopes), **self._layout)
 
-    def deviated(self, deviations: Sequence[Unknown]) -> Samples:
-        """Return the same measurements of robots that deviate from their drawings.
-
-        Raises:
-            InputError: A robot cannot.
-        """
-        robots = {label: deviated(robot, label, deviations) for label, robot in self.robots.items()}
-        every = tuple(replace(sample, robot=robots[sample.label]) for sample in self.every)
-        return replace(self, every=every)
+    def of_unknowns(self, unknowns: tuple[Unknown, ...]) -> Samples:
+        """Return the same measurements as a function of other constants."""
+        every = tuple(replace(sample, unknowns=unknowns) for sample in self.every)
+        return replace(self, every=every, unknowns=unknowns)
 
     def slopes_of(self, more: Unknown, values: Numbers) -> Numbers | None:
         """Return derivatives by one more constant at values of the others; None without any."""
-        both = (*self.unknowns, more)
-        every = tuple(replace(sample, unknowns=both) for sample in self.every)
-        residuals = Samples(every, both).residuals(np.append(values, more.start))
+        both = self.of_unknowns((*self.unknowns, more))
+        residuals = both.residuals(np.append(values, more.start))
         if residuals is None or not np.isfinite(residuals.slopes[:, -1]).all():
             return None
         return residuals.slopes[:, -1]

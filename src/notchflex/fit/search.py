@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from copy import copy
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -158,8 +157,6 @@ class FitProblem:
         unknowns: The constants.
         drawing: What else may deviate, within the tolerances of the drawings (`deviations_of`).
         noise: Standard deviations of the measurements; None before the first call.
-        lower: Least values allowed.
-        upper: Greatest values allowed.
     """
 
     def __init__(
@@ -173,10 +170,21 @@ class FitProblem:
         self.samples, self.objective, self.unknowns = samples, objective, samples.unknowns
         self.drawing = drawing
         self.noise: Noise | None = None
-        self._linearised: dict[str, np.ndarray] = {}
-        self.lower, self.upper = np.array(
-            [(unknown.lower, unknown.upper) for unknown in self.unknowns]
-        ).T
+
+    @property
+    def varied(self) -> tuple[Unknown, ...]:
+        """The constants, and with `with_drawing` what deviates, in standard deviations."""
+        return self.samples.unknowns
+
+    @property
+    def lower(self) -> Vector:
+        """Least values allowed of all that is varied."""
+        return np.array([unknown.lower for unknown in self.varied], float)
+
+    @property
+    def upper(self) -> Vector:
+        """Greatest values allowed of all that is varied."""
+        return np.array([unknown.upper for unknown in self.varied], float)
 
     def __call__(self, values: Vector) -> Cost | None:
         """Return the objective; None if the model has no solution, or no finite derivatives."""
@@ -187,64 +195,37 @@ class FitProblem:
             return None
         if self.noise is None:
             self.noise = first_noise(self.samples, residuals)
-        residuals = replace(residuals, **self._linearised)
         cost = self.objective.cost(residuals, self.noise.deviation)
-        for number, unknown in enumerate(self.unknowns):
+        for number, unknown in enumerate(self.varied):
             if unknown.prior is not None:
                 mean, deviation = unknown.prior
                 weight = self.objective.weight_of_one(residuals, self.noise.deviation)
                 cost = cost.with_prior(number, float(values[number]) - mean, deviation, weight)
         return cost
 
-    def linearised(self, values: Vector, deviations: Vector) -> FitProblem | None:
-        """Return the problem with the model linearised about deviations from the drawing.
+    def with_drawing(self, values: Vector) -> FitProblem:
+        """Return the same objective as a function of what deviates from the drawing too.
 
-        Deviations by which the model cannot be varied are left out; None if no robot deviates so.
+        Deviations by which the model cannot be varied at some values are left out.
         """
-        moved = [
-            replace(deviation, start=float(start))
-            for deviation, start in zip(self.drawing, deviations, strict=True)
-        ]
-        other = copy(self)
-        try:
-            other.samples = self.samples.deviated(moved)
-        except InputError:
-            return None
-        slopes = {one: other.samples.slopes_of(one, values) for one in moved}
-        known = {one: by_one for one, by_one in slopes.items() if by_one is not None}
-        other.drawing = tuple(known)
-        if known:
-            spread = np.array([*known.values()]).T
-            expected = spread @ (other.means - [unknown.start for unknown in known])
-            other._linearised = {"spread": spread, "expected": expected}
-        return other
-
-    @property
-    def means(self) -> Float[np.ndarray, " m"]:
-        """Means of the deviations from the drawings, in standard deviations."""
-        return np.array(
-            [deviation.prior[0] for deviation in self.drawing if deviation.prior is not None]
-        )
+        whole = copy(self)
+        whole.samples = self.samples.of_unknowns((*self.unknowns, *self.drawing))
+        residuals = whole.samples.residuals(np.append(values, np.zeros(len(self.drawing))))
+        slopes = np.full((1, len(whole.varied)), np.nan) if residuals is None else residuals.slopes
+        is_known = np.isfinite(slopes[:, len(self.unknowns) :]).all(axis=0)
+        whole.drawing = tuple(np.array(self.drawing, object)[is_known])
+        whole.samples = self.samples.of_unknowns((*self.unknowns, *whole.drawing))
+        return whole
 
     def minimum(self, start: Vector) -> Minimum:
         """Return the minimum that a search from a start ends at."""
         return minimise(self, start, self.lower, self.upper)
 
     def held(self, number: int, value: float, start: Vector) -> Minimum:
-        """Return the minimum with a constant held at a value, searched from a start.
-
-        Deviations from the drawing are linearised there anew: those at the estimate would put the
-        ends of wide intervals too near.
-        """
+        """Return the minimum with a constant held at a value, searched from a start."""
         start, lower, upper = (values.copy() for values in (start, self.lower, self.upper))
         start[number] = lower[number] = upper[number] = value
-        minimum = minimise(self, start, lower, upper, tolerance=1e-7)
-        if self.drawing and minimum.cost is not None:
-            deviations = self.means + minimum.cost.deviations
-            linearised = self.linearised(minimum.values, deviations)
-            if linearised is not None:
-                return minimise(linearised, minimum.values, lower, upper, tolerance=1e-7)
-        return minimum
+        return minimise(self, start, lower, upper, tolerance=1e-7)
 
 
 class SearchTask(PieceTask):
