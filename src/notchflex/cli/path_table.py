@@ -243,9 +243,8 @@ def path_columns(path: EquilibriumPath, rows: Sequence[int], name: str) -> list[
             part = entry.name.rpartition(" ")[2]
             head = f"{short}{' ' * (len(short) > 1)}{part}".strip()
         else:
-            head = "\n".join(
-                [*name.split("_"), *filter(None, entry.name.replace("notch ", "").split(", "))]
-            )
+            parts = entry.name.replace("notch ", "").replace(", ", "\n")
+            head = name.replace("_", "\n") + f"\n{parts}".rstrip()
         head += f"\n{unit}"
         if name == "notch_angle":
             head = head.replace("\n", " \n") + " "

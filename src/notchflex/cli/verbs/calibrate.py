@@ -164,6 +164,7 @@ class FitOptions:
                 "--fit needs names of constants joined by commas, such as "
                 "friction.coefficient,material.elastic_modulus."
             )
+        once("--fit", names)
         limits, priors = dict(self.bounds), dict(self.prior)
         for option, pairs in {"--bounds": self.bounds, "--prior": self.prior}.items():
             once(option, (name for name, _ in pairs))
@@ -276,6 +277,10 @@ def calibrate(
     with terminal.progress("loading the solver"):
         import notchflex.fit as fitting
 
+    for name, *_ in constants:
+        path_of_value = name.rpartition(":")[2]
+        if path_of_value.startswith("sensor."):
+            _check_known(path_of_value, fitting.SENSOR, f"--fit {name}", "no sensor has this")
     data = {
         label: [read_data(file, robots[label], path, measured, column) for file in files]
         for label, files in sources.items()
