@@ -14,7 +14,7 @@ NAMES = [name for name, quantity in QUANTITIES.items() if "row" not in quantity.
 
 def shown(out):
     """The steps of a table, counted from 0."""
-    return [int(row) - 1 for row in re.findall(r"(?m)^ *(\d+) ", out)]
+    return [int(row) - 1 for row in re.findall(r"(?m)^ +(\d+) ", out)]
 
 
 @pytest.mark.parametrize(("steps", "stride"), [(60, 1), (61, 2), (121, 5), (500, 10)])
@@ -27,7 +27,7 @@ def test_reversals_and_peaks_are_always_shown(call):
     loop = ("--tension", "0:3:101,3:0.7:78,0.7:2:66", "--columns", "tension")
     out = call(*WRIST, *loop)[1]
     assert shown(out) == sorted({*range(0, 245, 5), 100, 101, 178, 179, 244})
-    assert "245 steps, 54 shown: every 5th one, and where the load reverses" in out
+    assert "245 steps, 53 shown: every 5th one, and where the load reverses" in out
     out = call(*WRIST, *loop, "--all")[1]
     assert shown(out) == list(range(245))
     assert "shown" not in out
@@ -80,5 +80,5 @@ def test_every_quantity_can_be_a_column(call):
     code, out, _ = call(*WRIST, "--stroke", "0.5,4", "--columns", ",".join(NAMES))
     assert code == 1
     assert "This path has no values of commanded_tension" in " ".join(out.split())
-    assert {"sticks", "slides"} & {*out.split()}
+    assert "slip toward" in out
     assert "converged" in out

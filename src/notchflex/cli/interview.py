@@ -475,7 +475,9 @@ def reading(text: str, field: Field) -> float:
             f"got {_got(text)}; give a number such as 1.62, or a sum: 1.62-0.22."
         ) from None
     kind: Any = int if field.get("type") == "integer" else FiniteFloat
-    limits = {name: field[name] for name in ("gt", "ge", "lt", "le") if name in field}
+    names = [name for name in ("gt", "ge", "lt", "le") if name in field]
+    # Beside a strict limit the other is only that of the unit.
+    limits = {name: field[name] for name in names if name[1] == "t" or f"{name[0]}t" not in names}
     try:
         value = vars(create_model("Answer", value=(kind, Limits(**limits)))(value=value))["value"]
     except ValidationError as problem:

@@ -78,7 +78,7 @@ def named(data: Data, keys: str = "", forms: Mapping[str, str] | None = None) ->
         words, unit = (words, f"\n{unit}") if unit in FORMS else (name, "")
         is_text = any(isinstance(value, str) for value in values)
         form = (forms or {}).get(name, "" if is_text else FORMS.get(unit.strip(), ".3g"))
-        widest = max(_HEAD, *(len(cell(value, form)) for value in values))
+        widest = max(_HEAD, *(len(cell(value, form).partition("\n")[0]) for value in values))
         words = textwrap.fill(words.replace("_", " "), widest, break_long_words=False)
         columns.append((words + unit, values, form))
     return columns

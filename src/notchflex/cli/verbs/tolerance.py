@@ -91,16 +91,17 @@ def _print(analysis: ToleranceAnalysis, document: dict[str, Any], title: str) ->
     terminal.show(
         *tables.tolerance_words(analysis.robot, analysis.tolerances, analysis.assumed), ""
     )
-    limits = [
-        {
-            "limit": f"{row['name']} [{row['unit']}]",
-            **row,
-            "95_%_of_draws": [row["percentiles"][end] for end in ("2.5", "97.5")],
-            "outside_%": 100.0 * (row["below"] + row["above"]),
-        }
-        for row in document["limits"]
-    ]
-    _show(limits, "limit lower upper drawing worst_case rss_sd 95_%_of_draws outside_%")
+    limits: list[dict[str, Any]] = []
+    for row in document["limits"]:
+        entry, _, load = row["name"].partition(" ")
+        unit = f" [{row['unit']}]" if row["unit"] else ""
+        from_, to = row["worst_case"]
+        drawn = {f"{level}%": row["percentiles"][level] for level in ("2.5", "97.5")}
+        more = {"worst_from": from_, "worst_to": to, **drawn}
+        more["outside_%"] = 100.0 * (row["below"] + row["above"])
+        limits.append({"limit": f"{entry}\n  {load}{unit}".rstrip(), **row, **more})
+    keys = "limit lower upper drawing worst_from worst_to rss_sd 2.5% 97.5% outside_%"
+    _show(limits, keys)
     low, high = (100.0 * end for end in analysis.interval)
     wanted = analysis.wanted_yield
     terminal.show(

@@ -167,6 +167,8 @@ def _write(explored: Mapping[str, Workspace], outputs: WorkspaceOutputs) -> None
 
     def show(_: object) -> None:
         for label, each in explored.items():
+            if others:
+                terminal.line(f"{label}:", "bold")
             _print(each, documents[label])
         tables.show(compared)
 
@@ -187,6 +189,9 @@ def _print(workspace: Workspace, document: dict[str, Any]) -> None:
     if not len(workspace):
         return
     alpha, voxels = document["alpha_shape"], document["voxels"]
+    terminal.line(
+        f"  tendons up to {', '.join(f'{tension:.4g}' for tension in workspace.largest)} N"
+    )
     terminal.line(
         f"  alpha shape {alpha['size']:.4g} {alpha['unit']}; dexterity "
         f"{100 * voxels['dexterity_mean']:.2g} % of directions in a voxel of "
