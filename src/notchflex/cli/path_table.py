@@ -236,8 +236,9 @@ def path_columns(path: EquilibriumPath, rows: Sequence[int], name: str) -> list[
             elif unit == "%":
                 value *= 100.0
             cells.append(cell(value, form) or NO_NUMBER)
-        zeros = "-0." if entry.name == "y" else ""  # of a planar robot, across its plane
-        if {text.strip(zeros or NO_NUMBER) for text in cells} <= {"", NO_NUMBER}:
+        # A planar robot has no coordinate across its plane.
+        is_plane = entry.name == "y" and not (np.abs(entry.values) > 1e-9).any()
+        if is_plane or {*cells} <= {NO_NUMBER}:
             continue
         if short:
             part = entry.name.rpartition(" ")[2]

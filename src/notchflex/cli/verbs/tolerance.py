@@ -97,10 +97,10 @@ def _print(analysis: ToleranceAnalysis, document: dict[str, Any], title: str) ->
         unit = f" [{row['unit']}]" if row["unit"] else ""
         from_, to = row["worst_case"]
         drawn = {f"{level}%": row["percentiles"][level] for level in ("2.5", "97.5")}
-        more = {"worst_from": from_, "worst_to": to, **drawn}
+        more = {"worst_from": from_, "to": to, **drawn}
         more["outside_%"] = 100.0 * (row["below"] + row["above"])
         limits.append({"limit": f"{entry}\n  {load}{unit}".rstrip(), **row, **more})
-    keys = "limit lower upper drawing worst_from worst_to rss_sd 2.5% 97.5% outside_%"
+    keys = "limit lower upper drawing worst_from to rss_sd 2.5% 97.5% outside_%"
     _show(limits, keys)
     low, high = (100.0 * end for end in analysis.interval)
     wanted = analysis.wanted_yield
