@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,15 +14,6 @@ import pytest
 import notchflex as nf
 import notchflex.fit as fitting
 from fitted import NAMES, OBSERVED, ROBOT, fitted, measured
-from notchflex.cli.verbs import calibrate as verb
-from notchflex.cli.verbs.calibrate import (
-    FitOptions,
-    changed,
-    gathered,
-    print_left_out,
-    print_posterior,
-)
-from notchflex.fit import Fold, LeftOut, Posterior
 
 FIT = ("--fit", ",".join(NAMES), "--starts", "1")
 ALONE = (*FIT, "--no-priors")
@@ -51,9 +44,9 @@ def test_from_csv_to_fitted_robot(calibrate, data, tmp_path):
     row = next(line for line in words if line.startswith(NAMES[0]))
     assert f"{interval.lower:.5g} to {interval.upper:.5g}" in row
     assert f"{found.values[NAMES[0]]:.5g}" in row
-    assert sum(line.startswith("A     notch ") for line in words) == 5
+    assert sum(line.startswith("A      notch_angle ") for line in words) == 5
     assert "Next measurement of A, to narrow friction.coefficient:" in out
-    assert sum(line.endswith(" best") for line in words) == 1
+    assert re.search(r"(?m)^best: candidate [12]$", out)
     assert max(map(len, words)) <= 80
     assert "written: fitted/A.toml" in err
     document = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
@@ -167,56 +160,24 @@ def test_an_interrupted_fit_is_told_and_writes_nothing(calibrate, data, tmp_path
     assert [file.name for file in tmp_path.iterdir()] == [data]
 
 
-def test_other_tables_fit_80_columns(capsys):
-    found = fitted()
-    long = "notch[12].very_long_name_of_a_constant_of_a_robot"
-    drawn = Posterior(
-        (long,), np.arange(8.0).reshape(2, 4, 1) * 1e3, {long: 8.0}, {long: np.nan}, 0
+@pytest.mark.parametrize("by", ["pull", "robot"])
+def test_what_was_left_out_is_predicted(calibrate, data, by):
+    """Labels, values of one robot, limits and priors reach the fit, too."""
+    long = "a-robot-with-a-rather-long-name"
+    code, out, err = calibrate(
+        *(f"A={ROBOT}={data}", f"{long}={ROBOT}={data}", *ALONE, "--leave-out", by),
+        *("--set", "friction.coefficient=0.2", "--set", f"{long}:notch[2].depth=1.4"),
+        *("--bounds", f"{NAMES[0]}=:0.9", "--prior", f"{NAMES[1]}=1e4±5000", "--json", "fit.json"),
     )
-    print_posterior(fitting.posterior_document(drawn))
-    errors = {"total_angle": 0.1, "tip_position": 0.2}
-    folds = (Fold("A, pull a", found, errors, errors, True), Fold("B", found, {}, {}, False))
-    print_left_out(fitting.left_out_document(LeftOut("pull", found, folds)))
-    out = capsys.readouterr().out
+    assert code == 0, err
     assert max(map(len, out.splitlines())) <= 80
-    assert "5.73" in out  # 0.1 rad
-    assert "not solved" in out
-
-
-def test_sources_are_gathered_by_label(call, monkeypatch):
-    taken = []
-    monkeypatch.setattr(verb, "gathered", lambda sources: taken.extend(sources) or 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        call("calibrate", "A=w.toml=1.csv", "A=w.toml=2.csv", "x/w.toml=3.csv", "gao2017=4.csv",
-             "--fit", "m")  # fmt: skip
-    robots, data = gathered(taken)
-    assert robots == {"A": "w.toml", "w": "x/w.toml", "gao2017": "gao2017"}
-    assert data == {"A": ["1.csv", "2.csv"], "w": ["3.csv"], "gao2017": ["4.csv"]}
-
-
-def test_limits_and_priors(call, monkeypatch):
-    taken = []
-    check = FitOptions.constants
-    monkeypatch.setattr(FitOptions, "constants", lambda self: taken.append(check(self)) or 1 / 0)
-    for options in (
-        ["--fit", "a.b, A:c.d", "--bounds", "a.b=:2", "--bounds", "A:c.d=-1:1e3", "--prior",
-         "A:c.d=10+-0.5"],
-        ["--fit", "m", "--prior", "m=1e4±500"],
-    ):  # fmt: skip
-        with pytest.raises(ZeroDivisionError):
-            call("calibrate", "gao2017=4.csv", *options)
-    (one, other), (last,) = taken
-    assert one == ("a.b", None, 2.0, None)
-    assert other == ("A:c.d", -1.0, 1000.0, (10.0, 0.5))
-    assert last[3] == (10_000.0, 500.0)
-
-
-def test_values_are_set_in_all_robots_or_one():
-    robots = changed(
-        {"A": ROBOT, "B": ROBOT}, ["friction.coefficient=0.2", "B:notch[2].depth=1.38"]
-    )
-    assert {one.friction.coefficient for one in robots.values()} == {0.2}
-    assert [one.notches[1].depth for one in robots.values()] == [1.4, 1.38]
+    document = json.loads(Path("fit.json").read_text(encoding="utf-8"))
+    one, other = document["constants"]
+    assert (one["limits"], one["before"]) == ([0.0, 0.9], 0.2)
+    assert other["prior"] == [1e4, 5000.0]
+    folds = document["left_out"]["folds"]
+    assert [*dict.fromkeys(fold["left_out"].split(",")[0] for fold in folds)] == ["A", long]
+    assert all(f"{fold['errors'][0]['error']:.3g}" in out for fold in folds)
 
 
 PAIR = f"{ROBOT}=a.csv"

@@ -81,18 +81,17 @@ def test_comparison_of_many_notches_fits_80_columns(call, tmp_path):
     assert code == 0
     assert max(map(len, out.splitlines())) <= 80
     for notch in range(1, 28):
-        assert f"n{notch} " in out.replace("\n", " ")
+        assert f"notch {notch} [deg]" in out
 
 
 @pytest.mark.parametrize(
-    ("columns", "shown"), [pytest.param("80", False, marks=pytest.mark.nightly), ("130", True)]
+    ("columns", "in_one"), [pytest.param("80", False, marks=pytest.mark.nightly), ("130", True)]
 )
-def test_a_table_is_as_wide_as_the_terminal(columns, shown):
+def test_a_table_is_as_wide_as_the_terminal(columns, in_one):
     loads = ("--tension", "0:2:3", "--gravity", "0,0.5,-9.81")
     out = on_a_terminal("simulate", "pacheco2021-a", *loads, COLUMNS=columns)
     lines = out.splitlines()
-    assert any("n5" in line and "tip y" in line for line in lines) is shown
-    assert ("--columns notch_angle shows them" in " ".join(out.split())) is not shown
+    assert any("n5" in line and "tip y" in line for line in lines) is in_one
     table = lines[: next(i for i, line in enumerate(lines) if line.startswith("T: "))]
     assert max(len(re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", line)) for line in table[1:]) <= int(
         columns
@@ -103,8 +102,7 @@ def test_a_table_is_as_wide_as_the_terminal(columns, shown):
 def test_a_pipe_has_one_width_unless_told(call, monkeypatch, columns):
     monkeypatch.setenv("COLUMNS", columns)
     _, out, _ = call("simulate", "two-axis-wrist", "--tension", "1=0:2:3", "--tension", "2=1")
-    assert ("T4" in out and "n8" in out) is not columns
-    assert ("No room in 60 columns for: " in out) is bool(columns)
+    assert any("T4" in line and "n8" in line for line in out.splitlines()) is not columns
 
 
 def test_robots_beside_each_other(call, tmp_path):

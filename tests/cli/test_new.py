@@ -7,8 +7,6 @@ import pytest
 
 from notchflex import load_robot
 from notchflex.cli import run
-from notchflex.cli.interview import choice, reading, value_of
-from notchflex.errors import InputError
 
 OPTIONS = {
     "--outer-diameter": "1.62",
@@ -187,7 +185,7 @@ def test_answers_come_line_by_line_from_a_pipe(monkeypatch, tmp_path):
 def test_a_person_is_asked_again_and_told_why(monkeypatch, tmp_path, capsys):
     tube = ["", "1,62", "1.62", "1.7", "1.40", ""]
     notches = ["", "x", "on-axis", "0", "2", "9", "1.4", "0.8", "1.2", "", ""]
-    rest = ["", "", "linear", "60000", "", "0", "0.01"]
+    rest = ["", "", "linear", "60000", "0.01", "", "0"]
     asked = person(monkeypatch, *tube, *notches, *rest)
     assert run(["new", "asked"]) == 0
     robot = load_robot(tmp_path / "asked.toml")
@@ -195,7 +193,7 @@ def test_a_person_is_asked_again_and_told_why(monkeypatch, tmp_path, capsys):
     assert robot.material.elastic_modulus == 60000.0
     assert robot.material.allowed_strain == 0.01
     out = " ".join(capsys.readouterr().out.split())
-    assert "give a finite number greater than 0 and less than 1.62" in out
+    assert "it should be less than 1.62" in out
     assert "give on-axis or off-axis" in out
     assert asked[1] == "Outer diameter of the tube [mm]: "
 
@@ -210,14 +208,15 @@ def test_a_person_is_asked_again_and_told_why(monkeypatch, tmp_path, capsys):
         ({"depth": "0"}, "greater than 0"),
         ({"depth": "1.3,1.4"}, "got 2 numbers; give one for all, or 4"),
         ({"height": "1e400"}, "finite"),
-        ({"uncut_length": "-0.1"}, "at least 0"),
-        ({"notches": "2.5"}, "whole number"),
-        ({"notches": "0"}, "at least 1"),
+        ({"uncut_length": "-0.1"}, "greater than or equal to 0"),
+        ({"notches": "2.5"}, "valid integer"),
+        ({"notches": "0"}, "greater than or equal to 1"),
         ({"cut": "o"}, "give on-axis or off-axis"),
-        ({"tendon_radius": "0.9"}, "at most 0.81"),
-        ({"friction": "-0.1"}, "at least 0"),
+        ({"tendon_radius": "0.9"}, "less than or equal to 0.81"),
+        ({"friction": "-0.1"}, "greater than or equal to 0"),
         ({"depth": "__import__('os')"}, "give a number such as"),
         ({"depth": "9**9**9**9"}, "give a number such as"),
+        *(({"height": text}, "") for text in ("1,2,3", "1/0", "True", "(", "2**3")),
         ({"height": None}, "No answer to: Height of the notch"),
         ({"tendon_radius": "0.7,0.7"}, "No answer to: Side of the tube on which the tendon runs"),
     ],
@@ -241,18 +240,6 @@ def test_folder_that_is_missing_is_told_before_asking(monkeypatch, capsys):
     monkeypatch.setattr("builtins.input", lambda prompt: pytest.fail("asked"))
     assert run(["new", "missing/w"]) == 2
     assert "does not exist" in capsys.readouterr().err
-
-
-def test_readings():
-    assert reading("−0.5", {}) == -0.5
-    assert reading("3/2", {}) == 1.5
-    assert reading("1,9", {}) == 1.9
-    assert value_of("1", {"type": "number", "count": 3}) == [1.0, 1.0, 1.0]
-    assert choice("on", ("on-axis", "off-axis")) == "on-axis"
-    assert value_of("3", {"type": "integer", "ge": 1, "le": 3}) == 3
-    for bad in ("", "1,2,3", "1, 2", "1/0", "True", "(", "2**3"):
-        with pytest.raises(InputError):
-            reading(bad, {})
 
 
 TUBE = ["--outer-diameter", "5.99", "--inner-diameter", "4"]
@@ -294,7 +281,7 @@ def test_links_that_differ_keep_their_slots_in_turn(monkeypatch):
 
 def test_a_person_is_asked_for_every_key_of_a_strip(monkeypatch):
     answers = ["", "10", "6", "", "strip", "7", "3.5", "1.5", "6.9", "", "", "", "0", "", ""]
-    rest = ["4", "", "linear", "1000", "frictionless", ""]
+    rest = ["4", "", "linear", "1000", "", "frictionless"]
     asked = person(monkeypatch, *answers, *rest)
     assert run(["new", "w"]) == 0, asked
     robot = load_robot("w.toml")

@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+import notchflex as nf
+from notchflex.analysis import closing_loads
 from notchflex.cli import run
 
 
@@ -53,3 +55,29 @@ def test_drawing_that_cannot_be_written(tmp_path, capsys):
 def test_a_force_loss_is_shown_with_its_unit(capsys):
     assert run(["show", "pacheco2021-a", "--set", "friction.constant_loss=0.05"]) == 0
     assert "constant loss 0.05 N" in " ".join(capsys.readouterr().out.split())
+
+
+def test_only_what_differs_between_notches_is_listed_notch_by_notch(call, tmp_path):
+    strips = nf.load_robot("liu2022")
+    arc = nf.ArcNotch("off-axis", depth=7.0, height=2.0, uncut_length=1.0)
+    nf.save_robot(strips.replace(notch=(*strips.notch, arc)), tmp_path / "mixed.toml")
+    code, out, _ = call("show", "mixed.toml")
+    assert code == 0
+    assert max(map(len, out.splitlines())) <= 80
+    kinds = [line.split()[1] for line in out.splitlines() if " strip " in line or " arc " in line]
+    assert kinds[-8:] == ["strip"] * 7 + ["arc"]
+    assert "never: no tension closes the notch." in " ".join(out.split())
+
+
+def test_a_failed_search_is_not_called_never(call, monkeypatch):
+    found = closing_loads.notch_table
+
+    def one_failed(*arguments):
+        first, *others = found(*arguments)
+        return [first | {"closing_status": "not found", "closing_tension_N": float("nan")}, *others]
+
+    monkeypatch.setattr(closing_loads, "notch_table", one_failed)
+    out = " ".join(call("show", "pacheco2021-a")[1].split())
+    assert out.count("not found") == 2  # in the table and in its legend
+    assert "the notch may close" in out
+    assert "never" not in out

@@ -37,17 +37,6 @@ def test_files_and_table_say_the_same(call, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.json", "a.png"]
 
 
-def test_long_paths_are_thinned_and_say_so(call):
-    _, out, _ = call("simulate", "pacheco2021-a", "--tension", "0:3:31,3:0:31")
-    assert "62 steps, 33 shown: every 2nd one, and where the load reverses" in out
-    shown = [int(line.split()[0]) for line in out.splitlines() if line[:4].strip().isdigit()]
-    assert shown == sorted({*range(1, 63, 2), 32, 62})
-    _, out, _ = call("simulate", "pacheco2021-a", "--tension", "0:3:31,3:0:31", "--all")
-    shown = [int(line.split()[0]) for line in out.splitlines() if line[:4].strip().isdigit()]
-    assert shown == list(range(1, 63))
-    assert "shown" not in out
-
-
 def test_what_set_changed_stands_above_the_table_and_in_the_picture(call, tmp_path):
     change = ("--set", "notch.depth=1.38", "--set", "friction.coefficient=0.1")
     _, out, _ = call(*LOOP[:2], "--tension", "0,1", *change, "--plot", "a.svg")
@@ -70,30 +59,6 @@ def test_named_columns(call, monkeypatch):
     code, out, err = call(*LOOP[:2], "--tension", "1", "--columns", "notch_angel")
     assert (code, out) == (2, "")
     assert "did you mean `notch_angle`" in err
-
-
-def test_quiet_computes_only_what_it_warns_of(call, monkeypatch):
-    made, asked = [], []
-    monkeypatch.setattr(
-        "notchflex.cli.path_table.print_path", lambda *_, **__: made.append("table")
-    )
-    monkeypatch.setattr("notchflex.results.io.whole_document", lambda _: made.append("json"))
-    for name in ("reason", "dissipation", "tendon_work", "front"):
-
-        def spy(path, name=name):
-            asked.append(name)
-            return []
-
-        monkeypatch.setattr(nf.EquilibriumPath, name, property(spy))
-    assert call(*LOOP[:2], "--tension", "0,1", "--quiet") == (0, "", "")
-    assert (made, asked) == ([], [])
-    call(*LOOP[:2], "--tension", "0,1")
-    assert made == ["table"]
-
-
-def test_bends_toward_x(call):
-    _, out, _ = call("simulate", "pacheco2021-a", "--tension", "1", "--json", "-")
-    assert json.loads(out)["steps"][0]["tip_position_mm"][0] > 1.0
 
 
 def test_set_changes_the_robot(call):

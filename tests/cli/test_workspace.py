@@ -17,7 +17,7 @@ def test_files_and_table(call, tmp_path):
     assert document["states"]["solved"] == 256
     assert document["peak_strain"]["largest"] <= 0.04
     assert document["limits"] == ["peak strain at most 0.04"]
-    assert f"{document['convex_hull']['size']:.5g} mm²" in out
+    assert f"{document['convex_hull']['size']:.4g} mm²" in out
     assert (tmp_path / "w.png").stat().st_size > 1000
 
 

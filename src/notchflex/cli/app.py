@@ -97,10 +97,9 @@ VERBS = {
         "Find constants of robots from measurements, with confidence intervals.",
         "notchflex simulate pacheco2021-a --tension 0.2:1.6:8 --csv a.csv\n"
         "    notchflex simulate pacheco2021-b --tension 0.2:1.2:6 --csv b.csv\n"
-        "    notchflex calibrate pacheco2021-a=a.csv \\\n"
-        "        --fit friction.coefficient,material.elastic_modulus -o fitted\n"
-        "    notchflex calibrate pacheco2021-a=a.csv pacheco2021-b=b.csv --leave-out robot \\\n"
-        "        --fit material.elastic_modulus,friction.coefficient --plot fit.png",
+        "    notchflex calibrate pacheco2021-a=a.csv --fit friction.coefficient -o fitted\n"
+        "    notchflex calibrate pacheco2021-a=a.csv pacheco2021-b=b.csv \\\n"
+        "        --fit material.elastic_modulus --leave-out robot --plot fit.png",
     ),
     "measure": (
         "Measure the angle of every notch in photographs of a bent robot, or its notches as cut.",
@@ -260,7 +259,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 1 not converged, 2 bad input (with one clear message).
     """
-    terminal.be_quiet(False)
+    terminal.quiet = False
     try:
         code = execute(list(sys.argv[1:] if arguments is None else arguments))
         sys.stdout.flush()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import math
 import operator
 import re
 import shutil
@@ -15,7 +14,8 @@ from functools import cache
 from itertools import groupby
 from typing import Any, NamedTuple
 
-from pydantic import TypeAdapter
+from pydantic import Field as Limits
+from pydantic import FiniteFloat, TypeAdapter, ValidationError, create_model
 
 from notchflex import InputError, Robot, Tendon, Tube
 from notchflex.robot.problems import MOST_NOTCHES
@@ -113,8 +113,8 @@ NOTES = {
 }
 """By kind, or by section for all kinds, and key."""
 
-_UNASKED = ("ends", "stiffness_factor", "allowed_strain")
-"""Keys that are asked for elsewhere, or never."""
+_UNASKED = ("ends", "stiffness_factor")
+"""Keys that are never asked for."""
 
 _DECIMAL_COMMAS = " For decimal commas, separate numbers by semicolons, or write a point: 1.9."
 
@@ -146,19 +146,18 @@ class Interview:
     """Takes answers from options first, then from a person or a pipe.
 
     Args:
-        answers: Option to its value on the command line; None where it was not given.
+        options: Option to its value on the command line; None where it was not given.
         accept_defaults: Take every default without asking.
 
     Attributes:
-        used: The options that answered a question.
+        unused: The options that answered no question.
         answered: Names of the values that somebody gave, as `notch.depth`.
     """
 
-    def __init__(self, answers: Mapping[str, str | None], *, accept_defaults: bool = False) -> None:
-        self._options = answers.keys()
-        self.answers = {option: text for option, text in answers.items() if text is not None}
+    def __init__(self, options: Mapping[str, str | None], *, accept_defaults: bool = False) -> None:
+        self._options = options
+        self.unused = {option for option, text in options.items() if text is not None}
         self.accept_defaults = accept_defaults
-        self.used: set[str] = set()
         self.answered: set[str] = set()
         self.person = sys.stdin is not None and sys.stdin.isatty()
         # What was typed so far, and how much of it has been asked for since the last way back.
@@ -175,7 +174,6 @@ class Interview:
             InputError: An answer that cannot be used and was not typed by a person, or none where
                 one is needed.
         """
-        warned = False
         while True:
             self.answered.clear()
             self._asked = 0
@@ -184,19 +182,15 @@ class Interview:
             except _GoBack:  # asked anew, but for what was typed before the last question
                 if self._typed:
                     self._typed.pop()
-                elif not warned:
+                else:
                     _show("This is the first question.")
-                    warned = True
 
     def _robot(self, name: str) -> Robot:
         # A kind that does not exist is refused before anything is asked.
         for base in (Notch, Friction, Material):
             self._kind(base, asks=False)
         title = self._ask("--title", description="title", type="string", default=name)
-        outer = self._keys("tube", Tube, "outer_diameter")
-        below = {"lt": outer["outer_diameter"]}
-        inner = self._keys("tube", Tube, "inner_diameter", inner_diameter=below)
-        tube = Tube(**outer, **inner, **self._keys("tube", Tube, "base_length"))
+        tube = Tube(**self._keys("tube", Tube, inner_diameter={"lt": "outer_diameter"}))
         notches = self._notches(tube)
         tendons = self._tendons(tube, notches)
         material = self._kind(Material)
@@ -204,8 +198,6 @@ class Interview:
         values = self._keys("material", material, transition_strain=plastic)
         friction = self._kind(Friction, asks=self.person)
         of_friction = self._keys("friction", friction)
-        # Asked last, so that pipes written before this question still fit.
-        values |= self._keys("material", material, "allowed_strain")
         return Robot(title, tube, notches, tendons, material(**values), friction(**of_friction))
 
     def _notches(self, tube: Tube) -> tuple[Notch, ...]:
@@ -215,25 +207,23 @@ class Interview:
         limits: Field = {"type": "integer", "ge": 1, "le": MOST_NOTCHES}
         count = self._ask("--notches", description="number of notches", **limits)
         below = {"lt": tube.outer_diameter}
-        columns = self._keys("notch", kind, count=count, but=(*cut,), depth=below)
-        rows = [cut | row for row in _rows(columns)]
+        rows = [cut | row for row in self._rows("notch", kind, count, depth=below, but=cut)]
         runs = [list(run) for _, run in groupby(enumerate(rows), key=lambda item: item[1])]
         return tuple(kind(**kind.further_on(run[0][1], run[0][0]), repeat=len(run)) for run in runs)
 
     def _tendons(self, tube: Tube, notches: tuple[Notch, ...]) -> tuple[Tendon, ...]:
         on_wall = {"default": f"{tube.inner_radius:g}", "le": tube.outer_radius}
-        columns = self._keys("tendon", Tendon, "radius", count=0, radius=on_wall)
-        count = len(columns["radius"])
-        side: Field = {"default": "0" if count == 1 else ""}
-        columns |= self._keys("tendon", Tendon, count=count, but=("radius",), direction_deg=side)
-        tendons = [Tendon(**row) for row in _rows(columns)]
+        radii = self._rows("tendon", Tendon, 0, "radius", radius=on_wall)
+        side: Field = {"default": "0" if len(radii) == 1 else ""}
+        more = self._rows("tendon", Tendon, len(radii), direction_deg=side, but=("radius",))
+        tendons = [Tendon(**radius, **row) for radius, row in zip(radii, more, strict=True)]
         # Over a strip or a link there is no arc of the wall, and in finite elements the tendon of a
         # wrist spans its notches: such a tendon runs straight.
         straight = any(
             "path" in dict(notch.tendon_problems(tendons[0])) or notch.has_elastic_ends
             for notch in notches
         )
-        if straight and "path" not in columns:
+        if straight and "path" not in more[0]:
             tendons = [replace(tendon, path="straight") for tendon in tendons]
         return tuple(tendons)
 
@@ -249,17 +239,11 @@ class Interview:
             "notch": ("--kind", "kind of notch"),
             "friction": ("--friction-kind", "kind of friction"),
         }.get(section, ("--material", "material"))
-        usual = [kind for kind in USUAL_KINDS if kind in kinds]
-        first = usual[0]
-        for kind in usual:  # an option that only one kind has tells the kind
-            others = {key for other in usual if other != kind for key in keys_of(kinds[other])}
-            own = {self._option(section, key) for key in keys_of(kinds[kind]) if key not in others}
-            first = kind if own & self.answers.keys() else first
-        if not asks and option not in self.answers:
-            return kinds[first]
-        names = [first, *(name for name in kinds if name != first)]
+        names = sorted(kinds, key=lambda kind: (*USUAL_KINDS, kind).index(kind))
+        if not asks and self._options[option] is None:
+            return kinds[names[0]]
         text = f"{text}, {' or '.join(names)}"
-        return kinds[self._ask(option, description=text, enum=names, default=first)]
+        return kinds[self._ask(option, description=text, enum=names, default=names[0])]
 
     def _option(self, section: str, key: str) -> str:
         """Return the option that answers for a key: one of its own, or `--set`."""
@@ -270,13 +254,20 @@ class Interview:
             name = "friction"
         return f"--{name}" if f"--{name}" in self._options else f"--set {section}.{key}"
 
+    def _rows(
+        self, section: str, kind: type, count: int, *keys: str, **more: Any
+    ) -> list[dict[str, Any]]:
+        """Ask for keys of several parts of a kind; see `_keys`. Return those of each."""
+        columns = self._keys(section, kind, *keys, count=count, **more)
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
     def _keys(
         self,
         section: str,
         kind: type,
         *keys: str,
         count: int | None = None,
-        but: tuple[str, ...] = (),
+        but: Collection[str] = (),
         **more: Field,
     ) -> dict[str, Any]:
         """Ask for keys of a part.
@@ -287,24 +278,26 @@ class Interview:
             keys: The keys, as far as it has them; without any those that are usual.
             count: How many values each has: 0 for any number, None for one that is no list.
             but: Keys that are asked for elsewhere.
-            **more: By key, what else than the schema says holds for it.
+            **more: By key, what else than the schema says holds for it; a limit may be another key.
         """
         values: dict[str, Any] = {}
         for key, field in keys_of(kind).items():
+            if key in but or (keys and key not in keys):
+                continue
             note, option = note_of(section, kind_of(kind), key), self._option(section, key)
-            is_usual = key not in _UNASKED and (
+            default = field.get("default", "")
+            default = "none" if default is None else f"{default}".removesuffix(".0")
+            limits = {name: values.get(limit, limit) for name, limit in more.get(key, {}).items()}
+            noted = {"hint": note.hint, "default": note.default or default, "count": count}
+            question = {**field, **noted, **limits}
+            is_usual = (
                 "default" not in field
                 or not option.startswith("--set")
                 or kind_of(kind) not in ("", *USUAL_KINDS)
             )
-            default = field.get("default", "")
-            default = "none" if default is None else f"{default}".removesuffix(".0")
-            noted = {"hint": note.hint, "default": note.default or default}
-            question = {**field, **noted, "count": count, **more.get(key, {})}
-            elsewhere = key in (*but, "allowed_strain")
-            if key in keys if keys else (is_usual or option in self.answers) and not elsewhere:
+            if (is_usual and key not in _UNASKED) or self._options.get(option) is not None:
                 values[key] = self._ask(option, f"{section}.{key}", **question)
-            elif note.default and not keys and not elsewhere:
+            elif note.default:
                 values[key] = value_of(note.default, question)
         return values
 
@@ -332,9 +325,9 @@ class Interview:
             self.answered.add(name)
             return value
 
-        if option in self.answers:
-            self.used.add(option)
-            return read(self.answers[option].strip())
+        self.unused.discard(option)
+        if (text := self._options.get(option)) is not None:
+            return read(text.strip())
         if default and self.accept_defaults:
             return read("")
         self._asked += 1
@@ -375,10 +368,6 @@ class Interview:
             raise InputError.MISSING_VALUE(
                 f"No answer to: {text}. Give {option}, or a line of input."
             ) from None
-
-
-def _rows(columns: dict[str, list[Any]]) -> list[dict[str, Any]]:
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def _words(question: Field) -> str:
@@ -462,12 +451,6 @@ _OPERATIONS: dict[type, Callable[[float, float], float]] = {
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
 }
-_LIMITS = {
-    "gt": (operator.gt, "greater than"),
-    "ge": (operator.ge, "at least"),
-    "lt": (operator.lt, "less than"),
-    "le": (operator.le, "at most"),
-}
 
 
 def reading(text: str, field: Field) -> float:
@@ -491,20 +474,15 @@ def reading(text: str, field: Field) -> float:
         raise InputError.NOT_A_NUMBER(
             f"got {_got(text)}; give a number such as 1.62, or a sum: 1.62-0.22."
         ) from None
-    strict = {"ge": "gt", "le": "lt"}  # beside which it is only the limit of the unit
-    limits = [
-        (*limit, field[name])
-        for name, limit in _LIMITS.items()
-        if name in field and strict.get(name) not in field
-    ]
-    if not math.isfinite(value) or not all(holds(value, limit) for holds, _, limit in limits):
-        allowed = " and ".join(f"{words} {limit:g}" for _, words, limit in limits)
-        wanted = f"a finite number {allowed}".strip()
-        raise InputError.OUT_OF_RANGE(f"got {value:g}; give {wanted}.")
-    if field.get("type") == "integer":
-        if not value.is_integer():
-            raise InputError.NOT_A_NUMBER(f"got {_got(text)}; give a whole number.")
-        return int(value)
+    kind: Any = int if field.get("type") == "integer" else FiniteFloat
+    names = [name for name in ("gt", "ge", "lt", "le") if name in field]
+    # Beside a strict limit the other is only that of the unit.
+    limits = {name: field[name] for name in names if name[1] == "t" or f"{name[0]}t" not in names}
+    try:
+        value = vars(create_model("Answer", value=(kind, Limits(**limits)))(value=value))["value"]
+    except ValidationError as problem:
+        words = problem.errors()[0]["msg"].removeprefix("Input ")
+        raise InputError.OUT_OF_RANGE(f"got {value:g}; it {words}.") from None
     # Nobody reads callipers to a nanometre; this drops the noise of 1.62-0.22.
     return round(value, 9)
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter, Token
 
@@ -35,12 +35,13 @@ from notchflex.support import (
     parse_whole,
     read_body_force,
     read_command,
+    replacing,
 )
 
 if TYPE_CHECKING:
     from notchflex.pieces import PieceFolder
 
-Values = TypeVar("Values")
+Bounds = tuple[float | None, float | None]
 
 
 def converted(
@@ -48,8 +49,8 @@ def converted(
     metavar: str,
     *,
     several: bool = False,
-    name: str | None = None,
     hyphen: bool = True,
+    **more: Any,
 ) -> Parameter:
     """Return the parameter of an option that a function reads.
 
@@ -58,8 +59,8 @@ def converted(
             option and the word are put before it.
         metavar: What `--help` shows for the word.
         several: Whether the option may be given several times; its value is then a tuple.
-        name: The option, if it is not named as the parameter.
         hyphen: Whether the word may begin with a hyphen, as negative numbers do.
+        **more: Further arguments of `Parameter`.
     """
 
     def convert_one(token: Token) -> Any:
@@ -79,8 +80,8 @@ def converted(
         n_tokens=1,
         accepts_keys=False,
         metavar=f"{metavar}..." if several else metavar,
-        name=name,
         allow_leading_hyphen=hyphen,
+        **more,
     )
 
 
@@ -99,44 +100,49 @@ def vector(what: str, metavar: str = "X,Y,Z") -> Parameter:
     return converted(parse_vector(what), metavar)
 
 
-def texts(name: str, metavar: str, help: str | None = None) -> Parameter:
-    """Return the parameter of an option with a text that may be given several times."""
-    return Parameter(name=name, metavar=f"{metavar}...", help=help)
-
-
-def named(form: str, read: Callable[[str], Values], text: str) -> tuple[str, Values]:
-    """Read `NAME=VALUES`.
+def named(form: str, read: Callable[[str], Any], metavar: str = "SPEC", **more: Any) -> Parameter:
+    """Return the parameter of an option `NAME=VALUES` that is given once for each of some names.
 
     Args:
         form: What is allowed, for the message.
         read: Reads the values.
-        text: What was typed.
+        metavar: What `--help` shows for the word.
+        **more: Further arguments of `Parameter`.
     """
-    name, _, values = (word.strip() for word in text.partition("="))
-    if not (name and values):
-        raise InputError.BAD_SYNTAX(f"give {form}.")
-    return name, read(values)
+
+    def read_pair(text: str) -> tuple[str, Any]:
+        name, _, values = (word.strip() for word in text.partition("="))
+        if not (name and values):
+            raise InputError.BAD_SYNTAX(f"give {form}.")
+        return name, read(values)
+
+    return converted(read_pair, metavar, several=True, **more)
 
 
-def low_high(
-    form: str, text: str, *, alone_is_high: bool = False
-) -> tuple[float | None, float | None]:
-    """Read `LOW:HIGH`, one of which may be left out.
+def once(option: str, names: Iterable[str]) -> None:
+    """Refuse an option that is given twice for one name."""
+    names = list(names)
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError.CONFLICT(f"{option} {name} is given twice; give it once.")
+
+
+def low_high(form: str, *, alone_is_high: bool = False) -> Callable[[str], Bounds]:
+    """Return a reader of `LOW:HIGH`, one of which may be left out.
 
     Args:
         form: What is allowed, for the message.
-        text: What was typed.
         alone_is_high: Whether a number without a colon is the upper limit.
     """
-    low, colon, high = text.partition(":")
-    if not colon and alone_is_high:
-        low, high = "", low
-    elif not colon:
-        raise InputError.BAD_SYNTAX(f"give {form}.")
-    if not (low.strip() or high.strip()):
-        raise InputError.BAD_SYNTAX(f"a number is missing; give {form}.")
-    lower, upper = (parse_number(word, form) if word.strip() else None for word in (low, high))
-    return lower, upper
+
+    def read(text: str) -> Bounds:
+        low, colon, high = text.rpartition(":")
+        if not (colon or alone_is_high) or not text.strip(" :"):
+            raise InputError.BAD_SYNTAX(f"give {form}.")
+        lower, upper = (parse_number(word, form) if word.strip() else None for word in (low, high))
+        return lower, upper
+
+    return read
 
 
 def exclude(first: str, second: str) -> InputError:
@@ -169,20 +175,16 @@ StateFile = Annotated[
     ),
 ]
 Columns = Annotated[
-    tuple[str, ...],
-    texts(
-        "--column",
+    tuple[tuple[str, str], ...],
+    named(
+        "NAME=HEADER, such as tension=Kraft",
+        str,
         "NAME=HEADER",
-        help='Which column of the data is what, such as `tension="Kraft [N]"`, `stroke=...`, '
-        "`total=...`, `notch_1=...` or `tip_x_mm=...`. Headers such as `Force [mN]` are "
-        "understood without it.",
+        name="--column",
+        help='Which column of the data is what: `tension="Kraft [N]"`, `stroke=...`, `total=...`, '
+        "`notch_1=...`, `tip_x_mm=...`. Headers such as `Force [mN]` are understood without it.",
     ),
 ]
-
-
-def named_columns(options: Sequence[str]) -> dict[str, str]:
-    """Read the values of `--column`."""
-    return dict(named("NAME=HEADER, such as tension=Kraft", str, text) for text in options)
 
 
 @Parameter(name="*", group=OUTPUT)
@@ -191,8 +193,8 @@ class Outputs:
     """The results that a call asks for.
 
     Attributes:
-        json: Write the result as JSON to this file; `-` prints it and nothing else.
-        quiet: Print no tables, notes or progress: only warnings, errors, and what `-` asks for.
+        json: Write the result as JSON; `-` prints it and nothing else.
+        quiet: Print only warnings, errors, and what `-` asks for.
     """
 
     json: File = None
@@ -211,18 +213,17 @@ class Outputs:
         Args:
             inputs: Files that are read; no output may replace one of them.
             pictures: Suffixes that `--plot` may have.
-            files: By option, further files that are written and are checked elsewhere.
+            files: By option, further files that are written.
             folder: Option and name of a folder, and the files that are written into it.
 
         Returns:
             The files in the folder.
         """
-        terminal.be_quiet(self.quiet)
-        inputs, targets = list(inputs), self.targets
+        terminal.quiet = self.quiet
+        inputs, targets = list(inputs), {**self.targets, **(files or {})}
         option, name, names = folder
         inside = () if name is None else check_folder(name, names, option, inputs=inputs)
-        others = {f"{option} ({file.name})": str(file) for file in inside}
-        check_distinct({**targets, **(files or {}), **others})
+        check_distinct({**targets, **{f"{option} ({file.name})": str(file) for file in inside}})
         for option, target in targets.items():
             if option == "--plot":
                 check_picture(target, option, inputs=inputs, kinds=pictures)
@@ -249,39 +250,51 @@ class Outputs:
 
     def write(
         self,
-        document: Callable[[], Any],
-        show: Callable[[], object] = lambda: None,
-        *,
-        columns: Callable[[], Mapping[str, Any]] | None = None,
-        picture: Any = None,
+        result: Any,
+        document: Callable[[Any], Any],
+        show: Callable[[Any], object] | None = None,
+        title: str | None = None,
+        **writers: Callable[..., object],
     ) -> None:
         """Write and print what was asked for.
 
         Args:
-            document: Makes the document of `--json`.
-            show: Prints tables.
-            columns: Makes the columns of `--csv`.
-            picture: The result whose usual picture is that of `--plot`, or a function that returns
-                a picture.
+            result: What was computed.
+            document: Makes the document of `--json` of it.
+            show: Prints its tables.
+            title: Heading of the usual picture; that of its kind if None.
+            **writers: By option, what writes the result to another file: a function of result and
+                file. That of `plot` also takes what shows progress, and by default draws the usual
+                picture.
         """
-        from notchflex.support import write_columns, write_json
+        from notchflex.support import write_json
 
-        targets = self.targets
-        if target := targets.get("--json"):
-            write_json(target, document())
-        if columns and (target := targets.get("--csv")):
-            write_columns(target, columns())
-        if picture is not None and (target := targets.get("--plot")):
-            with terminal.progress(f"drawing {target}", compiles=False):
-                _picture(picture).save(target)
-        if self.prints_tables:
-            show()
+        for option, target in self.targets.items():
+            name = option.strip("-").replace("-", "_")
+            if name == "json":
+                write_json(target, document(result))
+            elif name == "plot":
+                text = f"drawing {target}"
+                with terminal.progress(text, compiles=False) as progress:
+                    draw = writers.get(name, partial(_draw, title))
+                    draw(result, target, partial(progress, text))
+            elif name in writers:
+                writers[name](result, target)
+        if show and self.prints_tables:
+            show(result)
 
 
-def _picture(result: Any) -> Any:
+def _draw(title: str | None, result: Any, target: str, _: object) -> None:
     from notchflex.plotting import picture
 
-    return result() if callable(result) else picture(result)
+    picture(result, title=title).save(target)
+
+
+def as_csv(columns: Callable[[Any], Mapping[str, Any]]) -> Callable[[Any, str], None]:
+    """Return what writes the columns of a result as CSV."""
+    from notchflex.support import write_columns
+
+    return lambda result, target: write_columns(target, columns(result))
 
 
 @Parameter(name="*", group=OUTPUT)
@@ -290,7 +303,7 @@ class DrawnOutputs(Outputs):
     """Results that are drawn, too.
 
     Attributes:
-        plot: Draw a picture to this .png, .svg or .pdf file, or to an interactive .html file.
+        plot: Draw a picture: .png, .svg, .pdf or (interactive) .html.
     """
 
     plot: File = None
@@ -319,13 +332,11 @@ class PathOutputs(TableOutputs):
 
     save_state: File = None
 
-    def write_state(self, state: Any) -> None:
-        """Write the last state, if it is asked for."""
-        from notchflex.support import replacing
 
-        if self.save_state is not None:
-            with replacing(self.save_state) as temporary:
-                state.save(temporary)
+def save_state(result: Any, target: str) -> None:
+    """Write the last state of a result."""
+    with replacing(target) as temporary:
+        result.state.save(temporary)
 
 
 # Loads
@@ -388,10 +399,6 @@ class ExternalLoads:
                 f"--tip-point {point}: nothing acts there; give --tip-force or --tip-mass."
             )
 
-    def __bool__(self) -> bool:
-        """Whether any option was given."""
-        return self != ExternalLoads()
-
     def arguments(self) -> dict[str, Any]:
         """Return these loads as arguments of `notchflex.Load` and of `LoadPath.loaded`."""
         from notchflex import BodyForce
@@ -419,9 +426,9 @@ class Work:
     """Who works on a long computation.
 
     Attributes:
-        workers: Work in so many processes of this machine; by default in one.
-        scheduler: Work with the workers of a dask scheduler, such as tcp://10.0.0.1:8786; all see
-            the same folder (extra `cluster`).
+        workers: Work in so many processes; by default in one.
+        scheduler: Work with those of a dask scheduler that see the same folder, such as
+            tcp://10.0.0.1:8786 (`cluster`).
     """
 
     workers: Annotated[int | None, integer(1, 1024)] = None
@@ -439,8 +446,8 @@ class InPieces(Work):
     """A long computation that keeps finished pieces in a folder.
 
     Attributes:
-        folder: Work in pieces, and keep the finished ones in this folder (extra `data`): the same
-            call resumes where it was stopped.
+        folder: Keep finished pieces in this folder (extra `data`): the same call resumes where it
+            was stopped.
     """
 
     folder: Annotated[str | None, Parameter(metavar="DIR")] = None

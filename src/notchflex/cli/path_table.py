@@ -5,34 +5,34 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from notchflex import InputError
 from notchflex.cli import tables, terminal
-from notchflex.cli.tables import FORMS, NO_NUMBER, cell, tolerance_lines
+from notchflex.cli.options import once
+from notchflex.cli.tables import FORMS, NO_NUMBER, cell
 from notchflex.loads.load_path import external_words
-from notchflex.support import AXES, CONTACT_STATES, QUANTITIES, holds, nearest
+from notchflex.support import CONTACT_STATES, QUANTITIES, entries_of, holds, nearest
 
 if TYPE_CHECKING:
     from notchflex import Bands, EquilibriumPath
-    from notchflex.support import ExternalLoad, Quantity
 
 CLOSED = "*"
 PERCENT = ("outer_strain", "peak_strain")
 """Strains, which files hold as numbers, are shown in percent."""
 
-USUAL = {
-    "tension": 1,
-    "stroke": 2,
-    "total_chord_angle": 5,
-    "notch_angle": 7,
-    "total_angle": 3,
-    "tip_position": 4,
-    "peak_strain": 6,
-}
-"""What is shown where no quantities are named, from left to right; and which has room first."""
+USUAL = (
+    "tension",
+    "stroke",
+    "total_chord_angle",
+    "notch_angle",
+    "total_angle",
+    "tip_position",
+    "peak_strain",
+)
+"""What is shown where no quantities are named."""
 
 HEADS = {
     "tension": "T",
@@ -94,56 +94,45 @@ def print_path(
     Args:
         path: Solved path.
         title: What stands above the table.
-        columns: Quantities to show, by their names; none for the usual ones. The usual ones that
-            do not fit are left out and named, those that were asked for are continued below.
+        columns: Quantities to show, by their names; none for the usual ones. What does not fit is
+            continued below.
         every_row: Whether all steps of a long path are shown.
         bands: The bands of the path; None shows the path itself.
     """
     rows, stride = shown_rows(path, every_row=every_row)
-    room = terminal.width()
-    console = terminal.output(room)
-    console.print(title, style="bold", soft_wrap=True)
-    for sentence in load_sentences(path.load.external[0]):
-        console.print(sentence, soft_wrap=True)
+    terminal.line(title, "bold")
+    if words := ", ".join(external_words(path.load.external[0])):
+        _print_lines(f"external loads: {words}", terminal.NARROW, "    ")
     if bands is not None:
         shown = banded_columns(bands, rows, columns or ("total_angle", "tip_position"))
     elif columns:
         shown = {name: path_columns(path, rows, name) for name in columns}
     else:
         shown = usual_columns(path, rows)
-    left = room - len("step ")
-    left_out: list[str] = []
-    for name in () if columns or bands else sorted(shown, key=USUAL.__getitem__):
-        width = sum(column.width for column in shown[name])
-        if width > left:
-            left_out.append(name)
-        else:
-            left -= width
-    every = [column for name in shown if name not in left_out for column in shown[name]]
+    every = [column for columns in shown.values() for column in columns]
     _print_columns(path, rows, every)
-    notes: list[str] = []
-    if meanings := dict.fromkeys(column.meaning for column in every):
-        notes.append(f"{'; '.join(meanings)}.")
+    notes = ["; ".join(dict.fromkeys(column.meaning for column in every))]
     if empty := [name for name in shown if not shown[name]]:
-        notes.append(f"This path has no values of {', '.join(empty)}.")
-    if left_out:
-        titles = [QUANTITIES[name].title for name in left_out]
-        notes.append(
-            f"No room in {room} columns for: {', '.join(titles)}. --columns {','.join(left_out)} "
-            "shows them, and so does a wider terminal."
-        )
-    for note in notes:
-        joined = note.replace(" [", "\u00a0[")  # a unit stays with what it is of
-        for line in textwrap.wrap(joined, width=min(room, 100) - 1, break_long_words=False):
-            console.print(line.replace("\u00a0", " "), soft_wrap=True)
-    lines = [rows_note(len(path), len(rows), stride)]
+        notes.append(f"This path has no values of {', '.join(empty)}")
+    for note in filter(None, notes):
+        _print_lines(f"{note}.", min(terminal.width(), 100) - 1)
     if bands is not None:
-        drawn = f"5 %, 50 %, 95 %: percentiles of {bands.draws} draws within the tolerances."
-        lines = [drawn, *tolerance_lines(bands), *lines]
-    elif left_out or stride > 1:
-        lines.append("--csv FILE or --json FILE writes everything.")
-    for line in filter(None, lines):
-        console.print(line, soft_wrap=True)
+        terminal.line(f"5 %, 50 %, 95 %: percentiles of {bands.draws} draws within the tolerances.")
+        for words in tables.tolerance_words(path.robot, bands.tolerances, bands.assumed):
+            terminal.line(words)
+    if stride > 1:
+        terminal.line(
+            f"{len(path)} steps, {len(rows)} shown: every {stride}{'nd' if stride == 2 else 'th'} "
+            "one, and where the load reverses. --all shows every step, --csv FILE and --json FILE "
+            "have everything."
+        )
+
+
+def _print_lines(text: str, width: int, indent: str = "") -> None:
+    """Print a text broken at words; a unit stays with what it is of."""
+    joined = text.replace(" [", "\u00a0[")
+    lines = textwrap.fill(joined, width, subsequent_indent=indent, break_long_words=False)
+    terminal.line(lines.replace("\u00a0", " "))
 
 
 def print_beside(
@@ -152,18 +141,17 @@ def print_beside(
     """Print quantities of several paths under the same loads, side by side."""
     first = next(iter(paths.values()))
     rows, _ = shown_rows(first, every_row=every_row)
-    room = terminal.width()
-    widest = max(8, (room - len("step ") - len(paths)) // len(paths))
+    widest = max(8, (terminal.width() - len("step ") - len(paths)) // len(paths))
     for name in columns or ("total_angle",):
-        terminal.output(room).print(f"\n{QUANTITIES[name].title}, beside each other", style="bold")
+        terminal.line(f"\n{QUANTITIES[name].title}, beside each other", "bold")
         shown: list[PathColumn] = []
         for label, path in paths.items():
             short = tables.shortened(label, widest)
             several = path_columns(path, rows, name)
             for column in several:
                 head, _, unit = column.head.rpartition("\n")
-                head = f"{short}\n{head}" if len(several) > 1 else short
-                shown.append(column._replace(head=f"{head}\n{unit}"))
+                lines = [short, head, unit] if len(several) > 1 else [short, unit]
+                shown.append(column._replace(head="\n".join(lines)))
         _print_columns(first, rows, shown)
 
 
@@ -178,13 +166,11 @@ def parse_columns(text: str) -> list[str]:
     names = [word.strip() for word in text.split(",")]
     for name in names:
         if name not in allowed:
-            got = repr(name) if name else "an empty name"
             raise InputError.UNKNOWN_NAME(
-                f"--columns {text}: {got} is not the name of a quantity{nearest(name, allowed)}. "
-                f"Allowed: {', '.join(allowed)}."
+                f"--columns {text}: {name!r} is not the name of a quantity"
+                f"{nearest(name, allowed)}. Allowed: {', '.join(allowed)}."
             )
-        if names.count(name) > 1:
-            raise InputError.CONFLICT(f"--columns {text}: {name} is given twice; give it once.")
+    once("--columns", names)
     return names
 
 
@@ -196,16 +182,10 @@ def usual_columns(path: EquilibriumPath, rows: Sequence[int]) -> dict[str, list[
     shown = {
         name: path_columns(path, rows, name) for name in USUAL if holds(path, QUANTITIES[name])
     }
-    for name in ("tension", "stroke"):  # of a step that was not solved, what was commanded
-        values, command = _values(path, name), _values(path, f"commanded_{name}")
-        values = np.where(np.isfinite(values), values, command)
-        shown[name] = path_columns(path, rows, name, values)
-    if not np.nanmax(np.abs(path.tip_position[:, 1]), initial=0.0) > 1e-9:
-        del shown["tip_position"][1]  # a planar robot has no coordinate across its plane
-    largest = np.abs(_values(path, "peak_strain")).max(axis=1)
-    (strain,) = path_columns(path, rows, "peak_strain", largest)
+    largest = 100.0 * np.abs(path.peak_strain).max(axis=1)
+    cells = [cell(largest[row] if path.converged[row] else None, ".2f") for row in rows]
     meaning = "strain: largest strain of all notches [%]"
-    shown["peak_strain"] = [strain._replace(head="strain\n%", meaning=meaning)]
+    shown["peak_strain"] = [PathColumn("strain\n%", cells, meaning)]
     return shown
 
 
@@ -213,103 +193,83 @@ def banded_columns(
     bands: Bands, rows: Sequence[int], names: Sequence[str]
 ) -> dict[str, list[PathColumn]]:
     """Return what is commanded, and low end, middle and high end of quantities."""
-    shown: dict[str, list[PathColumn]] = {}
-    for name in ("commanded_tension", "commanded_stroke"):
-        columns = path_columns(bands.path, rows, name)
-        if commanded := [column for column in columns if {*column.cells} != {NO_NUMBER}]:
-            shown[name] = commanded
-    for name in names:
-        if name not in bands:
-            shown[name] = path_columns(bands.path, rows, name)
-            continue
+    commands = ("commanded_tension", "commanded_stroke")
+    shown = {name: path_columns(bands.path, rows, name) for name in (*commands, *names)}
+    for name in (name for name in names if name in bands):
         ends = [path_columns(bands.end(end), rows, name) for end in ("low", "median", "high")]
-        shown[name] = []
-        for triple in zip(*ends, strict=True):
-            texts = {text.strip("-0.* ") for column in triple for text in column.cells}
-            if texts <= {"", NO_NUMBER}:
-                continue  # a component that is zero in all steps
-            for column, part in zip(triple, ("5 %", "50 %", "95 %"), strict=True):
-                head, _, unit = column.head.rpartition("\n")
-                shown[name].append(column._replace(head=f"{head}\n{part}\n{unit}"))
-    return shown
+        shown[name] = [
+            _below(column, part)
+            for triple in zip(*ends, strict=True)
+            for column, part in zip(triple, ("5 %", "50 %", "95 %"), strict=True)
+        ]
+    return {name: columns for name, columns in shown.items() if columns or name not in commands}
 
 
-def _values(path: EquilibriumPath, name: str) -> np.ndarray:
-    """Return a quantity as it is shown: without numbers where a step did not converge."""
-    values = np.asarray(getattr(path, name))
-    if name == "contact_state":
-        values = np.array([CONTACT_STATES[state] for state in values.flat]).reshape(values.shape)
-    if name in _EVERY_STEP:
-        return values
-    solved = np.asarray(path.converged).reshape(-1, *[1] * (values.ndim - 1))
-    nothing: Any = np.nan if values.dtype.kind == "f" else None
-    return np.where(solved, values, nothing)
+def _below(column: PathColumn, text: str) -> PathColumn:
+    """Return a column with another line in its head, above the unit."""
+    head, _, unit = column.head.rpartition("\n")
+    return column._replace(head=f"{head}\n{text}\n{unit}")
 
 
-def path_columns(
-    path: EquilibriumPath, rows: Sequence[int], name: str, values: np.ndarray | None = None
-) -> list[PathColumn]:
-    """Return a column for every component of a quantity that holds anything.
-
-    Args:
-        path: Solved path.
-        rows: Steps to show.
-        name: The quantity.
-        values: What is shown in its place.
-    """
+def path_columns(path: EquilibriumPath, rows: Sequence[int], name: str) -> list[PathColumn]:
+    """Return a column for every entry of a quantity that has any value in these steps."""
     if getattr(path, name, None) is None:
         return []
     quantity = QUANTITIES[name]
-    values = _values(path, name) if values is None else values
     unit = "%" if name in PERCENT else quantity.unit
     form = FORMS.get(unit, ".4g")
-    short = f"{HEADS[name]}: " if name in HEADS else ""
-    meaning = f"{short}{MEANINGS.get(name, quantity.title)}{f' [{unit}]' if unit else ''}"
+    short = HEADS.get(name, "")
+    meaning = f"{short}{': ' * bool(short)}{MEANINGS.get(name, quantity.title)}"
+    meaning += f" [{unit}]" if unit else ""
+    # Of a step that was not solved, what was commanded.
+    command = QUANTITIES.get(f"commanded_{name}")
+    commanded = [] if command is None else [entry.values for entry in entries_of(path, command)]
     columns: list[PathColumn] = []
-    for index in np.ndindex(values.shape[1:]):
-        component = values[:, *index]
-        if values.dtype.kind == "f":
-            if quantity.per[1:] in (("span",), ("contact",)) and np.isnan(component).all():
-                continue  # a tendon that ends before the others has fewer
-            component = component * (100.0 if unit == "%" else quantity.scale)
-        cells = [cell(value, form) or NO_NUMBER for value in component[list(rows)].tolist()]
-        head = f"{_head(quantity, index, values.shape[1:])}\n{unit}"
+    for number, entry in enumerate(entries_of(path, quantity)):
+        cells: list[str] = []
+        for row in rows:
+            value = entry.values[row].item()
+            if not path.converged[row] and name not in _EVERY_STEP:
+                value = commanded[number][row].item() if commanded else None
+            elif name == "contact_state":
+                value = CONTACT_STATES[value]
+            elif unit == "%":
+                value *= 100.0
+            cells.append(cell(value, form) or NO_NUMBER)
+        # A planar robot has no coordinate across its plane.
+        is_plane = entry.name == "y" and not (np.abs(entry.values) > 1e-9).any()
+        if is_plane or {*cells} <= {NO_NUMBER}:
+            continue
+        if short:
+            part = entry.name.rpartition(" ")[2]
+            head = f"{short}{' ' * (len(short) > 1)}{part}".strip()
+        else:
+            parts = entry.name.replace("notch ", "").replace(", ", "\n")
+            head = name.replace("_", "\n") + f"\n{parts}".rstrip()
+        head += f"\n{unit}"
         if name == "notch_angle":
-            closed = _values(path, "closed")[list(rows), *index]
-            cells = [text + (CLOSED if on else " ") for text, on in zip(cells, closed, strict=True)]
             head = head.replace("\n", " \n") + " "
+            closed = (path.closed[row, number] and path.converged[row] for row in rows)
+            cells = [text + (CLOSED if on else " ") for text, on in zip(cells, closed, strict=True)]
         columns.append(PathColumn(head, cells, meaning))
     return columns
-
-
-def _head(quantity: Quantity, index: tuple[int, ...], shape: tuple[int, ...]) -> str:
-    head = HEADS.get(quantity.name, quantity.name.replace("_", "\n"))
-    words = [
-        AXES[one] if what == "axis" else str(one + (what not in ("span", "body")))
-        for what, one in zip(quantity.per, index, strict=False)
-        if (what, shape[0]) != ("tendon", 1)
-    ]
-    gap = "" if len(head) == 1 or not words else (" " if quantity.name in HEADS else "\n")
-    return head + gap + ".".join(words)
 
 
 def _print_columns(
     path: EquilibriumPath, rows: Sequence[int], columns: Sequence[PathColumn]
 ) -> None:
     """Print columns in tables that fit, each with the steps; one column at least in each."""
-    room = terminal.width()
     step = PathColumn("step\n", [str(row + 1) for row in rows], "")
     blocks = [[step]]
     for column in columns:
-        block = blocks[-1]
-        if len(block) > 1 and sum(one.width for one in block) + column.width > room:
-            blocks.append([step, column])
-        else:
-            block.append(column)
+        width = sum(each.width for each in (*blocks[-1], column))
+        if len(blocks[-1]) > 1 and width > terminal.width():
+            blocks.append([step])
+        blocks[-1].append(column)
     styles = ["" if path.converged[row] else "red" for row in rows]
     for block in blocks:
-        table = tables.table([(head, cells, ">") for head, cells, _ in block], styles=styles)
-        terminal.output(room).print(table)
+        columns_shown = [(head, cells, ">") for head, cells, _ in block]
+        terminal.show(tables.table(columns_shown, styles=styles), wide=True)
 
 
 # Rows
@@ -345,16 +305,15 @@ def shown_rows(path: EquilibriumPath, *, every_row: bool = False) -> tuple[list[
         for size in (1, 2, 5)
         if steps <= MAX_ROWS * size * 10**power
     )
-    reversals: set[int] = set()
-    extremes: set[int] = set()
-    for column in (*np.asarray(path.commanded_tension).T, *np.asarray(path.commanded_stroke).T):
-        if np.isfinite(column).any():  # the tension of a tendon with a stroke is not commanded
-            reversals |= reversals_of(column)
-            extremes |= {int(np.nanargmin(column)), int(np.nanargmax(column))}
-    rows = set(range(0, steps, stride)) | {steps - 1}
-    rows |= reversals if len(reversals) <= MAX_ROWS else extremes
-    rows |= {int(step) for step in np.flatnonzero(~np.asarray(path.converged))[:1]}
-    return sorted(rows), stride
+    commands = np.hstack([path.commanded_tension, path.commanded_stroke])
+    # The tension of a tendon with a stroke is not commanded.
+    commands = commands[:, np.isfinite(commands).any(axis=0)]
+    reversals = set().union(*map(reversals_of, commands.T))
+    if len(reversals) > MAX_ROWS:
+        reversals = {*np.nanargmin(commands, axis=0), *np.nanargmax(commands, axis=0)}
+    failed = np.flatnonzero(~np.asarray(path.converged))[:1]
+    rows = {*range(0, steps, stride), steps - 1, *reversals, *failed}
+    return sorted(map(int, rows)), stride
 
 
 def reversals_of(column: np.ndarray) -> set[int]:
@@ -369,21 +328,3 @@ def reversals_of(column: np.ndarray) -> set[int]:
         if change[before] != change[after]
     ]
     return {step for turn in turns for step in turn}
-
-
-def rows_note(steps: int, shown: int, stride: int) -> str:
-    """Return the sentence that says which steps are shown; "" where all are."""
-    if stride == 1:
-        return ""
-    which = {1: "st", 2: "nd", 3: "rd"}.get(stride, "th")
-    return (
-        f"{steps} steps, {shown} shown: every {stride}{which} one, and where the load reverses. "
-        "--all shows every step."
-    )
-
-
-def load_sentences(load: ExternalLoad) -> list[str]:
-    """Return lines with the external loads, which act at all steps; none where nothing acts."""
-    words = ", ".join(external_words(load))
-    text = f"external loads: {words}" if words else ""
-    return textwrap.wrap(text, width=terminal.NARROW, subsequent_indent="    ")

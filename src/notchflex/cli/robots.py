@@ -5,20 +5,19 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 from cyclopts import Parameter
 
-from notchflex import InputError
+from notchflex import InputError, Robot
 from notchflex.cli import terminal
-from notchflex.cli.options import named_columns, texts
+from notchflex.cli.options import converted
 from notchflex.support import load_changed, parse_assignment
 
 if TYPE_CHECKING:
-    from notchflex import Robot
     from notchflex.fit import Measurements
 
-_MAX_BESIDE = 4
+_MOST_VARIANTS = 4
 """Robots beside the first: five can be distinguished by colour."""
 
 RobotName = Annotated[
@@ -27,12 +26,11 @@ RobotName = Annotated[
 ]
 Settings = Annotated[
     tuple[str, ...],
-    texts(
-        "--set",
-        "PATH=VALUE",
-        help="Change a value of the robot, such as `material.elastic_modulus=9000`, "
-        "`notch[2].depth=1.3` (the second from the base), `notch.depth=1.38` (every notch) or "
-        "`material.kind=linear`.",
+    Parameter(
+        name="--set",
+        metavar="PATH=VALUE...",
+        help="Change a value of the robot: `material.elastic_modulus=9000`, `notch[2].depth=1.3` "
+        "(the second from the base), `notch.depth=1.38` (every notch), `material.kind=linear`.",
     ),
 ]
 OnePath = Annotated[
@@ -40,16 +38,15 @@ OnePath = Annotated[
     Parameter(
         name="--path",
         negative="--from-rest",
-        help="Take the rows of each pull as one loading path with friction history, or each row as "
-        "loaded from rest. Without either the column `from_rest` decides, else the order of the "
-        "rows: a force that falls within a pull makes it a path.",
+        help="Take each pull as one loading path with friction history, or each row as loaded from "
+        "rest. By default the column `from_rest` decides, else whether the force falls in a pull.",
     ),
 ]
 MeasuredAs = Annotated[
     Literal["ring", "edge"],
     Parameter(
-        help="What columns such as `notch_1_deg` hold: the angle between the uncut pieces beside a "
-        "notch, or between its two faces (`notch_1_edge_deg`). They differ with elastic ends."
+        help="Columns such as `notch_1_deg` hold angles between the uncut pieces beside a "
+        "notch, or between its faces (`notch_1_edge_deg`): different with elastic ends."
     ),
 ]
 
@@ -92,65 +89,59 @@ def robot_label(name: str) -> str:
     return Path(name).stem if name.endswith(".toml") else Path(name).name
 
 
-def variant(text: str, alternatives: str = "") -> tuple[str, list[tuple[str, object]]]:
-    """Read `LABEL: PATH=VALUE, PATH=VALUE` of `--beside`.
+class Variant(NamedTuple):
+    """One `--beside`: a label with the name of a robot, or with values of the first robot."""
 
-    Args:
-        text: What was given.
-        alternatives: What else may be given, as the message begins.
+    label: str
+    robot: str
+    values: list[tuple[str, object]]
 
-    Example:
-        >>> variant("slick: friction.coefficient=0")
-        ('slick', [('friction.coefficient', 0)])
-    """
-    label, colon, values = text.partition(":")
-    if not colon or not label.strip():
+
+def _read_variant(text: str) -> Variant:
+    """Read `ROBOT`, `LABEL: ROBOT` or `LABEL: PATH=VALUE, PATH=VALUE`."""
+    if "=" not in text:  # a colon without a blank belongs to a path
+        label, _, name = map(str.strip, text.rpartition(": "))
+        return Variant(label or robot_label(name), name, [])
+    label, colon, values = map(str.strip, text.partition(":"))
+    if not (colon and label):
         raise InputError.BAD_SYNTAX(
-            f'--beside {text}: give {alternatives}"LABEL: PATH=VALUE, PATH=VALUE", for example '
+            'give ROBOT, LABEL: ROBOT, or "LABEL: PATH=VALUE, PATH=VALUE", for example '
             '"linear: material.kind=linear".'
         )
-    return label.strip(), list(map(parse_assignment, values.split(",")))
+    return Variant(label, "", list(map(parse_assignment, values.split(","))))
 
 
-def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, Robot]:
+def beside_parameter(metavar: str) -> Parameter:
+    """Return the parameter of `--beside`."""
+    return converted(_read_variant, metavar, several=True, name="--beside")
+
+
+Beside = Annotated[tuple[Variant, ...], beside_parameter("ROBOT")]
+
+
+def beside_robots(first: Robot, name: str, variants: Sequence[Variant]) -> dict[str, Robot]:
     """Return the robots of a call, the first one first, each under its label.
 
     Args:
         first: The robot that was named, with its `--set`.
         name: How it was named, which is its label.
-        beside: The values of `--beside`: `ROBOT`, `LABEL: ROBOT` or `LABEL: PATH=VALUE, ...`.
+        variants: The values of `--beside`.
     """
-    if len(beside) > _MAX_BESIDE:
+    if len(variants) > _MOST_VARIANTS:
         raise InputError.OUT_OF_RANGE(
-            f"--beside may be given {_MAX_BESIDE} times at most; got {len(beside)}."
+            f"--beside may be given {_MOST_VARIANTS} times at most; got {len(variants)}."
         )
     robots = {robot_label(name): first}
-    for text in beside:
-        if "=" in text:
-            label, values = variant(text, "ROBOT, LABEL: ROBOT, or ")
-            robot = first.with_values(values)
-            warn_unlikely(robot)
-        else:
-            label, named = _label_and_robot(text)
-            robot = chosen_robot(named)
+    for label, named, values in variants:
         if label in robots:
             raise InputError.CONFLICT(
-                f"--beside {text}: there is already a robot called {label}; put another label "
+                f"--beside {label}: there is already a robot called {label}; put another label "
                 'before it, such as "second: ROBOT".'
             )
-        robots[label] = robot
+        robots[label] = chosen_robot(named) if named else first.with_values(values)
+        if values:
+            warn_unlikely(robots[label])
     return robots
-
-
-def beside_files(beside: Sequence[str]) -> list[Path]:
-    """Return the robot files that `--beside` names."""
-    return robot_files(*(_label_and_robot(text)[1] for text in beside if "=" not in text))
-
-
-def _label_and_robot(text: str) -> tuple[str, str]:
-    """Split `LABEL: ROBOT` or `ROBOT`; a colon without a blank belongs to a path."""
-    label, _, name = (word.strip() for word in text.rpartition(": "))
-    return label or robot_label(name), name
 
 
 def read_data(
@@ -158,7 +149,7 @@ def read_data(
     robot: Robot,
     path: bool | None,
     measured_as: Literal["ring", "edge"] = "ring",
-    columns: Sequence[str] = (),
+    columns: Sequence[tuple[str, str]] = (),
 ) -> Measurements:
     """Read measurements, and write how the rows were interpreted and what was not used.
 
@@ -173,19 +164,17 @@ def read_data(
 
     rest = None if path is None else not path
     measured = read_measurements(
-        file, robot, from_rest=rest, measured=measured_as, columns=named_columns(columns)
+        file, robot, from_rest=rest, measured=measured_as, columns=dict(columns)
     )
-    notes: list[str] = []
-    if measured.renamed:
-        pairs = ", ".join(f"{old} as {new}" for new, old in measured.renamed.items())
-        notes.append(f"read {pairs}")
-    if measured.order:
-        notes.append(measured.order)
-    if measured.ignored:
-        notes.append(f"ignored columns: {', '.join(measured.ignored)}")
-    if count := measured.negative_forces:
-        are = "force is" if count == 1 else "forces are"
-        notes.append(f"{count} measured {are} negative (sensor offset); the model uses 0 N")
-    for note in notes:
-        terminal.note(f"{measured.source}: {note}.")
+    renamed = ", ".join(f"{old} as {new}" for new, old in measured.renamed.items())
+    count = measured.negative_forces
+    are = "force is" if count == 1 else "forces are"
+    for note, holds in {
+        f"read {renamed}": renamed,
+        measured.order: measured.order,
+        f"ignored columns: {', '.join(measured.ignored)}": measured.ignored,
+        f"{count} measured {are} negative (sensor offset); the model uses 0 N": count,
+    }.items():
+        if holds:
+            terminal.note(f"{measured.source}: {note}.")
     return measured

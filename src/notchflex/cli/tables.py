@@ -13,17 +13,23 @@ from notchflex.support import described_at
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from notchflex import Bands, Robot
+    from notchflex import Robot
     from notchflex.support import Tolerance
 
 NO_NUMBER = "–"
 
-FORMS = {"deg": ".2f", "%": ".2f", "mm": ".3f", "N": ".3f"}
+FORMS = {"deg": ".2f", "%": ".2f", "mm": ".3f", "mm2": ".4f", "mm4": ".4e", "N": ".3f"}
 """Rounding by unit."""
 
-Columns = Sequence[tuple[str, Iterable[Any], str]]
-"""Of each column the head, whose last line is the unit; the values; and the form of its numbers, as
-Python formats them: "" for words, ">" for words that are aligned to the right."""
+_HEAD = 8
+"""Letters in a line of a head, where its words can be broken."""
+
+Column = tuple[str, Sequence[Any], str]
+"""Head, whose last line is the unit; values; and the form of numbers, as Python formats them: ""
+for words, ">" for words that are aligned to the right."""
+
+Data = Mapping[str, Iterable[Any]] | Sequence[Mapping[str, Any]]
+"""Columns, or rows, by names such as `force_low_N`."""
 
 
 def cell(value: Any, form: str = "") -> str:
@@ -35,6 +41,7 @@ def cell(value: Any, form: str = "") -> str:
     """
     if isinstance(value, str):
         return value
+    value = getattr(value, "tolist", lambda: value)()
     if isinstance(value, list | tuple):
         ends: Iterable[Any] = value
         return " to ".join("open" if end is None else cell(end, form) for end in ends)
@@ -42,14 +49,43 @@ def cell(value: Any, form: str = "") -> str:
         return NO_NUMBER
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, int):
-        form = "d"
-    text = format(value, form)
+    text = format(value, "d" if isinstance(value, int) else form)
     return text.lstrip("-") if not text.strip("-0.") else text  # no minus sign of a rounded zero
 
 
+def named(data: Data, keys: str = "", forms: Mapping[str, str] | None = None) -> list[Column]:
+    r"""Return data as columns of a table; their names, broken at words, become heads.
+
+    Args:
+        data: Columns or rows; columns without any value are left out.
+        keys: Names of what is shown, with blanks between; "" for all.
+        forms: By name, the form of its numbers, where it is another than that of its unit.
+
+    Example:
+        >>> named({"tip_x_mm": [1.5], "reason": [None]})
+        [('tip x\nmm', [1.5], '.3f')]
+    """
+    if not isinstance(data, Mapping):
+        names = dict.fromkeys(name for row in data for name in row)
+        data = {name: [row.get(name) for row in data] for name in names}
+    columns: list[Column] = []
+    for name in keys.split() or data:
+        column: Any = data.get(name, ())
+        values: list[Any] = list(getattr(column, "tolist", column.__iter__)())
+        if all(cell(value) == NO_NUMBER for value in values):
+            continue
+        words, _, unit = name.rpartition("_")
+        words, unit = (words, f"\n{unit}") if unit in FORMS else (name, "")
+        is_text = any(isinstance(value, str) for value in values)
+        form = (forms or {}).get(name, "" if is_text else FORMS.get(unit.strip(), ".3g"))
+        widest = max(_HEAD, *(len(cell(value, form).partition("\n")[0]) for value in values))
+        words = textwrap.fill(words.replace("_", " "), widest, break_long_words=False)
+        columns.append((words + unit, values, form))
+    return columns
+
+
 def table(
-    columns: Columns, *, gap: int = 1, colour: str = "", styles: Sequence[str] | None = None
+    columns: Iterable[Column], *, gap: int = 1, colour: str = "", styles: Sequence[str] = ()
 ) -> Table:
     """Return a table without lines, and without heads where all are empty.
 
@@ -63,80 +99,67 @@ def table(
     """
     from rich.table import Table
 
-    heads = [head for head, _, _ in columns]
+    heads, values, forms = zip(*columns, strict=True)
     result = Table(
         box=None,
         padding=(0, gap, 0, 0),
         header_style="bold",
         pad_edge=False,
         show_header=any(heads),
+        row_styles=styles or None,
     )
     deepest = max(head.count("\n") for head in heads)
-    for number, (head, _, form) in enumerate(columns):
+    for head, form in zip(heads, forms, strict=True):
         result.add_column(
             "\n" * (deepest - head.count("\n")) + head,
             justify="right" if form else "left",
             no_wrap=bool(form),
             overflow="fold",
-            style="" if number else colour,
+            style="" if result.columns else colour,
         )
-    cells = [
-        [cell(value, form) for value in getattr(values, "tolist", lambda values=values: values)()]
-        for _, values, form in columns
-    ]
-    for number, row in enumerate(zip(*cells, strict=True)):
-        result.add_row(*row, style=None if styles is None else styles[number])
+    for row in zip(*values, strict=True):
+        result.add_row(*map(cell, row, forms))
     return result
 
 
-def frame(columns: Mapping[str, Iterable[Any]], **forms: str) -> Columns:
-    r"""Return the columns of a file or a document as those of a table.
+def show(
+    data: Data,
+    keys: str = "",
+    forms: Mapping[str, str] | None = None,
+    *,
+    colour: str = "",
+    wide: bool = False,
+    most: int | None = None,
+) -> None:
+    """Print a table of columns or rows, with two blanks between columns where these fit.
 
     Args:
-        columns: Values by their names, such as `force_low_N`, which become heads.
-        **forms: By name, the form of its numbers, where it is another than that of its unit.
-
-    Example:
-        >>> frame({"tip_x_mm": [1.5]})
-        [('tip x\nmm', [1.5], '.3f')]
+        data: Columns or rows; see `named`.
+        keys: Names of what is shown; "" for all.
+        forms: By name, the form of its numbers.
+        colour: Of the first column, on a terminal.
+        wide: Whether it may be as wide as the terminal.
+        most: Number of rows beyond which they are thinned; None for no limit.
     """
-    result: list[tuple[str, Iterable[Any], str]] = []
-    for name, values in columns.items():
-        values = list(values)
-        words, _, unit = name.rpartition("_")
-        known = unit in FORMS
-        head = f"{words if known else name}".replace("_", " ") + (f"\n{unit}" if known else "")
-        form = "" if any(isinstance(value, str) for value in values) else FORMS.get(unit, ".3g")
-        result.append((head, values, forms.get(name, form)))
-    return result
+    columns = named(data, keys, forms)
+    if not columns:
+        return
+    count = len(columns[0][1])
+    stride = -(-count // (most or count))
+    rows = sorted({*range(0, count, stride), count - 1})
+    columns = [(head, [values[row] for row in rows], form) for head, values, form in columns]
+    console = terminal.output(terminal.width() if wide else None)
+    shown = table(columns, gap=2, colour=colour)
+    if console.measure(shown).maximum >= console.width:
+        shown = table(columns, colour=colour)
+    console.print(shown)
+    if stride > 1:
+        terminal.note(f"{len(rows)} of {count} rows are shown; --csv and --json have all.")
 
 
-def records(rows: Sequence[Mapping[str, Any]], **forms: str) -> Columns:
-    """Return rows, values by their names, as columns of a table; see `frame`."""
-    names = dict.fromkeys(name for row in rows for name in row)
-    return frame({name: [row.get(name) for row in rows] for name in names}, **forms)
-
-
-def width_of(table: Table) -> int:
-    """Return how many characters a table needs."""
-    console = terminal.output()
-    return console.measure(table, options=console.options.update(max_width=10_000)).maximum
-
-
-def show(columns: Columns, *, gap: int = 1, colour: str = "") -> None:
-    """Print a table."""
-    terminal.output().print(table(columns, gap=gap, colour=colour))
-
-
-def wrapped(text: str) -> list[str]:
-    """Break a paragraph at its words."""
-    return textwrap.wrap(text, width=terminal.NARROW - 1)
-
-
-def say(*paragraphs: str) -> None:
-    """Print paragraphs, broken at their words, with blank lines between."""
-    text = "\n\n".join("\n".join(wrapped(paragraph)) for paragraph in paragraphs)
-    terminal.output().print(text, soft_wrap=True)
+def wrapped(text: str, indent: str = "") -> str:
+    """Break a paragraph at its words; its further lines are indented."""
+    return textwrap.fill(text, width=terminal.NARROW - 1, subsequent_indent=indent)
 
 
 def shortened(text: str, size: int) -> str:
@@ -144,37 +167,19 @@ def shortened(text: str, size: int) -> str:
     return text if len(text) <= size else f"{text[: size - 1]}…"
 
 
-def shown_of(count: int, most: int) -> tuple[list[int], int]:
-    """Return which of many rows are shown, the first and the last among them, and their stride."""
-    stride = -(-count // most)
-    return sorted({*range(0, count, stride), count - 1}), stride
-
-
-def tolerance_lines(bands: Bands) -> list[str]:
-    """Return the tolerances that bands were made with, and which of them were assumed."""
-    return tolerance_words(bands.path.robot, bands.tolerances, bands.assumed)
-
-
 def tolerance_words(
     robot: Robot, tolerances: Iterable[Tolerance], assumed: Collection[str]
 ) -> list[str]:
-    """Return tolerances in lines of text.
-
-    Args:
-        robot: The robot.
-        tolerances: Its tolerances.
-        assumed: Names of the values whose tolerance is assumed.
-    """
+    """Return the tolerances of a robot in paragraphs: those of its file, and assumed ones."""
     words: dict[bool, list[str]] = {False: [], True: []}
     for tolerance in tolerances:
         words[tolerance.value in assumed].append(_words(robot, tolerance))
-    lines: list[str] = []
-    if words[False]:
-        lines += wrapped(f"Tolerances: {', '.join(words[False])}.")
-    if words[True]:
-        text = f"Tolerances assumed: {', '.join(words[True])}."
-        lines += wrapped(f"{text} A [tolerance] table in the robot file replaces them.")
-    return lines
+    more = " A [tolerance] table in the robot file replaces them."
+    return [
+        wrapped(f"Tolerances{' assumed' * is_assumed}: {', '.join(texts)}.{more * is_assumed}")
+        for is_assumed, texts in words.items()
+        if texts
+    ]
 
 
 def _words(robot: Robot, tolerance: Tolerance) -> str:
@@ -185,9 +190,9 @@ def _words(robot: Robot, tolerance: Tolerance) -> str:
         return value if isinstance(value, str) else f"{value:g} {unit}".strip()
 
     if tolerance.sd is not None:
-        words = f"{tolerance.value} {size(tolerance.sd)} (SD)"
+        words = f"{size(tolerance.sd)} (SD)"
     elif tolerance.plus == tolerance.minus:
-        words = f"{tolerance.value} ±{size(tolerance.plus)}"
+        words = f"±{size(tolerance.plus)}"
     else:
-        words = f"{tolerance.value} +{size(tolerance.plus)} −{size(tolerance.minus)}"
-    return f"{words} each" if tolerance.per_notch else words
+        words = f"+{size(tolerance.plus)} −{size(tolerance.minus)}"
+    return f"{tolerance.value} {words}{' each' * tolerance.per_notch}"

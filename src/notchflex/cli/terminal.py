@@ -9,13 +9,13 @@ import shutil
 import sys
 import unicodedata
 import warnings
-from collections.abc import Generator, Iterable
-from typing import TYPE_CHECKING, Protocol, TextIO
+from collections.abc import Callable, Generator, Iterable
+from typing import TYPE_CHECKING, TextIO
 
 from notchflex.support import let_go
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.console import Console, RenderableType
 
 DONE, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h
@@ -66,9 +66,7 @@ def width() -> int:
     the same text everywhere. The variable `COLUMNS` overrides both.
     """
     fallback = NARROW if sys.stdout.isatty() else WIDE
-    if sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdecimal():
-        fallback = shutil.get_terminal_size((fallback, 24)).columns
-    return max(fallback, NARROWEST)
+    return max(shutil.get_terminal_size((fallback, 24)).columns, NARROWEST)
 
 
 def output(columns: int | None = None) -> Console:
@@ -80,14 +78,36 @@ def output(columns: int | None = None) -> Console:
     return _console(sys.stdout, columns)
 
 
+def show(*parts: RenderableType, style: str = "", wide: bool = False) -> None:
+    """Print tables, and texts that are broken at their words.
+
+    Args:
+        *parts: What is printed.
+        style: Style of texts on a terminal.
+        wide: Whether tables may be as wide as `width()`.
+    """
+    console = output(width() if wide else None)
+    for part in parts:
+        console.print(part, style=style)
+
+
+def line(text: str, style: str = "") -> None:
+    """Print a text in one line, however long it is."""
+    output().print(text, style=style, soft_wrap=True)
+
+
 def messages() -> Console:
     """Return the console of standard error, for notes, warnings and progress."""
     return _console(sys.stderr)
 
 
+quiet = False
+"""Whether notes, tables and progress are left out: `--quiet`, set once for each call."""
+
+
 def note(text: str) -> None:
     """Write one line of information to standard error; nothing with `--quiet`."""
-    if not _quiet:
+    if not quiet:
         _write("Note:", "cyan", text)
 
 
@@ -106,22 +126,14 @@ def error(text: str) -> None:
     _write("Error:", "bold red", text)
 
 
-_quiet: set[str] = set()
-"""Holds `--quiet` where it was given: set by `be_quiet`, once for each call."""
+def failed(text: str) -> int:
+    """Write an error of a computation; return the exit code."""
+    error(text)
+    return NOT_CONVERGED
 
 
-def be_quiet(quiet: bool) -> None:
-    """Set whether notes, tables and progress are left out."""
-    _quiet.clear()
-    if quiet:
-        _quiet.add("--quiet")
-
-
-class Progress(Protocol):
-    """Shows how far a stage of a computation is: what is done, and how much there is."""
-
-    def __call__(self, stage: str, done: int, total: int, status: str = "") -> None:
-        """Show what is done of a stage."""
+Progress = Callable[..., None]
+"""Shows what is done of a stage: `(stage, done, total, status)`, the status may be left out."""
 
 
 @contextlib.contextmanager
@@ -137,11 +149,6 @@ def progress(text: str, *, compiles: bool = True) -> Generator[Progress]:
     Yields:
         A function that is told how far a stage is, and what else is shown behind its bar.
     """
-    prepare = use_compile_cache if compiles else lambda: None
-    if _quiet or not sys.stderr.isatty():
-        prepare()
-        yield lambda stage, done, total, status="": None
-        return
     from rich import progress as shown
 
     columns = (
@@ -152,16 +159,18 @@ def progress(text: str, *, compiles: bool = True) -> Generator[Progress]:
         shown.TimeRemainingColumn(),
         shown.TextColumn("{task.fields[status]}"),
     )
-    with shown.Progress(*columns, console=messages(), transient=True) as bars:
+    hidden = quiet or not sys.stderr.isatty()
+    with shown.Progress(*columns, console=messages(), transient=True, disable=hidden) as bars:
         stages = {text: bars.add_task(text, total=None, status="")}
 
-        def show(stage: str, done: int, total: int, status: str = "") -> None:
+        def update(stage: str, done: int, total: int, status: str = "") -> None:
             if stage not in stages:
                 stages[stage] = bars.add_task(stage, total=total, status="")
             bars.update(stages[stage], completed=done, total=total, status=status)
 
-        prepare()
-        yield show
+        if compiles:
+            use_compile_cache()
+        yield update
 
 
 def use_compile_cache() -> None:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
 from cyclopts import Group, Parameter
 
 from notchflex import InputError
 from notchflex.cli import tables, terminal
 from notchflex.cli.options import (
     NO_FOLDER,
+    Bounds,
     Columns,
     DrawnOutputs,
     Folder,
@@ -26,6 +25,7 @@ from notchflex.cli.options import (
     low_high,
     named,
     number,
+    once,
     tendon_command,
 )
 from notchflex.cli.robots import (
@@ -37,26 +37,17 @@ from notchflex.cli.robots import (
     robot_files,
     robot_label,
 )
-from notchflex.cli.terminal import BAD_INPUT, DONE, NOT_CONVERGED
+from notchflex.cli.terminal import BAD_INPUT, DONE
 from notchflex.support import TendonCommand, load_columns, need, parse_number
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from notchflex import LoadPath, Robot
-    from notchflex.fit import (
-        Calibration,
-        FitObjective,
-    )
+    from notchflex import Robot
+    from notchflex.fit import Calibration, FitObjective
 
 BEYOND = Group("Beyond the fit", sort_key=8)
 _PAIR = "ROBOT=DATA.csv or LABEL=ROBOT=DATA.csv"
 _BOUNDS = "NAME=LOW:HIGH, such as friction.coefficient=0:0.5; one of the two may be left out"
 _PRIOR = "NAME=MEAN+-SD, such as material.elastic_modulus=10000+-500"
-_MOST_CANDIDATES = 16
-"""More candidates for a measurement than that are thinned in the table."""
-
-Bounds = tuple[float | None, float | None]
 Prior = tuple[float, float]
 Names = Annotated[tuple[str, ...], Parameter(metavar="NAME...")]
 
@@ -71,8 +62,8 @@ def _read_source(text: str) -> Source:
     words = [word.strip() for word in text.split("=")]
     if len(words) not in (2, 3) or not all(words):
         raise InputError.BAD_SYNTAX(f"give a robot with its data: {_PAIR}.")
-    robot, data = words[-2:]
-    label = words[0] if len(words) == 3 else robot_label(robot)
+    *label, robot, data = words
+    (label,) = label or [robot_label(robot)]
     if ":" in label or os.sep in label:
         raise InputError.BAD_SYNTAX(f"a label must not contain `:` or `{os.sep}`; choose another.")
     if label in ("each", "offset", "factor"):
@@ -82,13 +73,8 @@ def _read_source(text: str) -> Source:
     return label, robot, data
 
 
-def gathered(sources: Sequence[Source]) -> tuple[dict[str, str], dict[str, list[str]]]:
-    """Return by label the name or file of each robot, and its files of measurements.
-
-    Example:
-        >>> gathered([("a", "a.toml", "1.csv"), ("a", "a.toml", "2.csv")])
-        ({'a': 'a.toml'}, {'a': ['1.csv', '2.csv']})
-    """
+def _gathered(sources: Sequence[Source]) -> tuple[dict[str, str], dict[str, list[str]]]:
+    """Return by label the name or file of each robot, and its files of measurements."""
     if not sources:
         raise InputError.MISSING_VALUE(f"Give a robot with its data: {_PAIR}.")
     robots: dict[str, str] = {}
@@ -99,42 +85,37 @@ def gathered(sources: Sequence[Source]) -> tuple[dict[str, str], dict[str, list[
                 f"{robots[label]} and {robot} are both called {label}; give one of them another "
                 f"label: LABEL={robot}={file}."
             )
-        files = data.setdefault(label, [])
-        if file in files:
-            raise InputError.CONFLICT(f"{file} is given twice for {label}; give it once.")
-        files.append(file)
+        data.setdefault(label, []).append(file)
+        once(f"{label}:", data[label])
     return robots, data
 
 
-def changed(robots: Mapping[str, str], settings: Sequence[str]) -> dict[str, Robot]:
+def _changed(robots: Mapping[str, str], settings: Sequence[str]) -> dict[str, Robot]:
     """Load robots with the values of `--set`: of all, or of one whose label precedes."""
     of_robot: dict[str, list[str]] = {label: [] for label in robots}
     for text in settings:
         label, colon, rest = text.partition(":")
-        if colon and "=" not in label:
-            _check_label(label, robots, f"--set {text}")
-            of_robot[label].append(rest)
-        else:
-            for values in of_robot.values():
-                values.append(text)
+        of_one = colon and "=" not in label
+        if of_one:
+            _check_known(label, robots, f"--set {text}", "no robot of this fit is called that")
+        for each in [label] if of_one else robots:
+            of_robot[each].append(rest if of_one else text)
     return {label: chosen_robot(name, of_robot[label]) for label, name in robots.items()}
 
 
-def _check_label(label: str, robots: Mapping[str, str], source: str) -> None:
-    if label not in robots:
-        raise InputError.UNKNOWN_NAME(
-            f"{source}: no robot of this fit is called {label}; allowed: {', '.join(robots)}."
-        )
+def _check_known(name: str, allowed: Iterable[str], source: str, problem: str) -> None:
+    if name not in allowed:
+        raise InputError.UNKNOWN_NAME(f"{source}: {problem}; allowed: {', '.join(allowed)}.")
 
 
 # What is found, and what is made of it
 
 
 def _read_prior(values: str) -> Prior:
-    words = re.split(r"\+-|±", values)
-    if len(words) != 2:
+    mean, sign, sd = re.sub(r"\+-", "±", values).partition("±")
+    if not sign:
         raise InputError.BAD_SYNTAX(f"give {_PRIOR}.")
-    return parse_number(words[0], _PRIOR), parse_number(words[1], _PRIOR)
+    return parse_number(mean, _PRIOR), parse_number(sd, _PRIOR)
 
 
 @Parameter(name="*")
@@ -143,31 +124,25 @@ class FitOptions:
     """What is found, and how.
 
     Attributes:
-        fit: Constants to find, joined by commas: values of the robot file, of all robots; `LABEL:`
-            before one for a single robot, `each:` for one in every robot, `notch[each].` in every
-            notch; `offset:notch.depth` added to, `factor:notch.height` multiplying every such
-            value; `notch.precurvature_deg/height`; `sensor.force_offset`, `sensor.force_factor`,
+        fit: Constants to find, joined by commas: values of all robots; `LABEL:` before one for a
+            single robot, `each:` for one in every robot, `notch[each].` in every notch;
+            `offset:notch.depth` added to, `factor:notch.height` multiplying every such value;
+            `notch.precurvature_deg/height`; `sensor.force_offset`, `sensor.force_factor`,
             `sensor.stroke_slack`.
         bounds: Limits in the unit, `NAME=LOW:HIGH`.
         prior: Prior in the unit, `NAME=MEAN+-SD`.
-        priors: Whether what is not fitted may deviate within its tolerances, or assumed ones. Not
-            with `each:`, nor with other objectives.
-        objective: What is minimised: squared residuals over their noise, which alone gives
-            intervals; eq. 17 of Pacheco 2021; distances of points (Gao 2017, eq. 27).
+        priors: Let what is not fitted deviate within its tolerances; not with `each:` or other
+            objectives.
+        objective: Squared residuals over their noise, which alone give intervals; eq. 17 of
+            Pacheco 2021; distances of points (Gao 2017, eq. 27).
         huber: Outliers beyond so many standard deviations count less; about 1.5.
         starts: Number of starting points.
         seed: Seed of the starting points.
     """
 
     fit: Names
-    bounds: Annotated[
-        tuple[tuple[str, Bounds], ...],
-        converted(partial(named, _BOUNDS, partial(low_high, _BOUNDS)), "SPEC", several=True),
-    ] = ()
-    prior: Annotated[
-        tuple[tuple[str, Prior], ...],
-        converted(partial(named, _PRIOR, _read_prior), "SPEC", several=True),
-    ] = ()
+    bounds: Annotated[tuple[tuple[str, Bounds], ...], named(_BOUNDS, low_high(_BOUNDS))] = ()
+    prior: Annotated[tuple[tuple[str, Prior], ...], named(_PRIOR, _read_prior)] = ()
     priors: Annotated[bool, Parameter(negative="--no-priors")] = True
     objective: Literal["least-squares", "robot-errors", "distances"] = "least-squares"
     huber: Annotated[float | None, number("a number of standard deviations", "SD")] = None
@@ -189,20 +164,12 @@ class FitOptions:
                 "--fit needs names of constants joined by commas, such as "
                 "friction.coefficient,material.elastic_modulus."
             )
+        once("--fit", names)
         limits, priors = dict(self.bounds), dict(self.prior)
-        for option, given in (
-            ("--fit", names),
-            ("--bounds", [name for name, _ in self.bounds]),
-            ("--prior", [name for name, _ in self.prior]),
-        ):
-            for name in given:
-                if given.count(name) > 1:
-                    raise InputError.CONFLICT(f"{option} {name} is given twice; give it once.")
-                if name not in names:
-                    raise InputError.UNKNOWN_NAME(
-                        f"{option} {name}: this constant is not fitted; --fit names "
-                        f"{', '.join(names)}."
-                    )
+        for option, pairs in {"--bounds": self.bounds, "--prior": self.prior}.items():
+            once(option, (name for name, _ in pairs))
+            for name, _ in pairs:
+                _check_known(name, names, f"{option} {name}", "this constant is not fitted")
         return [(name, *limits.get(name, (None, None)), priors.get(name)) for name in names]
 
     def fit_objective(self) -> FitObjective:
@@ -220,15 +187,15 @@ class BeyondFit:
     """Further analyses of a finished fit.
 
     Attributes:
-        leave_out: Also fit without each pull or robot, and predict what was left out.
-        photograph: With `--leave-out robot`: update its own constants (`each:`) by one row of the
-            robot left out, and predict its other rows again.
-        next: Candidates for the next measurement: tensions [N] as in `simulate --tension`. Shows
-            which narrows the intervals most.
+        leave_out: Also fit without each, and predict what was left out.
+        photograph: With `--leave-out robot`: predict it again after its own constants (`each:`)
+            were updated by one of its rows.
+        next: Tensions [N] as in `simulate --tension`: which, measured next, narrows the intervals
+            most.
         next_robot: Label of the robot of `--next`; the first if left out.
-        narrow: Constant that `--next` is to narrow; all together if left out.
+        narrow: Constant that `--next` is to narrow; all by default.
         posterior: Also sample the posterior (extra `bayes`).
-        draws: Draws of each of the two chains of `--posterior`.
+        draws: Draws of each of its two chains.
     """
 
     leave_out: Literal["pull", "robot"] | None = None
@@ -246,7 +213,8 @@ class BeyondFit:
                 "--next-robot and --narrow belong to --next; give candidates with it."
             )
         if self.next_robot is not None:
-            _check_label(self.next_robot, robots, f"--next-robot {self.next_robot}")
+            source = f"--next-robot {self.next_robot}"
+            _check_known(self.next_robot, robots, source, "no robot of this fit is called that")
         if self.posterior:
             if objective != "least-squares":
                 raise InputError.CONFLICT(
@@ -269,9 +237,8 @@ def calibrate(
         Source,
         converted(_read_source, "[LABEL=]ROBOT=DATA.csv", hyphen=False),
         Parameter(
-            help=f"{_PAIR}: a robot (ready, or a file) and its measurements (the columns of "
-            "`notchflex.read_measurements`). The same robot again adds data; a label "
-            "distinguishes robots of one file."
+            help=f"{_PAIR}: a robot and its measurements, with columns as "
+            "`notchflex.read_measurements` reads them. The same robot again adds data."
         ),
     ],
     search: FitOptions,
@@ -291,28 +258,29 @@ def calibrate(
     repeatability.
 
     Args:
-        output: Write the fitted robots into this folder, LABEL.toml each, with their comments.
+        output: Write the fitted robots (LABEL.toml) into this folder.
     """
-    names, sources = gathered(pairs)
+    names, sources = _gathered(pairs)
     constants = search.constants()
     beyond.check(names, search.objective)
-    inputs: list[str | Path] = [file for files in sources.values() for file in files]
+    inputs = [Path(file) for files in sources.values() for file in files]
     inputs += robot_files(*names.values())
     fitted = [f"{label}.toml" for label in names]
     outputs.check(inputs, folder=("--output", output, fitted))
-    robots = changed(names, settings)
+    robots = _changed(names, settings)
     folder = pieces.chosen("calibration", inputs)
     candidates = None
     if beyond.next:
-        from notchflex import LoadPath
-
         robot = robots[beyond.next_robot or next(iter(robots))]
-        candidates = LoadPath(*load_columns(beyond.next, (), robot.number_of_tendons))
+        candidates = load_columns(beyond.next, (), robot.number_of_tendons)
 
     with terminal.progress("loading the solver"):
         import notchflex.fit as fitting
 
-    _check_sensor(name for name, *_ in constants)
+    for name, *_ in constants:
+        path_of_value = name.rpartition(":")[2]
+        if path_of_value.startswith("sensor."):
+            _check_known(path_of_value, fitting.SENSOR, f"--fit {name}", "no sensor has this")
     data = {
         label: [read_data(file, robots[label], path, measured, column) for file in files]
         for label, files in sources.items()
@@ -332,28 +300,25 @@ def calibrate(
         analyses, problems = _analyse(fit, beyond, candidates, search.seed, progress)
     if output is not None:
         terminal.note_written(fitting.write_fitted(fit, output, inputs=inputs))
-    _write(fit, analyses, outputs)
+
+    def show(fit: Calibration) -> None:
+        print_calibration(fit)
+        for key, document in analyses.items():
+            _PRINTERS[key](document)
+
+    outputs.write(fit, lambda fit: fitting.calibration_document(fit) | analyses, show)
     for problem in problems:
         terminal.error(problem)
+    code = DONE
     if not fit.converged:
-        terminal.error(f"not converged: {fit.reason}. Try --starts or --bounds.")
-    return BAD_INPUT if problems else DONE if fit.converged else NOT_CONVERGED
-
-
-def _check_sensor(names: Iterable[str]) -> None:
-    """Refuse an unknown constant of the measurement, which is in no robot file."""
-    from notchflex.fit import SENSOR
-
-    for name in names:
-        path = name.rpartition(":")[2]
-        if path.startswith("sensor.") and path not in SENSOR:
-            raise InputError.UNKNOWN_NAME(f"--fit {name}: give one of {', '.join(SENSOR)}.")
+        code = terminal.failed(f"not converged: {fit.reason}. Try --starts or --bounds.")
+    return BAD_INPUT if problems else code
 
 
 def _analyse(
     fit: Calibration,
     beyond: BeyondFit,
-    candidates: LoadPath | None,
+    candidates: tuple[Any, Any] | None,
     seed: int,
     progress: terminal.Progress,
 ) -> tuple[dict[str, Any], list[str]]:
@@ -363,53 +328,34 @@ def _analyse(
         The documents of the results by their keys, and what failed.
     """
     import notchflex.fit as fitting
+    from notchflex import LoadPath
 
-    analyses: dict[str, tuple[str, Callable[..., Any], Callable[[Any], Any], dict[str, Any]]] = {}
-    more: dict[str, Any] = {"seed": seed, "progress": progress}
-    if by := beyond.leave_out:
+    analyses: dict[str, Callable[[], dict[str, Any]]] = {}
+    if beyond.leave_out is not None:
         part = fitting.PHOTOGRAPH if beyond.photograph else None
-        analyses["left_out"] = (
-            "--leave-out", fitting.leave_out, fitting.left_out_document,
-            {"by": by, "photograph": part, **more},
-        )  # fmt: skip
+        analyses["left_out"] = lambda: fitting.left_out_document(
+            fitting.leave_out(
+                fit, by=beyond.leave_out or "pull", photograph=part, seed=seed, progress=progress
+            )
+        )
     if candidates is not None:
-        analyses["next_measurement"] = (
-            "--next", fitting.next_measurement, fitting.next_measurement_document,
-            {"candidates": candidates, "robot": beyond.next_robot, "narrow": beyond.narrow},
-        )  # fmt: skip
+        analyses["next_measurement"] = lambda: fitting.next_measurement_document(
+            fitting.next_measurement(
+                fit, LoadPath(*candidates), robot=beyond.next_robot, narrow=beyond.narrow
+            )
+        )
     if beyond.posterior:
-        analyses["posterior"] = (
-            "--posterior", fitting.sample_posterior, fitting.posterior_document,
-            {"draws": beyond.draws, **more},
-        )  # fmt: skip
+        analyses["posterior"] = lambda: fitting.posterior_document(
+            fitting.sample_posterior(fit, draws=beyond.draws, seed=seed, progress=progress)
+        )
     documents: dict[str, Any] = {}
     problems: list[str] = []
-    for key, (option, analysis, document, arguments) in analyses.items():
+    for key, analysis in analyses.items():
         try:
-            documents[key] = document(analysis(fit, **arguments))
+            documents[key] = analysis()
         except InputError as problem:
-            problems.append(f"{option}: {problem}")
+            problems.append(f"{_OPTIONS[key]}: {problem}")
     return documents, problems
-
-
-def _write(fit: Calibration, analyses: dict[str, Any], outputs: DrawnOutputs) -> None:
-    printers = {
-        "left_out": print_left_out,
-        "next_measurement": print_next,
-        "posterior": print_posterior,
-    }
-
-    def show() -> None:
-        print_calibration(fit)
-        for key, document in analyses.items():
-            printers[key](document)
-
-    def document() -> dict[str, Any]:
-        from notchflex.fit import calibration_document
-
-        return calibration_document(fit) | analyses
-
-    outputs.write(document, show, picture=fit)
 
 
 # Tables
@@ -417,105 +363,84 @@ def _write(fit: Calibration, analyses: dict[str, Any], outputs: DrawnOutputs) ->
 
 def print_calibration(fit: Calibration) -> None:
     """Print constants, their intervals, problems found, and the errors of every part."""
-    from notchflex.fit import NO_PROBLEMS, data_of, diagnose, errors_of_parts
+    from notchflex.fit import NO_PROBLEMS, calibration_document
 
-    console = terminal.output()
-    for label in fit.given:
-        console.print(f"{label}: {', '.join(data_of(fit, label))}", soft_wrap=True)
-    count, searches = fit.counted, len(fit.searches)
+    document = calibration_document(fit)
+    for label, robot in document["robots"].items():
+        terminal.line(f"{label}: {', '.join(robot['data'])}")
+    count, searches = document["numbers_counted"], len(document["searches"])
     words = f"{count} number{'s' * (count > 1)} measured"
-    if totals := len(fit.residuals) - count:
+    if totals := document["numbers_measured"] - count:
         words += f" (and {totals} total angle{'s' * (totals > 1)}, the sum of the notches)"
-    console.print(f"{words}; {searches} search{'es' if searches > 1 else ''}")
-    chi = fit.reduced_chi_squared
-    noise = f"; reduced chi squared {chi:.3g} (about 1: as noise)" if math.isfinite(chi) else ""
-    console.print(f"{type(fit.problem.objective).__name__} {fit.cost:.6g}{noise}")
+    terminal.line(f"{words}; {searches} search{'es' if searches > 1 else ''}")
+    chi = document["reduced_chi_squared"]
+    noise = "" if chi is None else f"; reduced chi squared {chi:.3g} (about 1: as noise)"
+    terminal.line(f"{document['objective']['name']} {fit.cost:.6g}{noise}")
     if fit.drawing:
         names = ", ".join(f"{name} {sd:+.2g}" for name, sd in fit.deviations_of_drawing.items())
-        console.print(f"Deviations within tolerances, in standard deviations: {names}.")
-    console.print()
-    rows: list[dict[str, Any]] = []
-    for name, value in fit.values.items():
-        row: dict[str, Any] = {"constant": name, "value": value, "unit": fit.units[name]}
-        if interval := fit.intervals.get(name):
-            row["95 % interval"] = (interval.lower, interval.upper)
-        rows.append({**row, "deviation": fit.deviations[name]})
-    forms = {"value": ".5g", "95 % interval": ".5g", "deviation": ".2g"}
-    tables.show(tables.records(rows, **forms))
-    console.print()
-    for sentence in diagnose(fit) or (NO_PROBLEMS,):
-        console.print(sentence)
-    console.print()
-    errors = [
-        {
-            "robot": part.robot,
-            "measured": part.title,
-            "rms error": part.error,
-            "between repeats": part.repeats,
-            "unit": part.unit,
-        }
-        for part in errors_of_parts(fit)
-    ]
-    tables.show(tables.records(errors))
+        terminal.show(f"Deviations within tolerances, in standard deviations: {names}.")
+    terminal.line("")
+    tables.show(
+        document["constants"],
+        "name value unit interval_95 standard_deviation",
+        {"value": ".5g", "interval_95": ".5g", "standard_deviation": ".2g"},
+    )
+    terminal.show("", *(document["verdict"] or (NO_PROBLEMS,)), "")
+    tables.show(document["errors"], "robot quantity part rmse repeats unit")
 
 
-def print_left_out(document: dict[str, Any]) -> None:
+def _print_left_out(document: dict[str, Any]) -> None:
     """Print how well constants fitted without a part predict it."""
     errors: list[dict[str, Any]] = []
     constants: list[dict[str, Any]] = []
-    updated: list[dict[str, Any]] = []
     for fold in document["folds"]:
-        head, seen = {"left out": fold["left_out"]}, fold["photograph"] or {}
+        head, seen = {"left_out": fold["left_out"]}, fold["photograph"] or {}
+        after = {one["quantity"]: one["error"] for one in seen.get("errors", ())}
         unsolved: list[dict[str, Any]] = [{"quantity": "not solved"}]
         for error in fold["errors"] if fold["solved"] else unsolved:
-            row = head | {"quantity": error["quantity"], "error": error.get("error")}
-            unit = {"unit": error.get("unit", "")}
-            errors.append(row | {"of fit to all": error.get("error_of_all")} | unit)
-            if fold["before"]:
-                after = {one["quantity"]: one["error"] for one in seen.get("errors", ())}
-                row |= {"in 90 % band": error.get("inside_90")}
-                row |= {"after photograph": after.get(error["quantity"])}
-                updated.append(row | unit)
+            errors.append(head | error | {"after_photograph": after.get(error["quantity"])})
         for name, (mean, size) in fold["before"].items():
-            value = seen.get("values", {}).get(name)
-            row = {"constant": name, "before": f"{mean:.4g} ± {size:.2g}", "photograph": value}
-            constants.append(head | row | {"width of total after / before": seen.get("gain")})
-    console = terminal.output()
-    console.print(f"\nFitted without each {document['by']}, and tried on it (root mean square):")
-    tables.show(tables.records(errors))
+            row = {"constant": name, "before": f"{mean:.4g} ± {size:.2g}"}
+            row |= {"photograph": seen.get("values", {}).get(name)}
+            constants.append(head | row | {"width_of_total_after_/_before": seen.get("gain")})
+    terminal.line(f"\nFitted without each {document['by']}, and tried on it (root mean square):")
+    keys = "left_out quantity error error_of_all inside_90 after_photograph unit"
+    tables.show(errors, keys, {"inside_90": ".0%"})
     if constants:
-        console.print("\nConstants of a robot left out, by prior and others, and by one row of it:")
-        tables.show(tables.records(constants, photograph=".4g"))
-        console.print()
-        tables.show(tables.records(updated, **{"in 90 % band": ".0%"}))
+        terminal.line("\nConstants of a robot left out, by prior and others, and by one row of it:")
+        tables.show(constants, forms={"photograph": ".4g"})
 
 
-def print_next(document: dict[str, Any]) -> None:
+def _print_next(document: dict[str, Any]) -> None:
     """Print how much each candidate would narrow the intervals."""
-    count = len(document["candidates"])
-    shown = np.linspace(1, count, min(count, _MOST_CANDIDATES)).round().astype(int)
     rows: list[dict[str, Any]] = []
-    for row in sorted({*shown.tolist(), document["best"]}):
-        candidate = document["candidates"][row - 1]
+    for row, candidate in enumerate(document["candidates"], start=1):
         loads = {
-            f"{key.partition('_')[0]} {tendon} {key.partition('_')[2]}": value
+            f"{key.partition('_')[0]}_{tendon}_{key.partition('_')[2]}": value
             for key, values in candidate["load"].items()
             for tendon, value in enumerate(values, start=1)
-            if value is not None and math.isfinite(value)
         }
         gain = candidate["gain"] if candidate["converged"] else "not solved"
-        best = "best" if row == document["best"] else ""
-        rows.append({"candidate": row, **loads, "interval after / before": gain, " ": best})
+        rows.append({"candidate": row, **loads, "interval_after_/_before": gain})
     names = ", ".join(document["wanted"]) or "all constants together"
-    terminal.output().print(f"\nNext measurement of {document['robot']}, to narrow {names}:")
-    tables.show(tables.records(rows, **{"interval after / before": ".3f"}))
+    terminal.line(f"\nNext measurement of {document['robot']}, to narrow {names}:")
+    tables.show(rows, forms={"interval_after_/_before": ".3f"}, most=60)
+    terminal.line(f"best: candidate {document['best']}")
 
 
-def print_posterior(document: dict[str, Any]) -> None:
+def _print_posterior(document: dict[str, Any]) -> None:
     """Print mean, interval and convergence of the draws of every constant."""
-    terminal.output().print(
+    terminal.line(
         f"\nPosterior, {document['chains']} chains of {document['draws_per_chain']} draws, "
         f"{document['divergent']} divergent:"
     )
     forms = {"mean": ".5g", "interval_95": ".4g", "standard_deviation": ".2g"}
-    tables.show(tables.records(document["constants"], **forms, effective_draws=".0f"))
+    tables.show(document["constants"], forms=forms | {"effective_draws": ".0f"})
+
+
+_OPTIONS = {"left_out": "--leave-out", "next_measurement": "--next", "posterior": "--posterior"}
+_PRINTERS = {
+    "left_out": _print_left_out,
+    "next_measurement": _print_next,
+    "posterior": _print_posterior,
+}

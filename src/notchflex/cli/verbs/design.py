@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from notchflex import InputError
 from notchflex.cli import tables, terminal
 from notchflex.cli.options import DrawnOutputs, Folder, number
-from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.cli.terminal import DONE
 
 if TYPE_CHECKING:
     from notchflex.designing import Design, DesignFront
@@ -43,35 +43,26 @@ def design(
     outputs.check([spec], folder=("-o", output, file_names()))
     with terminal.progress("loading the solver"):
         import notchflex.designing as designing
-    for option, given, robots in (
-        ("--grid", grid, "with any length"),
-        ("--robust", robust, "as drawn"),
-    ):
-        if front and given:
-            raise InputError.CONFLICT(
-                f"--front is of robots {robots}: leave out {option}, name the point that you "
-                f"choose as `robot` of the design file, and run it again with {option} and without "
-                "--front."
-            )
+    if front and (grid or robust):
+        raise InputError.CONFLICT(
+            "--front is of robots as drawn, with any length: leave out --grid and --robust, name "
+            "the point that you choose as `robot` of the design file, and run it again with them."
+        )
     if front:
         with terminal.progress("spreading over the front") as progress:
             points = designing.design_front(spec, progress=progress)
         if output is not None:
             terminal.note_written(designing.write_front(points, output, inputs=[spec]))
-        outputs.write(lambda: _front_document(points), lambda: _print_front(points), picture=points)
+        outputs.write(points, _front_document, _print_front)
         reason = points.reason
     else:
         with terminal.progress("ranking robots") as progress:
             result = designing.design(spec, robust=robust, grid=grid, progress=progress)
         if output is not None:
             terminal.note_written(designing.write_design(result, output, inputs=[spec]))
-        outputs.write(
-            lambda: designing.design_document(result), lambda: _print(result), picture=result
-        )
+        outputs.write(result, designing.design_document, _print)
         reason = "" if result.converged else result.reason
-    if reason:
-        terminal.error(f"{reason}.")
-    return NOT_CONVERGED if reason else DONE
+    return terminal.failed(f"{reason}.") if reason else DONE
 
 
 def _front_document(front: DesignFront) -> dict[str, Any]:
@@ -82,44 +73,27 @@ def _front_document(front: DesignFront) -> dict[str, Any]:
 
 
 def _print_front(front: DesignFront) -> None:
-    columns = dict(zip(front.titles, front.objectives.T.tolist(), strict=True))
+    columns = dict(zip(front.titles, front.objectives.T, strict=True))
     numbers = map(str, range(1, 1 + len(front.points)))
-    forms = dict.fromkeys(columns, ".5g")
-    tables.show(tables.frame({"point": numbers, **columns}, **forms), gap=2)
+    tables.show({"point": numbers, **columns}, forms=dict.fromkeys(columns, ".5g"))
 
 
 def _print(design: Design) -> None:
+    from notchflex.designing import design_document
     from notchflex.designing.result import numbers
 
+    document = design_document(design)
     wishes = [
-        {
-            "asked of": wish.title,
-            "asked": wish.asked,
-            "achieved": numbers(wish.achieved),
-            "unit": wish.unit,
-            "before": numbers(wish.before),
-            "met": "" if wish.met is None else tables.cell(wish.met),
-        }
-        for wish in design.wishes
+        wish | {key: numbers(wish[key]) for key in ("achieved", "before")}
+        for wish in document["wishes"]
     ]
-    variables = [
-        {
-            "variable": variable.name,
-            "value": variable.value,
-            "unit": variable.unit,
-            "before": variable.before,
-            "limits": (variable.lower, variable.upper),
-        }
-        for variable in design.variables
-    ]
-    console = terminal.output()
-    tables.show(tables.records(wishes, achieved=">", before=">"), gap=2)
+    tables.show(wishes, "quantity asked achieved unit before met", {"achieved": ">", "before": ">"})
+    variables = [{**row, "limits": (row["lower"], row["upper"])} for row in document["variables"]]
     if variables:
-        console.print()
-        tables.show(tables.records(variables, value=".5g", before=".5g", limits="g"), gap=2)
-    console.print()
-    for sentence in design.explanation:
-        console.print(sentence)
-    console.print(
+        terminal.line("")
+        keys = "name value unit before limits"
+        tables.show(variables, keys, {"value": ".5g", "before": ".5g", "limits": "g"})
+    terminal.show("", *design.explanation)
+    terminal.line(
         f"{design.starts} searches, {design.solves} robots solved, {design.gradients} derivatives."
     )

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, make_dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from notchflex import InputError
+from notchflex import InputError, Robot
 from notchflex.cli import terminal
 from notchflex.cli.options import OUTPUT, File, Outputs, Strokes, Tensions, converted, number
 from notchflex.cli.robots import RobotName, Settings, chosen_robot, robot_files
-from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.cli.terminal import DONE
 from notchflex.export.export import build, write
 from notchflex.export.formats import (
     FORMATS,
@@ -23,10 +23,7 @@ from notchflex.export.formats import (
     Subject,
     check_suffix,
 )
-from notchflex.support import TendonCommand, load_columns, parse_number
-
-if TYPE_CHECKING:
-    from notchflex import Robot
+from notchflex.support import load_columns, parse_number
 
 PATTERN = Group("Flat pattern (--dxf, --svg, --pdf)", sort_key=1)
 SOLIDS = Group("Solids (--stl, --step)", sort_key=2)
@@ -139,46 +136,39 @@ def export(
         check_suffix(name, file, f"--{name}")
         FORMATS[name].check_packages(f"--{name}")
     chosen = chosen_robot(robot, settings)
-    if (tension or stroke) and not any(FORMATS[name].bends for name in targets):
+    loaded = bool(tension or stroke)
+    if loaded and not any(FORMATS[name].bends for name in targets):
         bending = " ".join(f"--{name}" for name, kind in FORMATS.items() if kind.bends)
         raise InputError.CONFLICT(
             "--tension, --stroke: no file that was asked for shows the robot under load; leave "
             f"them out, or give {bending}."
         )
-    with terminal.progress(f"exporting {chosen.name}", compiles=bool(tension or stroke)):
-        subject = _subject(chosen, tension, stroke)
-        if subject.path is not None and not subject.path.converged[subject.step]:
-            terminal.error(f"not converged: {subject.path.reason[subject.step]}.")
-            return NOT_CONVERGED
+    with terminal.progress(f"exporting {chosen.name}", compiles=loaded):
+        unloaded = subject = Subject(chosen)
+        if loaded:
+            from notchflex import LoadPath, simulate
+
+            load = LoadPath(*load_columns(tension, stroke, chosen.number_of_tendons))
+            path = simulate(chosen, load)
+            if not path.converged[-1]:
+                return terminal.failed(f"not converged: {path.reason[-1]}.")
+            subject = Subject(chosen, path, len(path) - 1)
         documents: dict[str, Any] = {}
         for name, file in targets.items():
             kind = FORMATS[name].options
-            loads = FORMATS[name].bends and not (straight and kind is SolidOptions)
-            documents[file] = build(name, subject if loads else Subject(chosen), options[kind])
+            bent = FORMATS[name].bends and not (straight and kind is SolidOptions)
+            documents[file] = build(name, subject if bent else unloaded, options[kind])
         written = write(documents)
 
-    def document() -> dict[str, Any]:
+    def document(robot: Robot) -> dict[str, Any]:
         from notchflex.support import document_head, robot_digest
 
         files = [{"file": one.file, "warnings": list(one.warnings), **one.facts} for one in written]
-        return {**document_head(chosen), "robot_hash": robot_digest(chosen), "files": files}
+        return {**document_head(robot), "robot_hash": robot_digest(robot), "files": files}
 
-    outputs.write(document)
+    outputs.write(chosen, document)
     for sentence in dict.fromkeys(text for one in written for text in one.warnings):
         terminal.warn(sentence)
-    if outputs.prints_tables:
-        for one in written:
-            print(f"Wrote {one.file}.")
+    for one in written if outputs.prints_tables else ():
+        print(f"Wrote {one.file}.")
     return DONE
-
-
-def _subject(
-    robot: Robot, tension: tuple[TendonCommand, ...], stroke: tuple[TendonCommand, ...]
-) -> Subject:
-    """Return the robot, solved under its loads where there are any."""
-    if not (tension or stroke):
-        return Subject(robot)
-    from notchflex import LoadPath, simulate
-
-    path = simulate(robot, LoadPath(*load_columns(tension, stroke, robot.number_of_tendons)))
-    return Subject(robot, path, len(path) - 1)

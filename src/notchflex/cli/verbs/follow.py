@@ -15,18 +15,15 @@ from notchflex.cli.options import (
     ExternalLoads,
     PathOutputs,
     StateFile,
-    named_columns,
     number,
+    save_state,
 )
 from notchflex.cli.robots import RobotName, Settings, changed_title, chosen_robot, robot_files
-from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.cli.terminal import DONE
 from notchflex.support import DEGREES
 
 if TYPE_CHECKING:
     from notchflex.control import Following
-
-_MOST_ROWS = 60
-"""More targets than this are thinned in the table."""
 
 
 def _at_least(what: str, least: float = 0.0) -> Parameter:
@@ -84,6 +81,8 @@ def follow(
     outputs.check([*robot_files(robot), targets, *([from_state] if from_state else [])])
     chosen = chosen_robot(robot, settings)
     from notchflex import Load, State, control
+    from notchflex.control import following as files
+    from notchflex.support import write_path_csv
 
     limits = control.Limits(
         tension=(least_tension, most_tension),
@@ -92,7 +91,7 @@ def follow(
         strain=most_strain,
         gap=least_gap,
     )
-    goals = control.read_targets(targets, chosen, named_columns(column))
+    goals = control.read_targets(targets, chosen, dict(column))
     start = None if from_state is None else State.load(from_state)
     with terminal.progress(f"following {len(goals)} targets with {chosen.name}"):
         following = control.follow(
@@ -105,57 +104,42 @@ def follow(
             approach=approach,
             search=control.TargetSearch(near=tolerance, near_angle=math.radians(angle_tolerance)),
         )
-    _write(following, outputs, changed_title(chosen, settings))
+    outputs.write(
+        following,
+        files.following_document,
+        _print,
+        title=changed_title(chosen, settings),
+        csv=lambda result, file: write_path_csv(file, result.path, files.following_columns(result)),
+        save_state=save_state,
+    )
     if not following.path.converged.all():
-        terminal.error(f"not converged: {next(text for text in following.path.reason if text)}.")
-        return NOT_CONVERGED
+        return terminal.failed(f"not converged: {next(filter(None, following.path.reason))}.")
     missed = np.flatnonzero(~np.asarray(following.reached))
     if not len(missed):
         return DONE
-    terminal.error(
+    return terminal.failed(
         f"{len(missed)} of {len(following)} targets not met, first target {missed[0] + 1}: "
         f"{following.reason[missed[0]]}."
     )
-    return NOT_CONVERGED
-
-
-def _write(following: Following, outputs: PathOutputs, title: str) -> None:
-    from notchflex.control.following import following_columns, following_document
-    from notchflex.support import write_path_csv
-
-    def picture() -> Any:
-        from notchflex.plotting import following_picture
-
-        return following_picture(following, title=title)
-
-    outputs.write(lambda: following_document(following), lambda: _print(following), picture=picture)
-    if outputs.csv:
-        write_path_csv(outputs.csv, following.path, following_columns(following))
-    outputs.write_state(following.state)
 
 
 def _print(following: Following) -> None:
     """Print drives, tip and error of every target; of many targets some."""
-    console = terminal.output(terminal.width())
     met = int(np.count_nonzero(following.reached))
-    console.print(f"{following.robot.name}: {met} of {len(following)} targets met", soft_wrap=True)
-    shown, stride = tables.shown_of(len(following), _MOST_ROWS)
-    columns: dict[str, Any] = {"target": [row + 1 for row in shown]}
-    for name, unit in (("tension", "N"), ("stroke", "mm")):
-        drives = getattr(following, name)[shown].T.tolist()
-        for tendon, drive in enumerate(drives, start=1):
-            columns[f"{name}_{unit}" if len(drives) == 1 else f"{name}_{tendon}_{unit}"] = drive
-    tips = following.tip_position[shown].T.tolist()
-    columns |= {f"tip_{axis}_mm": tip for axis, tip in zip("xyz", tips, strict=True)}
-    angle = following.path.total_angle[following.step] * DEGREES
-    columns["angle_deg"] = angle[shown].tolist()
-    for name in ("error_mm", "error_deg"):
-        if getattr(following, name).any():
-            columns[name] = getattr(following, name)[shown].tolist()
+    terminal.line(f"{following.robot.name}: {met} of {len(following)} targets met")
+    columns: dict[str, Any] = {"target": range(1, 1 + len(following))}
+    for name, unit, vectors in (
+        ("tension", "N", following.tension),
+        ("stroke", "mm", following.stroke),
+        ("tip", "mm", following.tip_position),
+    ):
+        labels = "xyz" if name == "tip" else map(str, range(1, 1 + vectors.shape[1]))
+        columns |= {
+            f"{name}_{label}_{unit}": vector
+            for label, vector in zip(labels, vectors.T, strict=True)
+        }
+    columns["angle_deg"] = following.path.total_angle[following.step] * DEGREES
+    columns |= {name: getattr(following, name) for name in ("error_mm", "error_deg")}
     vias = np.diff(following.step, prepend=-1) > 1
-    columns[""] = [("overshoot " if vias[i] else "") + following.code[i] for i in shown]
-    forms = {name: ".4f" for name in columns if name.endswith(("_N", "_mm"))}
-    forms |= {"error_mm": ".2g", "error_deg": ".2g"}
-    console.print(tables.table(tables.frame(columns, **forms)))
-    if stride > 1:
-        terminal.note(f"every {stride}th target is shown; --csv FILE writes all.")
+    columns[""] = np.char.add(np.where(vias, "overshoot ", ""), following.code)
+    tables.show(columns, wide=True, most=60)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from notchflex.cli import terminal
-from notchflex.cli.options import Columns, DrawnOutputs, named_columns
+from notchflex.cli.options import Columns, DrawnOutputs
 
 
 def friction_rig(
@@ -31,12 +31,12 @@ def friction_rig(
 
     from notchflex import fit
 
-    rig = fit.friction_rig(fit.read_friction_rig(data, law, named_columns(column)))
+    rig = fit.friction_rig(fit.read_friction_rig(data, law, dict(column)))
 
-    def show() -> None:
-        for sentence in (data, *rig.words):
-            terminal.output().print(sentence, soft_wrap=sentence == data)
+    def show(rig: fit.FrictionRig) -> None:
+        terminal.line(data)
+        terminal.show(*rig.words)
 
-    outputs.write(lambda: fit.friction_document(rig), show, picture=rig)
+    outputs.write(rig, fit.friction_document, show)
     if rig.readings.ignored:
         terminal.note(f"ignored columns: {', '.join(rig.readings.ignored)}.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import platform
 import re
 import sys
@@ -18,8 +19,14 @@ from notchflex.cli.options import Outputs
 from notchflex.cli.terminal import DONE
 from notchflex.support import install_command, write_document
 
+_REQUIREMENT = re.compile(r"^([\w.-]+)(?:.*extra\s*==\s*[\"']([\w-]+))?")
+"""Name of a package, and the extra that asks for it."""
+
 WRONG_SUMS = 1
 """Exit code where JAX computes wrong numbers."""
+
+_WITH = {"jax": ("jax", "jaxlib")}
+"""Packages that are shown with what they bring."""
 
 DEVELOPMENT = ("test", "dev", "docs", "all")
 """Extras for developers, or of all others together."""
@@ -51,7 +58,7 @@ def doctor(
         terminal.note(f"removed {removed.programs} programs, {removed.size / 1e6:.1f} MB")
     with terminal.progress("computing a known sum"):
         report = examination()
-    outputs.write(lambda: report, lambda: _print(report))
+    outputs.write(report, dict[str, Any], _print)
     if report["healthy"]:
         return DONE
     canary = report["canary"]
@@ -99,92 +106,67 @@ def examination() -> dict[str, Any]:
     }
 
 
-def requirements(lines: Iterable[str] | None = None) -> dict[str, list[str]]:
-    """Return the packages that each extra asks for; "" has what every installation needs.
-
-    Example:
-        >>> lines = ["numpy>=2", "h5py>=3; extra == 'data'", "notchflex[data]; extra == 'all'"]
-        >>> requirements(lines)
-        {'': ['numpy'], 'data': ['h5py'], 'all': []}
-    """
-    if lines is None:
-        try:
-            lines = metadata.requires("notchflex") or []
-        except metadata.PackageNotFoundError:
-            lines = []
-    report: dict[str, list[str]] = {"": []}
-    for line in lines:
-        what, _, when = line.partition(";")
-        name = re.match(r"[\w.-]+", what.strip())
-        extra = re.search(r"extra\s*==\s*[\"']([\w-]+)[\"']", when)
-        packages = report.setdefault(extra[1] if extra else "", [])
-        if name and name[0] != "notchflex":
-            packages.append(name[0])
+def requirements() -> dict[str, list[str]]:
+    """Return the packages that each extra asks for; "" has what every installation needs."""
+    report: dict[str, list[str]] = {}
+    for line in metadata.requires("notchflex") or []:
+        name, extra = _REQUIREMENT.findall(line)[0]
+        if name != "notchflex":
+            report.setdefault(extra, []).append(name)
     return report
 
 
 def _versions(packages: Iterable[str]) -> dict[str, str | None]:
     """Version of each package, None where it is not installed; JAX's library too."""
-    names = list(dict.fromkeys(packages))
-    if "jax" in names:
-        names.insert(names.index("jax") + 1, "jaxlib")
-    return {name: _version(name) for name in names}
-
-
-def _version(name: str) -> str | None:
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return None
+    names = [name for package in packages for name in _WITH.get(package, (package,))]
+    installed: dict[str, str | None] = dict.fromkeys(names)
+    for name in names:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            installed[name] = metadata.version(name)
+    return installed
 
 
 def _extras() -> dict[str, Any]:
     return {
         extra: {
             "packages": (versions := _versions(packages)),
-            "installed": all(version is not None for version in versions.values()),
+            "installed": None not in versions.values(),
             "install": install_command(extra),
         }
         for extra, packages in requirements().items()
-        if extra and extra not in DEVELOPMENT and packages
+        if extra and extra not in DEVELOPMENT
     }
 
 
 def _print(report: dict[str, Any]) -> None:
     device, cache = report["device"], report["compile_cache"]
-    kept = "compiled in every process, not kept"
-    if cache["folder"]:
-        kept = (
-            f"{cache['programs']} compiled, {cache['bytes'] / 1e6:.1f} MB of at most "
-            f"{cache['most_bytes'] / 1e6:.0f}, in {cache['folder']}"
-        )
-    versions = report["packages"].items()
     sections = {
         f"notchflex {report['version']}": {
             "python": f"{report['python']}, {report['executable']}",
             "system": report["system"],
-            **{name: version or "not installed" for name, version in versions},
+            **report["packages"],
         },
         "\nJAX": {
             "device": f"{device['kind']}: {', '.join(device['names'])}",
             "floats": "64 bits" if device["x64"] else "32 bits",
             "backend": _BACKENDS[report["backend"]["name"]].format(**report["backend"]),
             "known sum": "right" if report["healthy"] else "WRONG",
-            "programs": kept,
+            "programs": f"{cache['programs']} compiled, {cache['bytes'] / 1e6:.1f} MB of at most "
+            f"{cache['most_bytes'] / 1e6:.0f}, in {cache['folder'] or 'no folder: not kept'}",
             "shipped": f"{cache['shipped']} programs of typical calls; only a wheel carries them",
         },
         "\nExtras": {name: _extra_words(extra) for name, extra in report["extras"].items()},
     }
     for title, rows in sections.items():
-        terminal.output().print(title, style="bold")
-        names = [name.ljust(14) for name in rows]
-        tables.show([("", names, ""), ("", rows.values(), "")], gap=2, colour="cyan")
+        terminal.line(title, "bold")
+        tables.show({"": [name.ljust(14) for name in rows], " ": rows.values()}, colour="cyan")
 
 
 def _extra_words(extra: dict[str, Any]) -> str:
-    versions = [f"{name} {version}" for name, version in extra["packages"].items() if version]
-    missing = [name for name, version in extra["packages"].items() if not version]
-    return f"{', '.join(missing)} missing: {extra['install']}" if missing else ", ".join(versions)
+    missing = [name for name, version in extra["packages"].items() if version is None]
+    if missing:
+        return f"{', '.join(missing)} missing: {extra['install']}"
+    return ", ".join(f"{name} {version}" for name, version in extra["packages"].items())
 
 
 def canary() -> tuple[float, float]:
@@ -224,35 +206,16 @@ def bench(
 
         rows = timing.measured(only, lambda case: progress("timing", 0, 0, case))
 
-    def show() -> None:
+    def show(document: dict[str, Any]) -> None:
         lines: list[dict[str, Any]] = []
-        for row in rows:
-            time = {"time": _time(row.us), "LU135": row.lu135, "target": row.target}
-            lines.append({"what": row.name, **time})
-            lines += [{"what": f"  {row.note}"}] if row.note else []
-        peers = [
-            {
-                "others": name,
-                "what": what,
-                "time": " to ".join(_time(1e3 * end) for end in dict.fromkeys(ms)),
-            }
-            for name, what, ms in timing.PEERS
-        ]
-        for table in (lines, peers):
-            tables.show(tables.records(table, time=">"), gap=2, colour="cyan")
-            print()
-        print(f"Others: {timing.MEASURED}.")
+        for row in document["rows"]:
+            lines += [row, *([{"name": f"  {row['note']}"}] if row["note"] else [])]
+        tables.show(lines, "name us lu135 target", {"us": ".4g"}, colour="cyan")
+        terminal.line("")
+        tables.show(document["peers"]["rows"], colour="cyan")
+        terminal.show(f"Others: {timing.MEASURED}.")
 
-    outputs.write(lambda: timing.bench_document(rows), show)
-
-
-def _time(us: float | None) -> str:
-    if us is None:
-        return ""
-    for unit, size in (("s", 1e6), ("ms", 1e3)):
-        if us >= size:
-            return f"{us / size:.3g} {unit}"
-    return f"{us:.3g} us"
+    outputs.write(timing.bench_document(rows), dict[str, Any], show)
 
 
 def completion(

@@ -18,7 +18,6 @@ from notchflex.cli.options import (
     ShortFile,
     converted,
     integer,
-    named_columns,
     number,
 )
 from notchflex.cli.robots import Settings, chosen_robot, robot_files
@@ -125,19 +124,30 @@ def measure(
             after the first, from the first on [deg].
         write_robot: With `--cut`: write the robot as it was cut to this file.
     """
-    if cut and (exif or loads is not None or pattern is not None):
+    if cut and (exif or loads or pattern or uncertainty or correct):
         raise InputError.CONFLICT(
-            "--cut: straight robots have no loads; leave out --loads, --pattern and --exif"
+            "--cut: straight robots have no loads, no angles and no page; leave out --loads, "
+            "--pattern, --exif, --uncertainty and --correct"
         )
     if not cut and (turn or write_robot is not None):
         raise InputError.MISSING_VALUE("--turn and --write-robot need --cut")
-    if cut and uncertainty is not None:
-        raise InputError.CONFLICT("--cut: --uncertainty is of angles; leave it out")
-    _check_page(correct, cut, port, open_browser)
-    inputs = [*photographs, *robot_files(robot), *([] if loads is None else [loads])]
+    if not correct and (port is not None or open_browser):
+        raise InputError.MISSING_VALUE("--port and --open need --correct")
+    if correct:
+        check_installed()
+        check_host(HOST, port or PORT)
+    from notchflex.photographs.overlay import overlay_names
+
+    if overlays is None and output not in (None, "-"):
+        overlays = f"{Path(output).with_suffix('')}-overlays"
     written = {"-o": output, "--write-robot": write_robot}
-    files = _check_files(photographs, inputs, overlays, written, outputs)
-    chosen = chosen_robot(robot, settings)
+    written = {option: file for option, file in written.items() if file is not None}
+    files = outputs.check(
+        [*photographs, *robot_files(robot), *([] if loads is None else [loads])],
+        files=written,
+        folder=("--overlays", overlays, overlay_names(photographs)),
+    )
+    chosen, done = chosen_robot(robot, settings), True
     with terminal.progress("measuring") as progress:
         from notchflex import photographs as reading
 
@@ -146,61 +156,30 @@ def measure(
             "board": None if board is None else reading.board_of(board),
         }
         if cut:
-            as_cut = reading.measure_cut(
+            measured = reading.measure_cut(
                 photographs, chosen, turn_deg=turn, progress=progress, **options
             )
-            return _write_cut(as_cut, outputs, written, files)
-        if uncertainty is not None:
-            options["uncertainty_deg"] = uncertainty
-        measured = reading.measure(
-            photographs,
-            chosen,
-            loads=loads,
-            pattern=pattern,
-            exif=exif,
-            columns=named_columns(column),
-            progress=progress,
-            **options,
-        )
-    done = True
-    if correct:
+        else:
+            if uncertainty is not None:
+                options["uncertainty_deg"] = uncertainty
+            measured = reading.measure(
+                photographs,
+                chosen,
+                loads=loads,
+                pattern=pattern,
+                exif=exif,
+                columns=dict(column),
+                progress=progress,
+                **options,
+            )
+    if correct and isinstance(measured, reading.MeasuredPhotographs):
         measured, done = _corrected(measured, options, port or PORT, open_browser)
-    _write(measured, outputs, output, files)
-    if not done:
-        return INTERRUPTED
-    return NOT_CONVERGED if measured.refused else DONE
-
-
-def _check_page(correct: bool, cut: bool, port: int | None, open_browser: bool) -> None:
-    """Check the options of the page before anything is measured."""
-    if correct and cut:
-        raise InputError.CONFLICT("--correct: notches as cut (--cut) have no page; leave it out")
-    if not correct and (port is not None or open_browser):
-        raise InputError.MISSING_VALUE("--port and --open need --correct")
-    if correct:
-        check_installed()
-        check_host(HOST, port or PORT)
-
-
-def _check_files(
-    photographs: Sequence[str],
-    inputs: Sequence[str | Path],
-    overlays: str | None,
-    written: dict[str, str | None],
-    outputs: Outputs,
-) -> Sequence[Path]:
-    """Check the files of a call before anything is measured; return those of the overlays."""
-    from notchflex.photographs.overlay import overlay_names
-
-    output = written["-o"]
-    if overlays is None and output not in (None, "-"):
-        overlays = f"{Path(str(output)).with_suffix('')}-overlays"
-    named = {option: target for option, target in written.items() if target is not None}
-    folder = ("--overlays", overlays, overlay_names(photographs))
-    files = outputs.check(inputs, files=named, folder=folder)
-    for option, target in named.items():
-        check_output(target, option, inputs=inputs)
-    return files
+    _write_overlays(measured, files)
+    outputs.write(
+        measured, lambda measured: measured.document(), None if "-" in written.values() else _print
+    )
+    code = _report(measured, written)
+    return code if done else INTERRUPTED
 
 
 def _corrected(
@@ -230,62 +209,47 @@ def _corrected(
     return corrected, page.done
 
 
-def _write_overlays(
-    measured: MeasuredPhotographs | MeasuredCut, files: Sequence[Path], *lines: Any
-) -> None:
+def _write_overlays(measured: MeasuredPhotographs | MeasuredCut, files: Sequence[Path]) -> None:
     """Write each photograph with its fitted outline."""
-    from notchflex.photographs.overlay import write_overlay
+    from notchflex.photographs import MeasuredCut
+    from notchflex.photographs.overlay import cut_lines, write_overlay
     from notchflex.photographs.reading import read_photograph
 
+    lines = cut_lines(measured) if isinstance(measured, MeasuredCut) else []
     for file, photograph in zip(files, measured.photographs, strict=False):
         file.parent.mkdir(exist_ok=True)
-        write_overlay(file, read_photograph(photograph.source), photograph, *lines)
+        write_overlay(file, read_photograph(photograph.source), photograph, lines)
 
 
-def _write(
-    measured: MeasuredPhotographs, outputs: Outputs, output: str | None, files: Sequence[Path]
-) -> None:
-    _write_overlays(measured, files)
-    if output is not None and measured.measured:
-        measured.write_csv(output)
-    outputs.write(
-        measured.document,
-        lambda: None if output == "-" else _print("angles of notches", measured),
-    )
-    for photograph in measured.refused:
-        terminal.warn(f"{photograph.source} is refused: {photograph.reason}.")
-    if output is not None and not measured.measured:
-        terminal.error(f"no photograph was measured; {output} is not written.")
-    elif output is not None and not measured.loads:
-        terminal.note("calibrate needs loads too: give --loads, --pattern or --exif.")
+def _report(measured: MeasuredPhotographs | MeasuredCut, written: dict[str, str]) -> int:
+    """Write files and what is missing; return the exit code."""
+    from notchflex.photographs import MeasuredCut
 
-
-def _write_cut(
-    cut: MeasuredCut, outputs: Outputs, written: dict[str, str | None], overlays: Sequence[Path]
-) -> int:
-    """Write and print the notches as they were cut; return the exit code."""
-    from notchflex.photographs.overlay import cut_lines
-
-    _write_overlays(cut, overlays, cut_lines(cut))
-    targets = [target for target in written.values() if target is not None]
-    shown = not cut.reason and "-" not in targets
-    outputs.write(cut.document, lambda: _print("notches as cut", cut) if shown else None)
-    if cut.reason:
-        terminal.warn(f"the cut is refused: {cut.reason}.")
-        if targets:
-            terminal.error(f"nothing was measured; not written: {', '.join(targets)}.")
+    is_cut = isinstance(measured, MeasuredCut)
+    if is_cut:
+        refused = {"the cut": measured.reason} if measured.reason else {}
+    else:
+        refused = {photograph.source: photograph.reason for photograph in measured.refused}
+    for name, reason in refused.items():
+        terminal.warn(f"{name} is refused: {reason}.")
+    if not measured.measured:
+        if written:
+            terminal.error(f"nothing was measured; not written: {', '.join(written.values())}.")
         return NOT_CONVERGED
-    for target, write in zip(written.values(), (cut.write_csv, cut.write_robot), strict=True):
-        if target is not None:
-            write(target)
-    if len(cut.photographs) == 1:
+    if "-o" in written:
+        measured.write_csv(written["-o"])
+        if not is_cut and not measured.loads:
+            terminal.note("calibrate needs loads too: give --loads, --pattern or --exif.")
+    if is_cut and "--write-robot" in written:
+        measured.write_robot(written["--write-robot"])
+    if is_cut and len(measured.photographs) == 1:
         terminal.note("depths need a second photograph, with the robot turned by some 20 deg.")
-    return DONE
+    return NOT_CONVERGED if refused else DONE
 
 
-def _print(what: str, measured: MeasuredPhotographs | MeasuredCut) -> None:
+def _print(measured: MeasuredPhotographs | MeasuredCut) -> None:
     """Print the columns of the CSV."""
-    columns = measured.columns()
-    if any(len(values) for values in columns.values()):
-        terminal.output().print(f"{measured.robot.name}: {what}, with standard deviations (sd)")
-        tables.show(tables.frame(columns, notch=".0f"))
+    if measured.measured:
+        what = "notches as cut" if "depth_mm" in measured.columns() else "angles of notches"
+        terminal.line(f"{measured.robot.name}: {what}, with standard deviations (sd)")
+        tables.show(measured.columns(), forms={"notch": ".0f"})

@@ -37,8 +37,7 @@ _SECTIONS = ("notch", "tendon", "material", "friction")
 def robots() -> None:
     """List the robots that come with the program."""
     names = list_robots()
-    columns = [("robot", names, ""), ("what it is", names.values(), "")]
-    tables.show(columns, gap=2, colour="cyan")
+    tables.show({"robot": names, "what_it_is": names.values()}, colour="cyan")
 
 
 def schema(*, design: bool = False, sweep: bool = False) -> None:
@@ -172,10 +171,6 @@ def new(
     else:
         text = _asked(path.stem, answers, set_, yes)
         following = "Look at it with: notchflex show {}"
-    if path.exists():
-        raise InputError.FILE_UNWRITABLE(
-            f"{path} appeared while you answered; choose another name."
-        )
     write_text(path, text)
     print(f"Wrote {path}. {following.format(shlex.quote(str(path)))}")
 
@@ -191,9 +186,9 @@ def _asked(name: str, answers: Answers, settings: tuple[str, ...], accept_defaul
         warnings.simplefilter("ignore", InputWarning)
         robot = interview.conduct(name)
     warn_unlikely(robot)
-    if unused := [option for option in values if option not in interview.used]:
+    for option in sorted(interview.unused):
         raise InputError.UNKNOWN_NAME(
-            f"{unused[0]}: no part of this robot asks for it, or another option does."
+            f"{option}: no part of this robot asks for it, or another option does."
         )
     return commented(robot_text(robot), interview.answered)
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from cyclopts import Parameter
 
 from notchflex import InputError
@@ -15,18 +14,18 @@ from notchflex.cli.options import (
     Columns,
     ExternalLoads,
     TableOutputs,
+    as_csv,
     converted,
-    named_columns,
     number,
 )
 from notchflex.cli.robots import RobotName, Settings, chosen_robot, robot_files
-from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.cli.terminal import DONE
 
 if TYPE_CHECKING:
     from notchflex.sensing import SensedForce
 
-_MOST_ROWS = 60
-"""More readings than this are thinned in the table."""
+_NOT_SHOWN = ("_sd_N", "averaged_as", "contact_p", "misfit")
+"""Columns of the CSV that the table leaves out."""
 
 Deviation = Annotated[float, number("a finite standard deviation, 0 or more", "SD", least=0.0)]
 
@@ -82,9 +81,9 @@ def sense(
     """
     outputs.check([*robot_files(robot), data])
     chosen = chosen_robot(robot, settings)
-    from notchflex.sensing.tables import read_sensor_table
+    from notchflex.sensing import tables as files
 
-    readings = read_sensor_table(data, chosen, beside, named_columns(column))
+    readings = files.read_sensor_table(data, chosen, beside, dict(column))
     with terminal.progress("finding the force") as progress:
         from notchflex import sensing
         from notchflex.support import ExternalLoad
@@ -101,7 +100,7 @@ def sense(
             largest=largest,
             progress=progress,
         )
-    _write(sensed, outputs)
+    outputs.write(sensed, files.sensed_document, _print, csv=as_csv(files.sensed_columns))
     if sensed.unexplained.any():
         first, count = int(sensed.unexplained.argmax()) + 1, int(sensed.unexplained.sum())
         terminal.warn(
@@ -111,40 +110,24 @@ def sense(
         )
     if not sensed.reason:
         return DONE
-    terminal.error(f"not converged: {sensed.reason}. The readings after it are left out.")
-    return NOT_CONVERGED
-
-
-def _write(sensed: SensedForce, outputs: TableOutputs) -> None:
-    from notchflex.sensing.tables import sensed_columns, sensed_document
-
-    outputs.write(
-        lambda: sensed_document(sensed),
-        lambda: _print(sensed),
-        columns=lambda: sensed_columns(sensed),
-        picture=sensed,
-    )
+    return terminal.failed(f"not converged: {sensed.reason}. The readings after it are left out.")
 
 
 def _print(sensed: SensedForce) -> None:
-    console = terminal.output()
+    from notchflex.sensing.tables import sensed_columns
+
     where = "the tip" if sensed.place is None else f"body {sensed.place}"
-    console.print(f"Force on {where} of {sensed.robot.name}, 95 % intervals", soft_wrap=True)
-    shown, stride = tables.shown_of(len(sensed), _MOST_ROWS)
-    columns: list[tuple[str, Any, str]] = [("reading", np.add(shown, 1), "d")]
-    # What else than noise makes an interval as wide as it is.
-    marks = np.where(sensed.limited, "open", np.where(sensed.stuck, "stuck", ""))
-    for which, name in enumerate(sensed.components):
-        ends = {name: sensed.force, "low": sensed.low, "high": sensed.high}
-        columns += [(f"{head}\nN", end[shown, which], ".4f") for head, end in ends.items()]
-        columns.append(("", marks[shown, which], ""))
-    contact = np.where(sensed.contact, "yes", "")
-    console.print(tables.table([*columns, ("contact", contact[shown], "")]))
-    if stride > 1:
-        console.print(f"{len(shown)} of {len(sensed)} readings; --csv and --json have all")
+    terminal.line(f"Force on {where} of {sensed.robot.name}, 95 % intervals")
+    columns = {
+        name: column
+        for name, column in sensed_columns(sensed).items()
+        if not name.endswith(_NOT_SHOWN)
+    }
+    forms = {name: ".4f" for name in columns if name.endswith("_N")}
+    tables.show(columns, forms=forms, wide=True, most=60)
     if sensed.limited.any():
         terminal.note(
-            f"open: the interval ends at the range of the search, {sensed.largest:.3g} N."
+            f"limited: the interval ends at the range of the search, {sensed.largest:.3g} N."
         )
     for sentence in sensed.not_observable:
         terminal.note(f"{sentence}.")

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from dataclasses import dataclass
-from itertools import groupby, pairwise
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from cyclopts import Parameter
 
@@ -14,27 +12,16 @@ from notchflex import InputError, Robot
 from notchflex.cli import tables, terminal
 from notchflex.cli.options import OUTPUT, File, Outputs
 from notchflex.cli.robots import RobotName, Settings, changed_title, chosen_robot, robot_files
-from notchflex.cli.tables import NO_NUMBER, Columns, tolerance_lines, wrapped
-from notchflex.robot.part import unit_of
-from notchflex.support import DEGREES, PAPER, fields_of, is_unsaid, to_table
+from notchflex.support import DEGREES, PAPER
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from notchflex import Band
     from notchflex.analysis.bands import ClosingBands
 
-NEVER, NOT_FOUND = "never", "not found"
 _MEANINGS = {
-    NEVER: "no tension closes the notch",
-    NOT_FOUND: "the solver did not converge at the tensions in question, so the notch may close; "
+    "never": "no tension closes the notch",
+    "not found": "the solver did not converge at the tensions in question, so the notch may close; "
     "`notchflex simulate` shows how far it bends",
 }
-_SHORTER = {"precurvature_deg": "precurved_deg", "direction_deg": "toward_deg"}
-"""Heads for what every notch has, so that there is room for what is its own."""
-
-_USUAL = (None, "rigid", "outer")
-"""Values that a table leaves out where all notches have them."""
 
 
 @Parameter(name="*", group=OUTPUT)
@@ -70,15 +57,12 @@ def show(
         from notchflex.support import document_head, unchecked_dimensions
 
         table = closing(chosen)
-        notches = notch_table(chosen, table)
+        document: dict[str, Any] = document_head(chosen)
+        document["notches"] = notch_table(chosen, table)
     for sentence in unchecked_dimensions(chosen):
         terminal.warn(sentence)
-    if outputs.plot is not None:
-        from notchflex.plotting import dimensioned_figure, save
-
-        save(dimensioned_figure(chosen), outputs.plot)
     if outputs.prints_tables:
-        print_robot(chosen, changed_title(chosen, settings), notches)
+        _print(chosen, changed_title(chosen, settings), document["notches"])
     bands = None
     if outputs.prints_tables or outputs.json is not None:
         with terminal.progress("drawing robots within the tolerances"):
@@ -86,176 +70,93 @@ def show(
                 bands = closing_bands(chosen, table)
             except InputError as problem:
                 terminal.warn(f"no bands: {problem}")
-    more = {} if bands is None else {"tolerances": closing_document(bands)}
-    outputs.write(lambda: {**document_head(chosen), "notches": notches, **more})
+        if bands is not None:
+            document["tolerances"] = closing_document(bands)
+
+    def draw(robot: Robot, target: str, _: object) -> None:
+        from notchflex.plotting import dimensioned_figure, save
+
+        save(dimensioned_figure(robot), target)
+
+    outputs.write(chosen, lambda _: document, plot=draw)
     if bands is not None and outputs.prints_tables:
-        terminal.output().print("\n" + "\n".join(closing_lines(chosen, bands)))
+        _print_accuracy(chosen, bands, document["tolerances"])
 
 
-def print_robot(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:
-    """Print tube, parts, and how the notches are cut and close."""
-    console = terminal.output()
-    tube = robot.tube
-    console.print(title, style="bold", soft_wrap=True)
-    console.print(
-        f"tube      outer diameter {tube.outer_diameter:g} mm, inner diameter "
-        f"{tube.inner_diameter:g} mm, length {robot.geometry.length:g} mm"
-    )
-    for part in ("material", "friction"):
-        console.print(_summary(robot, part))
-    for index, tendon in enumerate(robot.tendon, start=1):
-        number = f" {index}" if len(robot.tendon) > 1 else ""
-        end = robot.number_of_notches if tendon.end_body is None else tendon.end_body
-        console.print(
-            f"tendon{number}".ljust(10)
-            + f"radius {tendon.radius:g} mm, direction {tendon.direction_deg:g} deg, "
-            f"{tendon.path}, ends behind notch {end}"
-        )
-    console.print()
-    for table in (*description_tables(robot), closing_table(notches)):
-        console.print(table)
-        console.print()
-    tables.say(closing_legend(notches))
-
-
-def description_tables(robot: Robot) -> list[Table]:
-    """Return how the notches are cut, with one table for each kind; equal notches share a row."""
+def _print(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:
+    """Print the parts of a robot, in what its notches differ, and how they close."""
     from notchflex.analysis.closing_loads import named_values
 
-    kinds: dict[str, dict[tuple[tuple[str, Any], ...], list[int]]] = {}
-    for number, notch in enumerate(robot.notches, start=1):
-        values = named_values(notch)
-        of_kind = kinds.setdefault(values.pop("kind"), {})
-        of_kind.setdefault(tuple(values.items()), []).append(number)
-    result: list[Table] = []
-    for kind, of_kind in kinds.items():
-        columns = [(f"{kind}\nnotch", [run_of(numbers) for numbers in of_kind.values()], ">")]
-        for cells in zip(*of_kind, strict=True):  # the same key of all different notches
-            if any(value not in _USUAL and not is_unsaid(name, value) for name, value in cells):
-                name: str = cells[0][0]
-                head = _SHORTER.get(name, name).replace("_", "\n")
-                columns.append((head, [_value(value) for _, value in cells], ">"))
-        result.append(_spaced(columns))
-    return result
-
-
-def run_of(numbers: list[int]) -> str:
-    """Write rising numbers shortly.
-
-    Example:
-        >>> run_of([1, 2, 3, 7]), run_of([1, 3, 5, 7]), run_of([2, 6])
-        ('1–3, 7', '1, 3 … 7', '2, 6')
-    """
-    steps = {after - before for before, after in pairwise(numbers)}
-    if len(numbers) > 3 and len(steps) == 1 and steps != {1}:
-        return f"{numbers[0]}, {numbers[1]} … {numbers[-1]}"
-    runs = groupby(enumerate(numbers), key=lambda item: item[1] - item[0])
-    ends = [[number for _, number in run] for _, run in runs]
-    return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]}–{r[-1]}" for r in ends)
-
-
-def closing_table(notches: list[dict[str, Any]]) -> Table:
-    """Return the sections and the closing of all notches; columns without a number are left out."""
-    several = len(notches[0]["moment_arm_mm"]) > 1
+    terminal.line(title, "bold")
+    _, *parts, _ = repr(robot).splitlines()
+    parts.append(f"length    {robot.geometry.length:g} mm")
+    terminal.show(*(tables.wrapped(part.strip(), " " * 10) for part in parts), "")
+    values = [named_values(notch) for notch in robot.notches]
+    names = dict.fromkeys(name for row in values for name in row)
+    if differ := [name for name in names if len({row.get(name) for row in values}) > 1]:
+        numbers = {"notch": [str(row["notch"]) for row in notches]}
+        columns = {name: [row.get(name) for row in values] for name in differ}
+        tables.show(numbers | columns, forms={"notch": ">"})
+        print()
     rows = [
         {
+            **row,
             "notch": str(row["notch"]),
-            "A\nmm²": row["area_mm2"],
-            "y\nmm": row.get("centroid_mm"),
-            "I\nmm⁴": row["second_moment_mm4"],
-            "tendon": row["closing_tendon"] if several else None,
-            "arm\nmm": row["moment_arm_mm"][row["closing_tendon"] - 1],
-            "closing\ndeg": row["closing_angle_deg"],
-            "tension\nN": row["closing_status"]
+            "arm_mm": row["moment_arm_mm"][row["closing_tendon"] - 1],
+            "closing_tension_N": row["closing_status"]
             if row["closing_status"] in _MEANINGS
             else f"{row['closing_tension_N']:.3f}",
-            "strain\n%": 100.0 * row["closing_outer_strain"],
-            "peak\n%": 100.0 * row["closing_peak_strain"],
+            "outer_strain_%": 100.0 * row["closing_outer_strain"],
+            "peak_strain_%": 100.0 * row["closing_peak_strain"],
         }
         for row in notches
     ]
-    forms = {"notch": ">", "tension\nN": ">", "I\nmm⁴": ".4e", "closing\ndeg": ".2f"}
-    forms |= dict.fromkeys(("A\nmm²", "y\nmm", "arm\nmm"), ".4f")
-    forms |= dict.fromkeys(("strain\n%", "peak\n%"), ".2f")
-    return _spaced(tables.records(rows, **forms))
-
-
-def closing_legend(notches: list[dict[str, Any]]) -> str:
-    """Return what the columns of the closing table mean."""
-    pulled = "the tendon" if len(notches[0]["moment_arm_mm"]) == 1 else "the tendon named"
-    words, strains = "A, I: area and second moment", ""
-    if any("centroid_mm" in row for row in notches):
-        words = "A, y, I: area, centroid (from the tube axis toward the spine) and second moment"
-        strains = (
-            ", and the strain there of the outer fibre (Pacheco 2021, eq. 16) and of the farthest "
-            "fibre (peak)"
+    tendon = "closing_tendon" if robot.number_of_tendons > 1 else ""
+    tables.show(
+        rows,
+        "notch area_mm2 centroid_mm second_moment_mm4 " + tendon + " arm_mm closing_angle_deg "
+        "closing_tension_N outer_strain_% peak_strain_%",
+        {"arm_mm": ".4f", "centroid_mm": ".4f", "notch": ">", "closing_tension_N": ">"},
+    )
+    statuses = {row["closing_status"] for row in notches}
+    print()
+    terminal.show(
+        tables.wrapped(
+            _LEGEND
+            + "".join(
+                f" {status}: {text}." for status, text in _MEANINGS.items() if status in statuses
+            )
         )
-    shown = {row["closing_status"] for row in notches}
-    return (
-        f"{words} of what the cut leaves, where it is weakest. arm: moment arm of {pulled}. "
-        f"Closing: angle of the notch and tension of that tendon pulled alone from rest{strains}."
-        + "".join(f" {status}: {text}." for status, text in _MEANINGS.items() if status in shown)
     )
 
 
-def closing_lines(robot: Robot, bands: ClosingBands) -> list[str]:
-    """Return the effect of tolerances on closing and a typical load, and what was assumed."""
-    first, last = int(bands.tension.median.argmin()), int(bands.tension.median.argmax())
-    words = [
-        f"notch {bands.notches[step]} closes at {_range(bands.tension, '.3g', step=step)} N and "
-        f"{_range(bands.angle, '.1f', DEGREES, step)} deg"
-        for step in dict.fromkeys((first, last))
-    ]
+_LEGEND = (
+    "area, second moment and centroid (from the tube axis toward the spine): of what the cut "
+    "leaves, where it is weakest. arm: moment arm of the tendon with the longest, whose tension, "
+    "pulled alone from rest, closes the notch. Strains at closing: of the outer fibre (Pacheco "
+    "2021, eq. 16) and of the farthest one (peak)."
+)
+
+
+def _print_accuracy(robot: Robot, bands: ClosingBands, document: dict[str, Any]) -> None:
+    """Print the effect of tolerances on closing and a typical load, and what was assumed."""
+    columns: dict[str, Any] = {"notch": map(str, document["notches"])}
+    for name in ("closing_tension_N", "closing_angle_deg"):
+        ends = document[name]
+        columns[name] = list(zip(ends["low"], ends["high"], strict=True))
+    terminal.show("", f"Accuracy: 5 to 95 % of {document['draws']} draws within the tolerances")
+    tables.show(columns, forms={"notch": ">"})
+    angle = document["total_angle_deg"]
     pulled = f" of tendon {bands.tendon}" if robot.number_of_tendons > 1 else ""
     text = (
-        f"Accuracy: of {bands.bands.draws} draws within the tolerances, 5 to 95 % give: "
-        f"{'; '.join(words)}; total angle at {bands.load:.3g} N{pulled}: "
-        f"{_range(bands.total_angle, '.1f', DEGREES)} deg."
+        f"total angle at {bands.load:.3g} N{pulled}: {angle['low']:.1f} to {angle['high']:.1f} deg."
     )
     if bands.shares:
         parts = sorted(bands.shares.items(), key=lambda part: -part[1])
         words = [f"{name} {100.0 * share:.0f} %" for name, share in parts if share > 0.005]
-        text += f" Of the variance of that angle: {', '.join(words)}."
+        text += f" Of its variance: {', '.join(words)}."
     if math.isfinite(bands.by_depth):
         change = abs(bands.by_depth) * DEGREES
         text += f" 10 µm of depth in all notches change that angle by {change:.2g} deg."
-    return [*wrapped(text), *tolerance_lines(bands.bands)]
-
-
-def _range(band: Band, form: str, scale: float = 1.0, step: int | None = None) -> str:
-    ends = [band.low, band.high] if step is None else [band.low[step], band.high[step]]
-    low, high = (float(end) * scale for end in ends)
-    if math.isinf(high):
-        return f"{low:{form}} or more" if math.isfinite(low) else "no"
-    return f"{low:{form}} to {high:{form}}"
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, tuple):
-        return " ".join(f"{number:g}" for number in cast("tuple[float, ...]", value))
-    return tables.cell(value, "g")
-
-
-def _spaced(columns: Columns) -> Table:
-    """Make a table whose columns stand two characters apart, or one where it would be too wide."""
-    shown = [
-        one for one in columns if any(tables.cell(value, "g") != NO_NUMBER for value in one[1])
-    ]
-    wide = tables.table(shown, gap=2)
-    return wide if tables.width_of(wide) <= terminal.NARROW else tables.table(shown)
-
-
-def _summary(robot: Robot, part: str) -> str:
-    """Return the values of a part in one line, or in some with its title beside them."""
-    fields = fields_of(type(getattr(robot, part)))
-    table = to_table(robot)[part]
-    words = [str(table.pop("kind"))]
-    for key, value in table.items():
-        unit = unit_of(fields[key])
-        words.append(f"{key.replace('_', ' ')} {_value(value)} {unit}".strip())
-    return textwrap.fill(
-        ", ".join(words),
-        width=terminal.NARROW,
-        initial_indent=part.ljust(10),
-        subsequent_indent=" " * 10,
-    )
+    tolerances = tables.tolerance_words(robot, bands.bands.tolerances, bands.bands.assumed)
+    terminal.show("", tables.wrapped(text), *tolerances)

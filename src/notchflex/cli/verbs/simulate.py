@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -24,23 +24,23 @@ from notchflex.cli.options import (
     Strokes,
     Tensions,
     integer,
-    texts,
+    save_state,
     vector,
 )
 from notchflex.cli.robots import (
+    Beside,
     RobotName,
     Settings,
-    beside_files,
     beside_robots,
     changed_title,
     chosen_robot,
     robot_files,
 )
-from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.cli.terminal import DONE
 from notchflex.support import BROWSER, MOVING, PAPER, TendonCommand, Vector, load_columns
 
 if TYPE_CHECKING:
-    from notchflex import Bands, EquilibriumPath, LoadPath, Robot, State
+    from notchflex import Bands, EquilibriumPath, State
 
 
 @Parameter(name="*", group=OUTPUT)
@@ -49,11 +49,9 @@ class SimulateOutputs(PathOutputs):
     """Results of `simulate`.
 
     Attributes:
-        plot: Draw a picture to this .png, .svg or .pdf file, or to an interactive .html file, or to
-            an animated .gif file.
-        nc: Write the whole result as NetCDF to this file (extra `data`); `notchflex.read_path`
-            reads it back.
-        parquet: Write the columns of the CSV as a Parquet table to this file (extra `data`).
+        plot: Draw a picture: .png, .svg, .pdf, (interactive) .html or (animated) .gif.
+        nc: Write the whole result as NetCDF (extra `data`); `notchflex.read_path` reads it back.
+        parquet: Write the columns of the CSV as a Parquet table (extra `data`).
     """
 
     plot: File = None
@@ -74,7 +72,7 @@ def simulate(
     uncertain: bool = False,
     draws: Annotated[int | None, integer(2, 100_000)] = None,
     from_state: StateFile = None,
-    beside: Annotated[tuple[str, ...], texts("--beside", "ROBOT")] = (),
+    beside: Beside = (),
     columns: Annotated[str | None, Parameter(group=OUTPUT, metavar="NAMES")] = None,
     every_row: Annotated[bool, Parameter(group=OUTPUT, name="--all")] = False,
     outputs: SimulateOutputs = SimulateOutputs(),
@@ -101,67 +99,15 @@ def simulate(
             `tension,notch_angle,gap`. A wrong name lists all names.
         every_row: Show every step in the table; without it a path of more than 60 steps is thinned.
     """
-    import numpy as np
+    from notchflex.cli import path_table
 
-    from notchflex import LoadPath
-    from notchflex.cli.path_table import parse_columns
-
-    terminal.be_quiet(outputs.quiet)
-    shown = () if columns is None else parse_columns(columns)
+    terminal.quiet = outputs.quiet
+    shown = () if columns is None else path_table.parse_columns(columns)
     chosen = chosen_robot(robot, settings)
     title = changed_title(chosen, settings)
     robots = beside_robots(chosen, robot, beside)
-    if external and not tension and not stroke:
+    if external != NO_LOADS and not tension and not stroke:
         tension = (TendonCommand("--tension", 1, [math.nan]),)  # all hang slack, in one step
-    _check_bands(uncertain, draws, beside, from_state)
-    tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
-    outputs.check(
-        [*robot_files(robot), *beside_files(beside)],
-        pictures=PAPER + BROWSER + (() if beside else MOVING),  # several robots do not move
-    )
-    if outputs.plot is not None and len(tensions) < 2 and _moves(outputs.plot):
-        raise InputError.FILE_FORMAT(
-            f"--plot {outputs.plot}: one step cannot be animated; write a .png, .svg or .pdf."
-        )
-    text = f"solving {len(tensions)} steps of {chosen.name}"
-    with terminal.progress(text) as progress:
-        start = None if from_state is None else _start(from_state)
-        turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
-        load = LoadPath(tensions, strokes, turn).loaded(**external.arguments())
-        bands = None
-        if uncertain:
-            from notchflex import analysis
-            from notchflex.analysis.bands import DRAWS
-
-            bands = analysis.uncertain(
-                chosen,
-                load,
-                outputs=analysis.band_names(shown),
-                draws=draws or DRAWS,
-                refinement=refinement,
-                progress=partial(progress, text),
-            )
-            paths = {chosen.name: bands.path}
-        else:
-            paths = _solve(robots, load, start, refinement, partial(progress, text))
-    _write(paths, outputs, title, bands)
-    if bands is not None:
-        for sentence in bands.warnings():
-            terminal.warn(sentence)
-    if outputs.prints_tables:
-        from notchflex.cli import path_table
-
-        path = next(iter(paths.values()))
-        path_table.print_path(path, title, columns=shown, every_row=every_row, bands=bands)
-        if len(paths) > 1:
-            path_table.print_beside(paths, columns=shown, every_row=every_row)
-    return max(_report(path, f"{label}: " if beside else "") for label, path in paths.items())
-
-
-def _check_bands(
-    uncertain: bool, draws: int | None, beside: Sequence[str], from_state: str | None
-) -> None:
-    """Refuse options that `--uncertain` excludes or needs."""
     if uncertain and (beside or from_state is not None):
         excluded = "--beside" if beside else "--from-state"
         raise InputError.CONFLICT(
@@ -169,25 +115,46 @@ def _check_bands(
         )
     if draws is not None and not uncertain:
         raise InputError.CONFLICT("--draws counts the robots of --uncertain; give both or neither.")
+    tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
+    outputs.check(
+        robot_files(robot, *(variant.robot for variant in beside)),
+        pictures=PAPER + BROWSER + (() if beside else MOVING),  # several robots do not move
+    )
+    if _moves(outputs.plot) and len(tensions) < 2:
+        raise InputError.FILE_FORMAT(
+            f"--plot {outputs.plot}: one step cannot be animated; write a .png, .svg or .pdf."
+        )
+    text = f"solving {len(tensions)} steps of {chosen.name}"
+    bands, paths = None, {}
+    with terminal.progress(text) as progress:
+        import numpy as np
 
+        from notchflex import LoadPath, analysis
 
-def _solve(
-    robots: Mapping[str, Robot],
-    load: LoadPath,
-    start: State | None,
-    refinement: int,
-    progress: Any,
-) -> dict[str, EquilibriumPath]:
-    """Return the path of every robot; only the first starts from a saved state."""
-    from notchflex import analysis
-
-    paths: dict[str, EquilibriumPath] = {}
-    for number, (label, robot) in enumerate(robots.items()):
-        if number:
-            progress(number, len(robots))
-        state = None if number else start
-        paths[label] = analysis.simulate(robot, load, from_state=state, refinement=refinement)
-    return paths
+        start = None if from_state is None else _start(from_state)
+        turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
+        load = LoadPath(tensions, strokes, turn).loaded(**external.arguments())
+        if uncertain:
+            more: dict[str, Any] = {} if draws is None else {"draws": draws}
+            bands = analysis.uncertain(
+                chosen, load, outputs=analysis.band_names(shown), refinement=refinement,
+                progress=partial(progress, text), **more,
+            )  # fmt: skip
+            paths, robots = {chosen.name: bands.path}, {}
+        for number, (label, each) in enumerate(robots.items()):
+            if number:
+                progress(text, number, len(robots))
+            paths[label] = analysis.simulate(each, load, from_state=start, refinement=refinement)
+            start = None  # only the first starts from a saved state
+    _write(paths, outputs, title, bands)
+    for sentence in () if bands is None else bands.warnings():
+        terminal.warn(sentence)
+    if outputs.prints_tables:
+        path = next(iter(paths.values()))
+        path_table.print_path(path, title, columns=shown, every_row=every_row, bands=bands)
+        if len(paths) > 1:
+            path_table.print_beside(paths, columns=shown, every_row=every_row)
+    return max(_report(path, f"{label}: " if beside else "") for label, path in paths.items())
 
 
 def _start(file: str) -> State:
@@ -210,39 +177,39 @@ def _write(
     from notchflex.analysis.bands import band_columns, band_document
     from notchflex.support import whole_document, write_netcdf, write_parquet, write_path_csv
 
-    (_, path), *others = paths.items()
+    first, *others = paths.values()
+    more = None if bands is None else band_columns(bands)
 
-    def document() -> dict[str, Any]:
-        beside = {label: whole_document(other) for label, other in others}
-        more = {"beside": beside} if beside else {}
-        return whole_document(path) | more | ({"bands": band_document(bands)} if bands else {})
+    def document(path: EquilibriumPath) -> dict[str, Any]:
+        whole = whole_document(path)
+        if others:
+            whole["beside"] = {label: whole_document(paths[label]) for label in list(paths)[1:]}
+        return whole if bands is None else {**whole, "bands": band_document(bands)}
 
-    def picture() -> Any:
-        from notchflex.plotting import beside_picture, path_picture
+    def draw(path: EquilibriumPath, target: str, progress: Any) -> None:
+        from notchflex import plotting
 
-        if not others:
-            return path_picture(path, title=title, bands=bands)
-        names = dict.fromkeys([title, *(other.robot.name for _, other in others)])
-        return beside_picture(paths, title="; ".join(names))
+        if _moves(target):
+            plotting.save_animation(path, target, title=title, progress=progress)
+        elif others:
+            names = dict.fromkeys([title, *(other.robot.name for other in others)])
+            plotting.beside_picture(paths, title="; ".join(names)).save(target)
+        else:
+            plotting.path_picture(path, title=title, bands=bands).save(target)
 
-    moving = outputs.plot if outputs.plot and _moves(outputs.plot) else None
-    outputs.write(document, picture=None if moving else picture)
-    if outputs.csv:
-        write_path_csv(outputs.csv, path, band_columns(bands) if bands else None)
-    for target, write in ((outputs.nc, write_netcdf), (outputs.parquet, write_parquet)):
-        if target:
-            write(target, path)
-    if moving:
-        text = f"drawing {moving}"
-        with terminal.progress(text, compiles=False) as progress:
-            from notchflex.plotting import save_animation
-
-            save_animation(path, moving, title=title, progress=partial(progress, text))
-    outputs.write_state(path.state)
+    outputs.write(
+        first,
+        document,
+        plot=draw,
+        csv=lambda path, file: write_path_csv(file, path, more),
+        nc=lambda path, file: write_netcdf(file, path),
+        parquet=lambda path, file: write_parquet(file, path),
+        save_state=save_state,
+    )
 
 
-def _moves(picture: str) -> bool:
-    return Path(picture).suffix.lower() in MOVING
+def _moves(picture: str | None) -> bool:
+    return picture is not None and Path(picture).suffix.lower() in MOVING
 
 
 def _report(path: EquilibriumPath, label: str) -> int:
@@ -251,9 +218,9 @@ def _report(path: EquilibriumPath, label: str) -> int:
 
     for sentence in path_warnings(path):
         terminal.warn(f"{label}{sentence}")
-    failed = [row for row, converged in enumerate(path.converged) if not converged]
-    if not failed:
-        return DONE
-    first = failed[0]
-    terminal.error(f"{label}not converged: step {first + 1} of {len(path)}: {path.reason[first]}.")
-    return NOT_CONVERGED
+    for step, converged in enumerate(path.converged):
+        if not converged:
+            return terminal.failed(
+                f"{label}not converged: step {step + 1} of {len(path)}: {path.reason[step]}."
+            )
+    return DONE

@@ -15,6 +15,7 @@ from notchflex.cli.options import (
     NO_FOLDER,
     NO_LOADS,
     OUTPUT,
+    Bounds,
     DrawnOutputs,
     ExternalLoads,
     File,
@@ -24,30 +25,31 @@ from notchflex.cli.options import (
     low_high,
     named,
     number,
-    texts,
+    once,
 )
 from notchflex.cli.robots import (
+    Beside,
     RobotName,
     Settings,
-    beside_files,
     beside_robots,
     chosen_robot,
     robot_files,
 )
-from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.cli.terminal import DONE
 from notchflex.support import parse_number
 
 if TYPE_CHECKING:
-    from notchflex.workspaces import Overlap, Workspace
+    from notchflex.workspaces import Workspace
 
 _LIMIT = "NAME=LARGEST or NAME=SMALLEST:LARGEST, such as strain=0.04 or gap=0.05:"
-_SPREADS = {
-    "total_angle_deg": "total angle [deg]",
-    "peak_strain": "peak strain",
-    "tension_N": "largest tension [N]",
-    "hysteresis_mm": "error by hysteresis [mm]",
-    "softest_stiffness_N_mm": "softest stiffness [N/mm]",
-}
+_SPREADS = (
+    "total_angle_deg",
+    "peak_strain",
+    "tension_N",
+    "hysteresis_mm",
+    "softest_stiffness_N_mm",
+)
+"""Numbers of the document of which percentiles are shown."""
 
 
 def _tensions(text: str) -> list[float]:
@@ -72,18 +74,14 @@ def workspace(
     /,
     *,
     limit: Annotated[
-        tuple[tuple[str, tuple[float | None, float | None]], ...],
-        converted(
-            partial(named, _LIMIT, partial(low_high, _LIMIT, alone_is_high=True)),
-            "NAME=VALUE",
-            several=True,
-        ),
+        tuple[tuple[str, Bounds], ...],
+        named(_LIMIT, low_high(_LIMIT, alone_is_high=True), "NAME=VALUE"),
     ] = (),
     tension: Annotated[list[float] | None, converted(_tensions, "N[,N...]")] = None,
     states: Annotated[int, integer(32, 20_000_000_000)] = 100_000,
     pretension: Annotated[float, number("a tension in N, 0 or more", "N", least=0.0)] = 0.0,
     stiffness: Annotated[int, integer(0, 5000)] = 0,
-    beside: Annotated[tuple[str, ...], texts("--beside", "ROBOT")] = (),
+    beside: Beside = (),
     external: ExternalLoads = NO_LOADS,
     settings: Settings = (),
     pieces: InPieces = NO_FOLDER,
@@ -109,22 +107,13 @@ def workspace(
             `LABEL: ROBOT`, or this one with other values, `LABEL: PATH=VALUE, PATH=VALUE`. May be
             given up to four times.
     """
-    names = [name for name, _ in limit]
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise InputError.CONFLICT(
-            f"--limit {twice[0]} is given twice; give both bounds at once, as {twice[0]}=LOW:HIGH."
-        )
-    inputs = [*robot_files(robot), *beside_files(beside)]
+    once("--limit", (name for name, _ in limit))
+    inputs = robot_files(robot, *(variant.robot for variant in beside))
     outputs.check(inputs)
     robots = beside_robots(chosen_robot(robot, settings), robot, beside)
     if pieces.folder is not None and beside:
         raise InputError.CONFLICT("--folder takes one robot; leave --beside out.")
     folder = pieces.chosen("workspace", inputs)
-    if folder is None and states > 20_000_000:
-        raise InputError.OUT_OF_RANGE(
-            f"--states {states}: more than 20000000 states need --folder DIR, which keeps them in "
-            "pieces."
-        )
     with terminal.progress("exploring") as progress:
         from notchflex import pull
         from notchflex import workspaces as exploring
@@ -147,7 +136,14 @@ def workspace(
             for label, each in robots.items()
         }
     _write(explored, outputs)
-    return _report(explored)
+    code = DONE
+    for label, each in explored.items():
+        name = f"{label}: " if beside else ""
+        if not len(each):
+            code = terminal.failed(f"{name}no state is left: none converged within the limits.")
+        elif each.failed:
+            terminal.warn(f"{name}{each.failed} of {each.tried} states did not converge.")
+    return code
 
 
 def _write(explored: Mapping[str, Workspace], outputs: WorkspaceOutputs) -> None:
@@ -158,85 +154,51 @@ def _write(explored: Mapping[str, Workspace], outputs: WorkspaceOutputs) -> None
         workspace_document,
     )
 
-    compared = overlaps(explored) if all(map(len, explored.values())) else []
+    compared = overlap_documents(overlaps(explored) if all(map(len, explored.values())) else [])
     documents = {label: workspace_document(each) for label, each in explored.items()}
     (_, alone), *others = documents.items()
+    more = {"beside": dict(others), "overlaps": compared} if others else {}
 
-    def document() -> dict[str, Any]:
-        overlap = overlap_documents(compared)
-        return alone | ({"beside": dict(others), "overlaps": overlap} if others else {})
+    def draw(first: Workspace, target: str, _: object) -> None:
+        from notchflex import plotting
 
-    def picture() -> Any:
-        from notchflex.plotting import workspace_picture, workspaces_picture
+        picture = plotting.workspaces_picture(explored) if others else plotting.picture(first)
+        picture.save(target)
 
-        if others:
-            return workspaces_picture(explored)
-        return workspace_picture(next(iter(explored.values())))
+    def show(_: object) -> None:
+        for label, each in explored.items():
+            if others:
+                terminal.line(f"{label}:", "bold")
+            _print(each, documents[label])
+        tables.show(compared)
 
-    def show() -> None:
-        for label, each in documents.items():
-            _print(f"{label}: " if others else "", each)
-        for overlap in compared:
-            _print_overlap(overlap)
-
-    outputs.write(document, show, picture=picture)
-    if outputs.nc:
-        save_netcdf(explored, outputs.nc)
-
-
-def _report(explored: Mapping[str, Workspace]) -> int:
-    """Write what is missing; return the exit code."""
-    code = DONE
-    for label, each in explored.items():
-        name = f"{label}: " if len(explored) > 1 else ""
-        if not len(each):
-            terminal.error(f"{name}no state is left: none converged within the limits.")
-            code = NOT_CONVERGED
-        elif each.failed:
-            terminal.warn(f"{name}{each.failed} of {each.tried} states did not converge.")
-    return code
+    outputs.write(
+        next(iter(explored.values())),
+        lambda _: alone | more,
+        show,
+        plot=draw,
+        nc=lambda _, target: save_netcdf(explored, target),
+    )
 
 
-def _print(label: str, document: dict[str, Any]) -> None:
-    """Print one workspace, from its document."""
-    counts = document["states"]
-    largest = [f"{tension:.4g}" for tension in document["largest_tension_N"]]
-    pulled = ", ".join(largest if len({*largest}) > 1 else largest[:1])
-    lines = [
-        f"Workspace of {label}{document['name']}, tendons up to {pulled} N",
-        *(f"limit: {text}" for text in document["limits"]),
-        f"{counts['kept']} of {counts['solved']} states kept, {counts['not_converged']} not "
-        f"converged, {counts['beyond_limits']} beyond limits",
-    ]
-    if extent := document.get("extent_mm"):
-        hull, alpha, voxels = document["convex_hull"], document["alpha_shape"], document["voxels"]
-        lines += [f"{axis}  {low:.3f} to {high:.3f} mm" for axis, (low, high) in extent.items()]
-        lines += [
-            f"convex hull {hull['size']:.5g} {hull['unit']}, alpha shape {alpha['size']:.4g} "
-            f"{alpha['unit']}",
-            f"dexterity {100 * voxels['dexterity_mean']:.2g} % of directions in a voxel of "
-            f"{voxels['edge_mm']:.3g} mm, up to {100 * voxels['dexterity_largest']:.2g} %",
-        ]
+def _print(workspace: Workspace, document: dict[str, Any]) -> None:
+    """Print one workspace."""
+    *lines, _ = repr(workspace).splitlines()
     for line in lines:
-        terminal.output().print(line, soft_wrap=True)
-    if not extent:
+        terminal.line(line)
+    if not len(workspace):
         return
-    spreads = {title: document[key] for key, title in _SPREADS.items()}
-    rows = [
-        {"": title} | {f"{name[1:]} %" if name.startswith("p") else name: one[name] for name in one}
-        for title, one in spreads.items()
-        if one["largest"] is not None
-    ]
-    tables.show(tables.records(rows, **dict.fromkeys(rows[0].keys() - {""}, ".4g")), gap=2)
-
-
-def _print_overlap(overlap: Overlap) -> None:
-    """Print what two workspaces have in common."""
-    first, second = overlap.first, overlap.second
-    terminal.output().print(
-        f"{first} and {second}: of voxels of {overlap.voxel:.3g} mm {overlap.both} hold tips of "
-        f"both, {overlap.first_alone} of {first} alone, {overlap.second_alone} of {second} alone; "
-        f"{100 * overlap.first_in_second:.0f} % of {first} lie in the hull of {second}, "
-        f"{100 * overlap.second_in_first:.0f} % of {second} in that of {first}",
-        soft_wrap=True,
+    alpha, voxels = document["alpha_shape"], document["voxels"]
+    terminal.line(
+        f"  tendons up to {', '.join(f'{tension:.4g}' for tension in workspace.largest)} N"
+    )
+    terminal.line(
+        f"  alpha shape {alpha['size']:.4g} {alpha['unit']}; dexterity "
+        f"{100 * voxels['dexterity_mean']:.2g} % of directions in a voxel of "
+        f"{voxels['edge_mm']:.3g} mm, up to {100 * voxels['dexterity_largest']:.2g} %"
+    )
+    spreads = [{"": name.replace("_", " "), **document[name]} for name in _SPREADS]
+    tables.show(
+        [row for row in spreads if row["largest"] is not None],
+        forms=dict.fromkeys(spreads[0].keys() - {""}, ".4g"),
     )

@@ -1,0 +1,101 @@
+"""Loads on the command line: what `--tension`, `--tip-force` and the others stand for."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import notchflex as nf
+from notchflex.support import parse_whole, read_command
+
+NUMBERS = st.floats(-100.0, 100.0, allow_nan=False)
+WRIST = ("simulate", "pacheco2021-a")
+
+
+def steps(text):
+    """The steps that a word stands for."""
+    return read_command("--stroke", True, text).steps
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("2", [2.0]),
+        ("0:3:4,3:0:4", [0.0, 1.0, 2.0, 3.0, 3.0, 2.0, 1.0, 0.0]),
+        ("1e-3, 2", [0.001, 2.0]),
+        ("2:2:1", [2.0]),
+        ("0, 1:2:2 ,5", [0.0, 1.0, 2.0, 5.0]),
+    ],
+)
+def test_values_and_ranges(text, values):
+    assert steps(text) == values
+
+
+@given(st.lists(NUMBERS, min_size=1, max_size=8), NUMBERS, NUMBERS, st.integers(2, 50))
+def test_any_numbers_read_back_and_ranges_have_their_ends(values, start, stop, count):
+    assert steps(",".join(map(repr, values))) == values
+    series = steps(f"{start}:{stop}:{count}")
+    assert (len(series), series[0], series[-1]) == (count, start, stop)
+
+
+@given(st.integers())
+def test_whole_numbers_read_back_within_their_range(value):
+    if -5 <= value <= 7:
+        assert parse_whole(-5, 7)(str(value)) == value
+    else:
+        with pytest.raises(nf.InputError):
+            parse_whole(-5, 7)(str(value))
+
+
+def test_all_options_reach_every_step_and_the_head_of_the_table(call, tmp_path):
+    code, out, _ = call(
+        *WRIST, "--tension", "0:1:3", "--tip-force", "0,-0.01,0", "--tip-moment", "0.1,0.2,0.3",
+        "--tip-point", "0, 0, 1.5", "--body-force", "1:0,0,0.1", "--body-force",
+        "2:-1e-2,0,0@0.8,0,0.5", "--tip-mass", "2", "--gravity", "0,0,9.81", "--following",
+        "--base-rotation", "-90,0,45", "--json", "a.json",
+    )  # fmt: skip
+    assert code == 0
+    load = nf.pull(0.0, 1.0, 3)
+    load = nf.LoadPath(load.tension, load.stroke, np.radians([-90.0, 0.0, 45.0])).loaded(
+        tip_force=(0, -0.01, 0),
+        tip_moment=(0.1, 0.2, 0.3),
+        tip_point=(0, 0, 1.5),
+        body_forces=[
+            nf.BodyForce(1, (0, 0, 0.1), following=True),
+            nf.BodyForce(2, (-0.01, 0, 0), point=(0.8, 0, 0.5), following=True),
+        ],
+        tip_mass=2,
+        gravity=(0, 0, 9.81),
+        following=True,
+    )
+    path = nf.simulate(nf.load_robot("pacheco2021-a"), load)
+    written = [
+        step["tip_position_mm"] for step in json.loads((tmp_path / "a.json").read_text())["steps"]
+    ]
+    np.testing.assert_allclose(written, path.tip_position, atol=1e-12)
+    head = " ".join(out.split("\nstep")[0].split())
+    for words in (
+        "tip force (0, -0.01, 0) N at (0, 0, 1.5) mm from the tip",
+        "tip moment (0.1, 0.2, 0.3) N mm",
+        "tip mass 2 g, gravity (0, 0, 9.81) m/s²",
+        "force (-0.01, 0, 0) N on body 2 at (0.8, 0, 0.5) mm following it",
+    ):
+        assert words in head
+    assert max(map(len, out.split("\nstep")[0].splitlines())) <= 80
+
+
+def test_loads_without_tendons_are_one_step_of_slack_tendons(call):
+    code, out, _ = call(*WRIST, "--tip-force", "-0.01,0,0", "--json", "-")
+    (step,) = json.loads(out)["steps"]
+    assert code == 0
+    assert step["load"]["tension_N"] == [None]
+    assert step["tendon_tension_N"] == [0.0]
+
+
+def test_following_alone_with_body_forces_leaves_the_tip_as_it_is(call):
+    options = ("--tension", "1", "--body-force", "1:0,0,0.1", "--following", "--json", "-")
+    load = json.loads(call(*WRIST, *options)[1])["steps"][0]["load"]
+    assert load["following"] is False
+    assert load["body_forces"][0]["following"] is True
