@@ -8,7 +8,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import notchflex as nf
-from notchflex.plotting import dimensioned_figure, notch_rows, save
+from notchflex.plotting import dimensioned_figure, notch_rows
 from notchflex.plotting.drawing import MAX_SHAPES
 from notchflex.plotting.shapes import outline, shape_from_angles
 
@@ -160,13 +160,6 @@ def test_a_kind_without_names_of_its_pieces_is_drawn_with_their_lengths(monkeypa
     monkeypatch.setattr("notchflex.plotting.drawing._PIECES", {})
     texts = texts_of(nf.load_robot("gao2017"))
     assert {"0.55", "0.7", "0.35", "depth 4.27"} <= set(texts)
-
-
-@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
-def test_drawing_is_written(tmp_path, suffix):
-    file = tmp_path / f"drawing.{suffix}"
-    save(dimensioned_figure(nf.load_robot("gao2017")), file)
-    assert file.stat().st_size > 5000
 
 
 def test_depth_from_a_calliper_on_radial_edges():

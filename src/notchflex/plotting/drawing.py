@@ -47,7 +47,7 @@ _WORDS = 4.2  # least distance of a cross-section from the start, for the texts 
 # and largest distance of a drawn arc from the true one.
 _STUB, _LONGEST, _CHORD = 0.35, 1.6, 0.0005
 
-_PIECES = {
+_PIECES: dict[type[Notch], tuple[str, ...]] = {
     ArcNotch: ("height", "uncut length"),
     StripNotch: ("height", "strip thickness", "uncut length"),
     ULink: ("slot width", "strip thickness", "slot width", "uncut length"),
@@ -67,7 +67,8 @@ class NotchRow:
     """The views of one shape of notch, side by side: a part of the tube, and a cross-section.
 
     The first coordinate runs along the tube toward the tip, the second across it toward the bend,
-    both from the tube axis at the left end [mm].
+    both from the tube axis at the left end, in mm, or times the scale in inches. Inches are the
+    scale [in/mm], width, height and middle of the cross-section, outer and inner radius.
     """
 
     def __init__(self, robot: Robot, entry: int, names: str, most: float) -> None:
@@ -99,10 +100,15 @@ class NotchRow:
         if not self.tip:
             self._add_stub()
         self._add_depths(toward)
-        # The scale [in/mm].
-        outer = robot.tube.outer_diameter
-        room = most - _LEFT - _COLUMN * len(self.across) - 0.35 - _RIGHT
-        self.scale = usual_scale(min(_DIAMETER * most / outer, room / (self.length + outer)))
+        tube, columns = robot.tube, _COLUMN * len(self.across) + 0.55
+        room = most - _LEFT - columns - _RIGHT
+        size = min(_DIAMETER * most, room / (1.0 + self.length / tube.outer_diameter))
+        self.scale = usual_scale(size / tube.outer_diameter)
+        self.outer, self.inner = self.scale * tube.outer_radius, self.scale * tube.inner_radius
+        # From the left end of the tube to the middle of the cross-section.
+        self.middle = max(self.scale * self.length + columns + self.outer, _WORDS)
+        self.width = _LEFT + self.middle + self.outer + _RIGHT
+        self.height = 1.46 + 2.0 * self.outer + _LEVEL * len(self.along) + 0.17 * len(self.notes)
 
     def _sized(self, name: str, length: float, part: str = "notch") -> str:
         """Return a length with the tolerance of its key of the robot file."""
@@ -180,23 +186,6 @@ class NotchRow:
             text = f"strip\nlength\n{self._sized('strip_length', strip)}"
             self.across.append((self.section[0], [Dimension(-0.5 * strip, 0.5 * strip, text)]))
 
-    @property
-    def height(self) -> float:
-        """Its height [in]."""
-        texts = _LEVEL * len(self.along) + 0.17 * len(self.notes)
-        return 1.46 + self.scale * self.robot.tube.outer_diameter + texts
-
-    @property
-    def middle(self) -> float:
-        """Where the middle of the cross-section is [in]."""
-        columns = self.scale * self.length + _COLUMN * len(self.across)
-        return _LEFT + max(columns + 0.35 + self.scale * self.robot.tube.outer_radius, _WORDS)
-
-    @property
-    def width(self) -> float:
-        """Its width [in]."""
-        return self.middle + self.scale * self.robot.tube.outer_radius + _RIGHT
-
 
 def _bottom(cut: NotchCut) -> float:
     return min(height for _, height in cut.corners)
@@ -205,11 +194,7 @@ def _bottom(cut: NotchCut) -> float:
 def label(at: Any, text: str, align: str = "center center", **options: Any) -> Note:
     """Return a text on a white background."""
     options = {"colour": INK, "size": TEXT, "inside": False} | options
-    return Note(text, tuple(at), align=align, **options)
-
-
-def _moved(point: Any, right: float, up: float) -> Any:
-    return np.add(point, (right, up))
+    return Note(text, at, align=align, **options)
 
 
 def _stroke(points: Any, colour: Colour = _FINE, width: float = 0.5, dash: Any = ()) -> Curve:
@@ -225,12 +210,17 @@ def _arrow(start: Any, end: Any, colour: Colour = _FINE, width: float = 0.7) -> 
 
 
 def _dimension(
-    start: float, end: float, at: float, edge: float, upright: bool = False
+    start: float, end: float, at: float, edge: float, text: str = "", upright: bool = False
 ) -> Iterator[Mark]:
-    """Yield a dimension line from `start` to `end` along the tube, at a height, without its text.
+    """Yield a dimension line from `start` to `end` along the tube, at a height, with its text.
 
     Its extension lines start at the height `edge`. An upright one is across the tube.
     """
+    middle = 0.5 * (start + end)
+    if upright:
+        yield label((at + 0.07, middle), text, "left center")
+    else:
+        yield label((middle, at + 0.035), text, "center bottom")
 
     def place(along: float, across: float) -> tuple[float, float]:
         return (across, along) if upright else (along, across)
@@ -344,116 +334,108 @@ def notch_rows(robot: Robot, width: float = _WIDTH) -> tuple[list[NotchRow], lis
 
 def draw_row(axes: Axes, row: NotchRow, top: float) -> None:
     """Draw the views of one notch below a height."""
-    outer = row.scale * row.robot.tube.outer_radius
-    axis = top - 0.62 - _LEVEL * len(row.along) - outer
-    centre = np.array([row.middle, axis])
-    for marks in (
-        [label((0.25, top - 0.12), _heading(row), "left center", size=9.0, bold=True)],
-        _side_view(row, np.array([_LEFT, axis])),
-        _dimensions(row, axis),
-        _section_view(row, centre),
-        _section_tendons(row, centre),
+    axis = top - 0.62 - _LEVEL * len(row.along) - row.outer
+    draw_marks(axes, [label((0.25, top - 0.12), _heading(row), "left center", size=9.0, bold=True)])
+    for view, left in (
+        (_side_view, _LEFT),
+        (_dimensions, _LEFT),
+        (_section_view, _LEFT + row.middle),
+        (_section_tendons, _LEFT + row.middle),
     ):
-        draw_marks(axes, list(marks))
+        draw_marks(axes, [_shifted(mark, (left, axis)) for mark in view(row)])
+
+
+def _shifted(mark: Any, origin: Any) -> Any:
+    if isinstance(mark, Area):
+        return dataclasses.replace(mark, polygons=[ring + origin for ring in mark.polygons])
+    if isinstance(mark, Note):
+        return dataclasses.replace(mark, at=np.add(mark.at, origin))
+    return dataclasses.replace(mark, points=np.add(mark.points, origin))
 
 
 def _heading(row: NotchRow) -> str:
     notch, names = row.notch, shorten(row.names, 48, placeholder=" ...")
-    number = "notch" if names.isdigit() else "notches"
-    parts = [f'{number} {names}: kind "{notch.kind}"']
-    if isinstance(notch, ArcNotch):
-        parts.append(f'cut "{notch.cut}"')
-    parts.append(f"bends toward {notch.direction_deg:g}°")
-    if row.held and not row.robot.tube.base_length:
-        parts.append("base length 0")
-    if not notch.uncut_length:
-        parts.append("uncut length 0")
-    return ", ".join([*parts, f"scale {scale_text(row.scale)}"])
+    parts = (
+        f'{"notch" if names.isdigit() else "notches"} {names}: kind "{notch.kind}"',
+        f'cut "{notch.cut}"' if isinstance(notch, ArcNotch) else "",
+        f"bends toward {notch.direction_deg:g}°",
+        "base length 0" if row.held and not row.robot.tube.base_length else "",
+        "" if notch.uncut_length else "uncut length 0",
+        f"scale {scale_text(row.scale)}",
+    )
+    return ", ".join(filter(None, parts))
 
 
-def _dimensions(row: NotchRow, axis: float) -> Iterator[Mark]:
-    tube, scale = row.robot.tube, row.scale
-    right, outer = _LEFT + scale * row.length, scale * tube.outer_radius
+def _dimensions(row: NotchRow) -> Iterator[Mark]:
+    tube, scale, outer = row.robot.tube, row.scale, row.outer
     for level, (start, end, text) in enumerate(row.along):
-        low, high = _LEFT + scale * start, _LEFT + scale * end
-        height = axis + outer + 0.2 + _LEVEL * level
-        yield from _dimension(low, high, height, axis + outer)
-        yield label((0.5 * (low + high), height + 0.035), text, "center bottom")
-    for size, at, name in (
-        (tube.outer_diameter, _LEFT - 0.6, "outer"),
-        (tube.inner_diameter, _LEFT - 0.25, "inner"),
+        height = outer + 0.2 + _LEVEL * level
+        yield from _dimension(scale * start, scale * end, height, outer, text)
+    for name, size, radius, at in (
+        ("outer", tube.outer_diameter, outer, -0.6),
+        ("inner", tube.inner_diameter, row.inner, -0.25),
     ):
         limits = with_limits(row.robot.tolerance, f"tube.{name}_diameter", size)
-        low, high = axis - 0.5 * scale * size, axis + 0.5 * scale * size
-        yield from _dimension(low, high, at, _LEFT, upright=True)
-        yield label((at - 0.1, axis), f"{name} diameter {limits}", turned=True)
+        yield from _dimension(-radius, radius, at, 0.0, upright=True)
+        yield label((at - 0.1, 0.0), f"{name} diameter {limits}", turned=True)
     for number, (start, column) in enumerate(row.across):
+        right = scale * row.length
         at = right + 0.15 + _COLUMN * (0.5 + number)
-        for dimension in column:
-            low, high = axis + scale * dimension.start, axis + scale * dimension.end
-            yield from _dimension(low, high, at, at - 0.1, upright=True)
-            for y in (low, high):
-                edge = right if y in (axis - outer, axis + outer) else _LEFT + scale * start
+        for low, high, text in column:
+            yield from _dimension(scale * low, scale * high, at, at - 0.1, text, upright=True)
+            for y in (scale * low, scale * high):
+                edge = right if abs(y) == outer else scale * start
                 yield _stroke([(edge, y), (at + 0.05, y)])
-            x, align = (at, "center center") if high - low > 0.5 else (at + 0.07, "left center")
-            yield label((x, 0.5 * (low + high)), dimension.text, align)
 
 
-def _side_view(row: NotchRow, start: Any) -> Iterator[Mark]:
-    robot, scale = row.robot, row.scale
-    outer, inner = scale * robot.tube.outer_radius, scale * robot.tube.inner_radius
-    length = scale * row.length
-
-    def level(y: float, before: float = 0.0, behind: float = 0.0) -> Any:
-        return start + np.array([(-before, y), (length + behind, y)])
-
-    yield Area([start + box(0.0, -outer, length, outer)], _TUBE, 1.0)
+def _side_view(row: NotchRow) -> Iterator[Mark]:
+    scale, outer, length = row.scale, row.outer, row.scale * row.length
+    yield Area([box(0.0, -outer, length, outer)], _TUBE, 1.0)
     for sign in (-1.0, 1.0):
-        yield _ink(level(sign * outer))
-        yield _stroke(level(sign * inner), width=0.6, dash=_HIDDEN)
+        yield _ink([(0.0, sign * outer), (length, sign * outer)])
+        inner = sign * row.inner
+        yield _stroke([(0.0, inner), (length, inner)], width=0.6, dash=_HIDDEN)
     for cut in row.cuts:
-        edge = start + scale * cut
+        edge = scale * cut
         out = np.array([0.0, np.sign(cut[0, 1]) * 0.02])  # over the line of the surface
         yield Area([np.concatenate([edge[:1] + out, edge, edge[-1:] + out])], "white", 1.0)
         yield _ink(edge)
-    yield from (_ink(start + scale * face, 0.7) for face in row.faces)
-    for tendon in robot.tendon:
+    yield from (_ink(scale * face, 0.7) for face in row.faces)
+    for tendon in row.robot.tendon:
         turn = math.radians(tendon.direction_deg - row.notch.direction_deg)
         y = scale * tendon.radius * math.cos(turn)
-        yield _stroke(level(y, 0.16, 0.06), VERMILLION, 1.1)
-    yield _stroke(level(0.0, 0.12, 0.1), dash=_CENTRE)
+        yield _stroke([(-0.16, y), (length + 0.06, y)], VERMILLION, 1.1)
+    yield _stroke([(-0.12, 0.0), (length + 0.1, 0.0)], dash=_CENTRE)
     for x, free in ((0.0, row.held), (length, row.tip)):
         if free:
-            yield _ink(start + np.array([(x, -outer), (x, outer)]))
+            yield _ink([(x, -outer), (x, outer)])
     for place in row.breaks:
-        yield from _broken(start[0] + scale * place, start[1] - outer, start[1] + outer)
+        yield from _broken(scale * place, -outer, outer)
     if row.held:  # hatched, as what is fixed
         for y in np.arange(-outer, outer, 0.12):
-            yield _ink(start + np.array([(-0.1, y), (0.0, y + 0.1)]), 0.5)
-    legend = _moved(start, 0.0, -(outer + 0.47))
-    yield _arrow(legend, _moved(legend, 0.5, 0.0), INK, 1.0)
-    yield label(_moved(legend, 0.56, 0.0), "z, toward the tip", "left center")
-    yield _stroke(legend + np.array([(1.8, 0.0), (2.1, 0.0)]), VERMILLION, 1.1)
-    yield label(_moved(legend, 2.16, 0.0), "tendon", "left center")
-    section = _moved(start, scale * row.section[0], 0.0)
-    foot = _moved(section, 0.0, -(outer + 0.2))
-    yield _stroke([_moved(section, 0.0, outer + 0.06), foot], dash=_CENTRE)
-    yield _ink([_moved(section, 0.0, -(outer + 0.05)), foot], 1.4)
-    yield _arrow(_moved(foot, 0.24, 0.0), foot, INK)
-    yield label(_moved(foot, 0.32, 0.0), "A", bold=True)
+            yield _ink([(-0.1, y), (0.0, y + 0.1)], 0.5)
+    low = -outer - 0.47
+    yield _arrow((0.0, low), (0.5, low), INK, 1.0)
+    yield label((0.56, low), "z, toward the tip", "left center")
+    yield _stroke([(1.8, low), (2.1, low)], VERMILLION, 1.1)
+    yield label((2.16, low), "tendon", "left center")
+    x, foot = scale * row.section[0], -outer - 0.2
+    yield _stroke([(x, outer + 0.06), (x, foot)], dash=_CENTRE)
+    yield _ink([(x, -outer - 0.05), (x, foot)], 1.4)
+    yield _arrow((x + 0.24, foot), (x, foot), INK)
+    yield label((x + 0.32, foot), "A", bold=True)
 
 
-def _section_view(row: NotchRow, centre: Any) -> Iterator[Mark]:
+def _section_view(row: NotchRow) -> Iterator[Mark]:
     """Yield the cross-section as seen from the tip, with the bend upward."""
-    tube, scale = row.robot.tube, row.scale
-    outer, inner = scale * tube.outer_radius, scale * tube.inner_radius
-    half = math.acos(-row.section[1] / tube.outer_radius)
+    radius, outer, inner = row.robot.tube.outer_radius, row.outer, row.inner
+    half = math.acos(-row.section[1] / radius)
     level = math.cos(half) * outer / inner  # of a straight edge, in radii of the bore
     half_inner = half if row.radial else math.acos(min(max(level, -1.0), 1.0))
     part = np.linspace(-1.0, 1.0, 121)
 
-    def arc(radius: float, most: float) -> Any:
-        return centre + radius * np.column_stack([np.sin(most * part), -np.cos(most * part)])
+    def arc(size: float, most: float) -> Any:
+        return size * np.column_stack([np.sin(most * part), -np.cos(most * part)])
 
     yield Area([arc(outer, math.pi)], _FINE, 1.0, 0.6, face=_BEYOND)
     yield Area([arc(inner, math.pi)], _FINE, 1.0, 0.6, face="white")
@@ -462,27 +444,21 @@ def _section_view(row: NotchRow, centre: Any) -> Iterator[Mark]:
         ring = np.concatenate([ring, arc(inner, half_inner)[::-1]])
     yield Area([ring], INK, 1.0, 0.8, face=BLUE)
     for way in np.eye(2):
-        ends = (outer + 0.1) * np.stack([-way, way])
-        yield _stroke(centre + ends, dash=_CENTRE)
+        yield _stroke(np.outer([-outer - 0.1, outer + 0.1], way), dash=_CENTRE)
     # The dimension of the angle of what remains.
     edge = arc(outer + 0.12, half)
     yield _stroke(edge, width=0.7)
     yield from (_arrow(edge[8], edge[0]), _arrow(edge[-9], edge[-1]))
-    for end in (0, -1):
-        way = (edge[end] - centre) / (outer + 0.12)
-        yield _stroke(centre + np.outer([outer + 0.02, outer + 0.17], way))
-    length = 2.0 * half * tube.outer_radius
-    words = f"remaining arc {math.degrees(2.0 * half):.4g}°, {length:.4g} at the outer surface"
-    foot = _moved(centre, 0.0, -(outer + 0.3))
-    for text in (words, *row.notes, "A–A, seen from the tip"):
-        yield label(foot, text, bold=text.startswith("A–A"))
-        foot = _moved(foot, 0.0, -0.17)
-    top = _moved(centre, 0.0, outer)
-    yield _arrow(_moved(top, 0.0, 0.1), _moved(top, 0.0, 0.42), VERMILLION, 2.0)
+    for way in arc(1.0, half)[[0, -1]]:
+        yield _stroke(np.outer([outer + 0.02, outer + 0.17], way))
+    angle, length = math.degrees(2.0 * half), 2.0 * half * radius
+    words = f"remaining arc {angle:.4g}°, {length:.4g} at the outer surface"
+    for number, text in enumerate((words, *row.notes, "A–A, seen from the tip")):
+        yield label((0.0, -outer - 0.3 - 0.17 * number), text, bold=text.startswith("A–A"))
     direction = row.notch.direction_deg
-    text = f"bends toward\ndirection {direction:g}°"
-    yield label(_moved(top, 0.12, 0.3), text, "left center")
-    corner = _moved(centre, outer + 1.15, -0.3 * outer)
+    yield _arrow((0.0, outer + 0.1), (0.0, outer + 0.42), VERMILLION, 2.0)
+    yield label((0.12, outer + 0.3), f"bends toward\ndirection {direction:g}°", "left center")
+    corner = np.array([outer + 1.15, -0.3 * outer])
     for name, turn in (("x", 90.0), ("y", 180.0)):  # the axes of the base
         angle = math.radians(turn - direction)
         way = np.array([math.cos(angle), math.sin(angle)])
@@ -490,17 +466,17 @@ def _section_view(row: NotchRow, centre: Any) -> Iterator[Mark]:
         yield label(corner + 0.37 * way, name)
 
 
-def _section_tendons(row: NotchRow, centre: Any) -> Iterator[Mark]:
+def _section_tendons(row: NotchRow) -> Iterator[Mark]:
     """Yield the tendons, and the radius of the one nearest to the side of the bend."""
     turns = [math.radians(t.direction_deg - row.notch.direction_deg) for t in row.robot.tendon]
-    nearest = max(range(len(turns)), key=lambda number: math.cos(turns[number]))
-    for number, (tendon, turn) in enumerate(zip(row.robot.tendon, turns, strict=True)):
-        arm = row.scale * tendon.radius * np.array([-math.sin(turn), math.cos(turn)])
-        yield Curve([centre + arm], VERMILLION, None, marker="o", size=4.0, layer=14)
-        if number == nearest:
-            limits = with_limits(row.robot.tolerance, "tendon.radius", tendon.radius)
-            middle = centre + 0.5 * arm
-            aside = row.middle + row.scale * row.robot.tube.outer_radius + 0.32
-            yield _arrow(centre, centre + arm)
-            yield _stroke([middle, (aside, middle[1])])
-            yield label((aside + 0.02, middle[1]), f"tendon\nradius\n{limits}", "left center")
+    arms = [
+        row.scale * tendon.radius * np.array([-math.sin(turn), math.cos(turn)])
+        for tendon, turn in zip(row.robot.tendon, turns, strict=True)
+    ]
+    yield Curve(arms, VERMILLION, None, marker="o", size=4.0, layer=14)
+    nearest = int(np.argmax(np.cos(turns)))
+    radius = row.robot.tendon[nearest].radius
+    limits, (x, y) = with_limits(row.robot.tolerance, "tendon.radius", radius), arms[nearest]
+    yield _arrow((0.0, 0.0), (x, y))
+    yield _stroke([(0.5 * x, 0.5 * y), (row.outer + 0.32, 0.5 * y)])
+    yield label((row.outer + 0.34, 0.5 * y), f"tendon\nradius\n{limits}", "left center")
