@@ -10,7 +10,7 @@ from scipy.stats import t
 
 from fitted import NAMES, fitted
 from notchflex.fit import Interval
-from notchflex.plotting import calibration_picture, picture
+from notchflex.plotting import calibration_picture
 from notchflex.plotting.marks import Area
 from notchflex.plotting.style import VERMILLION
 
@@ -139,9 +139,3 @@ def test_browser_shows_band_ends_and_correlations():
     assert texts == [f"{value:.2f}" for value in found.correlation.ravel()]
     points = [one for one in shown.data if (one.name or "") == "measured, pull a"]
     assert len(points) == 6  # five notches and the total
-
-
-def test_it_is_the_picture_of_a_fit():
-    own, made = calibration_picture(fitted()), picture(fitted(), title="mine")
-    assert made.title == "mine"
-    assert [cell.panel.title for cell in made.cells] == [cell.panel.title for cell in own.cells]

@@ -101,7 +101,7 @@ def test_legends_name_what_begins_with_an_underscore(drawn):
 
 
 def test_animation_of_a_nasty_robot(tmp_path, monkeypatch):
-    monkeypatch.setattr("notchflex.plotting.path.DOTS_PER_INCH", 12)
+    monkeypatch.setattr("notchflex.plotting.pictures.DOTS_PER_INCH", 12)
     save_animation(nasty_path(2), tmp_path / "a.gif")
     assert (tmp_path / "a.gif").stat().st_size > 1000
 

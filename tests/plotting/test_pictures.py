@@ -24,7 +24,7 @@ from notchflex.plotting import (
     state_picture,
 )
 from notchflex.plotting.marks import Area, Curve, Panel, bar_panel, grid
-from notchflex.plotting.path import MAX_FRAMES, frames_of
+from notchflex.plotting.pictures import MAX_FRAMES, frames_of
 from notchflex.plotting.style import for_browser as html
 from notchflex.results.quantities import QUANTITIES
 from refusals import refused
@@ -249,18 +249,20 @@ def test_rig_in_a_browser_is_that_on_paper(drawn):
     groups = {one.legendgroup for one in shown.data if one.showlegend}
     assert {one.legendgroup for one in [*stripes, *levels]} <= groups
     deviation = rig.readings.coefficient_deviation
-    readings = next(one for one in shown.data if one.name == "reading")
-    assert np.isnan(readings.error_y.array[0])
-    np.testing.assert_allclose(readings.error_y.array[1:], deviation[1:], rtol=1e-5)
-    assert readings.text[0] == ""
-    ends = np.array([bar[:, 1] for bar in left.collections[0].get_segments()])
-    np.testing.assert_allclose(np.ptp(ends, axis=1)[1:], 2.0 * deviation[1:])
+    # Every reading has a bar from end to end, and a gap behind it.
+    bars = [one for one in shown.data if one.name == "reading" and one.mode == "lines"]
+    on_paper = next(one for one in left.get_lines() if len(one.get_xdata()) == 3 * len(deviation))
+    for heights in (np.array(bars[0].y, float), on_paper.get_ydata()):
+        low, high, gap = heights.reshape(-1, 3).T
+        assert np.isnan(low[0])
+        np.testing.assert_allclose((high - low)[1:], 2.0 * deviation[1:])
+        assert np.isnan(gap).all()
     assert picture(rig).title == own.title
 
 
 def test_names_at_an_axis_have_room_in_a_browser():
     def place(name):
-        panel = bar_panel([1.0], [name], ["red"], "mm")
+        panel = bar_panel(np.ones(1), [name], "mm")
         plain = Panel([Curve([[0.0, 0.0], [1.0, 1.0]], "red")], "x", "y")
         layout = Picture("", grid([plain, panel], 2)).interactive().layout
         return (layout.xaxis2.domain[0] - layout.xaxis.domain[1]) * layout.meta["width"]
@@ -303,7 +305,7 @@ def test_animation_moves_and_ends_where_the_path_ends(tmp_path):
 def test_animation_takes_its_time_and_stands_at_both_ends(tmp_path, monkeypatch, steps):
     from PIL import Image
 
-    monkeypatch.setattr("notchflex.plotting.path.DOTS_PER_INCH", 12)
+    monkeypatch.setattr("notchflex.plotting.pictures.DOTS_PER_INCH", 12)
     file = tmp_path / "x.gif"
     save_animation(fake_path(steps), file)
     with Image.open(file) as moving:

@@ -22,10 +22,12 @@ from notchflex.plotting.fits import (
 )
 from notchflex.plotting.marks import Curve, Mark, Panel, dots, line
 from notchflex.plotting.output import Picture
-from notchflex.plotting.path import (
+from notchflex.plotting.pictures import (
     beside_picture,
     path_figure,
     path_picture,
+    picture,
+    plot_on_axes,
     save_animation,
     state_picture,
 )
@@ -67,7 +69,6 @@ from notchflex.plotting.style import (
     house_style,
     save,
 )
-from notchflex.plotting.usual import picture, plot_on_axes
 from notchflex.plotting.with_matplotlib import draw_marks, draw_panel
 from notchflex.plotting.with_plotly import chart_of
 

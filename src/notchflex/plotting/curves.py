@@ -16,6 +16,7 @@ from notchflex.plotting.marks import (
     DASHED,
     DOTTED,
     INSIDE,
+    MARKERS,
     SOLID,
     Array,
     Colour,
@@ -38,6 +39,7 @@ LINE = {LOADING: SOLID, UNLOADING: DASHED}
 NEUTRAL = "#4c4c4c"
 """Colour of legend entries for marks of several colours."""
 NOTCH_LABEL = "notch [number], 1 at the base"
+TIP_LABELS = tuple(f"tip position {axis} [mm]" for axis in "xz")
 STEP = "step"
 """Name of the number of the step, from 1."""
 MAX_NAMES = 12
@@ -56,6 +58,20 @@ def evenly(values: Any, most: int) -> list[int]:
     values = np.asarray(values, float)
     goals = np.linspace(values.min(), values.max(), most) if len(values) else []
     return list(dict.fromkeys(int(np.argmin(np.abs(values - goal))) for goal in goals))
+
+
+def entry_lines(x: Array, table: Array, each: str = "", **style: Any) -> list[Mark]:
+    """Return a curve over x for each entry of a table, (rows, entries), named by its number.
+
+    Of many entries some are drawn; `style` are further options of `Curve`.
+    """
+    shown = evenly(range(table.shape[1]), MAX_NAMES)
+    if len(shown) == 1:
+        return [line(x, table[:, 0], BLUE, **style)]
+    return [
+        line(x, table[:, entry], colour, name=f"{each} {entry + 1}", **style)
+        for entry, colour in zip(shown, sequence_colours(len(shown)), strict=True)
+    ]
 
 
 def branches(x: Array) -> Iterator[tuple[slice, str]]:
@@ -78,13 +94,24 @@ def branches(x: Array) -> Iterator[tuple[slice, str]]:
         yield slice(start, end + 1), LOADING if sign[start:end].sum() >= 0.0 else UNLOADING
 
 
+def branches_of(path: EquilibriumPath) -> list[tuple[slice, str]]:
+    """Return the branches of a path, by the sum over the tendons that change.
+
+    Each counts by its prescribed tension or stroke.
+    """
+    values, _, changing = prescribed(path)
+    values = values[:, changing]
+    sizes = np.nanmax(np.abs(values), axis=0, initial=1e-300)
+    return list(branches((values / sizes).sum(axis=1)))
+
+
 def steps_by_branch(path: EquilibriumPath) -> dict[str, list[int]]:
     """Return the converged steps of loading and of unloading, each if there are any."""
-    steps: dict[str, dict[int, None]] = {}
-    for part, way in branches(load_parameter(path)):
+    steps = {LOADING: list[int](), UNLOADING: list[int]()}
+    for part, way in branches_of(path):
         solved = part.start + np.flatnonzero(path.converged[part])
-        steps.setdefault(way, {}).update(dict.fromkeys(solved.tolist()))
-    return {way: list(some) for way, some in steps.items() if some}
+        steps[way] += [step for step in solved.tolist() if step not in steps[way]]
+    return {way: some for way, some in steps.items() if some}
 
 
 def prescribed(path: EquilibriumPath) -> tuple[Array, list[int], list[int]]:
@@ -118,16 +145,6 @@ def abscissa(path: EquilibriumPath) -> tuple[Array, str]:
         name = "stroke" if tendon in by_stroke else "tension"
         return values[:, tendon], tendon_label(path, name, tendon)
     return np.arange(1.0, len(path) + 1.0), "step [number]"
-
-
-def load_parameter(path: EquilibriumPath) -> Array:
-    """Return a number for each step, (S,), that increases while the tendons are pulled.
-
-    The sum over the tendons that change, each by its prescribed tension or stroke.
-    """
-    values, _, changing = prescribed(path)
-    values = values[:, changing]
-    return (values / np.nanmax(np.abs(values), axis=0, initial=1e-300)).sum(axis=1)
 
 
 def tendon_label(path: EquilibriumPath, name: str, tendon: int) -> str:
@@ -169,16 +186,37 @@ def branch_lines(
     are both. `style` are further options of `Curve`.
     """
     y = np.where(path.converged, y, np.nan)
-    parts = list(branches(load_parameter(path)))
+    parts = branches_of(path)
     for part, way in parts:
         usual = {"name": "" if len(parts) == 1 else way} if name is None else {"name": name}
         usual |= {"marker": "o" if part.stop - part.start == 1 else ""}
         yield line(x[part], y[part], colour or COLOUR[way], LINE[way], **(usual | style))
 
 
+def entry_branches(
+    path: EquilibriumPath, across: Any, table: Any, names: Any, ends: Any = None
+) -> Iterator[Mark]:
+    """Yield the branches of every entry, (entries, S), over its own x; several have colours.
+
+    With the ends of a band of tolerances, (2, entries, S), the band lies behind its curve.
+    """
+    count = len(table)
+    named = evenly(range(count), MAX_NAMES)
+    for entry, colour in enumerate(sequence_colours(count) if count > 1 else [None]):
+        tag = {"group": names[entry]} if colour else {}
+        if ends is not None:
+            for part, way in branches_of(path):
+                x, style = across[entry][part], tag or {"name": "5 to 95 % of draws"}
+                shade = colour or COLOUR[way]
+                low, high = ends[:, entry, part]
+                yield band(x, low, high, shade, 0.18, layer=1, **style)
+        tag |= {"name": names[entry] * (entry in named)} if colour else {}
+        yield from branch_lines(path, across[entry], table[entry], colour, **tag)
+
+
 def way_entries(path: EquilibriumPath) -> list[Curve]:
     """Return legend entries of loading and unloading, if a path has both."""
-    ways = dict.fromkeys(way for _, way in branches(load_parameter(path)))
+    ways = dict.fromkeys(way for _, way in branches_of(path))
     return [Curve([], NEUTRAL, LINE[way], name=way) for way in ways if len(ways) > 1]
 
 
@@ -194,7 +232,6 @@ def load_panel(
     name: str,
     bands: Mapping[str, Band] | None = None,
     extra: Sequence[Mark] = (),
-    names: bool = True,
     **options: Any,
 ) -> Panel:
     """Return a quantity over the load, each entry in its colour, with its band of tolerances.
@@ -204,23 +241,19 @@ def load_panel(
         name: A quantity with one number, or one for each notch.
         bands: Bands by name of the quantity; None for none.
         extra: Further marks.
-        names: Whether the legend names the entries.
         options: Those of `Panel`.
     """
     x, x_label = abscissa(path)
-    table = scaled(path, name, getattr(path, name))
-    count, items = table.shape[1], list[Mark]()
-    named = evenly(range(count), MAX_NAMES) if names else []
-    for entry, colour in enumerate(sequence_colours(count) if count > 1 else [None]):
-        group = f"notch {entry + 1}" if count > 1 else ""
-        if bands is not None and name in bands:
-            ends = [scaled(path, name, end) for end in (bands[name].low, bands[name].high)]
-            low, high = np.sort([end[:, entry] for end in ends], axis=0)
-            items += _bands(path, x, low, high, colour, group)
-        style = {"group": group, "name": group if entry in named else ""} if group else {}
-        items += branch_lines(path, x, table[:, entry], colour, **style)
-    label = options.pop("y_label", QUANTITIES[name].label)
-    return Panel([*items, *extra, *failures(path, x)], x_label, label, shared="x", **options)
+    table = scaled(path, name, getattr(path, name)).T
+    ends = None
+    if bands and name in bands:
+        low, high = (scaled(path, name, end).T for end in (bands[name].low, bands[name].high))
+        ends = np.where(path.converged, np.sort([low, high], axis=0), np.nan)
+    names = [f"notch {number}" for number in range(1, len(table) + 1)]
+    lines = entry_branches(path, [x] * len(table), table, names, ends)
+    items: list[Mark] = [*lines, *extra, *failures(path, x)]
+    options = {"y_label": QUANTITIES[name].label} | options
+    return Panel(items, x_label, shared="x", **options)
 
 
 def scaled(path: EquilibriumPath, name: str, values: Any) -> Array:
@@ -229,34 +262,29 @@ def scaled(path: EquilibriumPath, name: str, values: Any) -> Array:
     return 100.0 * np.abs(values) if name == "peak_strain" else QUANTITIES[name].scale * values
 
 
-def _bands(
-    path: EquilibriumPath, x: Array, low: Array, high: Array, colour: Colour | None, group: str
-) -> Iterator[Mark]:
-    low = np.where(path.converged, low, np.nan)
-    name = "" if group else "5 to 95 % of draws"
-    for part, way in branches(load_parameter(path)):
-        shade = colour or COLOUR[way]
-        yield band(x[part], low[part], high[part], shade, 0.18, name=name, group=group, layer=1)
-
-
 def path_panels(path: EquilibriumPath, bands: Mapping[str, Band] | None) -> list[Panel]:
     """Return the curves that a path of several steps is worth."""
+    panels = [total_panel(path, bands), notches_panel(path, bands)]
+    _, by_stroke, changing = prescribed(path)
+    for tendon in [tendon for tendon in changing if tendon in by_stroke][:MAX_PROFILES]:
+        # The tension of a tendon over its stroke: the hysteresis of friction.
+        labels = [tendon_label(path, name, tendon) for name in ("stroke", "tension")]
+        items: list[Mark] = [*failures(path, path.commanded_stroke[:, tendon])]
+        items[:0] = branch_lines(path, path.stroke[:, tendon], path.tension[:, tendon])
+        panels.append(Panel(items, *labels, legend=INSIDE, from_zero=True))
     allowed, limits = path.robot.material.allowed_strain, list[Mark]()
     if allowed is not None:
         level, name = 100.0 * allowed, f"allowed {100.0 * allowed:.3g} %"
         limits.append(Span("y", level, VERMILLION, DASHED, 1.2, name=name))
     label = f"{QUANTITIES['peak_strain'].title} of every notch [%]"
     style: dict[str, Any] = {"y_label": label, "from_zero": True, "legend": INSIDE}
-    panels = [total_panel(path, bands), notches_panel(path, bands)]
-    _, by_stroke, changing = prescribed(path)
-    driven = [tendon for tendon in changing if tendon in by_stroke][:MAX_PROFILES]
-    panels += [stroke_panel(path, tendon) for tendon in driven]
+    strain = load_panel(path, "peak_strain", bands, limits, **style)
     # The curves of the notches have their names in the panel of the angles.
-    panels.append(load_panel(path, "peak_strain", bands, limits, names=False, **style))
+    items = [replace(item, name="") if item.group else item for item in strain.items]
+    panels.append(replace(strain, items=items))
     if len(steps_by_branch(path)) > 1:
-        tendons = pulled_tendons(path)
-        panels += [profile_panel(path, tendon) for tendon in tendons[:MAX_PROFILES]]
-        panels += [front_panel(path)] if reverses_step_by_step(path) else []
+        panels += [profile_panel(path, tendon) for tendon in pulled_tendons(path)[:MAX_PROFILES]]
+        panels += front_panels(path)
     return panels
 
 
@@ -278,14 +306,6 @@ def notches_panel(path: EquilibriumPath, bands: Mapping[str, Band] | None = None
         points = np.stack([x, angles[:, notch]], axis=1)[closed[:, notch]]
         extra.append(dots(points, colour, group=f"notch {notch + 1}", layer=3))
     return load_panel(path, "notch_angle", bands, extra)
-
-
-def stroke_panel(path: EquilibriumPath, tendon: int) -> Panel:
-    """Return the tension of a tendon (from 0) over its stroke: the hysteresis of friction."""
-    labels = [tendon_label(path, name, tendon) for name in ("stroke", "tension")]
-    items: list[Mark] = [*branch_lines(path, path.stroke[:, tendon], path.tension[:, tendon])]
-    items += failures(path, path.commanded_stroke[:, tendon])
-    return Panel(items, *labels, legend=INSIDE, from_zero=True)
 
 
 def pulled_tendons(path: EquilibriumPath) -> list[int]:
@@ -325,50 +345,34 @@ def profile_panel(path: EquilibriumPath, tendon: int) -> Panel:
     return span_panel([*items, *way_entries(path)], which)
 
 
-def front_panel(path: EquilibriumPath) -> Panel:
+def front_panels(path: EquilibriumPath) -> list[Panel]:
     """Return the number of contacts of every pulled tendon at which the friction has reversed.
 
     After a reversal of the load, friction reverses contact by contact from the base; fractions
-    follow from the state of the contact in between (`EquilibriumPath.front`).
+    follow from the state of the contact in between (`EquilibriumPath.front`). Where it reverses in
+    fewer than three steps there is nothing to see, and no panel.
     """
     x, x_label = abscissa(path)
-    tendons, counts = pulled_tendons(path), reversed_contacts(path)
-    items: list[Mark] = []
-    for order, tendon in enumerate(tendons):
-        which = f", tendon {tendon + 1}" if len(tendons) > 1 else ""
-        marker = "os^D"[order % 4]
-        for curve in branch_lines(path, x, counts[:, tendon], marker=marker, size=2.2):
-            items.append(replace(curve, name=curve.name and curve.name + which))
-    most = max(spans_of(path, tendon) - 1 for tendon in tendons)
-    return Panel(
-        items,
-        x_label,
-        "reversed contacts [number]",
-        title=f"contacts with reversed friction, of {most}",
-        shared="x",
-        whole="y",
-        y_range=(-0.03 * most, 1.03 * most),
-    )
-
-
-def reversed_contacts(path: EquilibriumPath) -> Array:
-    """Return the number of contacts with reversed friction, (S, tendons); NaN without tension."""
     contact, eta = (np.asarray(part, float) for part in path.front)
     # eta decreases from 1 to -1 while the friction of one contact reverses.
     counts = contact - 1.0 + 0.5 * (1.0 - np.where(np.isnan(eta), 1.0, eta))
-    return np.where(path.tension > SLACK, counts, np.nan)
-
-
-def reverses_step_by_step(path: EquilibriumPath) -> bool:
-    """Return whether friction reverses over three steps or more, so that it is worth a panel."""
-    solved = np.asarray(path.converged)
-    for tendon in pulled_tendons(path):
-        count = reversed_contacts(path)[solved, tendon]
-        partial = count[(count > 0.0) & (count < spans_of(path, tendon) - 1)]
+    counts[path.tension <= SLACK] = np.nan
+    tendons, solved = pulled_tendons(path), np.asarray(path.converged)
+    most, is_seen, items = 0, False, list[Mark]()
+    for order, tendon in enumerate(tendons):
+        contacts, count = spans_of(path, tendon) - 1, counts[solved, tendon]
+        partial = count[(count > 0.0) & (count < contacts)].round(6)
         rubs = np.any(path.contact_bound[solved, tendon] > 0.0)
-        if rubs and len(np.unique(partial.round(6))) > 2:
-            return True
-    return False
+        is_seen |= bool(rubs and len(np.unique(partial)) > 2)
+        most = max(most, contacts)
+        which = f", tendon {tendon + 1}" if len(tendons) > 1 else ""
+        style: dict[str, Any] = {"marker": MARKERS[order % len(MARKERS)], "size": 2.2}
+        for curve in branch_lines(path, x, counts[:, tendon], **style):
+            items.append(replace(curve, name=curve.name and curve.name + which))
+    title, label = f"contacts with reversed friction, of {most}", "reversed contacts [number]"
+    limits = -0.03 * most, 1.03 * most
+    panel = Panel(items, x_label, label, title=title, shared="x", whole="y", y_range=limits)
+    return [panel] if is_seen else []
 
 
 def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
@@ -383,12 +387,9 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
         raise InputError.WRONG_SHAPE(
             f"{x} has {len(across)} entries; take one of them for the horizontal axis: {columns}"
         )
-    items: list[Mark] = []
-    for right, up, shade in zip(across, upward, sequence_colours(len(upward)), strict=True):
-        style: list[Any] = [shade, up.name] if len(upward) > 1 else []
-        items += branch_lines(path, right.values, up.values, *style)
-    if len(upward) > 1:
-        items += way_entries(path)
+    names, table = [entry.name for entry in upward], [entry.values for entry in upward]
+    lines = entry_branches(path, [entry.values for entry in across], table, names)
+    items: list[Mark] = [*lines, *(way_entries(path) if len(upward) > 1 else ())]
     if len({entry.header for entry in across}) == 1:
         items += failures(path, across[0].values)
     legend = BESIDE if len(upward) > 1 else INSIDE
@@ -400,23 +401,27 @@ def _series(path: EquilibriumPath, name: str) -> tuple[str, list[Any], tuple[str
 
     It has the name of the quantity, or the CSV column of one of its entries.
     """
-    if name == STEP:
-        number = np.arange(1.0, len(path) + 1.0)
-        return STEP, [SimpleNamespace(header="", name="", values=number)], ()
-    listed = [row for row in QUANTITIES.values() if is_listed(row) and row.kind is not str]
-    choice = [quantity.name for quantity in listed]
-    for quantity in listed:
-        entries = list(entries_of(path, quantity))
-        if quantity.name == name:
-            return quantity.label, entries, quantity.per
-        for entry in entries:
-            if entry.header and entry.header == name:
-                return entry_label(quantity, entry.name), [entry], ()
-        choice += [entry.header for entry in entries if entry.header]
+    names: list[str] = []
+    for choice, label, entries, per in _choices(path):
+        if choice == name:
+            return label, entries, per
+        names.append(choice)
     if name in QUANTITIES:
         raise InputError.UNSUPPORTED(
             f"{name} can't be drawn as lines; draw a quantity such as total_angle"
         )
-    choice.append(STEP)
-    meant = nearest(str(name), choice, 3) or f"; there are {', '.join(choice)}"
+    meant = nearest(str(name), names, 3) or f"; there are {', '.join(names)}"
     raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r} to draw{meant}")
+
+
+def _choices(path: EquilibriumPath) -> Iterator[tuple[str, str, list[Any], tuple[str, ...]]]:
+    """Yield all that can be drawn as lines: its name, its label, its entries and their kind."""
+    number = np.arange(1.0, len(path) + 1.0)
+    yield STEP, STEP, [SimpleNamespace(header="", name="", values=number)], ()
+    for quantity in QUANTITIES.values():
+        if is_listed(quantity) and quantity.kind is not str:
+            entries = list(entries_of(path, quantity))
+            yield quantity.name, quantity.label, entries, quantity.per
+            for entry in entries:
+                if entry.header:
+                    yield entry.header, entry_label(quantity, entry.name), [entry], ()

@@ -28,12 +28,13 @@ from notchflex.plotting.marks import (
     Span,
     band,
     bar_panel,
+    box,
     dots,
     grid,
     line,
 )
 from notchflex.plotting.output import Picture
-from notchflex.plotting.shapes import outline, shape_from_angles
+from notchflex.plotting.shapes import project
 from notchflex.plotting.style import (
     BLUE,
     GREY,
@@ -43,13 +44,14 @@ from notchflex.plotting.style import (
     diverging_colour,
     sequence_colours,
 )
-from notchflex.support import DEGREES, QUANTITIES
+from notchflex.support import AXES, DEGREES, QUANTITIES
 
 if TYPE_CHECKING:
     from notchflex.comparison import Comparison
     from notchflex.fit import Calibration, FrictionRig
 
 _MODEL_LINES = (SOLID, DASHED, DASH_DOT, DOTTED, MIXED)
+_AXIS_POINTS = 200  # of a centre line
 _SIZES = {"column_width": 3.0, "row_height": 2.6}
 
 
@@ -122,7 +124,7 @@ def _angles(comparison: Comparison, prefix: str = "") -> Array:
 
 def _runs(rows: Any, x: Array, pull: Any, from_rest: bool) -> list[Any]:
     """Return the rows of each line of a model: all by load if from rest, else by pull."""
-    if from_rest:
+    if from_rest and len(rows):
         return [rows[np.argsort(x[rows], kind="stable")]]
     return [rows[pull[rows] == label] for label in dict.fromkeys(pull[rows].tolist())]
 
@@ -144,7 +146,7 @@ def _centre_lines(comparison: Comparison) -> Panel:
     longest = max(comparison.measured.pulls, key=lambda label: (trial == label).sum())
     solved = np.flatnonzero((trial == longest) & comparison.converged)
     points = solved[evenly(comparison.total_angle[solved], 6)]
-    view = np.radians(robot.notches[0].direction_deg)
+    view, length = np.radians(robot.notches[0].direction_deg), robot.geometry.length
     items: list[Mark] = [] if len(points) else [Note("no point was solved")]
     title = "centre lines of the model" if len(points) else ""
     for point, colour in zip(points, sequence_colours(len(points)), strict=True):
@@ -153,7 +155,8 @@ def _centre_lines(comparison: Comparison) -> Panel:
             (comparison.measured_notch_angle[point], DOTTED, 2.4),
         ):
             if np.isfinite(angles).all():
-                centre = outline(shape_from_angles(robot, angles), view).centre_line
+                shape = robot.geometry.shape(angles)
+                centre = project(shape.axis(np.linspace(0.0, length, _AXIS_POINTS)), view)
                 items.append(Curve(centre, colour, dash, width))
                 if dash:
                     items.append(dots(centre[-1:], colour, 4.0))
@@ -164,12 +167,12 @@ def _centre_lines(comparison: Comparison) -> Panel:
 
 def _errors(models: Mapping[str, Comparison], colours: list[Any]) -> Panel:
     """Return the tip error of every model as a bar, or of the total angle if no tip is known."""
-    values = [model.rmse_tip for model in models.values()]
+    values = np.array([model.rmse_tip for model in models.values()])
     label, title = "tip error [mm]", "tip error, rms"
     if np.isnan(values).all():
-        values = [model.rmse_total * DEGREES for model in models.values()]
+        values = np.array([model.rmse_total for model in models.values()]) * DEGREES
         label, title = "total angle error [deg]", "error of the total angle, rms"
-    return bar_panel(values, list(models), colours, label, title=title)
+    return bar_panel(values, list(models), label, colours=colours, title=title)
 
 
 _MEASURED, _MODEL, _BAND, _END = "measured", "model", "band", "end of the interval"
@@ -181,9 +184,7 @@ MAX_NAMED = 8
 """Of so many notches a legend has the first and the last colour only."""
 
 _NOTCHES = ("notch_angle", "edge_angle")
-_KINDS = dict.fromkeys((*_NOTCHES, "total_angle", "total_edge_angle", "tip_rotation"), "angle") | {
-    "tip_tension": "tension"
-}
+_MEANS = {"deg": "angle", "mm": "position", "N": "tension"}
 
 
 def calibration_picture(fit: Calibration) -> Picture:
@@ -199,121 +200,93 @@ def calibration_picture(fit: Calibration) -> Picture:
     Args:
         fit: The fit.
     """
-    panels: list[Panel] = []
-    for label in fit.given:
-        panels += [*_data_panels(fit, label), _residual_panel(fit, label)]
+    angles = fit.residuals.part[fit.residuals.are(*_NOTCHES)]
+    shown = np.unique(angles).tolist()
+    # The marker of every notch (from 0), the same for all robots.
+    notches = {
+        notch: dots([], colour, name=f"residuals of notch {notch + 1}")
+        for notch, colour in zip(shown, sequence_colours(len(shown)), strict=True)
+    }
+    panels = [panel for label in fit.given for panel in _robot_panels(fit, label, notches)]
     panels += [_likelihood_panel(fit, name) for name in fit.intervals]
     if len(fit.names) > 1:
         panels.append(_correlation_panel(fit))
     measured = "measured, a kind of marker for each pull"
-    notches = list(_notch_entries(fit).values())
+    named = list(notches.values())
     entries: list[Curve | Area] = [
         dots([], GREY, 4.0, hollow=True, name=measured, group=_MEASURED),
         Curve([], BLUE, name=_MODEL),
         Area([], BLUE, 0.25, name="95 % band of the model", group=_BAND),
         Curve([], VERMILLION, DASHED, 1.0, name="end of the 95 % interval", group=_END),
-        *(notches if len(notches) < MAX_NAMED else [notches[0], notches[-1]]),
+        *(named if len(named) < MAX_NAMED else [named[0], named[-1]]),
         dots([], GREY, 3.5, marker="X", name=_OTHERS),
     ]
-    shown = {mark.group or mark.name for panel in panels for mark in panel.items}
-    legend = [entry for entry in entries if (entry.group or entry.name) in shown]
+    there = {mark.group or mark.name for panel in panels for mark in panel.items}
+    legend = [entry for entry in entries if (entry.group or entry.name) in there]
     title = f"{', '.join(fit.given)}: {fit.counted} numbers"
     return Picture(title, grid(panels, min(4, len(panels))), legend, **_SIZES)
 
 
-def _data_panels(fit: Calibration, label: str) -> Iterator[Panel]:
-    """Yield the panels of a robot: some notches, and every other measured number."""
-    from notchflex.fit import OBSERVED
+def _robot_panels(fit: Calibration, label: str, notches: Mapping[int, Curve]) -> Iterator[Panel]:
+    """Yield every measured number of a robot over the load, some of many, and the residuals."""
+    from notchflex.fit import OBSERVED, edge, part_title
 
+    residuals, prefix = fit.residuals, f"{label}: " if len(fit.given) > 1 else ""
+    of_robot = residuals.robot == list(fit.given).index(label)
+    x, x_label = _loads(fit, of_robot)
     for quantity in OBSERVED:
-        if quantity != "axis_points":  # thirty points and more: only their residuals
-            parts = np.unique(fit.residuals.part[_rows_of(fit, label, quantity)])
-            for part in parts[evenly(range(len(parts)), MAX_NOTCHES)].tolist():
-                yield _data_panel(fit, label, quantity, part)
-
-
-def _data_panel(fit: Calibration, label: str, quantity: str, part: int) -> Panel:
-    """Return one number over the load: measured, model, and the band of the model."""
-    from notchflex.fit import edge, part_title
-
-    residuals, (name, unit, scale) = fit.residuals, edge(quantity)
-    x, x_label = _loads(fit, label)
-    half = fit.half_width(residuals.slopes) * scale
-    samples, items = [sample.measured for sample in fit.problem.samples.every], list[Mark]()
-    shown = np.flatnonzero(_rows_of(fit, label, quantity) & (residuals.part == part))
-    runs: list[Any] = []
-    for number in np.unique(residuals.sample[shown]).tolist():
-        of_sample = shown[residuals.sample[shown] == number]
-        runs += _runs(of_sample, x, residuals.pull, samples[number].from_rest)
-    for rows in runs:
-        sample = samples[residuals.sample[rows[0]]]
-        table = sample.observed[quantity]
-        measured = table.reshape(len(table), -1)[residuals.row[rows], part] * scale
-        model = measured + residuals.values[rows] * scale
-        if np.isfinite(half[rows]).all():
-            ends = model - half[rows], model + half[rows]
-            items.append(band(x[rows], *ends, BLUE, 0.25, group=_BAND))
-        items.append(line(x[rows], model, BLUE, group=_MODEL, layer=3))
-        for pull in dict.fromkeys(residuals.pull[rows].tolist()):
-            of_pull = residuals.pull[rows] == pull
-            title = f"{_MEASURED}, pull {sample.pull[residuals.row[rows][of_pull][0]]}"
-            points, marker = np.stack([x[rows], measured], 1)[of_pull], MARKERS[pull % len(MARKERS)]
-            entry = dots(points, GREY, 3.2, marker=marker, hollow=True, name=title, layer=4)
-            items.append(replace(entry, group=_MEASURED))
-    title = part_title(quantity, 0 if quantity.startswith("total_") else part + 1)
-    if quantity in ("tip_position", "tip_rotation"):
-        title = f"{name}, {'xyz'[part]}"
-    y_label = f"{_KINDS.get(quantity, 'position')} [{unit}]"
-    return Panel(items, x_label, y_label, title=_titled(fit, label, title), legend="")
-
-
-def _residual_panel(fit: Calibration, label: str) -> Panel:
-    """Return the residuals of a robot over their noise, notches by colour.
-
-    A total angle that is the sum of the notches has no noise of its own and is not drawn.
-    """
-    residuals, noise = fit.residuals, fit.noise.deviation
-    x, x_label = _loads(fit, label)
-    points = np.stack([x, residuals.values / noise], axis=1)
-    noisy, angles = np.isfinite(noise), _rows_of(fit, label, *_NOTCHES)
-    others = points[_rows_of(fit, label) & noisy & ~angles]
+        if quantity == "axis_points":  # thirty points and more: only their residuals
+            continue
+        of_quantity, (name, unit, _) = of_robot & residuals.are(quantity), edge(quantity)
+        parts = np.unique(residuals.part[of_quantity])
+        for part in parts[evenly(range(len(parts)), MAX_NOTCHES)].tolist():
+            title = part_title(quantity, 0 if quantity.startswith("total_") else part + 1)
+            if quantity in ("tip_position", "tip_rotation"):
+                title = f"{name}, {AXES[part]}"
+            items = list(_data_marks(fit, quantity, of_quantity & (residuals.part == part), x))
+            y_label = f"{_MEANS[unit]} [{unit}]"
+            yield Panel(items, x_label, y_label, title=prefix + title, legend="")
+    # A total angle that is the sum of the notches has no noise of its own and is not drawn.
+    points = np.stack([x, residuals.values / fit.noise.deviation], axis=1)
+    noisy, angles = of_robot & np.isfinite(fit.noise.deviation), residuals.are(*_NOTCHES)
     items: list[Mark] = [Span("y", -1.96, GREY, high=1.96, opacity=0.15), Span("y", 0.0, GREY)]
-    if len(others):
-        items.append(dots(others, GREY, 3.5, marker="X", name=_OTHERS, layer=1))
-    for notch, entry in _notch_entries(fit).items():
-        of_notch = angles & noisy & (residuals.part == notch)
-        if of_notch.any():
-            items.append(replace(entry, points=points[of_notch], layer=3))
-    title = _titled(fit, label, "model less measured")
-    return Panel(items, x_label, "residual / its noise [-]", title=title, legend="")
+    others = dots(points[noisy & ~angles], GREY, 3.5, marker="X", name=_OTHERS, layer=1)
+    of_notches = [
+        replace(entry, points=points[noisy & angles & (residuals.part == notch)], layer=3)
+        for notch, entry in notches.items()
+    ]
+    items += [mark for mark in (others, *of_notches) if len(mark.points)]
+    title, y_label = f"{prefix}model less measured", "residual / its noise [-]"
+    yield Panel(items, x_label, y_label, title=title, legend="")
 
 
-def _notch_entries(fit: Calibration) -> dict[int, Curve]:
-    """Return the marker of every notch (from 0), the same for all robots."""
-    angles = np.any([_rows_of(fit, label, *_NOTCHES) for label in fit.given], axis=0)
-    notches = np.unique(fit.residuals.part[angles]).tolist()
-    return {
-        notch: dots([], colour, name=f"residuals of notch {notch + 1}")
-        for notch, colour in zip(notches, sequence_colours(len(notches)), strict=True)
-    }
+def _data_marks(fit: Calibration, quantity: str, shown: Any, x: Array) -> Iterator[Mark]:
+    """Yield some residuals of a quantity as measured, as model, and as the band of the model."""
+    from notchflex.fit import edge
+
+    residuals, (_, _, scale) = fit.residuals, edge(quantity)
+    half = fit.half_width(residuals.slopes) * scale
+    for number, sample in enumerate(fit.problem.samples.every):
+        seen, of_sample = sample.measured, np.flatnonzero(shown & (residuals.sample == number))
+        for rows in _runs(of_sample, x, residuals.pull, seen.from_rest):
+            table = seen.observed[quantity].reshape(len(seen.pull), -1)
+            measured = table[residuals.row[rows], residuals.part[rows]] * scale
+            model = measured + residuals.values[rows] * scale
+            if np.isfinite(half[rows]).all():
+                ends = model - half[rows], model + half[rows]
+                yield band(x[rows], *ends, BLUE, 0.25, group=_BAND)
+            yield line(x[rows], model, BLUE, group=_MODEL, layer=3)
+            for pull in dict.fromkeys(residuals.pull[rows].tolist()):
+                of_pull = residuals.pull[rows] == pull
+                name = f"{_MEASURED}, pull {seen.pull[residuals.row[rows][of_pull][0]]}"
+                points = np.stack([x[rows], measured], axis=1)[of_pull]
+                style: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "hollow": True}
+                yield dots(points, GREY, 3.2, name=name, group=_MEASURED, layer=4, **style)
 
 
-def _titled(fit: Calibration, label: str, title: str) -> str:
-    return f"{label}: {title}" if len(fit.given) > 1 else title
-
-
-def _rows_of(fit: Calibration, label: str, *quantities: str) -> Any:
-    """Return which residuals belong to a robot, and to some of its quantities."""
-    from notchflex.fit import OBSERVED
-
-    of_robot = fit.residuals.robot == list(fit.given).index(label)
-    numbers = [OBSERVED.index(quantity) for quantity in quantities or OBSERVED]
-    return of_robot & np.isin(fit.residuals.quantity, numbers)
-
-
-def _loads(fit: Calibration, label: str) -> tuple[Array, str]:
+def _loads(fit: Calibration, of_robot: Any) -> tuple[Array, str]:
     """Return tension or stroke of a tendon at every residual of a robot, and its label."""
-    residuals, of_robot = fit.residuals, _rows_of(fit, label)
+    residuals = fit.residuals
     loads = [sample.measured.load for sample in fit.problem.samples.every]
     rows = list(zip(residuals.sample[of_robot], residuals.row[of_robot], strict=True))
     tension, stroke = (
@@ -333,16 +306,16 @@ def _likelihood_panel(fit: Calibration, name: str) -> Panel:
     # Interpolates the nearly linear signed roots.
     root = np.sqrt(rise) * np.sign(value - fit.values[name])
     x = np.linspace(value[0], value[-1], 200)
+    ends = {"below": interval.lower, "above": interval.upper}
     items: list[Mark] = [
         Span("y", level, GREY, DOTTED, 1.2),
         line(x, np.interp(x, value, root) ** 2, BLUE),
         dots(computed, BLUE, group="profile", layer=3),
-    ]
-    ends = {"below": interval.lower, "above": interval.upper}
-    items += [
-        Span("x", end, VERMILLION, DASHED, 1.0, group=_END)
-        for end in ends.values()
-        if end is not None
+        *(
+            Span("x", end, VERMILLION, DASHED, 1.0, group=_END)
+            for end in ends.values()
+            if end is not None
+        ),
     ]
     if sides := [side for side, end in ends.items() if end is None]:
         items.append(Note(f"open {' and '.join(sides)}", (0.03, 0.95), VERMILLION, "left top"))
@@ -364,13 +337,9 @@ def _correlation_panel(fit: Calibration) -> Panel:
     numbers = [str(number + 1) for number in range(count)]
     for (row, column), value in np.ndenumerate(fit.correlation):
         x, y = column, count - 1 - row
-        corners = np.array(
-            [(x - 0.5, y - 0.5), (x + 0.5, y - 0.5), (x + 0.5, y + 0.5), (x - 0.5, y + 0.5)]
-        )
-        names = f"{fit.names[row]}, {fit.names[column]}"
-        is_known = np.isfinite(value)
+        is_known, names = np.isfinite(value), f"{fit.names[row]}, {fit.names[column]}"
         colour = diverging_colour(value) if is_known else "white"
-        items.append(Area([corners], colour, 1.0, group=names))
+        items.append(Area([box(x - 0.5, y - 0.5, x + 0.5, y + 0.5)], colour, 1.0, group=names))
         text, shade = f"{value:.2f}" if is_known else "-", "white" if abs(value) > 0.7 else "black"
         part = (x + 0.5) / count, (y + 0.5) / count
         items.append(Note(text, part, shade, size=min(8.0, 36.0 / count)))
@@ -427,9 +396,11 @@ def _readings(rig: FrictionRig, x: Array) -> list[Mark]:
     ]
     items.append(Span("y", mean, BLUE, width=1.4, name=rf"$\mu$ = {mean:.4g}"))
     points = np.stack([x, readings.coefficient], axis=1)
-    deviation = readings.coefficient_deviation
-    error = deviation if np.isfinite(deviation).any() else None
-    items.append(dots(points, "#333333", name="reading", error=error))
+    # A bar with a gap behind it for each reading; none where no deviation is known.
+    half = np.multiply.outer(readings.coefficient_deviation, [-1.0, 1.0, np.nan])
+    ends = (readings.coefficient[:, None] + half).ravel()
+    items.append(line(np.repeat(x, 3), ends, "#333333", width=0.7, group="reading"))
+    items.append(dots(points, "#333333", name="reading"))
     if rig.outliers:
         points = points[list(rig.outliers)]
         items.append(dots(points, VERMILLION, 8.0, hollow=True, name="outlier", layer=3))

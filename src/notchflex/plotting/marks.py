@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.style import Colour
+from notchflex.plotting.style import SKY, Colour
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,6 @@ class Curve(Mark):
     marker: str = ""  # one of `MARKERS`
     size: float = 3.0  # of the markers [pt]
     hollow: bool = False
-    error: Any = None  # half heights of error bars, (k,), NaN for none
 
     @property
     def rows(self) -> Array:
@@ -178,26 +177,27 @@ class Panel:
         return "xyz" if self.z_label else "xy"
 
 
-def box(left: float, low: float, right: float, high: float) -> Array:
+def box(left: Any, low: Any, right: Any, high: Any) -> Array:
     """Return the corners of a rectangle."""
     return np.array([(left, low), (right, low), (right, high), (left, high)])
 
 
 def bar_panel(
-    values: Sequence[float],
+    values: Array,
     names: Sequence[str],
-    colours: Sequence[Colour],
     label: str,
     extra: Sequence[Mark] = (),
+    colours: Sequence[Colour] = (),
     **options: Any,
 ) -> Panel:
     """Return horizontal bars from top to bottom, with their values; `options` are of `Panel`."""
-    marks = [*extra]
-    for row, (value, colour) in enumerate(zip(values[::-1], colours[::-1], strict=True)):
+    marks, last = [*extra], len(values) - 1
+    for number, value in enumerate(values.tolist()):
+        row, colour = last - number, colours[number] if colours else SKY
         marks.append(Area([box(0.0, row - 0.3, value, row + 0.3)], colour, 1.0))
         marks.append(Note(f" {value:.2f}", (value, row), align="left center", inside=False))
-    most = max([value for value in values if value > 0.0], default=1.0)
-    options = {"x_range": (0.0, 1.2 * most), "ticks": {"y": names[::-1]}} | options
+    limits = 0.0, 1.2 * np.nanmax(values, initial=0.0) or 1.2
+    options = {"x_range": limits, "ticks": {"y": names[::-1]}} | options
     return Panel(marks, label, "", **options)
 
 
@@ -219,6 +219,15 @@ def grid(panels: Sequence[Panel], columns: int) -> list[Cell]:
 def stack(panels: Iterable[Panel], column: int = 0, height: int = 1) -> list[Cell]:
     """Arrange panels in one column from top to bottom, each over `height` rows."""
     return [Cell(panel, height * row, column, height) for row, panel in enumerate(panels)]
+
+
+def side_by_side(columns: Iterable[Sequence[Panel]]) -> list[Cell]:
+    """Arrange panels in columns that are two rows high, each with one panel or two."""
+    return [
+        cell
+        for number, panels in enumerate(columns)
+        for cell in stack(panels, number, 2 // len(panels))
+    ]
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ Batches, sweeps, tolerances, workspaces; designs, fronts, followed targets, sens
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
-from notchflex import Batch, EquilibriumPath, InputError
-from notchflex.plotting.curves import entry_label, evenly
+from notchflex import Batch, InputError
+from notchflex.plotting.curves import TIP_LABELS, entry_label, entry_lines
 from notchflex.plotting.marks import (
     BELOW,
     DASHED,
+    SOLID,
     Area,
     Array,
-    Cell,
     Colour,
     Curve,
     Mark,
@@ -33,10 +33,10 @@ from notchflex.plotting.marks import (
     dots,
     grid,
     line,
+    side_by_side,
     stack,
 )
 from notchflex.plotting.output import Picture
-from notchflex.plotting.path import TIP_LABELS
 from notchflex.plotting.shapes import plane_of, project, shape_panel
 from notchflex.plotting.style import (
     BLACK,
@@ -60,9 +60,6 @@ if TYPE_CHECKING:
     from notchflex.tolerancing import ToleranceAnalysis
     from notchflex.workspaces import Workspace
 
-
-MAX_COLUMNS = 12
-"""Entries of a quantity, such as notches, that are drawn; of more, an even selection."""
 
 _LEFT_OUT = ("converged", "reason", "iterations", "tip_position", "stable")
 
@@ -104,22 +101,25 @@ def batch_picture(
             f"the batch has {rows} rows, and against has the shape {x.shape}; give one value a row."
         )
     last: dict[str, Any] = {}  # of paths their last step
-    for name in batch:
-        if name in QUANTITIES:
+    for name, quantity in QUANTITIES.items():
+        if name in batch:
             values = np.asarray(batch[name])
-            last[name] = values[:, -1] if values.ndim > 1 + len(QUANTITIES[name].per) else values
+            last[name] = values[:, -1] if values.ndim > 1 + len(quantity.per) else values
     converged = last.get("converged", np.ones(rows)).astype(bool)
-    panels: list[Panel] = []
+    order, panels = np.argsort(x, kind="stable"), list[Panel]()
     for name, values in last.items():
+        quantity = QUANTITIES[name]
         if name in _LEFT_OUT or values.dtype.kind not in "fi" or values.ndim > 2:
             continue
-        table = values.reshape(rows, -1) * QUANTITIES[name].scale
-        table = np.where(converged[:, None], table, np.nan)
+        table = values.reshape(rows, -1) * quantity.scale
+        table = np.where(converged[:, None], table, np.nan)[order]
         if np.isfinite(table).any():
-            panels.append(_over_rows(name, x, table, label))
+            style = {"width": 0.8, "marker": "o", "size": 2.0}
+            items = entry_lines(x[order], table, *quantity.per, **style)
+            panels.append(Panel(items, label, quantity.label))
     if "tip_position" in last:
         tips = last["tip_position"][:, [0, 2]]
-        items: list[Mark] = [dots(tips[converged], BLUE, 2.5, group="tip")]
+        items = [dots(tips[converged], BLUE, 2.5, group="tip")]
         if not converged.all():
             items.append(dots(tips[~converged], VERMILLION, 2.5, name="not converged"))
         panels.append(Panel(items, *TIP_LABELS, equal=True))
@@ -129,17 +129,6 @@ def batch_picture(
             "notch_angle or tip_position."
         )
     return Picture(title, grid(panels, min(3, len(panels))))
-
-
-def _over_rows(name: str, x: Array, table: Array, label: str) -> Panel:
-    quantity, order, count = QUANTITIES[name], np.argsort(x, kind="stable"), table.shape[1]
-    shown = evenly(range(count), MAX_COLUMNS)
-    items: list[Mark] = []
-    for column, colour in zip(shown, sequence_colours(len(shown)), strict=True):
-        name, shade = (f"{quantity.per[0]} {column + 1}", colour) if count > 1 else ("", BLUE)
-        y = table[order, column]
-        items.append(line(x[order], y, shade, width=0.8, marker="o", size=2.0, name=name))
-    return Panel(items, label, quantity.label)
 
 
 MAX_ROWS = 2000
@@ -169,10 +158,6 @@ def sweep_picture(sweep: Sweep, x: str, y: str) -> Picture:
     frame = sweep.lazy()
     columns = [name for name in frame.collect_schema().names() if name != "code"]
     for name in (x, y):
-        if name == "code":
-            raise InputError.UNSUPPORTED(
-                "`code` is text, and text has no axis; it is shown by the colour of points."
-            )
         if name not in columns:
             raise InputError.UNKNOWN_NAME(
                 f'the sweep has no column "{name}"{nearest(name, columns)}; there are '
@@ -180,8 +165,7 @@ def sweep_picture(sweep: Sweep, x: str, y: str) -> Picture:
             )
     if sweep.rows > MAX_ROWS and sweep.plan.output.rows:
         # Every k-th row would be a regular part of a grid or of a Sobol sequence.
-        scattered = polars.col("row") % 2**31 * 2_654_435_761 % 2**32
-        frame = frame.filter(scattered < 2**32 * MAX_ROWS // sweep.rows)
+        frame = frame.filter(polars.col("row").hash() % -(-sweep.rows // MAX_ROWS) == 0)
     across, upward = (polars.col(name).cast(polars.Float64) for name in (x, y))
     table = frame.select(polars.col("code").cast(str), across.alias("x"), upward.alias("y"))
     code, *both = (column.to_numpy() for column in table.collect())
@@ -190,38 +174,34 @@ def sweep_picture(sweep: Sweep, x: str, y: str) -> Picture:
     if not placed.any():
         raise InputError.NO_DATA(f"no row has a number of {x}.")
     items: list[Mark] = [
-        dots(both[is_finite & (code == name)], colour, 1.6, name=name)
+        dots(points, colour, 1.6, name=name)
         for name, colour in (("accepted", BLUE), ("rejected", ORANGE))
-        if (is_finite & (code == name)).any()
+        if len(points := both[is_finite & (code == name)])
     ]
-    if is_finite.sum() >= _MIN_PER_BIN * _BINS:
-        items += _quantiles(both[is_finite])
-    lost = placed & ~is_finite
-    if lost.any():
-        floor = both[is_finite, 1].min() if is_finite.any() else 0.0
-        points = np.column_stack([both[lost, 0], np.full(lost.sum(), floor)])
-        items.append(dots(points, VERMILLION, 4.0, name="no result", marker="X"))
+    items += _quantiles(both[is_finite])
+    if len(lost := both[placed & ~is_finite]):
+        lost[:, 1] = both[is_finite, 1].min() if is_finite.any() else 0.0
+        items.append(dots(lost, VERMILLION, 4.0, name="no result", marker="X"))
     panel = Panel(items, sweep_label(sweep, x), sweep_label(sweep, y))
     title = f"{sweep.plan.name}: {sweep.rows} rows"
     return Picture(title, grid([panel], 1), column_width=5.4, row_height=4.2)
 
 
 def _quantiles(both: Array) -> list[Mark]:
-    """Return the median and the band of 95 % along x: at its values if these are few.
+    """Return the median and the band of 95 % in bins along x: one for each value if these are few.
 
-    Otherwise they are those of bins of equally many rows.
+    Otherwise as many rows are in each bin.
     """
-    both = both[np.argsort(both[:, 0], kind="stable")]
-    values, first = np.unique(both[:, 0], return_index=True)
-    parts = np.array_split(both, _BINS)
-    if len(values) <= _BINS:
-        parts = np.split(both, first[1:])
-    middle = np.array([np.median(part[:, 0]) for part in parts])
-    keep = np.append(True, np.diff(middle) > 0.0)
-    quantiles = np.array([np.quantile(part[:, 1], (0.025, 0.5, 0.975)) for part in parts])
-    middle, (low, half, high) = middle[keep], quantiles[keep].T
-    if len(middle) < 3:
+    if not len(both):
         return []
+    edges = np.unique(np.quantile(both[:, 0], np.linspace(0.0, 1.0, _BINS + 1)))
+    place = np.searchsorted(edges, both[:, 0], side="right")
+    bins = [both[place == number] for number in range(1, len(edges) + 1)]
+    bins = [rows for rows in bins if len(rows) >= _MIN_PER_BIN]
+    if len(bins) < 3:
+        return []
+    middle = np.array([np.median(rows[:, 0]) for rows in bins])
+    low, half, high = np.transpose([np.quantile(rows[:, 1], (0.025, 0.5, 0.975)) for rows in bins])
     return [
         band(middle, low, high, BLUE, 0.15, name="95 % of rows", layer=3),
         line(middle, half, "black", name="median", layer=4),
@@ -242,11 +222,8 @@ def sweep_label(sweep: Sweep, name: str) -> str:
         word if axis == "axis" else f"{axis} {word}"
         for axis, word in zip(quantity.per, words, strict=False)
     )
-    loads = sweep.plan.load if len(sweep.plan.load) > 1 else ()
-    where = [f"at {load}" for load in loads if f"_at_{load}" in name]
-    step = name.rpartition("_step_")[2] if "_step_" in name else ""
-    where += [f"step {step}"] if step.isdecimal() else []
-    return ", ".join([entry_label(quantity, entry), *where])
+    where = " ".join(words[len(quantity.per) + bool(quantity.unit) :])
+    return ", ".join(filter(None, [entry_label(quantity, entry), where]))
 
 
 MAX_LIMITS, MAX_BARS = 4, 12
@@ -267,19 +244,13 @@ def tolerance_picture(found: ToleranceAnalysis) -> Picture:
     shown = np.sort(np.argsort(-outside, kind="stable")[:MAX_LIMITS])
     panels = [_histogram(found, int(index)) for index in shown]
     worst, sources = int(np.argmax(outside)), [found.sources[index] for index in order]
-    parts = np.nan_to_num(found.sobol.total[worst])[order].tolist()
-    exact = (100.0 * found.control.exact[order]).tolist()
+    parts = np.nan_to_num(found.sobol.total[worst])[order]
     label = f"part of the variance of {found.criteria[worst].name.replace('_', ' ')} [-]"
-    colours = [SKY] * len(order)
-    panels.append(bar_panel(parts, sources, colours, label, title="total Sobol index"))
+    panels.append(bar_panel(parts, sources, label, title="total Sobol index"))
     levels = [(found.accepted_fraction, GREEN), (found.wanted_yield, PURPLE)]
-    marks = [
-        Span("x", 100.0 * level, colour, width=1.4, layer=4)
-        for level, colour in levels
-        if level is not None
-    ]
-    title = "yield if one dimension were exact"
-    panels.append(bar_panel(exact, sources, colours, "yield [%]", marks, title=title))
+    marks = [_level(100.0 * level, colour) for level, colour in levels if level is not None]
+    exact, title = 100.0 * found.control.exact[order], "yield if one dimension were exact"
+    panels.append(bar_panel(exact, sources, "yield [%]", marks, title=title))
     low, high = (100.0 * end for end in found.interval)
     title = (
         f"{found.robot.name}: yield {100.0 * found.accepted_fraction:.1f} % "
@@ -297,6 +268,10 @@ def tolerance_picture(found: ToleranceAnalysis) -> Picture:
     return Picture(title, grid(panels, min(3, len(panels))), legend)
 
 
+def _level(level: float, colour: Colour) -> Span:
+    return Span("x", level, colour, width=1.4, layer=4)
+
+
 def _histogram(analysis: ToleranceAnalysis, index: int) -> Panel:
     limit = analysis.criteria[index]
     scale, unit = limit.quantity.scale, limit.quantity.unit
@@ -306,15 +281,18 @@ def _histogram(analysis: ToleranceAnalysis, index: int) -> Panel:
     if not len(count):
         return Panel([Note("no robot has a result")], label, "robots [%]")
     lower, upper = limit.lower * scale, limit.upper * scale
-    inside = (edges[:-1] >= lower) & (edges[1:] <= upper)
-    items: list[Mark] = []
-    for name, part, colour in (("within", inside, BLUE), ("outside", ~inside, ORANGE)):
-        bins = np.flatnonzero(part & (count > 0))
-        rectangles = [box(edges[bin], 0.0, edges[bin + 1], tops[bin]) for bin in bins]
-        items += [Area(rectangles, colour, group=name)] if rectangles else []
+    bars = {"within": list[Array](), "outside": list[Array]()}
+    for left, right, top in zip(edges, edges[1:], tops, strict=False):
+        bars["within" if lower <= left and right <= upper else "outside"].append(
+            box(left, 0.0, right, top)
+        )
+    items: list[Mark] = [
+        Area(bars[name], colour, group=name)
+        for name, colour in (("within", BLUE), ("outside", ORANGE))
+    ]
     nominal = analysis.linear.nominal[index] * scale
-    for level, colour in ((lower, VERMILLION), (upper, VERMILLION), (nominal, GREEN)):
-        items += [Span("x", level, colour, width=1.4, layer=4)] if np.isfinite(level) else []
+    levels = (lower, VERMILLION), (upper, VERMILLION), (nominal, GREEN)
+    items += [_level(level, colour) for level, colour in levels if np.isfinite(level)]
     for end in analysis.linear.worst_case[index] * scale:
         items.append(Span("x", end, GREY, DASHED, layer=3))
     return Panel(items, label, "robots [%]", from_zero=True)
@@ -324,7 +302,7 @@ MAX_POINTS = 4000
 """Tips that are drawn of one workspace; of more, an even selection."""
 
 _CLASSES = 6
-_LABELS = ("x [mm]", "y [mm]", "z [mm]")
+_LABELS: tuple[str, str, str] = ("x [mm]", "y [mm]", "z [mm]")
 
 
 def workspace_picture(found: Workspace) -> Picture:
@@ -346,21 +324,21 @@ def workspace_picture(found: Workspace) -> Picture:
         >>> picture.cells[1].panel.title
         'largest tension [N]'
     """
-    voxels = found.voxels()
-    across = 0 if np.ptp(found.extent[:, 0]) >= np.ptp(found.extent[:, 1]) else 1
+    voxels, across = found.voxels(), int(np.ptp(found.extent[:, :2], axis=0).argmax())
+    values = voxels.values
     maps = {
-        "largest tension [N]": voxels.values["tension"],
-        "peak strain [%]": 100.0 * voxels.values["strain"],
-        "largest error by hysteresis [mm]": voxels.values["hysteresis"],
+        "largest tension [N]": values["tension"],
+        "peak strain [%]": 100.0 * values["strain"],
+        "largest error by hysteresis [mm]": values["hysteresis"],
         "dexterity [% of directions]": 100.0 * voxels.dexterity,
+        "softest stiffness of the tip [N/mm]": values["stiffness"],
     }
-    if np.isfinite(found.stiffness).any():
-        maps["softest stiffness of the tip [N/mm]"] = voxels.values["stiffness"]
     panels = [_cloud(found, across)]
-    for name, values in maps.items():
-        points = np.column_stack([voxels.centre[:, [across, 2]], values])
-        items = list(_classes(points[np.isfinite(values)], name))
-        panels.append(Panel(items, _LABELS[across], _LABELS[2], title=name, equal=True))
+    for name, shown in maps.items():
+        finite = np.isfinite(shown)
+        if finite.any():
+            items = list(_classes(voxels.centre[finite][:, [across, 2]], shown[finite], name))
+            panels.append(Panel(items, _LABELS[across], _LABELS[2], title=name, equal=True))
     return Picture(f"Workspace of {found.robot.name}", grid(panels, 3))
 
 
@@ -413,15 +391,12 @@ def _cloud(workspace: Workspace, across: int) -> Panel:
     return Panel(items, *(_LABELS[axis] for axis in axes), title=title, equal=True)
 
 
-def _classes(points: Array, name: str) -> Iterator[Mark]:
-    """Yield voxels (across, z, value) in a few classes of values of equal width."""
-    if not len(points):
-        return
-    values = points[:, 2]
+def _classes(points: Array, values: Array, name: str) -> Iterator[Mark]:
+    """Yield voxels (across, z) in a few classes of values of equal width."""
     ends = np.linspace(values.min(), values.max(), _CLASSES + 1)
-    number = np.clip(np.searchsorted(ends, values, side="right") - 1, 0, _CLASSES - 1)
+    number = np.digitize(values, ends[1:-1])
     for order, colour in enumerate(sequence_colours(_CLASSES)):
-        if len(mine := points[number == order, :2]):
+        if len(mine := points[number == order]):
             label = f"{ends[order]:.3g} to {ends[order + 1]:.3g}"
             group = f"{name} {order}"
             yield dots(mine, colour, 2.5, name=label, group=group, layer=2 + order)
@@ -432,40 +407,31 @@ MAX_VALUES = 12
 """Variables of a design that are drawn."""
 
 
-def design_picture(design: Design, *, title: str = "") -> Picture:
+def design_picture(design: Design) -> Picture:
     """Describe a design: the robot at up to three states, before and after, and its variables.
 
     Args:
         design: The design.
-        title: Heading.
     """
+    from notchflex.designing.model.quantities import target_points
+
     shapes: list[Panel] = []
-    steps = list(design.state_steps.values())[-3:]
     for label, path, colour in (
         ("before", design.path_before, _BEFORE),
         ("designed", design.path, _AFTER),
     ):
         if path is not None and path.converged.any():
-            solved = [step for step in steps if path.converged[step]]
-            panel = shape_panel(path, solved, title=label, colours=[colour] * 3, legend=BELOW)
-            shapes.append(replace(panel, items=[*panel.items, *_target_curves(design, path)]))
+            steps = [step for step in design.state_steps.values() if path.converged[step]][-3:]
+            panel = shape_panel(path, steps, title=label, colours=[colour] * 3, legend=BELOW)
+            view, items = plane_of(path), [*panel.items]
+            for curve in design.spec.curve:  # the points that the robot was designed for
+                points = target_points(curve)
+                points = points if view is None else project(points, view)
+                items.append(dots(points, VERMILLION, 2.5, name=f"curve {curve.name}", layer=40))
+            shapes.append(replace(panel, items=items))
     numbers = [_numbers(wish) for wish in design.wishes if len(wish.achieved) > 1][:1]
-    cells = [Cell(panel, 0, column, 2) for column, panel in enumerate(shapes)]
-    cells += stack([_variables(design), *numbers], len(shapes), 1 if numbers else 2)
-    return Picture(title or f"{design.spec.name}: {design.before.name}", cells)
-
-
-def _target_curves(design: Design, path: EquilibriumPath) -> list[Mark]:
-    """Return the points of the curves that the robot was designed for."""
-    from notchflex.designing.model.quantities import target_points
-
-    marks: list[Mark] = []
-    view = plane_of(path)
-    for curve in design.spec.curve:
-        points = target_points(curve)
-        points = points if view is None else project(points, view)
-        marks.append(dots(points, VERMILLION, 2.5, name=f"curve {curve.name}", layer=40))
-    return marks
+    cells = side_by_side([*([shape] for shape in shapes), [_variables(design), *numbers]])
+    return Picture(f"{design.spec.name}: {design.before.name}", cells)
 
 
 def _variables(design: Design) -> Panel:
@@ -473,17 +439,15 @@ def _variables(design: Design) -> Panel:
     chosen = design.variables[:MAX_VALUES]
     if not chosen:
         return Panel([Note("no variables")], "", "", title="variables")
-    after, before = (
-        [(value - v.lower) / (v.upper - v.lower) for value, v in zip(values, chosen, strict=True)]
-        for values in ([v.value for v in chosen], [v.before for v in chosen])
+    after, before = np.transpose(
+        [(np.array([v.value, v.before]) - v.lower) / (v.upper - v.lower) for v in chosen]
     )
     names = [f"{v.name}\n{v.value:.4g} {v.unit}".rstrip() for v in chosen]
     # The values before stand below the bars, clear of the numbers at their ends.
-    points = np.stack([before[::-1], np.arange(len(chosen)) - 0.38], axis=1)
-    extra = [Span("x", 1.0, BLACK), dots(points, BLACK, 4.0, hollow=True, layer=4)]
+    circles = line(before[::-1], np.arange(len(chosen)) - 0.38, BLACK, None, marker="o", size=4.0)
+    extra = [Span("x", 1.0, BLACK), replace(circles, hollow=True, layer=4)]
     label = "from least (0) to greatest (1) value; circle: before"
-    colours, limits = [SKY] * len(chosen), (0.0, 1.15)
-    return bar_panel(after, names, colours, label, extra, title="variables", x_range=limits)
+    return bar_panel(after, names, label, extra, title="variables", x_range=(0.0, 1.15))
 
 
 def _numbers(wish: WishResult) -> Panel:
@@ -501,22 +465,21 @@ def _numbers(wish: WishResult) -> Panel:
     return Panel(items, "number", label, title=wish.asked, whole="x")
 
 
-def front_picture(front: DesignFront, *, title: str = "") -> Picture:
+def front_picture(front: DesignFront) -> Picture:
     """Describe a front: every objective over the first, points numbered by the first.
 
     Args:
         front: The front.
-        title: Heading.
     """
     values, titles = front.objectives, front.titles
-    pairs = [(0, upward) for upward in range(1, values.shape[1])]
-    pairs += [(1, 2)] if values.shape[1] > 2 else []
-    dash = None if values.shape[1] > 2 else ()
+    several = values.shape[1] > 2
+    pairs = [(0, 1), (0, 2), (1, 2)] if several else [(0, 1)]
+    dash = None if several else SOLID
     panels = [
         Panel([Curve(values[:, [x, y]], BLUE, dash, marker="o")], titles[x], titles[y])
         for x, y in pairs
     ]
-    name = title or f"{front.spec.name}: {len(front.points)} robots"
+    name = f"{front.spec.name}: {len(front.points)} robots"
     return Picture(name, grid(panels, len(panels)), row_height=3.8)
 
 
@@ -540,20 +503,10 @@ def following_picture(found: Following, *, title: str = "") -> Picture:
         'tendon tension $T$ [N]'
     """
     number = np.arange(1.0, len(found) + 1.0)
-    tension = _tendon_curves(number, found.tension, sequence_colours(found.tension.shape[1]))
+    tension = entry_lines(number, found.tension, "tendon")
     drives = Panel(tension, _NUMBER, QUANTITIES["tension"].label, shared="x")
-    cells = [Cell(_tips(found), 0, 0, 2), *stack([drives, _errors(found, number)], 1)]
+    cells = side_by_side([[_tips(found)], [drives, _errors(found, number)]])
     return Picture(title or f"Targets followed by {found.robot.name}", cells, row_height=2.3)
-
-
-def _tendon_curves(
-    x: Array, tension: Array, colours: Sequence[Colour], marker: str = ""
-) -> list[Mark]:
-    names = [f"tendon {tendon + 1}" * (len(colours) > 1) for tendon in range(len(colours))]
-    return [
-        line(x, values, colour, name=name, marker=marker)
-        for values, colour, name in zip(tension.T, colours, names, strict=True)
-    ]
 
 
 def _tips(following: Following) -> Panel:
@@ -564,17 +517,18 @@ def _tips(following: Following) -> Panel:
     via = np.setdiff1d(np.arange(len(tips)), following.step)
     missed = following.tip_position[~following.reached]
     items: list[Mark] = [Curve(tips[:, axes], BLUE, name="tip")]
-    if goals is not None:
-        items.append(dots(goals[:, axes], GREY, 4.0, hollow=True, name="target", layer=1))
-    if len(via):
-        items.append(dots(tips[via][:, axes], ORANGE, name="overshoot", layer=3))
-    if len(missed):
-        items.append(dots(missed[:, axes], VERMILLION, 4.0, name="nearest", layer=4))
+    for points, colour, name, style in (
+        (goals, GREY, "target", {"size": 4.0, "hollow": True, "layer": 1}),
+        (tips[via], ORANGE, "overshoot", {"layer": 3}),
+        (missed, VERMILLION, "nearest", {"size": 4.0, "layer": 4}),
+    ):
+        if points is not None and len(points):
+            items.append(dots(points[:, axes], colour, name=name, **style))
     if len(axes) == 2:
         x_label, y_label = (f"tip position {AXES[axis]} [mm]" for axis in axes)
         return Panel(items, x_label, y_label, equal=True, legend=BELOW)
     # In space the labels stand close to each other, and the upright one needs room beside it.
-    return Panel(items, "x [mm]", "y [mm]", "z [mm]")
+    return Panel(items, *_LABELS)
 
 
 def _errors(following: Following, number: Array) -> Panel:
@@ -621,8 +575,7 @@ def sensed_picture(sensed: SensedForce, *, truth: Any = None) -> Picture:
     ]
     if sensed.path is not None:  # the best history
         tension = sensed.path.tension[sensed.group[sensed.converged]]
-        colours = [(GREY, GREEN, ORANGE, BLUE)[tendon % 4] for tendon in range(tension.shape[1])]
-        items = _tendon_curves(x[: len(tension)], tension, colours, "o")
+        items = entry_lines(x[: len(tension)], tension, "tendon", marker="o")
         panels.append(Panel(items, _READING, QUANTITIES["tension"].label, whole="x"))
     where = "the tip" if sensed.place is None else f"body {sensed.place}"
     title = f"Force on {where} of {sensed.robot.name}"

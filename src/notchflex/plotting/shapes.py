@@ -38,7 +38,7 @@ from notchflex.plotting.style import (
     PURPLE,
     SKY,
     VERMILLION,
-    rgb,
+    pale,
     sequence_colours,
 )
 from notchflex.support import FlexureShape
@@ -70,32 +70,22 @@ def shape_from_angles(
 
 
 def smooth(shape: RobotShape, pieces: int) -> RobotShape:
-    """Return a shape whose flexures have at least so many straight pieces, (n,).
+    """Return a shape whose flexures have at least so many straight pieces."""
+    return replace(shape, flexures=tuple(_finer(part, pieces) for part in shape.flexures))
 
-    Between two sections a flexure is the arc of a constant twist.
-    """
-    flexures = shape.flexures
-    counts = np.array([len(flexure.area) for flexure in flexures])
-    parts = -(-pieces // (counts - 1))
-    first, total = np.cumsum(counts) - counts, counts.sum()
-    places = [
-        start + np.arange((count - 1) * part + 1) / part
-        for start, count, part in zip(first, counts, parts, strict=True)
-    ]
-    place = np.concatenate(places)
-    rotation, position, *widths = (
-        np.concatenate([getattr(flexure, name) for flexure in flexures])
-        for name in ("rotation", "position", "spine", "near", "area")
-    )
-    poses = RigidTransform.from_components(position, Rotation.from_matrix(rotation))
+
+def _finer(flexure: FlexureShape, pieces: int) -> FlexureShape:
+    """Return a flexure with more sections; between two it is the arc of a constant twist."""
+    count = len(flexure.area)
+    parts = -(-pieces // (count - 1))
+    place = np.arange((count - 1) * parts + 1) / parts
     before = place.astype(int)
-    twist = (poses[before].inv() * poses[np.minimum(before + 1, total - 1)]).as_exp_coords()
+    poses = RigidTransform.from_components(flexure.position, Rotation.from_matrix(flexure.rotation))
+    twist = (poses[before].inv() * poses[np.minimum(before + 1, count - 1)]).as_exp_coords()
     line = poses[before] * RigidTransform.from_exp_coords((place - before)[:, None] * twist)
-    columns = [line.rotation.as_matrix(), line.translation]
-    columns += [np.interp(place, np.arange(total), width) for width in widths]
-    ends = np.cumsum([len(part) for part in places])[:-1]
-    rows = zip(*(np.split(column, ends) for column in columns), strict=True)
-    return replace(shape, flexures=tuple(FlexureShape(*row) for row in rows))
+    widths = flexure.spine, flexure.near, flexure.area
+    widths = (np.interp(place, np.arange(count), width) for width in widths)
+    return FlexureShape(line.rotation.as_matrix(), line.translation, *widths)
 
 
 def walls(robot: Robot, side_deg: float) -> list[tuple[float, float] | None]:
@@ -140,7 +130,6 @@ class ShapeOutline:
     bores: list[Array]  # inner wall of every body, one for each side with a wall
     flexures: list[Array]  # the strip of every notch
     tendons: list[Array]
-    centre_line: Array  # from base to tip
     held: Array  # the clamp below the base
 
 
@@ -184,7 +173,6 @@ def outline(shape: RobotShape, view: float) -> ShapeOutline:
         ],
         flexures=[project(strip(flexure), view) for flexure in shape.flexures],
         tendons=[project(tendon_line(shape, i), view) for i in range(len(shape.robot.tendon))],
-        centre_line=project(_centre_line(shape), view),
         held=place(0, box(-side, below, side, 0.0)),
     )
 
@@ -195,57 +183,30 @@ def strip(flexure: FlexureShape) -> Array:
 
 
 def body_corners(shape: RobotShape, body: int, view: float) -> Corners:
-    """Return the outline of a body (0 is the base): corners (across, along) in its frame [mm]."""
-    outer, ends = shape.robot.tube.outer_radius, _sides(shape, body, view)
-    reach = _reach(shape, body, view)
-    sides: list[Corners] = []
-    for sign, wall, inside in zip((1.0, -1.0), ends, reach, strict=True):
-        if wall is not None:
-            ring = [(outer, wall[0]), (outer, wall[1]), (inside, wall[1]), (inside, wall[0])]
-            sides.append([(sign * across, along) for across, along in ring])
-    if len(sides) == 1:
-        return sides[0]
-    right, left = sides
-    low, high = max(right[0][1], left[0][1]), min(right[1][1], left[1][1])
-    # Walls that overlap are connected at right angles, others diagonally.
-    top = [(reach[0], high), (-reach[1], high)] if high > low else []
-    foot = [(-reach[1], low), (reach[0], low)] if high > low else []
-    return [*right[:3], *top, *left[2::-1], left[3], *foot, right[3]]
+    """Return the outline of a body (0 is the base): corners (across, along) in its frame [mm].
+
+    A body with wall on one side reaches from there to the flexures that are attached to it.
+    """
+    outer, (right, left) = shape.robot.tube.outer_radius, _sides(shape, body, view)
+    if right and left:
+        return [(outer, right[0]), (outer, right[1]), (-outer, left[1]), (-outer, left[0])]
+    sign, (low, high) = (1.0, right) if right else (-1.0, left or (0.0, 0.0))
+    joined = [(shape.flexures[body - 1], -1)]
+    joined += [(flexure, 0) for flexure in shape.flexures[body : body + 1]]
+    edges = [
+        flexure.fibre(across)[end]
+        for flexure, end in joined
+        for across in (-flexure.spine, flexure.near)
+    ]
+    across = (np.array(edges) - shape.position[body]) @ shape.rotation[body] @ across_of(view)
+    inside = max(min(shape.robot.tube.inner_radius, float(np.min(sign * across))), 0.0)
+    ring = [(outer, low), (outer, high), (inside, high), (inside, low)]
+    return [(sign * across, along) for across, along in ring]
 
 
 def _sides(shape: RobotShape, body: int, view: float) -> list[tuple[float, float] | None]:
     """Return the ends of the wall of a body on the right and the left; None if no wall."""
     return [walls(shape.robot, np.degrees(view) + turn)[body] for turn in (0.0, 180.0)]
-
-
-def _reach(shape: RobotShape, body: int, view: float) -> list[float]:
-    """Return the distance of the wall of a body from the axis on the right and the left.
-
-    The inner radius, or less where a flexure is attached.
-    """
-    reach = [shape.robot.tube.inner_radius] * 2
-    joined = [(flexure, -1) for flexure in shape.flexures[max(body - 1, 0) : body]]
-    joined += [(flexure, 0) for flexure in shape.flexures[body : body + 1]]
-    for flexure, end in joined:
-        lines = flexure.fibre(-flexure.spine), flexure.position, flexure.fibre(flexure.near)
-        edges = np.stack([line[end] for line in lines])
-        local = (edges - shape.position[body]) @ shape.rotation[body] @ across_of(view)
-        side, sign = (0, 1.0) if local[1] > 0.0 else (1, -1.0)
-        reach[side] = min(reach[side], max(float(np.min(sign * local)), 0.0))
-    return reach
-
-
-def _centre_line(shape: RobotShape) -> Array:
-    """Return the tube axis along the bodies, and along notches with a spine beside it."""
-    geometry = shape.robot.geometry
-    points: list[Array] = []
-    for body, length in enumerate(geometry.body_length):
-        if body and geometry.has_spine[body - 1]:
-            flexure = shape.flexures[body - 1]
-            end = (shape.position[body] - flexure.position[-1]) @ flexure.rotation[-1]
-            points.append(flexure.fibre(*end[:2]))
-        points.append(shape.on_body(body, [[0.0, 0.0, 0.0], [0.0, 0.0, length]]))
-    return np.concatenate(points)
 
 
 _ROUND = 32  # flat pieces round the tube in space
@@ -277,12 +238,7 @@ def flexure_faces(shape: RobotShape) -> Iterator[Array]:
             edges = [(axis + outer * np.cos(angle), outer * np.sin(angle)) for angle in angles]
         else:
             half = 0.5 * flexure.area / (flexure.spine + flexure.near)
-            edges = [
-                (-flexure.spine, -half),
-                (-flexure.spine, half),
-                (flexure.near, half),
-                (flexure.near, -half),
-            ]
+            edges = [*box(-flexure.spine, -half, flexure.near, half)[::-1]]
             edges.append(edges[0])
         along = np.stack([flexure.fibre(across, out) for across, out in edges], axis=1)
         corners = [along[:-1, :-1], along[:-1, 1:], along[1:, 1:], along[1:, :-1]]
@@ -326,9 +282,7 @@ def prism(polygon: Any, view: float, depth: float) -> Manifold:
     from manifold3d import CrossSection, FillRule, Manifold
 
     solid = Manifold.extrude(CrossSection([polygon], FillRule.NonZero), depth)
-    axes = np.stack([across_of(view), UP, np.cross(across_of(view), UP)], axis=1)
-    middle = -0.5 * depth * axes[:, 2:]
-    return solid.transform(np.concatenate([axes, middle], axis=1))
+    return solid.translate((0.0, 0.0, -0.5 * depth)).rotate((90.0, 0.0, np.degrees(view)))
 
 
 DEAD, FOLLOWING, WEIGHT = "", ", following", ", weight"
@@ -366,7 +320,7 @@ def applied_loads(path: EquilibriumPath, step: int, shape: RobotShape) -> list[A
 
     Gravity on the robot's own mass is distributed and not included.
     """
-    load = path.load.external[step]
+    load, world = path.load.external[step], path.body_rotation[step, 0].T
     tip = np.array([0.0, 0.0, path.robot.geometry.body_length[-1]])
     kind = FOLLOWING if load.following else DEAD
     acting: list[tuple[str, str, int, Any, Any]] = [
@@ -376,9 +330,8 @@ def applied_loads(path: EquilibriumPath, step: int, shape: RobotShape) -> list[A
     ]
     for on_body in load.body_forces:
         kind = FOLLOWING if on_body.following else DEAD
-        acting.append(("force", kind, on_body.body, on_body.point, on_body.force))
-        acting.append(("moment", kind, on_body.body, on_body.point, on_body.moment))
-    world = path.body_rotation[step, 0].T
+        for name in ("force", "moment"):
+            acting.append((name, kind, on_body.body, on_body.point, getattr(on_body, name)))
     return [
         AppliedLoad(
             name,
@@ -488,8 +441,8 @@ def _from_the_side(
     if not order:  # the clamp does not move: it is drawn once
         yield Area([seen.held], GREY, 0.5, 0.8, layer=1)
     # Pale and nearly opaque, so that lines of shapes behind others can be seen.
-    polygons, pale = [*seen.flexures, *seen.bodies], _pale(colour, 0.3)
-    yield Area(polygons, colour, width=0.8, face=pale, name=label, layer=2 + level)
+    polygons, face = [*seen.flexures, *seen.bodies], pale(colour, 0.3)
+    yield Area(polygons, colour, width=0.8, face=face, name=label, layer=2 + level)
     gap = np.full((1, 2), np.nan)
     bores = np.concatenate([part for edge in seen.bores for part in (edge, gap)])
     yield Curve(bores, colour, FINE, 0.5, layer=3 + level, group=label)
@@ -500,15 +453,11 @@ def _from_the_side(
 def _in_space(shape: RobotShape, colour: Colour, label: str, order: int) -> Iterator[Mark]:
     base, *bodies = body_faces(shape)
     if not order:  # the base does not move: it is drawn once
-        yield Faces(base, _pale(GREY, 0.6))
+        yield Faces(base, pale(GREY, 0.6))
     faces = np.concatenate([*bodies, *flexure_faces(shape)])
-    yield Faces(faces, _pale(colour, 0.6), name=label)  # as shading darkens
+    yield Faces(faces, pale(colour, 0.6), name=label)  # as shading darkens
     for number in range(len(shape.robot.tendon)):
         yield Curve(tendon_line(shape, number), ORANGE, width=0.9, group=label, layer=5)
-
-
-def _pale(colour: Colour, part: float) -> Colour:
-    return tuple(1.0 - part * (1.0 - channel) for channel in rgb(colour))
 
 
 def _load_arrows(

@@ -79,6 +79,11 @@ def rgb(colour: Any) -> tuple[float, float, float]:
     return to_rgb(colour)
 
 
+def pale(colour: Colour, part: float) -> Colour:
+    """Return a part of a colour, the rest white."""
+    return tuple(1.0 - part * (1.0 - channel) for channel in rgb(colour))
+
+
 def sequence_colours(count: int) -> list[Colour]:
     """Return `count` colours from dark to light, also in grey print."""
     # The lightest fifth of the map is too pale for lines on white paper.

@@ -14,6 +14,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from notchflex.plotting.marks import (
     BELOW,
     BESIDE,
+    INSIDE,
     Area,
     Arrow,
     Curve,
@@ -90,13 +91,13 @@ def draw_panel(axes: Any, panel: Panel) -> None:
         entries.setdefault(name, handle)
     if not (panel.legend and entries):
         return
-    place: dict[str, Any] = {"loc": "best"}
-    if panel.legend == BELOW:
-        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.085)}
-    elif panel.legend == BESIDE:
-        # In space the labels of the vertical axis are there too.
-        corner = (1.25 if panel.z_label else 1.0, 1.0)
-        place = {"loc": "upper left", "bbox_to_anchor": corner, "borderaxespad": 0.2}
+    # In space the labels of the vertical axis are beside it too.
+    corner = (1.25 if panel.z_label else 1.0, 1.0)
+    place: dict[str, Any] = {
+        INSIDE: {"loc": "best"},
+        BELOW: {"loc": "upper center", "bbox_to_anchor": (0.5, -0.085)},
+        BESIDE: {"loc": "upper left", "bbox_to_anchor": corner, "borderaxespad": 0.2},
+    }[panel.legend]
     axes.legend(entries.values(), entries, **place)
 
 
@@ -133,10 +134,6 @@ def _draw(axes: Any, mark: Mark) -> None:
         case Curve():
             rows = mark.rows if len(mark.rows) else np.zeros((0, 3 if axes.name == "3d" else 2))
             axes.plot(*rows.T, **_line_style(mark))
-            if mark.error is not None:
-                bars: dict[str, Any] = {"ecolor": mark.colour, "elinewidth": 0.7}
-                half = np.nan_to_num(mark.error)  # a bar without height is not seen
-                axes.errorbar(*rows.T, yerr=half, fmt="none", zorder=mark.layer, **bars)
         case Area():
             for polygon in mark.polygons:
                 axes.add_patch(_polygon(mark, polygon))

@@ -184,7 +184,9 @@ def _traces(mark: Mark, panel: Panel, where: Layout, layout: Layout) -> Iterator
         case Arrow():
             yield from _arrow(mark)
         case Span():  # over all that the panel shows
-            ends = _axis(layout, where, "y" if mark.axis == "x" else "x")["range"]
+            # What a trace calls y2 is yaxis2 in the layout.
+            over = "yaxis" if mark.axis == "x" else "xaxis"
+            ends = layout[over + where[over][1:]]["range"]
             high = mark.low if mark.high is None else mark.high
             corners = box(mark.low, ends[0], high, ends[1])
             corners = corners if mark.axis == "x" else corners[:, ::-1]
@@ -230,11 +232,6 @@ def _line(mark: Curve, panel: Panel) -> Layout:
     if mark.dash and not panel.z_label:
         dashes = [f"{POINT * mark.width * length:.1f}px" for length in mark.dash]
         trace["line"]["dash"] = ",".join(dashes)
-    if mark.error is not None:
-        style: Layout = {"type": "data", "width": 0, "thickness": 0.7 * POINT, "color": colour}
-        trace["error_y"] = style | {"array": np.asarray(mark.error)}
-        trace["text"] = [f" ± {half:.2g}" if np.isfinite(half) else "" for half in mark.error]
-        trace["hovertemplate"] += "%{text}"
     trace["hovertemplate"] += "<extra></extra>"
     return trace
 
@@ -280,11 +277,6 @@ def _arrow(mark: Arrow) -> Iterator[Layout]:
         "type": "cone", "anchor": "tip", "sizemode": "raw", "showscale": False,
         "colorscale": [[0, colour], [1, colour]],
     }  # fmt: skip
-
-
-def _axis(layout: Layout, where: Layout, name: str) -> Layout:
-    """Return the layout of the axis x or y of a panel, whose name for plotly is like x2."""
-    return layout[f"{name}axis{where[f'{name}axis'][1:]}"]
 
 
 def _named(mark: Mark) -> Layout:

@@ -1,4 +1,4 @@
-"""The pictures of a path, of one of its states, of a robot, and of several paths."""
+"""The pictures of paths, states and robots, and the usual one of anything that can be drawn."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ from typing import Any
 
 import numpy as np
 from matplotlib.animation import PillowWriter
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from notchflex import Band, EquilibriumPath, InputError, Robot
+from notchflex import Band, Equilibrium, EquilibriumPath, InputError, Robot
 from notchflex.plotting.curves import (
     LINE,
     LOADING,
     NOTCH_LABEL,
     SLACK,
+    TIP_LABELS,
     UNLOADING,
     abscissa,
     branch_lines,
@@ -25,12 +27,14 @@ from notchflex.plotting.curves import (
     failures,
     notches_panel,
     path_panels,
+    quantities_panel,
     scaled,
     span_line,
     span_panel,
     steps_by_branch,
     total_panel,
 )
+from notchflex.plotting.fits import calibration_picture, comparison_picture, friction_picture
 from notchflex.plotting.marks import (
     BELOW,
     Colour,
@@ -40,9 +44,19 @@ from notchflex.plotting.marks import (
     Panel,
     dots,
     line,
+    side_by_side,
     stack,
 )
 from notchflex.plotting.output import Picture
+from notchflex.plotting.results import (
+    batch_picture,
+    design_picture,
+    following_picture,
+    front_picture,
+    sensed_picture,
+    tolerance_picture,
+    workspace_picture,
+)
 from notchflex.plotting.shapes import (
     load_label,
     representative_steps,
@@ -57,13 +71,11 @@ from notchflex.plotting.style import (
     MODEL_COLOURS,
     VERMILLION,
     house_style,
-    rgb,
+    pale,
     sequence_colours,
 )
-from notchflex.plotting.with_matplotlib import draw_panel, figure_of
+from notchflex.plotting.with_matplotlib import draw_panel, figure_of, projection
 from notchflex.support import MOVING, QUANTITIES, check_picture, replacing
-
-TIP_LABELS = tuple(f"tip position {axis} [mm]" for axis in "xz")
 
 MAX_TENDONS = 8
 """Tendons of one state whose tension is drawn."""
@@ -128,8 +140,18 @@ def state_picture(path: EquilibriumPath, step: int, *, title: str | None = None)
         step: Index of the step, from 0.
         title: Heading; the name of the robot if None.
     """
-    curves = [_notch_angles(path, step), _tension_along(path, step)]
-    cells = [*stack([state_shape(path, step)], height=2), *stack(curves, 1)]
+    angles: list[Mark] = [Note("not converged")]
+    tensions: list[Mark] = [Note("not converged")]
+    if path.converged[step]:
+        angles = [curve := _angle_curve(path, step, BLUE, size=4.0)]
+        if np.any(closed := np.asarray(path.closed[step])):
+            angles.append(dots(curve.rows[closed], VERMILLION, 5.0, name="closed notch", layer=3))
+        pulled = np.flatnonzero(path.tension[step] > SLACK)[:MAX_TENDONS].tolist()
+        tensions = [] if pulled else [Note("all tendons are slack")]
+        for tendon, colour in zip(pulled, sequence_colours(len(pulled)), strict=True):
+            name = f"tendon {tendon + 1}" if path.tension.shape[1] > 1 else ""
+            tensions.append(span_line(path, step, tendon, colour, size=2.2, name=name))
+    cells = side_by_side([[state_shape(path, step)], [_notches_of(angles), span_panel(tensions)]])
     return Picture(path.robot.name if title is None else title, cells)
 
 
@@ -146,26 +168,6 @@ def _angle_curve(path: EquilibriumPath, step: int, colour: Colour, **style: Any)
 
 def _notches_of(items: list[Mark], **options: Any) -> Panel:
     return Panel(items, NOTCH_LABEL, QUANTITIES["notch_angle"].label, whole="x", **options)
-
-
-def _notch_angles(path: EquilibriumPath, step: int) -> Panel:
-    if not path.converged[step]:
-        return _notches_of([Note("not converged")])
-    items: list[Mark] = [curve := _angle_curve(path, step, BLUE, size=4.0)]
-    if np.any(closed := np.asarray(path.closed[step])):
-        items.append(dots(curve.rows[closed], VERMILLION, 5.0, name="closed notch", layer=3))
-    return _notches_of(items)
-
-
-def _tension_along(path: EquilibriumPath, step: int) -> Panel:
-    if not path.converged[step]:
-        return span_panel([Note("not converged")])
-    pulled = np.flatnonzero(path.tension[step] > SLACK)[:MAX_TENDONS].tolist()
-    items: list[Mark] = [] if pulled else [Note("all tendons are slack")]
-    for tendon, colour in zip(pulled, sequence_colours(len(pulled)), strict=True):
-        name = f"tendon {tendon + 1}" if path.tension.shape[1] > 1 else ""
-        items.append(span_line(path, step, tendon, colour, size=2.2, name=name))
-    return span_panel(items)
 
 
 def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> Picture:
@@ -200,8 +202,7 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
     labels, total_label = set[str](), QUANTITIES["total_angle"].label
     for (name, path), colour in zip(paths.items(), MODEL_COLOURS, strict=False):
         steps = representative_steps(path, most=3)
-        pale = np.linspace(0.55, 0.0, len(steps))[:, None]
-        shades = [tuple(shade) for shade in pale + (1.0 - pale) * np.array(rgb(colour))]
+        shades = [pale(colour, part) for part in np.linspace(0.45, 1.0, len(steps))]
         shapes.append(shape_panel(path, steps, title=name, colours=shades, legend=BELOW))
         x, label = abscissa(path)
         labels.add(label)
@@ -224,18 +225,13 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
         [Panel(total, x_label, total_label), _notches_of(notches, title=bent, from_zero=True)],
         [Panel(tips, *TIP_LABELS, equal=True), replace(tension, title=f"{bent}, first tendon")],
     ]
-    cells = [
-        cell
-        for column, panels in enumerate(columns)
-        for cell in stack(panels, column, 2 // len(panels))
-    ]
     legend = [
         Curve([], colour, name=name) for name, colour in zip(paths, MODEL_COLOURS, strict=False)
     ]
     if any(len(steps_by_branch(path)) > 1 for path in paths.values()):
         legend += [Curve([], GREY, LINE[way], name=way) for way in (LOADING, UNLOADING)]
     heading = title or "; ".join(dict.fromkeys(path.robot.name for path in paths.values()))
-    return Picture(heading, cells, legend, column_width=3.7)
+    return Picture(heading, side_by_side(columns), legend, column_width=3.7)
 
 
 MAX_FRAMES = 48
@@ -285,7 +281,7 @@ def save_animation(
     widest = shape_panel(path, representative_steps(path), title=" ", legend="")
     panels = [total_panel(path), notches_panel(path)]
     heading = path.robot.name if title is None else title
-    figure = figure_of(Picture(heading, [*stack([widest], height=2), *stack(panels, 1)]))
+    figure = figure_of(Picture(heading, side_by_side([[widest], panels])))
     figure.draw_without_rendering()  # arranges the axes, once for all frames
     figure.set_layout_engine("none")
     robot, *curves = figure.axes
@@ -319,3 +315,111 @@ def frames_of(path: EquilibriumPath) -> list[int]:
     """Return an even selection of the converged steps, with the first and the last."""
     solved = np.flatnonzero(np.asarray(path.converged))
     return solved[evenly(range(len(solved)), MAX_FRAMES)].tolist()
+
+
+# The class of a result, and what describes its picture: a class is loaded by who makes one.
+_KINDS: dict[str, Any] = {
+    "Robot": robot_picture,
+    "EquilibriumPath": path_picture,
+    "Equilibrium": lambda state: state_picture(state.path, state.step),
+    "Batch": batch_picture,
+    "Bands": lambda bands: path_picture(bands.path, bands=bands),
+    "Comparison": comparison_picture,
+    "Calibration": calibration_picture,
+    "FrictionRig": friction_picture,
+    "Design": design_picture,
+    "DesignFront": front_picture,
+    "ToleranceAnalysis": tolerance_picture,
+    "Following": following_picture,
+    "SensedForce": sensed_picture,
+    "Workspace": workspace_picture,
+}
+
+
+def picture(result: Any, *, title: str | None = None) -> Picture:
+    """Describe the picture of a result, whatever its kind.
+
+    Args:
+        result: A robot, a path, a state, a batch, bands, a comparison, a calibration or any other
+            result that the library can draw, or a dict of label to path for several beside each
+            other.
+        title: Heading; that of its kind if None.
+
+    Returns:
+        The picture: `save` writes it as PNG, SVG, PDF or HTML, `figure` gives that of matplotlib,
+        `interactive` that of plotly.
+
+    Raises:
+        InputError: It is not one of these results.
+
+    Example:
+        >>> import tempfile
+        >>> import notchflex as nf
+        >>> from notchflex.plotting import picture
+        >>> state = nf.solve(nf.load_robot("pacheco2021-a"), nf.Load(tension=1.0))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     picture(state).save(f"{folder}/wrist.svg")
+    """
+    described = _usual(result)
+    return described if title is None else replace(described, title=title)
+
+
+def _usual(result: Any) -> Picture:
+    for kind in type(result).__mro__:
+        if kind.__name__ in _KINDS and kind.__module__.startswith("notchflex."):
+            return _KINDS[kind.__name__](result)
+    if isinstance(result, Mapping) and all(
+        isinstance(path, EquilibriumPath) for path in result.values()
+    ):
+        return beside_picture(result)
+    raise InputError.WRONG_TYPE(
+        f"a picture is made of one of these: {', '.join(_KINDS)}, or of a dict of paths; got "
+        f"{type(result).__name__}."
+    )
+
+
+def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> Axes:
+    """Draw one quantity y of a path over another x, or the shape of a state or a robot.
+
+    Without axes to draw into it makes new ones of pyplot.
+
+    Raises:
+        InputError: It can't be drawn on one pair of axes, or the quantity is unknown.
+    """
+    if isinstance(thing, EquilibriumPath):
+        if x is None or y is None:
+            raise InputError.MISSING_VALUE(
+                "a path is drawn on axes as one quantity over another; give both, such as "
+                "plot('stroke', 'tension')"
+            )
+        panel = quantities_panel(thing, x, y)
+    elif x is not None or y is not None:
+        raise InputError.WRONG_TYPE(
+            "one quantity is drawn over another for a path; "
+            f"got a {type(thing).__name__}, which is drawn by plot(it)"
+        )
+    elif isinstance(thing, Equilibrium):
+        panel = state_shape(thing.path, thing.step)
+    elif isinstance(thing, Robot):
+        panel = robot_shape(thing)
+    else:
+        raise InputError.WRONG_TYPE(
+            "axes can be given for a path, a state or a robot; the picture of a "
+            f"{type(thing).__name__} has axes of its own: plot(it)"
+        )
+    figure: Any = None
+    if ax is None:
+        # Made outside our style: pyplot chooses its backend, and with it whether figures show
+        # themselves, when it makes the first figure, and leaving the style would undo that.
+        from matplotlib import pyplot
+
+        size = (5.6, 5.6) if panel.equal or panel.z_label else (6.0, 4.0)
+        figure = pyplot.figure(figsize=size, layout="constrained")
+    with house_style():
+        axes: Any = ax or figure.add_subplot(**projection(panel))
+        if panel.z_label and axes.name != "3d":
+            raise InputError.UNSUPPORTED(
+                "this robot bends out of one plane; give axes made with projection='3d'"
+            )
+        draw_panel(axes, panel)
+    return axes
