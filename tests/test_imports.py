@@ -50,7 +50,7 @@ MOST_FILES = 17
 
 SATELLITES = ORDER[ORDER.index("search") :]
 
-INNER_NAMES = 54
+INNER_NAMES = 49
 """Names of the core that satellites import from elsewhere than `notchflex` and
 `notchflex.support`: this number only ever falls."""
 
@@ -85,7 +85,6 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("fit.calibration", "fit.residual_tests"): (
         "a fit tests its residuals when it is asked whether to trust it"
     ),
-    ("designing.result", "designing.front"): _TYPE,
     ("viewer.viewer", "viewer.page"): "the viewer makes its page; the page acts on the viewer",
 }
 """Importer and imported, without `notchflex.`, and why the one may import the other."""

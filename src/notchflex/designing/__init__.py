@@ -1,14 +1,14 @@
 """Design: dimensions of a robot from a specification."""
 
-from notchflex.designing.design_robot import design
-from notchflex.designing.front import DesignFront, design_front
+from notchflex.designing.design_robot import design, design_front
 from notchflex.designing.result import (
+    FILES,
     Design,
+    DesignFront,
     VariableResult,
     WishResult,
     design_document,
-    write_design,
-    write_front,
+    numbers,
 )
 from notchflex.designing.robust import YieldOf
 from notchflex.designing.specification import (
@@ -25,6 +25,7 @@ from notchflex.designing.specification import (
 )
 
 __all__ = [
+    "FILES",
     "Design",
     "DesignConstraint",
     "DesignFront",
@@ -42,7 +43,6 @@ __all__ = [
     "design",
     "design_document",
     "design_front",
+    "numbers",
     "read_design",
-    "write_design",
-    "write_front",
 ]

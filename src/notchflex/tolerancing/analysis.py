@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.optimize import brentq
-from scipy.stats import qmc, sobol_indices
+from scipy.stats import sobol_indices
 
 from notchflex import EquilibriumPath, InputError, Robot, Settings
-from notchflex.pieces import CODES, FAILED, INVALID, PieceFolder
+from notchflex.pieces import CODES, FAILED, INVALID, PieceFolder, sobol_points
 from notchflex.support import (
     Displayed,
     Summary,
@@ -35,6 +35,7 @@ from notchflex.tolerancing.study import (
     ToleranceTask,
     draw,
     draw_in_pieces,
+    drawn_numbers,
     study_of,
     tolerances_for,
     yield_interval,
@@ -157,8 +158,9 @@ def control(
         progress: Called with the sources done and all of them.
     """
     points = min(2 ** int(np.log2(draws)), _POINTS)
-    sampler = qmc.Sobol(len(study.sources), scramble=True, rng=np.random.default_rng(seed))
-    numbers = study.drawn(sampler.random(points))
+    numbers = drawn_numbers(
+        study.sources, sobol_points(len(study.sources), seed, 0, points, points)
+    )
     exact, factors = [], []
     for index, source in enumerate(study.sources):
 
@@ -219,8 +221,7 @@ def sobol(
     """
     sources = len(study.sources)
     points = min(2 ** int(np.log2(max(draws / (sources + 2), _LEAST_POINTS))), _POINTS)
-    sampler = qmc.Sobol(2 * sources, scramble=True, rng=np.random.default_rng(seed))
-    first, second = np.split(sampler.random(points), 2, axis=1)
+    first, second = np.split(sobol_points(2 * sources, seed, 0, points, points), 2, axis=1)
     mixed = np.where(np.eye(sources, dtype=bool)[:, None], second, first)
     levels = np.concatenate([first, second, *mixed])
     outcomes = study.at_levels(levels, progress)

@@ -64,6 +64,13 @@ standard deviations."""
 Counts = Int[np.ndarray, " k"]
 
 
+def drawn_numbers(
+    sources: Sequence[ToleranceSource], levels: Float[np.ndarray, "robots d"]
+) -> dict[str, Float[np.ndarray, " robots"]]:
+    """Return the numbers of robots by name, at levels of the sources; see `TAIL`."""
+    return values_at(sources, np.clip(levels, TAIL, 1.0 - TAIL))
+
+
 class Outcomes(NamedTuple):
     """Outcomes of robots.
 
@@ -132,17 +139,13 @@ class Study:
         names = [self.criteria[place].quantity.name for place in places]
         return places, tuple(dict.fromkeys(names))
 
-    def drawn(self, levels: Float[np.ndarray, "robots d"]) -> dict[str, Float[np.ndarray, " r"]]:
-        """Return the numbers of robots by name, at levels of the sources; see `TAIL`."""
-        return values_at(self.sources, np.clip(levels, TAIL, 1.0 - TAIL))
-
     def at_levels(
         self,
         levels: Float[np.ndarray, "robots d"],
         progress: Callable[[int, int], None] | None = None,
     ) -> Outcomes:
         """Solve robots at levels of the sources, each between 0 and 1."""
-        return self.solved(self.drawn(levels), len(levels), progress)
+        return self.solved(drawn_numbers(self.sources, levels), len(levels), progress)
 
     def solved(
         self,
@@ -316,6 +319,17 @@ def yield_interval(accepted: Int[np.ndarray, " replicates"], each: int) -> tuple
     )
 
 
+def drawn_levels(sources: int, draws: int, seed: int) -> Float[np.ndarray, "draws d"]:
+    """Return levels of about so many robots, one set of points after the other."""
+    return np.concatenate(replicates(sources, points_of_each(draws), seed))
+
+
+def yield_of(accepted: Bool[np.ndarray, " draws"]) -> tuple[float, tuple[float, float]]:
+    """Return which part of robots at `drawn_levels` is accepted, and its 95 % interval."""
+    sets = accepted.reshape(REPLICATES, -1)
+    return float(accepted.mean()), yield_interval(sets.sum(axis=1), sets.shape[1])
+
+
 @dataclass(frozen=True, eq=False)
 class DrawnCounts:
     """Counts of drawn robots, k numbers with limits.
@@ -370,7 +384,9 @@ def draw(
     outcomes = study.at_levels(levels, progress)
     codes, below, above = study.counts(outcomes)
     accepted = outcomes.accepted.reshape(REPLICATES, -1).sum(axis=1)
-    return DrawnRobots(codes, accepted, below, above, study.drawn(levels), outcomes)
+    return DrawnRobots(
+        codes, accepted, below, above, drawn_numbers(study.sources, levels), outcomes
+    )
 
 
 @dataclass(frozen=True, eq=False)
