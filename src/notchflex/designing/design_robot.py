@@ -123,7 +123,7 @@ def _forms(spec: DesignSpec, robot: Robot) -> list[Robot]:
     sizes = [
         [dict(zip(stock.values, size, strict=True)) for size in stock.sizes] for stock in spec.stock
     ]
-    combinations = list(itertools.product(spec.number_of_notches or [None], *sizes))
+    combinations: list[Any] = list(itertools.product(spec.number_of_notches or [None], *sizes))
     if len(combinations) > MAX_FORMS:
         raise InputError.OUT_OF_RANGE(
             f"there are {len(combinations)} combinations of sizes and numbers of notches; at most "

@@ -253,7 +253,7 @@ def wishes_of(spec: DesignSpec, robot: Robot) -> list[Wish]:
 
 
 def _resolved(
-    asked: DesignObjective | DesignConstraint,
+    asked: Any,
     robot: Robot,
     loads: Mapping[str, Any],
     curves: Mapping[str, TargetCurve],
@@ -428,7 +428,7 @@ class DesignProblem:
     """
 
     solver: Solver
-    wishes: Sequence[Wish]
+    wishes: Sequence[Any]
     failures: Counter[str] = field(default_factory=Counter[str])
 
     def __post_init__(self) -> None:

@@ -282,7 +282,7 @@ class _Counted(NamedTuple):
 
     def part(self, target: _Target) -> tuple[float, tuple[float, float]]:
         """Return which part meets all of some constraints, and its 95 % interval."""
-        return yield_of(self.met[:, target.columns].all(axis=1))
+        return yield_of(np.asarray(self.met[:, target.columns].all(axis=1)))
 
     def lack(self, targets: Sequence[_Target]) -> float:
         """Return by how much the lower ends of the yields miss what is wanted, in all."""

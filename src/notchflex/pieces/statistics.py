@@ -65,25 +65,19 @@ class Sketch:
     @classmethod
     def of(cls, values: Float[np.ndarray, " k"], start: int, scale: Scale, keep: int) -> Sketch:
         """Describe a column whose first row has the number `start`; NaN is left out."""
-        rows = np.arange(start, start + len(values))
-        is_finite = np.isfinite(values)
-        if not is_finite.all():
-            values, rows = values[is_finite], rows[is_finite]
+        rows = np.flatnonzero(np.isfinite(values))
+        values, rows = values[rows], rows + start
         if not len(values):
             return cls(scale=scale)
         middle, half = scale
         moved = values - middle
         bins = _bins(moved / half)
         first = int(bins.min())
-        counts = np.bincount(bins - first)
         with np.errstate(over="ignore"):
             total, squares = float(moved.sum()), float(np.square(moved).sum())
-        # Extremes are in the outermost bins: never are all values put in order.
-        below = np.cumsum(counts)
-        low = bins - first <= np.searchsorted(below, keep)
-        high = bins - first >= np.searchsorted(below, len(values) - keep, side="right")
-        smallest = _least(values[low], rows[low], keep)
-        largest = [[-value, row] for value, row in _least(-values[high], rows[high], keep)]
+        smallest = _least(values, rows, keep)
+        largest = [[-value, row] for value, row in _least(-values, rows, keep)]
+        counts = np.bincount(bins - first)
         return cls(len(values), total, squares, smallest, largest, first, counts, scale)
 
     def merged(self, more: Sketch, keep: int) -> Sketch:
@@ -159,6 +153,9 @@ def _least(
     values: Float[np.ndarray, " k"], rows: Int[np.ndarray, " k"], keep: int
 ) -> list[list[Any]]:
     """Return the smallest values with their rows; of equal ones those of the first rows."""
+    if keep < len(values):  # never are all values put in order
+        near = values <= np.partition(values, keep)[keep]
+        values, rows = values[near], rows[near]
     order = np.argsort(values, kind="stable")[:keep]
     return list(map(list, zip(values[order].tolist(), rows[order].tolist(), strict=True)))
 
@@ -181,22 +178,13 @@ def summed_up(
         keep: So many rows with the smallest and the largest values are told.
         more: Further entries.
     """
-    sketches = {
-        name: Sketch.of(values, start, scales[name], keep) for name, values in columns.items()
-    }
-    return {
-        "codes": np.bincount(codes, minlength=len(CODES)).tolist(),
-        **more,
-        "scales": scales,
-        "columns": {
-            name: {
-                key: value.tolist() if key == "counts" else value
-                for key, value in vars(sketch).items()
-                if key != "scale"
-            }
-            for name, sketch in sketches.items()
-        },
-    }
+    documents: dict[str, dict[str, Any]] = {}
+    for name, values in columns.items():
+        sketch = Sketch.of(values, start, scales[name], keep)
+        documents[name] = vars(sketch) | {"counts": sketch.counts.tolist()}
+        del documents[name]["scale"]
+    counts = np.bincount(codes, minlength=len(CODES)).tolist()
+    return {"codes": counts, **more, "scales": scales, "columns": documents}
 
 
 def add_to(sketches: dict[str, Sketch], head: Mapping[str, Any], keep: int) -> None:

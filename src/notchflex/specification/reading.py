@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from pydantic_core import ArgsKwargs
 
 from notchflex import ErrorCode, InputError
-from notchflex.support import nearest, part, validated
+from notchflex.support import check_integer, nearest, part, validated
 
 Record = TypeVar("Record")
 
@@ -135,6 +135,17 @@ def placed(place: str) -> Generator[None]:
         yield
     except InputError as error:
         raise type(error)(f"{place}: {error}", error.code) from None
+
+
+def whole(value: Any, name: str, least: int, most: int) -> int:
+    """Return a whole number within limits.
+
+    Raises:
+        InputError: It is none.
+    """
+    if not least <= check_integer(value, name) <= most:
+        raise InputError.OUT_OF_RANGE(f"{name} must be from {least:,} to {most:,}; got {value}")
+    return value
 
 
 def known(name: Any, allowed: Mapping[str, Any], what: str) -> Any:

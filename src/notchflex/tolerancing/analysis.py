@@ -93,15 +93,12 @@ def linear_effects(study: Study) -> LinearEffects:
     """
     names = [name for source in study.sources for name in source.nominal]
     slopes, nominal = np.empty((len(study.criteria), len(names))), np.empty(len(study.criteria))
-    for load, path in study.loads.items():
-        places, outputs = study.of_load(load)
-        solved = study.paths[load][: len(path)]
-        jacobian = solved.jacobian(names, outputs)
-        for place in places:
-            criterion = study.criteria[place]
+    for path, criteria, outputs in study.loads.values():
+        jacobian = path.jacobian(names, outputs)
+        for place, criterion in criteria.items():
             quantity = criterion.quantity.name
             slopes[place] = criterion.of(np.moveaxis(jacobian[quantity], -1, 0))
-            nominal[place] = criterion.of(np.asarray(solved.quantity(quantity))[None])[0]
+            nominal[place] = criterion.of(np.asarray(path.quantity(quantity))[None])[0]
     # Mean, standard deviation and both ends of each name, which moves with its source alone.
     deviations = np.zeros((4, len(names), len(study.sources)))
     for column, source in enumerate(study.sources):

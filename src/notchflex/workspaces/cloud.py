@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.spatial import ConvexHull, Delaunay, QhullError
+from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
 from notchflex import InputError, Robot
 from notchflex.specification import LimitedQuantity
@@ -95,10 +95,7 @@ def alpha_size(points: Float[np.ndarray, "n 3"], radius: float) -> float:
     if len(axes) < 2:
         return 0.0
     flat = (points - origin) @ axes.T
-    try:
-        simplices = flat[Delaunay(flat).simplices]
-    except QhullError:
-        return 0.0
+    simplices = flat[Delaunay(flat).simplices]
     edges = simplices[:, 1:] - simplices[:, :1]
     sizes = np.abs(np.linalg.det(edges)) / (2.0 if len(axes) == 2 else 6.0)
     is_regular = sizes > 1e-12 * sizes.max()
@@ -194,16 +191,14 @@ def voxel_map(
     dexterity = np.bincount(reached // DIRECTIONS) / DIRECTIONS
     maps: dict[str, np.ndarray] = {}
     for name, column in values.items():
-        is_finite = np.isfinite(column)
-        of_finite, finite = of_state[is_finite], column[is_finite]
+        is_finite, count = np.isfinite(column), len(occupied)
+        places, finite = of_state[is_finite], column[is_finite]
         if name == "hysteresis":
-            maps[name] = np.full(len(occupied), np.nan)
-            np.fmax.at(maps[name], of_finite, finite)
+            maps[name] = np.full(count, np.nan)
+            np.fmax.at(maps[name], places, finite)
         else:
-            count, total = (
-                np.bincount(of_finite, weights, len(occupied)) for weights in (None, finite)
-            )
-            maps[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+            with np.errstate(invalid="ignore"):  # none of 0
+                maps[name] = np.bincount(places, finite, count) / np.bincount(places, None, count)
     return VoxelMap(size, (occupied + 0.5) * size, states, dexterity, maps, of_state)
 
 
@@ -218,14 +213,8 @@ def sphere_directions() -> Float[np.ndarray, "directions 3"]:
 
 
 def nearest_directions(directions: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
-    """Return the nearest of the directions of the dexterity, piece by piece.
-
-    Args:
-        directions: Unit vectors.
-    """
-    sphere = sphere_directions().T
-    pieces = [directions[start : start + 65536] for start in range(0, len(directions), 65536)]
-    return np.concatenate([(one @ sphere).argmax(axis=1) for one in pieces])
+    """Return the nearest of the directions of the dexterity to unit vectors."""
+    return cKDTree(sphere_directions()).query(directions)[1]
 
 
 _VOXELS = 32
@@ -333,11 +322,9 @@ class Workspace(Displayed):
         """
         if size is None:
             size = self._voxel_size()
-        elif not 0.0 < check_number(size, "size", "mm") < np.inf:
-            raise InputError.OUT_OF_RANGE(f"the size of a voxel must be above 0 mm; got {size:g}")
-        elif (np.ptp(self.extent, axis=0) / size).max() > 1e6:
+        elif not 1e-6 * np.ptp(self.extent) < check_number(size, "size", "mm") < np.inf:
             raise InputError.OUT_OF_RANGE(
-                f"voxels of {size:g} mm are more than a million along a side; give a larger size"
+                f"a voxel must have a size above 0 mm, at most a million along a side; got {size:g}"
             )
         values = {
             "tension": self.tension.max(axis=1),
@@ -455,7 +442,7 @@ def _overlap(first: str, second: str, a: Workspace, b: Workspace) -> Overlap:
     )
 
 
-_PARTS = (0.05, 0.5, 0.95, 1.0)
+_PARTS = {"p5": 0.05, "p50": 0.5, "p95": 0.95, "largest": 1.0}
 
 
 def workspace_document(explored: Workspace) -> dict[str, Any]:
@@ -495,16 +482,8 @@ def workspace_document(explored: Workspace) -> dict[str, Any]:
 
 def _spread(values: np.ndarray) -> dict[str, float | None]:
     finite = values[np.isfinite(values)]
-    if not len(finite):
-        return dict.fromkeys(("p5", "p50", "p95", "largest"))
-    return dict(
-        zip(("p5", "p50", "p95", "largest"), np.quantile(finite, _PARTS).tolist(), strict=True)
-    )
-
-
-def overlap_documents(overlaps: Sequence[Overlap]) -> list[dict[str, Any]]:
-    """Return comparisons as plain values."""
-    return [vars(one) for one in overlaps]
+    parts = np.quantile(finite, list(_PARTS.values())).tolist() if len(finite) else [None] * 4
+    return dict(zip(_PARTS, parts, strict=True))
 
 
 def save_netcdf(workspaces: Mapping[str, Workspace], target: str) -> None:

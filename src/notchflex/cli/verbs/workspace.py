@@ -152,7 +152,6 @@ def workspace(
 
 def _write(explored: Mapping[str, Workspace], outputs: WorkspaceOutputs) -> None:
     from notchflex.workspaces import (
-        overlap_documents,
         overlaps,
         save_netcdf,
         workspace_document,
@@ -163,7 +162,7 @@ def _write(explored: Mapping[str, Workspace], outputs: WorkspaceOutputs) -> None
     (_, alone), *others = documents.items()
 
     def document() -> dict[str, Any]:
-        overlap = overlap_documents(compared)
+        overlap = [vars(each) for each in compared]
         return alone | ({"beside": dict(others), "overlaps": overlap} if others else {})
 
     def picture() -> Any:
