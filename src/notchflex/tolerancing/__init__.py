@@ -1,7 +1,11 @@
 """Tolerances and acceptance limits: worst case, yield, and which dimension to control."""
 
-from notchflex.tolerancing.analysis import ToleranceAnalysis, tolerance_analysis
-from notchflex.tolerancing.documents import tolerance_columns, tolerance_document
+from notchflex.tolerancing.analysis import (
+    ToleranceAnalysis,
+    tolerance_analysis,
+    tolerance_columns,
+    tolerance_document,
+)
 from notchflex.tolerancing.spec import AcceptanceLimit, ToleranceSpec, read_tolerance_spec
 from notchflex.tolerancing.study import (
     Outcomes,

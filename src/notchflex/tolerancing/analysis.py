@@ -1,9 +1,9 @@
-"""The tolerance analysis of a robot: worst case, yield, sensitivity, remedies."""
+"""The tolerance analysis of a robot: worst case, yield, sensitivity, remedies; its documents."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
@@ -15,13 +15,14 @@ from scipy.stats import sobol_indices
 
 from notchflex import EquilibriumPath, InputError, Robot, Settings
 from notchflex.pieces import CODES, FAILED, INVALID, PieceFolder, sobol_points
+from notchflex.specification import whole
 from notchflex.support import (
     Displayed,
     Summary,
     Tolerance,
-    check_integer,
     check_is_robot,
     deviation,
+    document_head,
     moments,
     short,
     short_repr,
@@ -36,6 +37,7 @@ from notchflex.tolerancing.study import (
     draw,
     draw_in_pieces,
     drawn_numbers,
+    limited_columns,
     study_of,
     tolerances_for,
     yield_interval,
@@ -353,7 +355,6 @@ class ToleranceAnalysis(Displayed):
         return Summary(title, rows, ".linear, .drawn, .sobol, .control; nf.plot(it) draws them")
 
 
-_MIN_DRAWS = 2 * REPLICATES
 _MAX_DRAWS, _MAX_IN_PIECES = 10_000_000, 10_000_000_000
 """Draws in memory at most, and in pieces."""
 
@@ -405,12 +406,7 @@ def tolerance_analysis(
         200
     """
     check_is_robot(robot)
-    most = _MAX_DRAWS if folder is None else _MAX_IN_PIECES
-    if not _MIN_DRAWS <= check_integer(draws, "draws") <= most:
-        more = ", or more in pieces (give a folder)" if folder is None else ""
-        raise InputError.OUT_OF_RANGE(
-            f"draws must be from {_MIN_DRAWS} to {most:,}{more}; got {draws}"
-        )
+    whole(draws, "draws", 2 * REPLICATES, _MAX_DRAWS if folder is None else _MAX_IN_PIECES)
     if isinstance(spec, str | os.PathLike):
         spec = read_tolerance_spec(spec, robot)
     elif not isinstance(spec, ToleranceSpec):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -445,3 +441,114 @@ def tolerance_analysis(
         wanted_yield=spec.wanted_yield,
         seed=seed,
     )
+
+
+PERCENTILES = (2.5, 50.0, 97.5)
+
+
+def tolerance_document(analysis: ToleranceAnalysis) -> dict[str, Any]:
+    """Return a tolerance analysis as a document of plain values, at the edge units.
+
+    Args:
+        analysis: The analysis.
+
+    Returns:
+        `yield` (with `interval`), `limits`, one for each number that has limits, and `sources`, one
+        for each deviation. Angles in deg, lengths in mm, forces in N.
+    """
+    return {
+        **document_head(analysis.robot),
+        "draws": analysis.draws,
+        "seed": analysis.seed,
+        "tolerances": {one.value: one.written for one in analysis.tolerances},
+        "assumed": list(analysis.assumed),
+        "yield": {
+            "accepted": analysis.accepted_fraction,
+            "interval": list(analysis.interval),
+            "wanted": analysis.wanted_yield,
+            "counts": analysis.counts,
+        },
+        "worst_case_sd": WORST_SD,
+        "limits": _limits(analysis),
+        "sources": _sources(analysis),
+        "sobol_robots": analysis.sobol.robots,
+        "sobol_failed": analysis.sobol.failed,
+        "control_robots": analysis.control.robots,
+    }
+
+
+def _limits(analysis: ToleranceAnalysis) -> list[dict[str, Any]]:
+    linear = analysis.linear
+    values = {
+        "drawing": linear.nominal,
+        "worst_case": linear.worst_case,
+        "rss_mean": linear.mean,
+        "rss_sd": linear.sd,
+    }
+    parts = {f"{level:g}": analysis.percentile(level / 100.0) for level in PERCENTILES}
+    documents: list[dict[str, Any]] = []
+    for index, criterion in enumerate(analysis.criteria):
+        scale = criterion.quantity.scale
+        # A limit that was turned to rad and back has a rounding error.
+        ends = {end: float(f"{getattr(criterion, end) * scale:.12g}") for end in ("lower", "upper")}
+        documents.append(
+            {
+                "name": criterion.name,
+                "quantity": criterion.quantity.name,
+                "unit": criterion.quantity.unit,
+                "load": criterion.load,
+                "step": criterion.step + 1,
+                **{end: value if np.isfinite(value) else None for end, value in ends.items()},
+                **{name: column[index] * scale for name, column in values.items()},
+                "percentiles": {level: part[index] * scale for level, part in parts.items()},
+                "below": analysis.below[index],
+                "above": analysis.above[index],
+            }
+        )
+    return documents
+
+
+def _sources(analysis: ToleranceAnalysis) -> list[dict[str, Any]]:
+    """Return what is found of every deviation; lists are in the order of `limits`."""
+    sobol, control = analysis.sobol, analysis.control
+    scales = np.array([criterion.quantity.scale for criterion in analysis.criteria])
+    return [
+        {
+            "name": name,
+            "one_sd": analysis.linear.spread[:, index] * scales,
+            "variance_share": analysis.linear.share[:, index],
+            "sobol_first": sobol.first[:-1, index],
+            "sobol_total": sobol.total[:-1, index],
+            "sobol_total_of_acceptance": sobol.total[-1, index],
+            "yield_if_exact": control.exact[index],
+            "allowed_factor": None if control.factor is None else control.factor[index],
+        }
+        for index, name in enumerate(analysis.sources)
+    ]
+
+
+def tolerance_columns(analysis: ToleranceAnalysis) -> dict[str, Sequence[Any]]:
+    """Return the drawn robots as columns: their numbers, those with limits, and what became of it.
+
+    Args:
+        analysis: The analysis.
+
+    Returns:
+        `robot` from 1, the numbers that deviate by name (mm, N, MPa, deg), the numbers that have
+        limits with their unit, empty where there is no result, and `outcome`: accepted, rejected,
+        NOT_CONVERGED or INVALID_ROBOT.
+
+    Raises:
+        InputError: They were drawn in pieces.
+    """
+    drawn = analysis.drawn
+    if isinstance(drawn, DrawnPieces):
+        raise InputError.UNSUPPORTED(
+            f"the drawn robots are rows of the files in {drawn.directory}; read those."
+        )
+    columns = {**drawn.numbers, **limited_columns(analysis.criteria, drawn.outcomes.values)}
+    return {
+        "robot": range(1, analysis.draws + 1),
+        **{name: values.tolist() for name, values in columns.items()},
+        "outcome": [CODES[code] for code in drawn.outcomes.codes],
+    }
