@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex import InputError, Robot, load_robot
+from notchflex import InputError, Robot
 from notchflex.designing.problem import (
     DesignEvaluation,
     DesignProblem,
@@ -43,19 +43,16 @@ from notchflex.designing.solver import BODIES, COMPLIANCE, OF_STATES, Point, Rea
 from notchflex.designing.specification import (
     DesignSpec,
     RobustOptions,
-    read_design,
-    spec_from_table,
 )
 from notchflex.designing.variables import Probe, drives_of, load_steps, variables_of
 from notchflex.search.slsqp import TOLERANCE, minimise
-from notchflex.specification import placed
+from notchflex.specification import placed, with_robot
 from notchflex.support import (
     check_number,
     from_table,
     need,
     numbers_at,
     remember_source,
-    short_repr,
     source_of,
     to_table,
     tolerances_of,
@@ -197,7 +194,7 @@ def design(
         >>> f"{made.robot.notches[0].height:.3f} mm"
         '0.627 mm'
     """
-    asked, first = specification_of(spec, robot)
+    asked, first = with_robot(spec, DesignSpec, "design file", robot)
     if not 0.0 <= check_number(grid, "grid") < np.inf:
         raise InputError.OUT_OF_RANGE(f"grid must be 0 mm or more and finite; got {grid:g} mm.")
     if robust and not asked.is_robust:
@@ -211,24 +208,6 @@ def design(
     searches = search(problems, asked.search, progress)
     found = robust_search(asked, tolerances, searches, progress, place)
     return made_of(asked, first, problems, *found)
-
-
-def specification_of(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
-    """Return a specification given in any form, and the robot to begin with.
-
-    Raises:
-        InputError: It is not allowed, or its robot cannot be read.
-    """
-    if isinstance(spec, str | os.PathLike):
-        asked, named = read_design(spec)
-        return asked, robot or named
-    if isinstance(spec, Mapping):
-        spec = spec_from_table(spec)
-    if not isinstance(spec, DesignSpec):
-        raise InputError.WRONG_TYPE(
-            f"a design needs a design file, its table or a DesignSpec; got {short_repr(spec)}"
-        )
-    return spec, robot or load_robot(spec.robot)
 
 
 def made_of(
@@ -326,7 +305,7 @@ def design_front(
         InputError: Not two or three objectives, pymoo is not installed, or as for `design`.
     """
     need("pymoo", "design", "a front between objectives")
-    asked, first = specification_of(spec, robot)
+    asked, first = with_robot(spec, DesignSpec, "design file", robot)
     if not 2 <= len(asked.objective) <= _MAX_OBJECTIVES or asked.curve:
         raise InputError.UNSUPPORTED(
             f"a front needs 2 or {_MAX_OBJECTIVES} objectives, and curves as one of them; got "

@@ -286,7 +286,8 @@ def _resolved(
         f"at {load}" if load else "",
         f"less {minus}" if minus else "",
     ]
-    kind, take = ObjectiveWish, asked.take
+    kind: Any = ObjectiveWish
+    take = asked.take
     if isinstance(asked, DesignConstraint):
         kind, take = ConstraintWish, "steps" if asked.order is not None else take or "each"
     elif take is None:  # several numbers need a word, but for values of the robot file

@@ -17,7 +17,7 @@ from notchflex import EquilibriumPath, InputError, Robot, batch, closing
 from notchflex.analysis.forward_model import ForwardModel, slope
 from notchflex.analysis.kinematics import axis_places, axis_point_changes, points_on_axis
 from notchflex.designing.specification import TargetCurve
-from notchflex.designing.variables import PROBE, Direction, LoadSteps, Variables
+from notchflex.designing.variables import PROBE, Direction, LoadSteps, Variables, Vector
 from notchflex.support import (
     DEGREES,
     QUANTITIES,
@@ -208,7 +208,7 @@ class Point:
         closed: Closing tensions, N, where they are known without the robot.
     """
 
-    x: Float[np.ndarray, " v"]
+    x: Vector
     robot: Robot
     steps: LoadSteps
     arrays: Mapping[str, np.ndarray]
@@ -284,14 +284,14 @@ class Solver:
     outputs: tuple[str, ...]
     counts: dict[str, int] = field(default_factory=lambda: {"solves": 0, "gradients": 0})
 
-    def path(self, x: Float[np.ndarray, " v"]) -> EquilibriumPath | None:
+    def path(self, x: Vector) -> EquilibriumPath | None:
         """Return the states of the robot of a vector; None if there are none."""
         if not self.steps.steps:
             return None
         robot, load = self.variables.robot_at(x), self.steps.path(self.variables.drives_at(x))
         return ForwardModel(robot, load, from_rest=self.steps.from_rest).solve(robot, load)
 
-    def point(self, x: Float[np.ndarray, " v"]) -> Point:
+    def point(self, x: Vector) -> Point:
         """Solve the robot of a vector, and differentiate it.
 
         Raises:

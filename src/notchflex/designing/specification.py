@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import KW_ONLY
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -19,8 +18,8 @@ from notchflex.specification import (
     OldWords,
     Varied,
     as_list,
-    made,
     record,
+    with_robot,
 )
 from notchflex.support import (
     Float,
@@ -28,8 +27,6 @@ from notchflex.support import (
     Int,
     ProblemError,
     Tolerances,
-    read_specification,
-    robot_named,
     schema_of,
 )
 
@@ -362,24 +359,7 @@ def read_design(path: str | os.PathLike[str]) -> tuple[DesignSpec, Robot]:
     Raises:
         InputError: The file or its robot cannot be read, or a value in it is not allowed.
     """
-    spec = read_specification(path, "design file", spec_from_table)
-    return spec, robot_named(spec.robot, Path(path).parent)
-
-
-def spec_from_table(table: Mapping[str, Any]) -> DesignSpec:
-    """Make a specification from the plain table of a design file.
-
-    Raises:
-        InputError: A key is missing, not known, or its value is not allowed.
-
-    Example:
-        >>> wish = {"quantity": "notch.height", "goal": "minimise"}
-        >>> height = {"value": "notch.height", "lower": 0.3, "upper": 1.0}
-        >>> table = {"robot": "pacheco2021-a", "variable": [height], "objective": [wish]}
-        >>> spec_from_table(table).variable[0].along
-        'all'
-    """
-    return made(DesignSpec, table)
+    return with_robot(path, DesignSpec, "design file")
 
 
 def design_schema() -> dict[str, Any]:

@@ -25,6 +25,9 @@ from notchflex.support import (
     sources_of,
 )
 
+Vector = Float[np.ndarray, " v"]
+"""A number for each variable."""
+
 Drives = Mapping[str, Float[np.ndarray, "2 t"]]
 """By load the tensions (N) and strokes (mm) of its tendons, NaN where not commanded."""
 
@@ -82,17 +85,17 @@ class Variables:
     grid: float = 0.0
 
     @cached_property
-    def lower(self) -> Float[np.ndarray, " v"]:
+    def lower(self) -> Vector:
         """Least values."""
         return np.array([column.lower for column in self.columns])
 
     @cached_property
-    def span(self) -> Float[np.ndarray, " v"]:
+    def span(self) -> Vector:
         """Greatest less least values."""
         return np.array([column.upper for column in self.columns]) - self.lower
 
     @cached_property
-    def start(self) -> Float[np.ndarray, " v"]:
+    def start(self) -> Vector:
         """The robot as it is, within the limits."""
         values = np.zeros(len(self.columns))
         for number, column in enumerate(self.columns):
@@ -111,14 +114,14 @@ class Variables:
         """Which numbers are lengths of the robot."""
         return np.array([column.unit == "mm" and not column.drive for column in self.columns], bool)
 
-    def on_grid(self, x: Float[np.ndarray, " v"]) -> Float[np.ndarray, " v"]:
+    def on_grid(self, x: Vector) -> Vector:
         """Return a vector with its lengths on the grid."""
         return np.where(self.lengths, self._placed(x), x) if self.grid else x
 
     def _placed(self, value: Any) -> Any:
         return np.round(np.round(value / self.grid) * self.grid, 9)  # 1.405, not 1.4050000000000002
 
-    def robot_at(self, x: Float[np.ndarray, " v"]) -> Robot:
+    def robot_at(self, x: Vector) -> Robot:
         """Return the robot of a vector.
 
         Raises:
@@ -132,7 +135,7 @@ class Variables:
             values |= {path: float(self._placed(values[path])) for path in column.weights}
         return self.robot.with_values(values) if values else self.robot
 
-    def drives_at(self, x: Float[np.ndarray, " v"]) -> Drives:
+    def drives_at(self, x: Vector) -> Drives:
         """Return what the loads command at a vector."""
         drives = {name: table.copy() for name, table in self.drives.items()}
         for column, number in zip(self.columns, x.tolist(), strict=True):

@@ -310,10 +310,10 @@ def heads(
     Raises:
         InputError: A piece was written for another manifest, or a needed one is not there.
     """
-    for piece in needed or range(manifest.pieces):
+    for piece in range(manifest.pieces) if needed is None else needed:
         if (head := _head(folder, manifest, piece)) is not None:
             yield head
-        elif needed:
+        elif needed is not None:
             raise InputError.FILE_DAMAGED(
                 f"{folder} lost its piece {piece} while it was read; call again."
             )

@@ -25,11 +25,13 @@ _HALF = 1024
 _MAX_BIN = 64 * _HALF
 
 
+Numbers = Float[np.ndarray, " k"]
+Integers = Int[np.ndarray, " k"]
 Scale = tuple[float, float]
 """Range of the values of a sample: a finite middle, and half the range, above 0."""
 
 
-def scale_of(values: Float[np.ndarray, " k"]) -> Scale:
+def scale_of(values: Numbers) -> Scale:
     """Find the scale of a sample; NaN is left out."""
     finite = values[np.isfinite(values)]
     if not len(finite):
@@ -63,7 +65,7 @@ class Sketch:
     scale: Scale = (0.0, 1.0)
 
     @classmethod
-    def of(cls, values: Float[np.ndarray, " k"], start: int, scale: Scale, keep: int) -> Sketch:
+    def of(cls, values: Numbers, start: int, scale: Scale, keep: int) -> Sketch:
         """Describe a column whose first row has the number `start`; NaN is left out."""
         rows = np.flatnonzero(np.isfinite(values))
         values, rows = values[rows], rows + start
@@ -139,7 +141,7 @@ class Sketch:
         return middle + half * np.where(size > 1.0, far, position)
 
 
-def _bins(position: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
+def _bins(position: Numbers) -> Integers:
     """Return the bins of values less the middle, in halves of the range."""
     bins = np.floor(position * _HALF)
     beyond = np.abs(position) > 1.0
@@ -149,9 +151,7 @@ def _bins(position: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
     return np.clip(bins, -_MAX_BIN, _MAX_BIN).astype(np.int64)
 
 
-def _least(
-    values: Float[np.ndarray, " k"], rows: Int[np.ndarray, " k"], keep: int
-) -> list[list[Any]]:
+def _least(values: Numbers, rows: Integers, keep: int) -> list[list[Any]]:
     """Return the smallest values with their rows; of equal ones those of the first rows."""
     if keep < len(values):  # never are all values put in order
         near = values <= np.partition(values, keep)[keep]
@@ -161,8 +161,8 @@ def _least(
 
 
 def summed_up(
-    columns: Mapping[str, Float[np.ndarray, " k"]],
-    codes: Int[np.ndarray, " k"],
+    columns: Mapping[str, Numbers],
+    codes: Integers,
     start: int,
     scales: Mapping[str, Scale],
     keep: int,

@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import inspect
+import os
 import re
 import sys
 import warnings
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
 from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
 
 from pydantic import Field, model_validator
 from pydantic_core import ArgsKwargs
 
-from notchflex import ErrorCode, InputError
-from notchflex.support import check_integer, nearest, part, validated
+from notchflex import ErrorCode, InputError, Robot, load_robot
+from notchflex.support import (
+    check_integer,
+    nearest,
+    part,
+    read_specification,
+    robot_named,
+    short_repr,
+    validated,
+)
 
 Record = TypeVar("Record")
 
@@ -126,6 +137,32 @@ def made(
             names = [*loads]
             text = re.sub(r"`load\[(\d+)\]", lambda n: f"`load.{names[int(n[1]) - 1]}", text)
         raise refuse(text) from None
+
+
+def with_robot(
+    given: Any, record: type[Record], what: str, robot: Robot | None = None
+) -> tuple[Record, Robot]:
+    """Return a specification, and the robot that it names or another one.
+
+    Args:
+        given: The specification, its table, or the path of its file.
+        record: Its class, with the name of the robot as `robot`.
+        what: What messages call its file.
+        robot: The robot, where it is not the one that is named.
+
+    Raises:
+        InputError: The file or its robot cannot be read, or a value is not allowed.
+    """
+    if isinstance(given, str | os.PathLike):
+        asked: Any = read_specification(given, what, partial(made, record))
+        return asked, robot or robot_named(asked.robot, Path(given).parent)
+    asked = made(record, given) if isinstance(given, Mapping) else given
+    if not isinstance(asked, record):
+        raise InputError.WRONG_TYPE(
+            f"a notchflex.{record.__name__} is needed, its table, or the path of a file; got "
+            f"{short_repr(given)}"
+        )
+    return asked, robot or load_robot(asked.robot)
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
-from notchflex import ErrorCode, InputError, Robot, load_robot, simulate
+from notchflex import ErrorCode, InputError, Robot, simulate
 from notchflex.pieces import (
     CODES,
     FAILED,
@@ -43,9 +43,11 @@ from notchflex.specification import (
     Criterion,
     entry_names,
     limited_numbers,
+    made,
     placed,
     read_load,
     whole,
+    with_robot,
 )
 from notchflex.support import (
     Displayed,
@@ -56,7 +58,6 @@ from notchflex.support import (
     number_at,
     number_of_cores,
     short,
-    short_repr,
     to_table,
     write_json,
 )
@@ -64,9 +65,7 @@ from notchflex.sweeping.plan import (
     Sampling,
     SweepPlan,
     SweepVariable,
-    plan_from_table,
     plan_table,
-    read_plan,
 )
 from notchflex.tolerancing import Study, piece_rows
 
@@ -291,7 +290,7 @@ def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
     content = manifest.document
     try:
         robot = from_table(content["robot"])
-        plan = plan_from_table({**content["plan"], "robot": robot.name})
+        plan = made(SweepPlan, {**content["plan"], "robot": robot.name})
         sketches = {str(name): Sketch() for name in content["columns"]}
     except (InputError, LookupError, TypeError, AttributeError):
         raise damaged(Path(directory, "sweep.json")) from None
@@ -307,6 +306,9 @@ def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
     counts: dict[str, int] = dict(zip(CODES, codes.tolist(), strict=True))
     return Sweep(Path(directory), manifest, plan, robot, tuple(pieces), counts, failures, sketches)
 
+
+Columns = dict[str, Float[np.ndarray, " k"]]
+"""Numbers of rows by name."""
 
 _MAX_LATIN = 20_000_000
 """A Latin hypercube is made whole: so many numbers fit into memory beside all else."""
@@ -329,7 +331,7 @@ def _ends(variable: SweepVariable) -> tuple[float, float]:
     return min(values), max(values)  # pyright: ignore
 
 
-def numbers_between(plan: SweepPlan, start: int, stop: int) -> dict[str, Float[np.ndarray, " k"]]:
+def numbers_between(plan: SweepPlan, start: int, stop: int) -> Columns:
     """Return the numbers of rows by name; points change fastest, then the last axis of the grid.
 
     Args:
@@ -346,7 +348,7 @@ def numbers_between(plan: SweepPlan, start: int, stop: int) -> dict[str, Float[n
     return _numbers(plan, places, np.concatenate(parts))
 
 
-def _sample(plan: SweepPlan) -> dict[str, Float[np.ndarray, " k"]]:
+def _sample(plan: SweepPlan) -> Columns:
     """Return the numbers of some rows: the first points, at places all over the grid."""
     each = 1 if plan.sampling is None else plan.sampling.points
     count = min(4 * _SAMPLE, plan.rows)
@@ -358,7 +360,7 @@ def _sample(plan: SweepPlan) -> dict[str, Float[np.ndarray, " k"]]:
 
 def _numbers(
     plan: SweepPlan, places: Int[np.ndarray, " k"], levels: Float[np.ndarray, "k d"]
-) -> dict[str, Float[np.ndarray, " k"]]:
+) -> Columns:
     """Return numbers by name at places of the grid and sampled levels."""
     numbers: dict[str, np.ndarray] = {}
     for variable in plan.grid[::-1]:
@@ -486,7 +488,7 @@ class SweepTask(PieceTask):
 
     def _solved(
         self, numbers: Mapping[str, Float[np.ndarray, " k"]]
-    ) -> tuple[dict[str, Float[np.ndarray, " k"]], Int[np.ndarray, " k"]]:
+    ) -> tuple[Columns, Int[np.ndarray, " k"]]:
         """Solve robots; return columns in the units of files, NaN where there is no result."""
         values, codes = self.study.solved(numbers, len(next(iter(numbers.values()))))
         scales = np.array([criterion.quantity.scale for criterion in self.study.criteria])
@@ -564,7 +566,7 @@ def sweep(
         raise InputError.WRONG_TYPE(f"part must be two numbers, such as (7, 100); got {part!r}")
     count = whole(part[1], "parts", 1, 10**9)
     first = whole(part[0], "part", 1, count)
-    task = SweepTask(*_plan_and_robot(plan))
+    task = SweepTask(*with_robot(plan, SweepPlan, "plan file"))
     check_target(directory, KIND, "-o", [plan] if isinstance(plan, str | Path) else [])
     with threadpool_limits(1):  # more threads may give other last digits
         number = task.manifest.pieces
@@ -575,25 +577,6 @@ def sweep(
     if result.finished:
         write_json(str(result.directory / "summary.json"), result.document())
     return result
-
-
-def _plan_and_robot(
-    plan: SweepPlan | Mapping[str, Any] | str | os.PathLike[str],
-) -> tuple[SweepPlan, Robot]:
-    """Return a plan and the robot that it names.
-
-    Raises:
-        InputError: It is not a plan, or its file or its robot cannot be read.
-    """
-    if isinstance(plan, Mapping):
-        plan = plan_from_table(plan)
-    if isinstance(plan, SweepPlan):
-        return plan, load_robot(plan.robot)
-    if not isinstance(plan, str | os.PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InputError.WRONG_TYPE(
-            f"a notchflex.SweepPlan is needed, or the path of a file; got {short_repr(plan)}"
-        )
-    return read_plan(plan)
 
 
 _LONG = 1.0
@@ -636,7 +619,7 @@ def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = 
         workers: As for `sweep`.
     """
     need("polars", "data", "sweep")
-    task = SweepTask(*_plan_and_robot(plan))
+    task = SweepTask(*with_robot(plan, SweepPlan, "plan file"))
     manifest = task.manifest
     data, head, taken = memoryview(b""), dict[str, Any](), 0.0
     for _ in range(2):

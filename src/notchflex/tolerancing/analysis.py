@@ -43,6 +43,10 @@ from notchflex.tolerancing.study import (
     yield_interval,
 )
 
+BySource = Float[np.ndarray, "k d"]
+"""A number for each limit and source."""
+
+ByLimit = Float[np.ndarray, " k"]
 WORST_SD = 3.0
 """Number of standard deviations in the worst case of an untruncated normal distribution."""
 
@@ -58,11 +62,11 @@ class LinearEffects(NamedTuple):
         high: The same toward larger values, not negative.
     """
 
-    nominal: Float[np.ndarray, " k"]
-    shift: Float[np.ndarray, "k d"]
-    spread: Float[np.ndarray, "k d"]
-    low: Float[np.ndarray, "k d"]
-    high: Float[np.ndarray, "k d"]
+    nominal: ByLimit
+    shift: BySource
+    spread: BySource
+    low: BySource
+    high: BySource
 
     @property
     def worst_case(self) -> Float[np.ndarray, "k 2"]:
@@ -71,17 +75,17 @@ class LinearEffects(NamedTuple):
         return np.stack(ends, axis=-1)
 
     @property
-    def mean(self) -> Float[np.ndarray, " k"]:
+    def mean(self) -> ByLimit:
         """Mean of the robots."""
         return self.nominal + self.shift.sum(axis=1)
 
     @property
-    def sd(self) -> Float[np.ndarray, " k"]:
+    def sd(self) -> ByLimit:
         """Standard deviation of the robots: the root of the sum of squares."""
         return np.sqrt((self.spread**2).sum(axis=1))
 
     @property
-    def share(self) -> Float[np.ndarray, "k d"]:
+    def share(self) -> BySource:
         """Part of each source in the variance of each number; 0 where nothing varies."""
         total = (self.spread**2).sum(axis=1, keepdims=True)
         return np.divide(self.spread**2, total, out=np.zeros_like(self.spread), where=total > 0.0)
@@ -201,8 +205,8 @@ class SobolIndices(NamedTuple):
         failed: How many of them had no result; a neighbour's stands in for it.
     """
 
-    first: Float[np.ndarray, "k d"]
-    total: Float[np.ndarray, "k d"]
+    first: BySource
+    total: BySource
     robots: int
     failed: int
 
@@ -298,16 +302,16 @@ class ToleranceAnalysis(Displayed):
         return dict(zip(CODES, self.drawn.codes.tolist(), strict=True))
 
     @property
-    def below(self) -> Float[np.ndarray, " k"]:
+    def below(self) -> ByLimit:
         """Part of the drawn robots below the lower limit of each number."""
         return self.drawn.below / self.draws
 
     @property
-    def above(self) -> Float[np.ndarray, " k"]:
+    def above(self) -> ByLimit:
         """Part of the drawn robots above the upper limit of each number."""
         return self.drawn.above / self.draws
 
-    def percentile(self, part: float) -> Float[np.ndarray, " k"]:
+    def percentile(self, part: float) -> ByLimit:
         """Return the value of each number that a part of the drawn robots stays below.
 
         Args:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.spatial import ConvexHull, Delaunay, cKDTree
+from scipy.spatial import ConvexHull, Delaunay, KDTree
 
 from notchflex import InputError, Robot
 from notchflex.specification import LimitedQuantity
@@ -30,6 +30,9 @@ from notchflex.support import (
 if TYPE_CHECKING:
     from xarray import Dataset
 
+
+Points = Float[np.ndarray, "n 3"]
+States = Float[np.ndarray, " n"]
 
 # A cloud thinner than this part of its size is flat, or a curve.
 _FLAT = 1e-6
@@ -63,7 +66,7 @@ class Hull:
         return ("", "mm", "mm²", "mm³")[self.dimension]
 
 
-def hull_of(points: Float[np.ndarray, "n 3"]) -> Hull:
+def hull_of(points: Points) -> Hull:
     """Return the convex hull of points, mm."""
     origin, axes = _frame(points)
     flat = (points - origin) @ axes.T
@@ -81,7 +84,7 @@ def hull_of(points: Float[np.ndarray, "n 3"]) -> Hull:
     return Hull(dimension, size, points[places], faces, origin, axes, equations)
 
 
-def alpha_size(points: Float[np.ndarray, "n 3"], radius: float) -> float:
+def alpha_size(points: Points, radius: float) -> float:
     """Return volume (mm³) or area (mm²) of the alpha shape of points.
 
     It is the union of the simplices of their Delaunay triangulation whose circumscribed sphere is
@@ -105,9 +108,7 @@ def alpha_size(points: Float[np.ndarray, "n 3"], radius: float) -> float:
     return float(sizes[is_regular][small].sum())
 
 
-def inside(
-    hull: Hull, points: Float[np.ndarray, "n 3"], slack: float = 1e-3
-) -> Bool[np.ndarray, " n"]:
+def inside(hull: Hull, points: Points, slack: float = 1e-3) -> Bool[np.ndarray, " n"]:
     """Return which points lie in a hull with a volume or an area.
 
     Args:
@@ -128,7 +129,7 @@ def inside(
 
 
 def _frame(
-    points: Float[np.ndarray, "n 3"],
+    points: Points,
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, "d 3"]]:
     """Return the middle of points and the axes along which they spread."""
     origin = points.mean(axis=0)
@@ -171,9 +172,9 @@ class VoxelMap:
 
 
 def voxel_map(
-    points: Float[np.ndarray, "n 3"],
-    directions: Float[np.ndarray, "n 3"],
-    values: Mapping[str, Float[np.ndarray, " n"]],
+    points: Points,
+    directions: Points,
+    values: Mapping[str, States],
     size: float,
 ) -> VoxelMap:
     """Sort states into voxels.
@@ -212,9 +213,9 @@ def sphere_directions() -> Float[np.ndarray, "directions 3"]:
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
 
 
-def nearest_directions(directions: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
+def nearest_directions(directions: Points) -> Int[np.ndarray, " n"]:
     """Return the nearest of the directions of the dexterity to unit vectors."""
-    return cKDTree(sphere_directions()).query(directions)[1]
+    return KDTree(sphere_directions()).query(directions)[1]
 
 
 _VOXELS = 32
@@ -257,13 +258,13 @@ class Workspace(Displayed):
     failed: int
     beyond: int
     tension: Float[np.ndarray, "n t"]
-    tip: Float[np.ndarray, "n 3"]
-    direction: Float[np.ndarray, "n 3"]
+    tip: Points
+    direction: Points
     loading: Bool[np.ndarray, " n"]
-    strain: Float[np.ndarray, " n"]
-    angle: Float[np.ndarray, " n"]
-    hysteresis: Float[np.ndarray, " n"]
-    stiffness: Float[np.ndarray, " n"]
+    strain: States
+    angle: States
+    hysteresis: States
+    stiffness: States
 
     def __len__(self) -> int:
         """Number of states."""
@@ -284,7 +285,7 @@ class Workspace(Displayed):
         return np.stack([self._some.min(axis=0), self._some.max(axis=0)])
 
     @property
-    def _some(self) -> Float[np.ndarray, "n 3"]:
+    def _some(self) -> Points:
         if not len(self):
             raise InputError.NO_DATA(
                 "no state is left: none converged within the limits; give wider limits"
