@@ -5,44 +5,13 @@ from notchflex.designing.result import (
     FILES,
     Design,
     DesignFront,
-    VariableResult,
     WishResult,
     design_document,
     numbers,
 )
-from notchflex.designing.robust import YieldOf
-from notchflex.designing.specification import (
-    DesignConstraint,
-    DesignObjective,
-    DesignSpec,
-    DesignState,
-    DesignVariable,
-    RobustOptions,
-    SearchOptions,
-    Stock,
-    TargetCurve,
-    read_design,
-)
+from notchflex.designing.solver import target_points
+from notchflex.designing.specification import DesignSpec, design_schema, read_design
 
-__all__ = [
-    "FILES",
-    "Design",
-    "DesignConstraint",
-    "DesignFront",
-    "DesignObjective",
-    "DesignSpec",
-    "DesignState",
-    "DesignVariable",
-    "RobustOptions",
-    "SearchOptions",
-    "Stock",
-    "TargetCurve",
-    "VariableResult",
-    "WishResult",
-    "YieldOf",
-    "design",
-    "design_document",
-    "design_front",
-    "numbers",
-    "read_design",
-]
+__all__ = ["FILES", "Design", "DesignFront", "DesignSpec", "WishResult", "design"]
+__all__ += ["design_document", "design_front", "design_schema", "numbers", "read_design"]
+__all__ += ["target_points"]

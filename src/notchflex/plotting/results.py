@@ -457,7 +457,7 @@ def design_picture(design: Design, *, title: str = "") -> Picture:
 
 def _target_curves(design: Design, path: EquilibriumPath) -> list[Mark]:
     """Return the points of the curves that the robot was designed for."""
-    from notchflex.designing.solver import target_points
+    from notchflex.designing import target_points
 
     marks: list[Mark] = []
     view = plane_of(path)

@@ -162,7 +162,7 @@ def with_robot(
             f"a notchflex.{record.__name__} is needed, its table, or the path of a file; got "
             f"{short_repr(given)}"
         )
-    return asked, robot or load_robot(asked.robot)
+    return asked, robot or load_robot(vars(asked)["robot"])
 
 
 @contextmanager

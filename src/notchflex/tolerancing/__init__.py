@@ -8,7 +8,6 @@ from notchflex.tolerancing.analysis import (
 )
 from notchflex.tolerancing.spec import AcceptanceLimit, ToleranceSpec, read_tolerance_spec
 from notchflex.tolerancing.study import (
-    Outcomes,
     Study,
     drawn_levels,
     drawn_numbers,
@@ -20,5 +19,5 @@ from notchflex.tolerancing.study import (
 
 __all__ = ["AcceptanceLimit", "ToleranceAnalysis", "ToleranceSpec"]
 __all__ += ["read_tolerance_spec", "tolerance_analysis"]
-__all__ += ["Outcomes", "Study", "drawn_levels", "drawn_numbers", "piece_rows", "replicates"]
+__all__ += ["Study", "drawn_levels", "drawn_numbers", "piece_rows", "replicates"]
 __all__ += ["tolerance_columns", "tolerance_document", "yield_interval", "yield_of"]

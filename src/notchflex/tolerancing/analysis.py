@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.optimize import brentq
-from scipy.stats import sobol_indices
 
 from notchflex import EquilibriumPath, InputError, Robot, Settings
 from notchflex.pieces import CODES, FAILED, INVALID, PieceFolder, sobol_points
@@ -202,7 +201,7 @@ class SobolIndices(NamedTuple):
         first: Part of the variance that a source makes alone, (k + 1, d); NaN where nothing varies.
         total: The same with what it makes together with others, (k + 1, d).
         robots: How many robots were solved.
-        failed: How many of them had no result; a neighbour's stands in for it.
+        failed: How many of them had no result; they and their counterparts are left out.
     """
 
     first: BySource
@@ -231,22 +230,17 @@ def sobol(
     values = np.column_stack([outcomes.values, outcomes.accepted])
     failed = int(np.isnan(values).any(axis=1).sum())
     sets = np.moveaxis(values.reshape(sources + 2, points, -1), 1, 2)
-    is_finite = np.isfinite(sets).all(axis=(0, 1))
-    if not is_finite.any():
+    sets = sets[..., np.isfinite(sets).all(axis=(0, 1))]
+    if not sets.size:
         nothing = np.full((sets.shape[1], sources), np.nan)
         return SobolIndices(nothing, nothing, len(levels), failed)
-    # A set of robots with one that failed is replaced by the good set before it.
-    last = np.maximum.accumulate(np.where(is_finite, np.arange(points), -1))
-    sets = sets[..., np.where(last >= 0, last, np.argmax(is_finite))]
     sets = sets - sets[:2].mean(axis=(0, 2))[:, None]  # smaller errors than about a distant mean
+    (one, other), mixed = sets[:2], sets[2:]
     varies = np.ptp(sets[:2], axis=(0, 2)) > 0.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        indices = sobol_indices(func={"f_A": sets[0], "f_B": sets[1], "f_AB": sets[2:]}, n=points)
-    orders = [
-        np.where(varies[:, None], order.reshape(-1, sources), np.nan)
-        for order in (indices.first_order, indices.total_order)
-    ]
-    return SobolIndices(orders[0], orders[1], len(levels), failed)
+    variance = np.where(varies, sets[:2].var(axis=(0, 2)), np.nan)
+    alone = (other * (mixed - one)).mean(axis=2) / variance
+    together = 0.5 * ((mixed - one) ** 2).mean(axis=2) / variance
+    return SobolIndices(alone.T, together.T, len(levels), failed)
 
 
 @dataclass(frozen=True, repr=False)

@@ -6,11 +6,10 @@ from notchflex.workspaces.cloud import (
     hull_of,
     overlaps,
     save_netcdf,
-    sphere_directions,
     workspace_document,
 )
 from notchflex.workspaces.explore import in_python, largest_tensions, workspace
 
 __all__ = ["Overlap", "Workspace", "hull_of", "in_python", "largest_tensions"]
-__all__ += ["overlaps", "save_netcdf", "sphere_directions"]
+__all__ += ["overlaps", "save_netcdf"]
 __all__ += ["workspace", "workspace_document"]

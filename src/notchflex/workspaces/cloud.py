@@ -215,7 +215,7 @@ def sphere_directions() -> Float[np.ndarray, "directions 3"]:
 
 def nearest_directions(directions: Points) -> Int[np.ndarray, " n"]:
     """Return the nearest of the directions of the dexterity to unit vectors."""
-    return KDTree(sphere_directions()).query(directions)[1]
+    return np.asarray(KDTree(sphere_directions()).query(directions)[1])
 
 
 _VOXELS = 32

@@ -55,7 +55,7 @@ def schema(*, design: bool = False, sweep: bool = False) -> None:
 
         document = plan_schema()
     elif design:
-        from notchflex.designing.specification import design_schema
+        from notchflex.designing import design_schema
 
         document = design_schema()
     else:
