@@ -397,29 +397,6 @@ def _latin(sampling: Sampling, dimension: int) -> Float[np.ndarray, "k d"]:
     return engine.random(sampling.points)
 
 
-def _study_of(plan: SweepPlan, robot: Robot) -> Study:
-    """Make the study of a plan.
-
-    Raises:
-        InputError: The robot has no such number, load, quantity or entry.
-    """
-    base = _middle(plan, robot.replace(tolerance=None))
-    for variable in plan.variable:
-        number_at(base, variable.value)
-    loads = {name: read_load(table, name, base) for name, table in plan.load.items()}
-    paths = {name: simulate(base, load, refinement=plan.refinement) for name, load in loads.items()}
-    criteria: dict[str, Criterion] = {}
-    for number, kept in enumerate(plan.keep, start=1):
-        with placed(f"`keep[{number}]`"):
-            for entry in limited_numbers(kept.in_python, paths):
-                if entry.name in criteria:
-                    raise InputError.CONFLICT(f"{entry.name} is kept twice; keep it once.")
-                criteria[entry.name] = entry
-    if not criteria:
-        raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
-    return Study(base, (), paths, tuple(criteria.values()), None, plan.refinement, 1)
-
-
 def _middle(plan: SweepPlan, robot: Robot) -> Robot:
     """Return the robot in the middle of the ranges.
 
@@ -457,8 +434,28 @@ class SweepTask(PieceTask):
 
     @cached_property
     def study(self) -> Study:
-        """The robot under its loads, and the numbers that are kept."""
-        return _study_of(self.plan, self.robot)
+        """The robot under its loads, and the numbers that are kept.
+
+        Raises:
+            InputError: The robot has no such number, load, quantity or entry.
+        """
+        plan, base = self.plan, _middle(self.plan, self.robot.replace(tolerance=None))
+        for variable in plan.variable:
+            number_at(base, variable.value)
+        loads = {name: read_load(table, name, base) for name, table in plan.load.items()}
+        paths = {
+            name: simulate(base, load, refinement=plan.refinement) for name, load in loads.items()
+        }
+        criteria: dict[str, Criterion] = {}
+        for number, kept in enumerate(plan.keep, start=1):
+            with placed(f"`keep[{number}]`"):
+                for entry in limited_numbers(kept.in_python, paths):
+                    if entry.name in criteria:
+                        raise InputError.CONFLICT(f"{entry.name} is kept twice; keep it once.")
+                    criteria[entry.name] = entry
+        if not criteria:
+            raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
+        return Study(base, (), paths, tuple(criteria.values()), None, plan.refinement, 1)
 
     @cached_property
     def columns(self) -> list[str]:

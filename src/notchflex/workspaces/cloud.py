@@ -422,25 +422,23 @@ def overlaps(found: Mapping[str, Workspace]) -> list[Overlap]:
     """
     if empty := [label for label, one in found.items() if not len(one)]:
         raise InputError.NO_DATA(f"{empty[0]}: no state is left within the limits")
-    pairs = combinations(found.items(), 2)
-    return [_overlap(first, second, a, b) for (first, a), (second, b) in pairs]
-
-
-def _overlap(first: str, second: str, a: Workspace, b: Workspace) -> Overlap:
-    size = max(float(np.ptp(one.extent, axis=0).max()) for one in (a, b)) / _VOXELS
-    in_a, in_b = (
-        set(map(tuple, np.unique(np.floor(one.tip / size), axis=0).tolist())) for one in (a, b)
-    )
-    return Overlap(
-        first,
-        second,
-        size,
-        both=len(in_a & in_b),
-        first_alone=len(in_a - in_b),
-        second_alone=len(in_b - in_a),
-        first_in_second=float(inside(b.hull, a.tip).mean()),
-        second_in_first=float(inside(a.hull, b.tip).mean()),
-    )
+    compared: list[Overlap] = []
+    for (first, a), (second, b) in combinations(found.items(), 2):
+        size = max(float(np.ptp(one.extent, axis=0).max()) for one in (a, b)) / _VOXELS
+        cells = (np.unique(np.floor(one.tip / size), axis=0).tolist() for one in (a, b))
+        in_a, in_b = (set(map(tuple, each)) for each in cells)
+        overlap = Overlap(
+            first,
+            second,
+            size,
+            both=len(in_a & in_b),
+            first_alone=len(in_a - in_b),
+            second_alone=len(in_b - in_a),
+            first_in_second=float(inside(b.hull, a.tip).mean()),
+            second_in_first=float(inside(a.hull, b.tip).mean()),
+        )
+        compared.append(overlap)
+    return compared
 
 
 _PARTS = {"p5": 0.05, "p50": 0.5, "p95": 0.95, "largest": 1.0}
