@@ -36,10 +36,7 @@ Pair = Annotated[tuple[Float, ...], Field(min_length=2, max_length=2)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=40)]
 Take = Literal["each", "largest", "smallest", "sum", "mean", "range", "steps", "rms"]
 Seed = Annotated[Int, Field(ge=0, le=2**31)]
-WantedYield = Annotated[
-    Float | None,
-    Field(ge=0.5, le=0.9999),
-]
+WantedYield = Annotated[Float | None, Field(ge=0.5, le=0.9999)]
 
 _NONE = (0.0, 0.0, 0.0)
 
@@ -61,9 +58,7 @@ class DesignQuantity(Measured):
     _: KW_ONLY
     minus: str | None = None
     direction: Vector | None = None
-    take: Literal["each", "largest", "smallest", "sum", "mean", "range", "steps", "rms"] | None = (
-        None
-    )
+    take: Take | None = None
 
     @model_validator(mode="after")
     def _can_be(self) -> DesignQuantity:
