@@ -23,7 +23,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import notchflex as nf
 from design_wishes import bend, s_curve, s_wrist, tip_first, wide_wrist
 from notchflex.designing.design_robot import problems_of
-from notchflex.designing.specification import spec_from_table
 from notchflex.search.slsqp import minimise
 
 PENALTY = 10.0
@@ -47,7 +46,7 @@ def against_evolution(along: str, generations: int = 300):
             "height, mm": f"{made.robot.notches[0].height:.6f}",
             "CPU, s": seconds["cpu"],
         }
-    problem = problems_of(spec_from_table(spec), wide_wrist())[0]
+    problem = problems_of(nf.DesignSpec(**spec), wide_wrist())[0]
 
     def merit(z: np.ndarray) -> float:
         (evaluated,) = problem.evaluate_all(z[None])
@@ -76,7 +75,7 @@ def curves():
     """Curves of many variables, by least squares as designs are, and by SLSQP."""
     for spec, robot in ((bend(), nf.load_robot("pacheco2021-a")), (s_curve(), s_wrist())):
         made = nf.design(spec | {"search": {"starts": 1}}, robot=robot)
-        problem = problems_of(spec_from_table(spec), robot)[0]
+        problem = problems_of(nf.DesignSpec(**spec), robot)[0]
         result = minimise(*problem.program(problem.initial), 150)
         ways = {
             "least squares": (made.wishes[0].achieved[0], made.converged, made.solves),

@@ -85,7 +85,6 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("fit.calibration", "fit.residual_tests"): (
         "a fit tests its residuals when it is asked whether to trust it"
     ),
-    ("designing.result", "designing.front"): _TYPE,
     ("viewer.viewer", "viewer.page"): "the viewer makes its page; the page acts on the viewer",
 }
 """Importer and imported, without `notchflex.`, and why the one may import the other."""

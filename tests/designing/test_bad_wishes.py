@@ -98,7 +98,7 @@ def test_300_mutated_files(kind, seeds, tmp_path, monkeypatch, capsys):
         raise ReachedError
 
     monkeypatch.setattr("notchflex.designing.design_robot.search", stop)
-    monkeypatch.setattr("notchflex.designing.front._spread", stop)
+    monkeypatch.setattr("notchflex.designing.design_robot._spread", stop)
     text, options = KINDS[kind]
     refused = 0
     for seed in seeds:

@@ -10,7 +10,7 @@ import pytest
 import notchflex as nf
 from design_wishes import bend, s_curve, s_wrist, tip_first, wide_wrist
 from notchflex.analysis.kinematics import axis_points, tip_from_angles
-from notchflex.designing.model.quantities import target_points
+from notchflex.designing import target_points
 
 
 def test_constant_curvature_synthesis():

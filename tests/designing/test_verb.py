@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tomllib
 from functools import partial
 from pathlib import Path
 
@@ -132,6 +133,14 @@ def test_robust_on_the_command_line(tmp_path, monkeypatch, capsys):
     # By hand: the sum has a standard deviation of 0.005 sqrt(5) mm, of which 95 % need 1.645.
     off = nf.load_robot("made/robot.toml").notches[0].height - 0.5
     assert 1.645 < 5.0 * off / (0.005 * 5.0**0.5) < 1.72
+
+
+def test_notches_that_deviate_together():
+    """One deviation of all heights moves their sum five times as far."""
+    tolerance = {"notch.height": {"sd": 0.005}}
+    made = nf.design(tomllib.loads(ROBUST) | {"tolerance": tolerance})
+    assert made.converged, made.reason
+    assert 1.645 < (made.robot.notches[0].height - 0.5) / 0.005 < 1.72
 
 
 def test_a_yield_is_that_of_the_robot_on_the_grid(tmp_path, monkeypatch, capsys):

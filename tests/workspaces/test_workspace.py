@@ -10,8 +10,7 @@ import notchflex as nf
 from notchflex.pieces import sobol_points
 from notchflex.workspaces import workspace
 from notchflex.workspaces.cloud import DIRECTIONS, alpha_size, hull_of, inside, overlaps, voxel_map
-from notchflex.workspaces.explore import rays
-from notchflex.workspaces.limits import in_python, limits_of
+from notchflex.workspaces.explore import in_python, limits_of, rays
 from refusals import refused
 
 RNG = np.random.default_rng(0)

@@ -1,48 +1,17 @@
 """Design: dimensions of a robot from a specification."""
 
-from notchflex.designing.design_robot import design
-from notchflex.designing.front import DesignFront, design_front
+from notchflex.designing.design_robot import design, design_front
 from notchflex.designing.result import (
+    FILES,
     Design,
-    VariableResult,
+    DesignFront,
     WishResult,
     design_document,
-    write_design,
-    write_front,
+    numbers,
 )
-from notchflex.designing.robust import YieldOf
-from notchflex.designing.specification import (
-    DesignConstraint,
-    DesignObjective,
-    DesignSpec,
-    DesignState,
-    DesignVariable,
-    RobustOptions,
-    SearchOptions,
-    Stock,
-    TargetCurve,
-    read_design,
-)
+from notchflex.designing.solver import target_points
+from notchflex.designing.specification import DesignSpec, design_schema, read_design
 
-__all__ = [
-    "Design",
-    "DesignConstraint",
-    "DesignFront",
-    "DesignObjective",
-    "DesignSpec",
-    "DesignState",
-    "DesignVariable",
-    "RobustOptions",
-    "SearchOptions",
-    "Stock",
-    "TargetCurve",
-    "VariableResult",
-    "WishResult",
-    "YieldOf",
-    "design",
-    "design_document",
-    "design_front",
-    "read_design",
-    "write_design",
-    "write_front",
-]
+__all__ = ["FILES", "Design", "DesignFront", "DesignSpec", "WishResult", "design"]
+__all__ += ["design_document", "design_front", "design_schema", "numbers", "read_design"]
+__all__ += ["target_points"]

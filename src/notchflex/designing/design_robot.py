@@ -1,4 +1,8 @@
-"""`nf.design`: a robot from a specification, in every allowed form, on a grid of lengths."""
+"""`nf.design` and `nf.design_front`: robots from a specification, in every allowed form.
+
+A front is found by a genetic search (NSGA-II of pymoo, one batch a generation) that spreads over
+it; every point is then polished by SLSQP: the first objective least, the others no worse.
+"""
 
 from __future__ import annotations
 
@@ -7,48 +11,61 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
-from notchflex import InputError, Robot, load_robot
-from notchflex.analysis.draws import tolerances_of
-from notchflex.designing.model.point import BODIES, Solver
-from notchflex.designing.model.quantities import COMPLIANCE, CURVE, OF_STATES
-from notchflex.designing.model.variables import Direction, check_states, state_paths, variables_of
-from notchflex.designing.model.wishes import wishes_of
-from notchflex.designing.problem import DesignProblem, Progress
+from notchflex import InputError, Robot
+from notchflex.designing.problem import (
+    DesignEvaluation,
+    DesignProblem,
+    ObjectiveWish,
+    Progress,
+    Row,
+    direction_of,
+    wishes_of,
+)
 from notchflex.designing.result import (
     Design,
+    DesignFront,
     VariableResult,
     WishResult,
-    asked_in_words,
     chosen_form,
     curves_missed,
     explain,
     missed_rows,
-    yield_sentences,
+    told_yields,
 )
 from notchflex.designing.robust import YieldOf, check_limits, robust_search
-from notchflex.designing.search import Searches, on_grid, search
+from notchflex.designing.search import Searches, SearchResult, drawn_robots, on_grid, search
+from notchflex.designing.solver import BODIES, COMPLIANCE, OF_STATES, Point, Reading, Solver
 from notchflex.designing.specification import (
-    DesignObjective,
     DesignSpec,
     RobustOptions,
-    read_design,
-    spec_from_table,
 )
+from notchflex.designing.variables import Probe, drives_of, load_steps, variables_of
+from notchflex.search.slsqp import TOLERANCE, minimise
+from notchflex.specification import placed, with_robot
 from notchflex.support import (
     check_number,
     from_table,
+    need,
     numbers_at,
     remember_source,
-    short_repr,
     source_of,
     to_table,
+    tolerances_of,
 )
 
 MAX_FORMS = 200
+_MAX_OBJECTIVES = 3
+# Objectives and violations of a robot that cannot be solved.
+_UNSOLVED = 1e6
+# Largest violation of a robot of the genetic search that is polished.
+_NEARLY = 1e-3
+# A point is kept beside another if it differs by this part of the range of an objective.
+_APART = 1e-3
 
 
 def problems_of(spec: DesignSpec, robot: Robot) -> list[DesignProblem]:
@@ -57,64 +74,53 @@ def problems_of(spec: DesignSpec, robot: Robot) -> list[DesignProblem]:
     Raises:
         InputError: What is asked does not fit the robot or itself.
     """
-    _check_stock(spec, robot)
+    _check_chosen(spec, robot)
     return [_problem(spec, form) for form in _forms(spec, robot)]
 
 
 def _problem(spec: DesignSpec, robot: Robot) -> DesignProblem:
-    """Make the problem of one form: its wishes, and the states that they need."""
-    check_states(spec.state, robot.number_of_tendons)
+    """Make the problem of one form: its wishes, and the loads that they need."""
+    drives = drives_of(spec.load, robot.number_of_tendons)
     wishes = wishes_of(spec, robot)
-    curves = {f"{CURVE}{curve.name}": curve.state for curve in spec.curve}
     used: list[str] = []
-    probes: list[tuple[str, Direction]] = []
+    probes: list[Probe] = []
     outputs: list[str] = []
-    for wish in wishes:
-        quantity = wish.asked.quantity
-        states = [name for name in (wish.asked.state, wish.asked.minus) if name is not None]
-        if quantity == COMPLIANCE:
-            probes += [(name, wish.direction) for name in states]
+    for asked, curve in ((wish.asked, wish.curve) for wish in wishes):
+        loads = [name for name in (asked.load, asked.minus) if name is not None]
+        if asked.quantity == COMPLIANCE:
+            probes += [(name, direction_of(asked), side) for name in loads for side in (1, -1)]
             outputs.append("tip_position")
-        elif quantity in curves:
-            used.append(curves[quantity])
+        elif curve is not None:
+            used.append(curve.load)
             outputs += BODIES
-        else:
-            used += states
-            outputs += [quantity] if quantity in OF_STATES else []
-    names = list(dict.fromkeys(used))
-    paths = state_paths(spec.state, robot.number_of_tendons, names, probes)
-    variables = variables_of(robot, spec.variable, paths.states)
-    unique = tuple(dict.fromkeys(outputs or ["total_angle"]))
-    return DesignProblem(Solver(variables, paths, unique), wishes)
+        elif asked.quantity in OF_STATES:
+            used += loads
+            outputs.append(asked.quantity)
+    variables = variables_of(robot, spec.variable, drives)
+    unique = tuple(dict.fromkeys(outputs))
+    return DesignProblem(Solver(variables, load_steps(spec.load, used, probes), unique), wishes)
 
 
-def _check_stock(spec: DesignSpec, robot: Robot) -> None:
-    """Raise if a number of the robot is chosen by a stock and by something else."""
-    paths = [(f"stock[{k}]", path) for k, one in enumerate(spec.stock, 1) for path in one.values]
-    variables = enumerate(spec.variable, 1)
-    paths += [(f"variable[{k}]", v.value) for k, v in variables if not v.is_load]
+def _check_chosen(spec: DesignSpec, robot: Robot) -> None:
+    """Raise if a number is chosen twice, by stocks or variables."""
+    paths = [(f"stock[{k}]", p, False) for k, one in enumerate(spec.stock, 1) for p in one.values]
+    paths += [(f"variable[{k}]", one.value, one.is_load) for k, one in enumerate(spec.variable, 1)]
     chosen: dict[str, str] = {}
-    for place, path in paths:
-        try:
-            numbers = numbers_at(robot, path)
-        except InputError as error:
-            raise InputError(f"`{place}`: {error}", error.code) from None
-        for number in numbers:
-            before = chosen.get(number, "")
-            if before.startswith("stock"):
-                raise InputError.CONFLICT(
-                    f"`{place}`: `{number}` is chosen by `{before}` too; leave one of them out."
-                )
-            chosen[number] = place
+    for place, path, is_load in paths:
+        with placed(f"`{place}`"):
+            for number in [path] if is_load else numbers_at(robot, path):
+                if number in chosen:
+                    raise InputError.CONFLICT(
+                        f"`{number}` is already chosen by `{chosen[number]}`; leave one out."
+                    )
+                chosen[number] = place
 
 
 def _forms(spec: DesignSpec, robot: Robot) -> list[Robot]:
-    numbers = spec.number_of_notches or (robot.number_of_notches,)
     sizes = [
-        [tuple(zip(stock.values, size, strict=True)) for size in stock.sizes]
-        for stock in spec.stock
+        [dict(zip(stock.values, size, strict=True)) for size in stock.sizes] for stock in spec.stock
     ]
-    combinations = list(itertools.product(numbers, itertools.product(*sizes)))
+    combinations: list[Any] = list(itertools.product(spec.number_of_notches or [None], *sizes))
     if len(combinations) > MAX_FORMS:
         raise InputError.OUT_OF_RANGE(
             f"there are {len(combinations)} combinations of sizes and numbers of notches; at most "
@@ -122,20 +128,15 @@ def _forms(spec: DesignSpec, robot: Robot) -> list[Robot]:
         )
     robots: list[Robot] = []
     problem: InputError | None = None
-    for number, chosen in combinations:
+    for count, *chosen in combinations:
+        values = {path: value for size in chosen for path, value in size.items()}
         try:
-            one = robot
-            if spec.number_of_notches:
-                one = with_notches(robot, int(number))
-            values = dict(pair for size in chosen for pair in size)
-            robots.append(one.with_values(values) if values else one)
+            form = robot if count is None else with_notches(robot, count)
+            robots.append(form.with_values(values) if values else form)
         except InputError as error:
             problem = error  # a size that does not suit the robot; others may
-    if not robots:
-        assert problem is not None
-        raise InputError(
-            f"no size and number of notches makes a robot: {problem}", problem.code
-        ) from None
+    if problem is not None and not robots:
+        raise InputError(f"no size and number of notches makes a robot: {problem}", problem.code)
     return robots
 
 
@@ -193,7 +194,7 @@ def design(
         >>> f"{made.robot.notches[0].height:.3f} mm"
         '0.627 mm'
     """
-    asked, first = specification_of(spec, robot)
+    asked, first = with_robot(spec, DesignSpec, "design file", robot)
     if not 0.0 <= check_number(grid, "grid") < np.inf:
         raise InputError.OUT_OF_RANGE(f"grid must be 0 mm or more and finite; got {grid:g} mm.")
     if robust and not asked.is_robust:
@@ -202,31 +203,11 @@ def design(
     place = partial(on_grid, grid=grid)
     if not asked.is_robust:
         return made_of(asked, first, problems, place(search(problems, asked.search, progress)))
-    given = first.replace(tolerance=asked.tolerance).tolerance
-    tolerances = given or tolerances_of(first)[0]
+    tolerances = first.replace(tolerance=asked.tolerance).tolerance or tolerances_of(first)[0]
     check_limits(problems, tolerances)
     searches = search(problems, asked.search, progress)
-    return made_of(
-        asked, first, problems, *robust_search(asked, tolerances, searches, progress, place)
-    )
-
-
-def specification_of(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
-    """Return a specification given in any form, and the robot to begin with.
-
-    Raises:
-        InputError: It is not allowed, or its robot cannot be read.
-    """
-    if isinstance(spec, str | os.PathLike):
-        asked, named = read_design(spec)
-        return asked, robot or named
-    if isinstance(spec, Mapping):
-        spec = spec_from_table(spec)
-    if not isinstance(spec, DesignSpec):
-        raise InputError.WRONG_TYPE(
-            f"a design needs a design file, its table or a DesignSpec; got {short_repr(spec)}"
-        )
-    return spec, robot or load_robot(spec.robot)
+    found = robust_search(asked, tolerances, searches, progress, place)
+    return made_of(asked, first, problems, *found)
 
 
 def made_of(
@@ -238,7 +219,7 @@ def made_of(
 ) -> Design:
     """Make the result of the best of some searches."""
     best = searches.best
-    problem, one, variables = best.problem, best.evaluation, best.problem.solver.variables
+    problem, point, variables = best.problem, best.evaluation.point, best.problem.solver.variables
     initial = problem.initial
     missed = [id(problem.rows[number].wish) for number in missed_rows(best)]
     lacking = [part.title for part in yields if not part.met]
@@ -246,32 +227,32 @@ def made_of(
         WishResult(
             title=wish.title,
             unit=wish.unit,
-            asked=asked_in_words(wish),
-            achieved=tuple(wish.measure(one.point).values.tolist()),
-            before=() if initial is None else tuple(wish.measure(initial.point).values.tolist()),
+            asked=wish.words,
+            achieved=tuple(wish.measure(point)[:, 0].tolist()),
+            before=() if initial is None else tuple(wish.measure(initial.point)[:, 0].tolist()),
             met=None
-            if isinstance(wish.asked, DesignObjective)
+            if isinstance(wish, ObjectiveWish)
             else id(wish) not in missed and wish.title not in lacking,
-            parts=wish.labels,
+            parts=tuple(wish.labels),
         )
         for wish in problem.wishes
     )
     reason = _reason(searches, bool(missed), bool(lacking))
-    values = zip(variables.columns, one.point.x.tolist(), variables.start.tolist(), strict=True)
+    values = zip(variables.columns, point.x.tolist(), variables.start.tolist(), strict=True)
     return Design(
         spec=spec,
         before=first,
-        robot=remember_source(one.point.robot, source_of(first)),
+        robot=remember_source(point.robot, source_of(first)),
         converged=not reason,
         reason=reason,
         wishes=wishes,
         variables=tuple(
-            VariableResult(column.name, column.unit, value, before, column.lower, column.upper)
+            VariableResult(column.title, column.unit, value, before, column.lower, column.upper)
             for column, value, before in values
         ),
         explanation=(
-            *yield_sentences(yields),
-            *chosen_form(spec, one.point.robot, len(problems)),
+            *(part.sentence for part in told_yields(yields)),
+            *chosen_form(spec, point.robot, len(problems)),
             *explain(searches.optimum),
         ),
         solves=sum(form.solver.counts["solves"] for form in problems),
@@ -298,3 +279,144 @@ def _reason(searches: Searches, is_missed: bool, lacks_yield: bool) -> str:
     if not best.is_stationary:
         return "the search ended before it settled; try more starts or iterations"
     return ""
+
+
+def design_front(
+    spec: DesignSpec | Mapping[str, Any] | str | os.PathLike[str],
+    *,
+    robot: Robot | None = None,
+    points: int = 12,
+    generations: int = 20,
+    progress: Progress | None = None,
+) -> DesignFront:
+    """Find the front between two or three objectives of a design.
+
+    Args:
+        spec: As for `design`.
+        robot: As for `design`.
+        points: Most points of the front.
+        generations: Generations of the genetic search, each of four times as many robots.
+        progress: Called with the stage, what is done of it and how much there is.
+
+    Returns:
+        The front; every point is a `Design`.
+
+    Raises:
+        InputError: Not two or three objectives, pymoo is not installed, or as for `design`.
+    """
+    need("pymoo", "design", "a front between objectives")
+    asked, first = with_robot(spec, DesignSpec, "design file", robot)
+    if not 2 <= len(asked.objective) <= _MAX_OBJECTIVES or asked.curve:
+        raise InputError.UNSUPPORTED(
+            f"a front needs 2 or {_MAX_OBJECTIVES} objectives, and curves as one of them; got "
+            f"{len(asked.objective)}"
+        )
+    if asked.is_robust:
+        raise InputError.UNSUPPORTED(
+            "a front is of robots as drawn: leave out `robust` and `wanted_yield`, then name the "
+            "point that you choose as `robot` of the design file and make that one robust."
+        )
+    if points < 2 or generations < 1:
+        raise InputError.OUT_OF_RANGE("a front needs 2 points and 1 generation or more")
+    problems = problems_of(asked, first)
+    report: Progress = progress or (lambda stage, done, total: None)
+    spread: list[SearchResult] = []
+    polished: list[SearchResult] = []
+    reason = ""
+    try:
+        for number, problem in enumerate(problems):
+            report("spreading over the front", number, len(problems))
+            spread += _spread(problem, points, generations, asked.search.seed)
+        chosen = _chosen(spread, points)
+        for number, point in enumerate(chosen):
+            report("polishing", number, len(chosen))
+            polished += _polished(point, asked.search.iterations)
+    except KeyboardInterrupt:
+        reason = "interrupted; these are the robots so far"
+    best = _chosen(polished, points)
+    if not best:
+        raise InputError.UNSUPPORTED("no robot meets all constraints; try `notchflex design` first")
+    designs = (made_of(asked, first, problems, Searches([one])) for one in best)
+    return DesignFront(asked, tuple(replace(one, explanation=()) for one in designs), reason)
+
+
+def _sums(problem: DesignProblem, here: DesignEvaluation) -> Float[np.ndarray, " m"]:
+    """Return what each objective adds to the sum that is minimised."""
+    return np.array([wish.term(here.point)[0, 0] for wish in problem.objectives])
+
+
+class _Cap(NamedTuple):
+    """A constraint: what an objective adds to the sum may be no more."""
+
+    objective: ObjectiveWish
+    most: float
+
+    @property
+    def rows(self) -> list[Row]:
+        return [Row(self.objective, "", -np.inf, self.most)]
+
+    def row_numbers(self, point: Point) -> Reading:
+        return self.objective.term(point)
+
+
+def _spread(problem: DesignProblem, points: int, generations: int, seed: int) -> list[SearchResult]:
+    """Return the last generation of a genetic search of one form of robots."""
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.problem import Problem as PymooProblem
+    from pymoo.optimize import minimize
+
+    size, widths = 4 * points, (len(problem.objectives), len(problem.rows))
+    start: Any = drawn_robots(problem, size, seed)
+    problem.set_sizes(list(filter(None, problem.evaluate_all(start))))
+
+    class Batched(PymooProblem):  # pyright: ignore[reportUntypedBaseClass]
+        """One batch a generation."""
+
+        def _evaluate(self, x: np.ndarray, out: dict[str, Any], *_: Any, **__: Any) -> None:
+            robots = problem.evaluate_all(x)
+            out["F"], out["G"] = (np.full((len(x), width), _UNSOLVED) for width in widths)
+            out["robot"] = np.array(robots, object)
+            for row, robot in enumerate(robots):
+                if robot is not None:
+                    out["F"][row] = _sums(problem, robot)
+                    out["G"][row] = np.abs(problem.violation(robot)) - _NEARLY
+
+    batched: Any = Batched(problem.count, widths[0], n_ieq_constr=widths[1], xl=0.0, xu=1.0)
+    algorithm: Any = NSGA2(pop_size=size, sampling=start)
+    result: Any = minimize(batched, algorithm, ("n_gen", generations), seed=seed, verbose=False)
+    return [SearchResult(problem, robot) for robot in filter(None, result.pop.get("robot"))]
+
+
+def _polished(point: SearchResult, iterations: int) -> list[SearchResult]:
+    """Make the first objective least, the others no worse; none where no constraints are met."""
+    problem, (first, *others) = point.problem, point.problem.objectives
+    most = _sums(problem, point.evaluation)
+    most += 1e-9 * np.maximum(np.abs(most), 1.0)
+    caps = [_Cap(*pair) for pair in zip(others, most[1:].tolist(), strict=True)]
+    capped = DesignProblem(problem.solver, [first, *problem.constraints, *caps])
+    capped.sizes[: len(problem.sizes)] = problem.sizes
+    start = capped.read(point.evaluation.point, point.evaluation.z)
+    minimum = minimise(*capped.program(start), iterations)
+    if minimum is None or capped.worst(minimum.reached.source) > TOLERANCE:
+        return []
+    end: DesignEvaluation = minimum.reached.source
+    settled = minimum._replace(is_stationary=True)
+    return [SearchResult(problem, problem.read(end.point, end.z), settled)]
+
+
+def _chosen(candidates: list[SearchResult], points: int) -> list[SearchResult]:
+    """Choose points that none of the others beats, spread evenly, by the first objective."""
+    from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
+    feasible = [point for point in candidates if point.merit[0] <= 2.0 * _NEARLY]
+    if not feasible:
+        return []
+    values = np.array([_sums(point.problem, point.evaluation) for point in feasible])
+    span = np.ptp(values, axis=0)
+    scaled = (values - values.min(axis=0)) / np.where(span > 0.0, span, 1.0)
+    # By the first objective, each of those that are nearly alike once.
+    _, apart = np.unique(np.round(scaled / _APART), axis=0, return_index=True)
+    best = NonDominatedSorting().do(scaled[apart], only_non_dominated_front=True)
+    kept = apart[np.sort(best)]
+    spread = np.linspace(0, len(kept) - 1, min(points, len(kept)))
+    return [feasible[number] for number in kept[spread.round().astype(int)]]

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from notchflex import ConvergenceError, EquilibriumPath, Robot
-from notchflex.designing.model.wishes import Wish
-from notchflex.designing.problem import DesignProblem, Row
+from notchflex.designing.problem import DesignProblem
 from notchflex.designing.robust import YieldOf
 from notchflex.designing.search import SearchResult
-from notchflex.designing.specification import DesignConstraint, DesignObjective, DesignSpec
+from notchflex.designing.solver import distances
+from notchflex.designing.specification import DesignSpec
 from notchflex.search.slsqp import TOLERANCE
 from notchflex.support import (
     Displayed,
@@ -35,17 +36,65 @@ from notchflex.support import (
     write_text,
 )
 
-if TYPE_CHECKING:
-    from notchflex.designing.front import DesignFront
-
-
 # The most sentences about limits, the dearest first.
 _MAX_SENTENCES = 12
 # Change of a limit, relative to its size, for which its cost is stated.
 _PART = 0.05
 # No effect is below this part of the sum; a limit of a variable is reached within this part.
 _NO_EFFECT, _AT_LIMIT = 1e-9, 1e-3
-MINIMISE, MAXIMISE = "as small as possible", "as great as possible"
+
+FILES = ("robot.toml", "wishes.csv", "design.json", "design.svg")
+"""Files of a design; the last one where a picture can be drawn."""
+
+_HEADS = ("quantity", "part", "unit", "asked", "achieved", "before", "met")
+_MET = {None: "", True: "yes", False: "no"}
+
+Writer = Callable[[Path], object]
+
+
+class SavedInFolder(Displayed):
+    """Base of results that are written into a folder."""
+
+    def _contents(self) -> dict[str, Writer]:
+        """By name of a file what writes it."""
+        raise NotImplementedError
+
+    def save(
+        self, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
+    ) -> tuple[Path, ...]:
+        """Write robot files, tables, documents and pictures into a folder.
+
+        Args:
+            folder: The folder; it is made if it is missing.
+            inputs: Files that are read; none of them may be replaced.
+
+        Returns:
+            The files.
+
+        Raises:
+            InputError: A file cannot be written.
+        """
+        contents = self._contents()
+        files = check_folder(os.fspath(folder), contents, "-o", inputs=inputs)
+        with unwritable(f"-o {folder} cannot be made"):
+            Path(folder).mkdir(exist_ok=True)
+        for file, write in zip(files, contents.values(), strict=True):
+            write(file)
+        return files
+
+
+def picture_of(result: object, name: str) -> dict[str, Writer]:
+    """Return the file of the picture of a result, where one can be drawn."""
+    if importlib.util.find_spec("matplotlib") is None:
+        return {}
+    from notchflex import plot
+
+    return {name: lambda file: plot(result).save(file)}
+
+
+def headed(title: str, unit: str) -> str:
+    """Return the head of a column with its unit."""
+    return f"{title} [{unit}]" if unit else title
 
 
 @dataclass(frozen=True)
@@ -70,6 +119,11 @@ class WishResult:
     met: bool | None
     parts: tuple[str, ...]
 
+    @property
+    def achieved_words(self) -> str:
+        """What is achieved, with its unit."""
+        return f"{numbers(self.achieved)} {self.unit}".rstrip()
+
 
 @dataclass(frozen=True)
 class VariableResult:
@@ -93,7 +147,7 @@ class VariableResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design(Displayed):
+class Design(SavedInFolder):
     """A designed robot, and how well it does what was asked.
 
     Attributes:
@@ -130,7 +184,7 @@ class Design(Displayed):
     @property
     def met(self) -> bool:
         """Whether all constraints hold."""
-        return all(one.met is not False for one in self.wishes)
+        return all(wish.met is not False for wish in self.wishes)
 
     @cached_property
     def path(self) -> EquilibriumPath | None:
@@ -145,23 +199,9 @@ class Design(Displayed):
 
     @property
     def state_steps(self) -> dict[str, int]:
-        """The step of every state in `path`."""
-        steps = self.outcome.problem.solver.paths.step
+        """The step of every load in `path`."""
+        steps = self.outcome.problem.solver.steps.last
         return {name: step for name, step in steps.items() if isinstance(name, str)}
-
-    def save(self, folder: str | os.PathLike[str]) -> tuple[Any, ...]:
-        """Write robot file, table, picture and JSON document into a folder.
-
-        Args:
-            folder: The folder; it is made if it is missing.
-
-        Returns:
-            The files.
-
-        Raises:
-            InputError: A file cannot be written.
-        """
-        return write_design(self, folder)
 
     def raise_if_failed(self) -> Design:
         """Return itself, if it converged.
@@ -173,13 +213,80 @@ class Design(Displayed):
             raise ConvergenceError(self.reason)
         return self
 
+    def _contents(self) -> dict[str, Writer]:
+        """The robot file, the table, the document and the picture."""
+        robot, table, document, picture = FILES
+        return {
+            robot: self.write_robot,
+            table: lambda file: write_csv(file, _HEADS, _wish_rows(self.wishes)),
+            document: lambda file: write_json(file, design_document(self)),
+            **picture_of(self, picture),
+        }
+
+    def write_robot(self, file: Path) -> None:
+        """Write the robot file: what was asked and achieved, and below it the robot."""
+        state = "converged" if self.converged else self.reason
+        lines = [f"# Designed by notchflex: {self.spec.name}; {state}."]
+        for wish in self.wishes:
+            missed = " (not met)" if wish.met is False else ""
+            lines.append(
+                f"#   {wish.title}: asked {wish.asked}, achieved {wish.achieved_words}{missed}"
+            )
+        lines += [f"#   {part.sentence}" for part in told_yields(self.yields)]
+        printable = ("".join(c if c.isprintable() else " " for c in line) for line in lines)
+        write_text(file, "\n".join([*printable, "", robot_text(self.robot)]))
+
     def _summary(self) -> Summary:
-        rows = [
-            (one.title, f"{numbers(one.achieved)} {one.unit}".rstrip() + f", asked {one.asked}")
-            for one in self.wishes
-        ]
+        rows = [(wish.title, f"{wish.achieved_words}, asked {wish.asked}") for wish in self.wishes]
         state = "converged" if self.converged else self.reason
         return Summary(f"Design {self.spec.name!r}: {state}", rows, " ".join(self.explanation[:2]))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DesignFront(SavedInFolder):
+    """Designs of which none is better in one objective without being worse in another.
+
+    Attributes:
+        spec: What was asked.
+        points: The designs, by the first objective.
+        reason: Why the search ended early, "" if it did not.
+    """
+
+    spec: DesignSpec
+    points: tuple[Design, ...]
+    reason: str
+
+    @property
+    def objectives(self) -> Float[np.ndarray, "points objectives"]:
+        """Values of the objectives, in their units."""
+        count = len(self.spec.objective)
+        return np.array([[w.achieved[0] for w in point.wishes[:count]] for point in self.points])
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """Names of the objectives, with units."""
+        wishes = self.points[0].wishes[: len(self.spec.objective)]
+        return tuple(headed(wish.title, wish.unit) for wish in wishes)
+
+    def _contents(self) -> dict[str, Writer]:
+        """point_01.toml and so on, the table and the picture."""
+        variables = [headed(each.name, each.unit) for each in self.points[0].variables]
+        files: dict[str, Writer] = {}
+        rows: list[list[Any]] = []
+        for number, values in enumerate(self.objectives.tolist(), start=1):
+            name, point = f"point_{number:02d}.toml", self.points[number - 1]
+            files[name] = point.write_robot
+            rows.append([name, *values, *(variable.value for variable in point.variables)])
+        heads = ["robot", *self.titles, *variables]
+        files["front.csv"] = lambda file: write_csv(file, heads, rows)
+        return files | picture_of(self, "front.svg")
+
+    def _summary(self) -> Summary:
+        rows = [
+            (f"point {number}", ", ".join(short(value) for value in values))
+            for number, values in enumerate(self.objectives.tolist(), start=1)
+        ]
+        return Summary(f"Front of {len(self.points)} designs: {', '.join(self.titles)}", rows)
 
 
 def numbers(values: Sequence[float]) -> str:
@@ -192,23 +299,13 @@ def numbers(values: Sequence[float]) -> str:
     return f"{short(low)} to {short(high)}"
 
 
-def asked_in_words(wish: Wish) -> str:
-    """Return what was asked, such as "at most 0.06"."""
-    asked = wish.asked
-    if isinstance(asked, DesignObjective):
-        if asked.target is not None:
-            return f"near {asked.target:g} {wish.unit}".rstrip()
-        return MINIMISE if asked.goal == "minimise" else MAXIMISE
-    assert isinstance(asked, DesignConstraint)
-    unit = f" {wish.unit}" if wish.unit else ""
-    if asked.order is not None:
-        by = f" by {asked.margin:g}{unit} or more" if asked.margin else ""
-        way = "falling" if asked.order == "tip-first" else "rising"
-        return f"{asked.order}: {way} toward the tip{by}"
-    if asked.equal is not None:
-        return f"{asked.equal:g}{unit}"
-    of = "" if asked.wanted_yield is None else f" for {100.0 * asked.wanted_yield:g} % of robots"
-    return f"{asked.words(wish.unit)}{of}"
+def _wish_rows(wishes: Iterable[WishResult]) -> list[tuple[Any, ...]]:
+    """Return a row for every number asked."""
+    return [
+        (wish.title, part, wish.unit, wish.asked, value, before, _MET[wish.met])
+        for wish in wishes
+        for part, value, before in zip_longest(wish.parts, wish.achieved, wish.before)
+    ]
 
 
 def design_document(made: Design) -> dict[str, Any]:
@@ -220,232 +317,90 @@ def design_document(made: Design) -> dict[str, Any]:
         and `starts`, and of a robust design `yields`. Angles in deg, lengths in mm, forces in N.
     """
     names = ("converged", "met", "reason", "wishes", "variables", "explanation")
-    names += ("solves", "gradients", "starts")
     document = document_head(made.robot) | {"design": made.spec.name}
-    document |= {name: getattr(made, name) for name in names}
-    document["wishes"] = [
-        {"quantity": wish.title}
-        | {key: value for key, value in vars(wish).items() if key != "title"}
-        for wish in made.wishes
-    ]
+    for name in (*names, "solves", "gradients", "starts"):
+        document[name] = getattr(made, name)
+    document["wishes"] = [{"quantity": wish.title} | vars(wish) for wish in made.wishes]
+    for wish in document["wishes"]:
+        del wish["title"]
     document["variables"] = [vars(variable) for variable in made.variables]
     return document | ({"yields": [vars(part) for part in made.yields]} if made.yields else {})
 
 
-def wish_rows(design: Design) -> Iterator[tuple[Any, ...]]:
-    """Yield a row for every number asked: quantity, part, unit, asked, achieved, before, met."""
-    for wish in design.wishes:
-        met = {None: "", True: "yes", False: "no"}[wish.met]
-        parts = wish.parts if len(wish.parts) == len(wish.achieved) else ("",) * len(wish.achieved)
-        for part, value, before in zip_longest(parts, wish.achieved, wish.before):
-            yield wish.title, part, wish.unit, wish.asked, value, before, met
+# Sentences that explain a design.
 
 
-HEADS = ("quantity", "part", "unit", "asked", "achieved", "before", "met")
+def told_yields(yields: Sequence[YieldOf]) -> list[YieldOf]:
+    """Return the yield of all limits, and those that are wanted."""
+    return [part for part in yields if part is yields[0] or part.wanted]
 
 
-FRONT_TABLE, FRONT_PICTURE = "front.csv", "front.svg"
-ROBOT, TABLE, DOCUMENT, PICTURE = "robot.toml", "wishes.csv", "design.json", "design.svg"
-
-
-def file_names() -> tuple[str, ...]:
-    """Return the names of the files, with a picture where one can be drawn."""
-    drawn = importlib.util.find_spec("matplotlib") is not None
-    return (ROBOT, TABLE, DOCUMENT, *((PICTURE,) if drawn else ()))
-
-
-def write_design(
-    made: Design, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
-) -> tuple[Path, ...]:
-    """Write the files of a design into a folder.
-
-    Args:
-        made: The design.
-        folder: The folder; it is made if it is missing.
-        inputs: Files that are read; none of them may be replaced.
-
-    Returns:
-        The files.
-
-    Raises:
-        InputError: A file cannot be written.
-    """
-    names = file_names()
-    files = check_folder(os.fspath(folder), names, "-o", inputs=inputs)
-    _make_folder(folder)
-    write_text(files[0], designed_text(made))
-    write_csv(files[1], HEADS, wish_rows(made))
-    write_json(files[2], design_document(made))
-    if PICTURE in names:
-        from notchflex import plot
-
-        plot(made).save(files[3])
-    return files
-
-
-def write_front(
-    front: DesignFront, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
-) -> tuple[Path, ...]:
-    """Write a front into a folder: point_01.toml and so on, the table and the picture.
-
-    Raises:
-        InputError: A file cannot be written.
-    """
-    robots = [f"point_{number:02d}.toml" for number in range(1, len(front.points) + 1)]
-    drawn = [FRONT_PICTURE] if PICTURE in file_names() else []
-    files = check_folder(os.fspath(folder), (*robots, FRONT_TABLE, *drawn), "-o", inputs=inputs)
-    _make_folder(folder)
-    for file, point in zip(files, front.points, strict=False):
-        write_text(file, designed_text(point))
-    names = [f"{v.name} [{v.unit}]" if v.unit else v.name for v in front.points[0].variables]
-    rows = (
-        [name, *values, *(v.value for v in point.variables)]
-        for name, point, values in zip(robots, front.points, front.objectives.tolist(), strict=True)
-    )
-    write_csv(files[len(robots)], ["robot", *front.titles, *names], rows)
-    if drawn:
-        from notchflex import plot
-
-        plot(front).save(files[-1])
-    return files
-
-
-def _make_folder(folder: str | os.PathLike[str]) -> None:
-    """Make a folder, if it is missing.
-
-    Raises:
-        InputError: It cannot be made.
-    """
-    with unwritable(f"-o {folder} cannot be made"):
-        Path(folder).mkdir(exist_ok=True)
-
-
-def designed_text(made: Design) -> str:
-    """Return the robot file: what was asked and achieved, and below it the robot."""
-    state = "converged" if made.converged else made.reason
-    lines = [f"# Designed by notchflex: {_one_line(made.spec.name)}; {state}."]
-    for one in made.wishes:
-        achieved = f"{numbers(one.achieved)} {one.unit}".rstrip()
-        missed = " (not met)" if one.met is False else ""
-        lines.append(f"#   {one.title}: asked {one.asked}, achieved {achieved}{missed}")
-    lines += [f"#   {sentence}" for sentence in yield_sentences(made.yields)]
-    return "\n".join([*map(_one_line, lines), "", robot_text(made.robot)])
-
-
-def _one_line(text: str) -> str:
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split("\n"))
-
-
-def curves_missed(outcome: SearchResult) -> tuple[str, ...]:
+def curves_missed(outcome: SearchResult) -> list[str]:
     """Return a sentence for every curve with points that the axis does not reach."""
     sentences: list[str] = []
-    for curve in {id(w.curve): w.curve for w in outcome.problem.wishes if w.curve}.values():
-        far = outcome.evaluation.point.curve(curve).values
-        numbers = (np.flatnonzero(far > curve.within) + 1).tolist()
-        if numbers:
-            shown = ", ".join(map(str, numbers[:10])) + (" ..." if len(numbers) > 10 else "")
+    for curve in {wish.curve: 0 for wish in outcome.problem.wishes if wish.curve}:
+        far = distances(outcome.evaluation.point.offsets(curve))[:, 0]
+        missed = list(map(str, np.flatnonzero(far > curve.within) + 1))
+        if missed:
+            shown = ", ".join(missed[:10]) + " ..." * (len(missed) > 10)
             sentences.append(
-                f"curve.{curve.name} is not reached at {len(numbers)} of {len(far)} points "
-                f"({shown}), up to {short(float(far.max()))} mm away; asked {curve.within:g} mm."
+                f"curve.{curve.name} is not reached at {len(missed)} of {len(far)} points "
+                f"({shown}), up to {short(far.max())} mm away; asked {curve.within:g} mm."
             )
-    return tuple(sentences)
+    return sentences
 
 
-def chosen_form(spec: DesignSpec, robot: Robot, forms: int) -> tuple[str, ...]:
+def chosen_form(spec: DesignSpec, robot: Robot, forms: int) -> list[str]:
     """Return a sentence about the number of notches and the sizes that were chosen of several."""
     if forms < 2:
-        return ()
+        return []
     chosen = [f"{robot.number_of_notches} notches"] if spec.number_of_notches else []
     for path in (path for stock in spec.stock for path in stock.values):
-        value = next(iter(numbers_at(robot, path).values()))
-        chosen.append(f"{path} {short(value)}")
-    return (f"Chosen of {forms} combinations: {', '.join(chosen)}.",)
+        chosen.append(f"{path} {short(next(iter(numbers_at(robot, path).values())))}")
+    return [f"Chosen of {forms} combinations: {', '.join(chosen)}."]
 
 
-def yield_sentences(yields: Sequence[YieldOf]) -> tuple[str, ...]:
-    """Return a sentence for the yield of all limits, and for every one that is wanted."""
-    return tuple(_yield_sentence(one) for one in yields if one is yields[0] or one.wanted)
-
-
-def _yield_sentence(one: YieldOf) -> str:
-    achieved, low, high, plain = (
-        f"{100.0 * part:.4g}" for part in (one.achieved, *one.interval, one.plain)
-    )
-    target = "" if one.wanted is None else f", wanted {100.0 * one.wanted:.4g} %"
-    meets = "meet" if one.title == "all limits" else "meet the limit of"
-    return (
-        f"{achieved} % of the robots made within the tolerances {meets} {one.title} "
-        f"({low} to {high} %{target}); without regard to tolerances {plain} %."
-    )
-
-
-def explain(outcome: SearchResult) -> tuple[str, ...]:
+def explain(outcome: SearchResult) -> list[str]:
     """Return sentences about the best robot of a design."""
     missed = missed_rows(outcome)
-    limits = (*_missed(outcome, missed), _at_limits(outcome)) if missed else _held(outcome)
-    return (*curves_missed(outcome), *limits)
+    return curves_missed(outcome) + (_missed(outcome, missed) if missed else _held(outcome))
 
 
-class _ActiveLimit(NamedTuple):
-    """A limit that the design is at."""
-
-    title: str
-    unit: str
-    limit: float
-    side: str  # "least", "greatest" or "wanted"
-    step: float  # a round change of the limit
-    effect: float  # change of the sum by that step more
-
-
-def _active_limits(outcome: SearchResult) -> list[_ActiveLimit]:
-    """Return the limits that are reached, that with the greatest effect first."""
+def _held(outcome: SearchResult) -> list[str]:
+    """Which limits hold the design, that with the greatest effect first, and what each costs."""
     problem, minimum = outcome.problem, outcome.minimum
     assert minimum is not None
-    rows = [
-        (row.title, row.wish.unit, row, row.size or size, 1.0)
-        for row, size in zip(problem.rows, problem.sizes.tolist(), strict=True)
-    ]
-    columns = [(c.name, c.unit, c, c.span, c.span) for c in problem.solver.variables.columns]
-    numbers = np.append(outcome.evaluation.rows.values, outcome.evaluation.point.x)
+    variables = problem.solver.variables
+    limits, spans = [*problem.rows, *variables.columns], variables.span
+    sizes = np.append(problem.sizes, spans)
+    scales = np.append(np.ones(len(problem.rows)), spans)
+    numbers = np.append(outcome.evaluation.rows[:, 0], outcome.evaluation.point.x)
     first = len(minimum.multipliers) - len(minimum.variables)  # of the variables
-    places = [*range(len(rows)), *range(first, first + len(columns))]
-    limits: list[_ActiveLimit] = []
-    for place, number, described in zip(places, numbers, [*rows, *columns], strict=True):
-        if minimum.active[place]:
-            title, unit, between, size, scale = described
-            is_low = between.upper - number > number - between.lower
-            limit = between.lower if is_low else between.upper
-            is_equal = between.lower == between.upper
-            side = "wanted" if is_equal else "least" if is_low else "greatest"
-            step = round_number(_PART * size)
-            effect = -minimum.multipliers[place] / scale * step
-            limits.append(_ActiveLimit(title, unit, limit, side, step, effect))
-    return sorted(limits, key=lambda limit: -abs(limit.effect))
-
-
-def _held(outcome: SearchResult) -> tuple[str, ...]:
-    """Which limits hold the design, and what each costs."""
-    sentences = [_sentence(outcome, limit) for limit in _active_limits(outcome)]
-    kept = [one for one in sentences if one]
-    if not kept:
-        return ("No limit is active: the design meets the specification inside all limits.",)
-    left = len(kept) - _MAX_SENTENCES
-    more = [f"{left} more limits are reached."] if left > 0 else []
-    return (*kept[:_MAX_SENTENCES], *more)
-
-
-def _sentence(outcome: SearchResult, active: _ActiveLimit) -> str:
-    what = _objective_name(outcome.problem)
-    limit = f"{active.title} stands at its {active.side} value, "
-    limit += f"{short(active.limit)} {active.unit}".strip()
-    if what is None or abs(active.effect) <= _NO_EFFECT * abs(outcome.evaluation.total):
-        return "" if active.side == "wanted" else f"{limit}."
-    name, unit, verb = what
-    # A wanted value is moved to where the sum falls, a limit to where it leaves more room.
-    is_more = active.effect < 0.0 if active.side == "wanted" else active.side == "greatest"
-    step = f"{short(active.step)} {active.unit}".strip() + (" more" if is_more else " less")
-    amount = f"{short(abs(active.effect))} {unit}".strip()
-    return f"{limit}; {step} would {verb} {amount} of {name}."
+    places = np.append(np.arange(len(problem.rows)), first + np.arange(len(spans)))
+    what, sentences = _objective_name(problem), list[tuple[float, str]]()
+    for k in np.flatnonzero(minimum.active[places]).tolist():
+        between, number = limits[k], numbers[k]
+        is_equal = between.lower == between.upper
+        is_low = between.upper - number > number - between.lower
+        side = "wanted" if is_equal else "least" if is_low else "greatest"
+        unit, limit = between.unit, between.lower if is_low else between.upper
+        step = round_number(_PART * sizes[k])
+        effect = float(-minimum.multipliers[places[k]] / scales[k] * step)  # of the step more
+        text = f"{between.title} stands at its {side} value, " + f"{short(limit)} {unit}".strip()
+        if what is not None and abs(effect) > _NO_EFFECT * abs(outcome.evaluation.total):
+            name, amount_unit, verb = what
+            # A wanted value is moved to where the sum falls, a limit to where it leaves more room.
+            is_more = effect < 0.0 if is_equal else not is_low
+            change = f"{short(step)} {unit}".strip() + (" more" if is_more else " less")
+            amount = f"{short(abs(effect))} {amount_unit}".strip()
+            text += f"; {change} would {verb} {amount} of {name}"
+        elif is_equal:
+            continue
+        sentences.append((abs(effect), f"{text}."))
+    told = [sentence for _, sentence in sorted(sentences, key=lambda pair: -pair[0])]
+    if len(told) > _MAX_SENTENCES:
+        told[_MAX_SENTENCES:] = [f"{len(told) - _MAX_SENTENCES} more limits are reached."]
+    return told or ["No limit is active: the design meets the specification inside all limits."]
 
 
 def _objective_name(problem: DesignProblem) -> tuple[str, str, str] | None:
@@ -454,14 +409,12 @@ def _objective_name(problem: DesignProblem) -> tuple[str, str, str] | None:
         return None
     if len(problem.objectives) > 1:
         return "the weighted sum of the objectives", "", "save"
-    wish = next(iter(problem.objectives))
-    asked = wish.asked
-    assert isinstance(asked, DesignObjective)
-    if asked.target is not None:
-        return f"the squared distance of {wish.title} from {asked.target:g}", "", "save"
+    (wish,) = problem.objectives
+    if wish.asked.target is not None:
+        return f"the squared distance of {wish.title} from {wish.asked.target:g}", "", "save"
     if wish.take == "rms":
         return f"the square of {wish.title}", f"{wish.unit}²" if wish.unit else "", "save"
-    return wish.title, wish.unit, "save" if asked.goal == "minimise" else "gain"
+    return wish.title, wish.unit, "save" if wish.asked.goal == "minimise" else "gain"
 
 
 def missed_rows(outcome: SearchResult) -> list[int]:
@@ -474,35 +427,27 @@ def missed_rows(outcome: SearchResult) -> list[int]:
     return list(worst.values())
 
 
-def _missed(outcome: SearchResult, missed: Sequence[int]) -> tuple[str, ...]:
-    """Conflicting constraints, and the violation of each at the nearest robot."""
+def _missed(outcome: SearchResult, missed: Sequence[int]) -> list[str]:
+    """Conflicting constraints, the violation of each at the nearest robot, and what may help."""
+    problem = outcome.problem
     several = "These constraints contradict each other"
     start = several if len(missed) > 1 else "One constraint cannot be met"
-    numbers = outcome.evaluation.rows.values.tolist()
-    return (
-        f"{start} within the limits of the variables; the robot that comes nearest:",
-        *(_miss(outcome.problem.rows[number], numbers[number]) for number in missed),
-    )
-
-
-def _miss(row: Row, value: float) -> str:
-    unit = f" {row.wish.unit}" if row.wish.unit else ""
-    limit = row.upper if value > row.upper else row.lower
-    way = "above" if value > limit else "below"
-    word = "the value" if row.lower == row.upper else "its limit"
-    off = f"{short(abs(value - limit))}{unit} {way} {word} {short(limit)}{unit}"
-    return f"{row.title} is {short(value)}{unit}, {off}."
-
-
-def _at_limits(outcome: SearchResult) -> str:
-    """Which variables stand at their limits, where wider ones could help."""
-    columns = outcome.problem.solver.variables.columns
+    told = [f"{start} within the limits of the variables; the robot that comes nearest:"]
+    for number in missed:
+        row, value = problem.rows[number], float(outcome.evaluation.rows[number, 0])
+        unit = f" {row.unit}" if row.unit else ""
+        way, limit = ("above", row.upper) if value > row.upper else ("below", row.lower)
+        word = "the value" if row.lower == row.upper else "its limit"
+        off = f"{short(abs(value - limit))}{unit} {way} {word} {short(limit)}{unit}"
+        told.append(f"{row.title} is {short(value)}{unit}, {off}.")
     names: list[str] = []
+    columns = problem.solver.variables.columns
     for z, column in zip(outcome.evaluation.z.tolist(), columns, strict=True):
         if abs(z - 0.5) > 0.5 - _AT_LIMIT:
             which, limit = ("greatest", column.upper) if z > 0.5 else ("least", column.lower)
-            names.append(f"{column.name} ({which}, {limit:g} {column.unit})".replace(" )", ")"))
+            names.append(f"{column.title} ({which}, {limit:g} {column.unit})".replace(" )", ")"))
     if not names:
-        return "No variable stands at its limit: other variables are needed, or weaker wishes."
+        none = "No variable stands at its limit: other variables are needed, or weaker wishes."
+        return [*told, none]
     shown = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
-    return f"Wider limits could help where a variable stands at its own: {shown}."
+    return [*told, f"Wider limits could help where a variable stands at its own: {shown}."]

@@ -11,8 +11,7 @@ the one wanted, with the lower end of its 95 % interval.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -23,30 +22,20 @@ from scipy.special import log_ndtr, ndtri
 
 from notchflex import ErrorCode, InputError
 from notchflex.analysis.closing_loads import closing_tensions_of
-from notchflex.analysis.draws import sources_of, values_at
-from notchflex.designing.model.point import Point
-from notchflex.designing.model.quantities import CLOSING, Reading
-from notchflex.designing.model.variables import deviations_of
-from notchflex.designing.model.wishes import Wish
 from notchflex.designing.problem import (
+    ConstraintWish,
     DesignProblem,
+    ObjectiveWish,
     Progress,
     Row,
     limits_of,
-    row_reading,
-    rows_of,
 )
 from notchflex.designing.search import Searches, SearchResult, search_from
-from notchflex.designing.specification import DesignConstraint, DesignSpec, RobustOptions
+from notchflex.designing.solver import CLOSING, Point, Reading
+from notchflex.designing.specification import DesignSpec, RobustOptions
 from notchflex.search.slsqp import TOLERANCE, Vector, violation
-from notchflex.support import Tolerance
-from notchflex.tolerancing import (
-    REPLICATES,
-    TAIL,
-    points_of_each,
-    replicates,
-    yield_interval,
-)
+from notchflex.support import Tolerance, sources_of
+from notchflex.tolerancing import drawn_levels, drawn_numbers, yield_of
 
 # Derivatives of a standard deviation are differences of exact derivatives, over this part of the
 # range of each variable.
@@ -66,14 +55,6 @@ class Hold(NamedTuple):
     factor: float
 
 
-class _Quantile(NamedTuple):
-    """A row of a robust problem."""
-
-    row: Row
-    place: int  # of its number in the rows of the robot of the drawing
-    weights: tuple[float, float, float]  # of that number, shift of its mean, standard deviation
-
-
 @dataclass(eq=False)
 class RobustProblem(DesignProblem):
     """A design whose limits robots made within tolerances must meet.
@@ -86,48 +67,50 @@ class RobustProblem(DesignProblem):
     holds: Mapping[int, Hold] = field(default_factory=dict[int, Hold])
 
     @cached_property
-    def objectives(self) -> tuple[Wish, ...]:
+    def objectives(self) -> list[ObjectiveWish]:
         """The objectives; none where the yield is made as great as possible."""
-        return super().objectives if self.holds else ()
+        return super().objectives if self.holds else []
 
     @cached_property
-    def rows(self) -> tuple[Row, ...]:
+    def rows(self) -> list[Row]:
         """Every limit: of one number, or of its quantile."""
-        return tuple(one.row for one in self._quantiles)
+        return [row for row, *_ in self._quantiles]
 
     @cached_property
-    def _quantiles(self) -> list[_Quantile]:
-        quantiles: list[_Quantile] = []
+    def _quantiles(self) -> list[tuple[Row, int, tuple[float, float, float]]]:
+        """The rows, where their numbers stand in the rows of the drawing, and three weights.
+
+        These are of that number, of the shift of its mean and of its standard deviation.
+        """
+        quantiles: list[tuple[Row, int, tuple[float, float, float]]] = []
         for place, (number, row) in enumerate(self._plain):
-            hold = self.holds.get(number)
-            if hold is None:
-                quantiles.append(_Quantile(row, place, (1.0, 0.0, 0.0)))
+            if number not in self.holds:
+                quantiles.append((row, place, (1.0, 0.0, 0.0)))
                 continue
-            of = f"for {100.0 * hold.part:g} % of the robots"
-            label = f"{row.label}, {of}" if row.label else of
+            part, factor = self.holds[number]
+            label = f"{row.label}, " * bool(row.label) + f"for {100.0 * part:g} % of the robots"
             for side, limit in _sides(row):
                 low, high = (-np.inf, limit) if side > 0.0 else (limit, np.inf)
                 held = Row(row.wish, label, low, high)
-                quantiles.append(_Quantile(held, place, (1.0, 1.0, side * hold.factor)))
+                quantiles.append((held, place, (1.0, 1.0, side * factor)))
         return quantiles
 
     @cached_property
     def _plain(self) -> list[tuple[int, Row]]:
         """The rows for the robot of the drawing, with the numbers of their constraints."""
-        return [(k, row) for k, wish in enumerate(self.constraints) for row in rows_of(wish)]
+        return [(k, row) for k, wish in enumerate(self.constraints) for row in wish.rows]
 
-    def _row_readings(self, point: Point) -> list[Reading]:
+    def _row_numbers(self, point: Point) -> Iterable[Reading]:
         if not self.holds:
-            return super()._row_readings(point)
-        moments = self._moments(point)[:, [one.place for one in self._quantiles]]
-        weights = np.array([one.weights for one in self._quantiles])
-        return [Reading(np.einsum("mk,kmv->mv", weights, moments))]
+            return super()._row_numbers(point)
+        moments, (_, places, weights) = self._moments(point), zip(*self._quantiles, strict=True)
+        return [np.einsum("mk,kmv->mv", weights, moments[:, places])]
 
     def _terms(self, point: Point, z: Vector) -> tuple[list[Reading], float]:
         if self.holds:
             return super()._terms(point, z)
         missing = self._missing(point)
-        return [missing], float(missing.values[0])
+        return [missing], float(missing[0, 0])
 
     def _missing(self, point: Point) -> Reading:
         """Logarithm of the sum of the parts of robots that miss each limit: all that can miss."""
@@ -144,7 +127,7 @@ class RobustProblem(DesignProblem):
         beta = table[:, 0]
         total = float(np.logaddexp.reduce(log_ndtr(-beta))) if len(beta) else 0.0
         density = np.exp(-0.5 * beta**2 - 0.5 * np.log(2.0 * np.pi) - total)
-        return Reading(np.append(total, -density @ table[:, 1:])[None])
+        return np.append(total, -density @ table[:, 1:])[None]
 
     def _moments(self, point: Point) -> Float[np.ndarray, "3 m 1+v"]:
         """Numbers of the drawing, shifts of their means and standard deviations, with slopes."""
@@ -158,21 +141,22 @@ class RobustProblem(DesignProblem):
 
     def _spread(self, point: Point) -> tuple[np.ndarray, Float[np.ndarray, "2 m"]]:
         """Numbers of the drawing, and shifts of their means and standard deviations."""
-        mean = np.array([one.mean for one in self.solver.deviations(point.robot)])
-        table = np.concatenate([row_reading(wish, point).table for wish in self.constraints])
+        deviations = self.solver.variables.deviations(point.robot)
+        table = np.concatenate([wish.row_numbers(point) for wish in self.constraints])
         numbers, by = np.split(table, [1 + self.count], axis=1)
-        return numbers, np.stack([by @ mean, np.linalg.norm(by, axis=1)])
+        mean = by @ np.array([deviation.mean for deviation in deviations])
+        return numbers, np.stack([mean, np.linalg.norm(by, axis=1)])
 
 
 def limited(problem: DesignProblem) -> list[int]:
     """Return the numbers of the constraints that have limits, not a value."""
-    every = enumerate(problem.constraints)
-    return [k for k, one in every if all(row.lower < row.upper for row in rows_of(one))]
+    numbers = range(len(problem.constraints))
+    return [k for k in numbers if all(row.lower < row.upper for row in problem.constraints[k].rows)]
 
 
 def _sides(row: Row) -> list[tuple[float, float]]:
     """Return the limits of a row: 1 with its greatest value, -1 with the least."""
-    return [one for one in ((1.0, row.upper), (-1.0, row.lower)) if np.isfinite(one[1])]
+    return [side for side in ((1.0, row.upper), (-1.0, row.lower)) if np.isfinite(side[1])]
 
 
 def check_limits(problems: Sequence[DesignProblem], tolerances: Sequence[Tolerance]) -> None:
@@ -186,8 +170,8 @@ def check_limits(problems: Sequence[DesignProblem], tolerances: Sequence[Toleran
             "a robust design needs a [[constraint]] with a limit: no robot made within tolerances "
             "has exactly one value; give `lower` or `upper`."
         )
-    robot = problems[0].solver.variables.robot
-    if not any(any(one.sd.values()) for one in deviations_of(robot, tolerances)):
+    variables = replace(problems[0].solver.variables, tolerances=tuple(tolerances))
+    if not any(any(one.sd.values()) for one in variables.deviations(variables.robot)):
         raise InputError.NO_DATA("nothing deviates: all tolerances are 0; give one that is not.")
 
 
@@ -195,7 +179,7 @@ def met_by(
     result: SearchResult,
     tolerances: Sequence[Tolerance],
     levels: Float[np.ndarray, "draws d"],
-    wishes: Sequence[Wish],
+    wishes: Sequence[ConstraintWish],
 ) -> Bool[np.ndarray, "draws k"]:
     """Solve robots within tolerances, and return which meet which constraints.
 
@@ -211,8 +195,7 @@ def met_by(
     """
     solver, x = result.problem.solver, result.evaluation.point.x
     exact = result.evaluation.point.robot.replace(tolerance=None)
-    numbers = values_at(sources_of(exact, tolerances), np.clip(levels, TAIL, 1.0 - TAIL))
-    rows = [rows_of(wish) for wish in wishes]
+    numbers = drawn_numbers(sources_of(exact, tolerances), levels)
     met = np.zeros((len(levels), len(wishes)), bool)
     try:
         arrays, converged = solver.rows(exact, [x], numbers)
@@ -221,31 +204,29 @@ def met_by(
             raise
         return met
     valid = np.flatnonzero(converged)
-    tensions: Sequence[np.ndarray | None] = [None] * len(valid)
+    closed: Sequence[np.ndarray | None] = [None] * len(valid)
     if any(wish.asked.quantity == CLOSING for wish in wishes):
-        tensions = [
-            *closing_tensions_of(exact, {name: one[valid] for name, one in numbers.items()})
-        ]
+        closed = [*closing_tensions_of(exact, {name: row[valid] for name, row in numbers.items()})]
     # What only states and closings are asked of is read without the robot.
     of_robot = any(
-        wish.curve is not None or (wish.asked.state is None and wish.asked.quantity != CLOSING)
+        wish.curve is not None or (wish.asked.load is None and wish.asked.quantity != CLOSING)
         for wish in wishes
     )
-    for row, tension in zip(valid.tolist(), tensions, strict=True):
+    for row, tension in zip(valid.tolist(), closed, strict=True):
         try:
-            own = {name: float(values[row]) for name, values in numbers.items()}
-            robot = exact.with_values(own) if of_robot else exact
+            values = {name: float(column[row]) for name, column in numbers.items()}
+            robot = exact.with_values(values) if of_robot else exact
         except InputError:  # numbers that make no robot
             continue
-        states = {name: values[row] for name, values in arrays.items()}
-        point = Point(x, robot, solver.paths, states, closing_tensions=tension)
-        met[row] = [_meets(rows_of_wish, point) for rows_of_wish in rows]
+        states = {name: array[row] for name, array in arrays.items()}
+        point = Point(x, robot, solver.steps, states, closed=tension)
+        met[row] = [_meets(wish, point) for wish in wishes]
     return met
 
 
-def _meets(rows: Sequence[Row], point: Point) -> bool:
-    sizes = np.array([row.size or 1.0 for row in rows])
-    missed = violation(row_reading(rows[0].wish, point).values, limits_of(rows), sizes)
+def _meets(wish: ConstraintWish, point: Point) -> bool:
+    sizes = np.array([row.size or 1.0 for row in wish.rows])
+    missed = violation(wish.row_numbers(point)[:, 0], limits_of(wish.rows), sizes)
     return bool((np.abs(missed) <= TOLERANCE).all())  # not where a value is NaN
 
 
@@ -272,6 +253,18 @@ class YieldOf:
         """Whether the part that is wanted is reached."""
         return self.wanted is None or self.achieved >= self.wanted
 
+    @property
+    def sentence(self) -> str:
+        """It and its interval in words."""
+        parts = self.achieved, *self.interval, self.plain
+        achieved, low, high, plain = (f"{100.0 * part:.4g}" for part in parts)
+        target = "" if self.wanted is None else f", wanted {100.0 * self.wanted:.4g} %"
+        meets = "meet" if self.title == "all limits" else "meet the limit of"
+        return (
+            f"{achieved} % of the robots made within the tolerances {meets} {self.title} "
+            f"({low} to {high} %{target}); without regard to tolerances {plain} %."
+        )
+
 
 class _Target(NamedTuple):
     """The yield of several constraints together, by their columns, and the part that is wanted."""
@@ -289,23 +282,11 @@ class _Counted(NamedTuple):
 
     def part(self, target: _Target) -> tuple[float, tuple[float, float]]:
         """Return which part meets all of some constraints, and its 95 % interval."""
-        meets = self.met[:, target.columns].all(axis=1).reshape(REPLICATES, -1)
-        return float(meets.mean()), yield_interval(meets.sum(axis=1), meets.shape[1])
+        return yield_of(np.asarray(self.met[:, target.columns].all(axis=1)))
 
     def lack(self, targets: Sequence[_Target]) -> float:
         """Return by how much the lower ends of the yields miss what is wanted, in all."""
         return sum(max((one.wanted or 0.0) - self.part(one)[1][0], 0.0) for one in targets)
-
-    def is_better(self, best: _Counted, targets: Sequence[_Target], every: _Target) -> bool:
-        """Whether it lacks less yield than the best so far, or has a smaller sum."""
-        if not targets:
-            is_met = self.result.merit[0] == 0.0, best.result.merit[0] == 0.0
-            return is_met[0] >= is_met[1] and self.part(every)[0] >= best.part(every)[0]
-        lack, best_lack = self.lack(targets), best.lack(targets)
-        if lack == best_lack == 0.0:
-            is_first = not isinstance(best.result.problem, RobustProblem)
-            return is_first or self.result.merit[1] < best.result.merit[1]
-        return lack < best_lack
 
 
 def robust_search(
@@ -328,63 +309,59 @@ def robust_search(
         The searches of the robust design, and the yields: of all limits together, and of every
         constraint with limits; no yields if Ctrl-C ended it before any was counted.
     """
-    options = spec.robust or RobustOptions()
-    numbers = limited(plain.best.problem)
+    options, numbers = spec.robust or RobustOptions(), limited(plain.best.problem)
     wishes = [plain.best.problem.constraints[number] for number in numbers]
-    every = _Target("all limits", options.wanted_yield, list(range(len(wishes))))
-    single = [_Target(wish.title, _wanted(wish), [k]) for k, wish in enumerate(wishes)]
-    targets = [one for one in (*single, every) if one.wanted is not None]
-    sources = len(sources_of(plain.best.problem.solver.variables.robot, tolerances))
-    each = points_of_each(options.draws)
-    levels = np.concatenate([*replicates(sources, each, options.seed)])
+    of_all = _Target("all limits", options.wanted_yield, list(range(len(wishes))))
+    single = [_Target(wish.title, wish.asked.wanted_yield, [k]) for k, wish in enumerate(wishes)]
+    targets = [target for target in (*single, of_all) if target.wanted is not None]
+    sources = sources_of(plain.best.problem.solver.variables.robot, tolerances)
+    levels = drawn_levels(len(sources), options.draws, options.seed)
+    designs: list[_Counted] = []
 
-    def counted(result: SearchResult) -> _Counted:
-        return _Counted(result, met_by(result, tolerances, levels, wishes))
-
-    interrupted = plain.interrupted
-    try:
-        first = best = counted(plain.best)
-    except KeyboardInterrupt:
-        return Searches([plain.best], True), ()
+    def count(results: Iterable[SearchResult]) -> list[_Counted]:
+        counted = [_Counted(one, met_by(one, tolerances, levels, wishes)) for one in results]
+        designs.extend(counted)
+        return counted
 
     def search_on(results: Sequence[SearchResult], holds: Mapping[int, Hold]) -> list[_Counted]:
-        nonlocal best
-        found = (_robust(one, tolerances, holds, spec.search.iterations) for one in results)
-        designs = [counted(one) for one in itertools.chain.from_iterable(found)]
-        for one in designs:
-            best = one if one.is_better(best, targets, every) else best
-        return designs
+        ends = [_robust(one, tolerances, holds, spec.search.iterations) for one in results]
+        return count(end for several in ends for end in several)
 
-    starts = sorted(plain.outcomes, key=lambda one: one.merit)[:_STARTS]
-    factors = [float(ndtri(one.wanted)) for one in targets]
+    def rank(design: _Counted) -> tuple[float, float]:
+        """Return what makes a design worse: first what it misses, then the sum."""
+        missed, total = design.result.merit
+        if targets:
+            return design.lack(targets), total
+        return missed, -design.part(of_all)[0]
+
+    starts = sorted(plain.outcomes, key=lambda end: end.merit)[:_STARTS]
+    factors, interrupted = [float(ndtri(one.wanted)) for one in targets], plain.interrupted
     try:
+        count([plain.best])
         for done in range(0 if interrupted else _ROUNDS):
             if progress is not None:
                 progress("making it robust", done, _ROUNDS)
-            designs = search_on(starts, _holds(targets, factors, numbers))
-            if not designs:
+            found = search_on(starts, _holds(targets, factors, numbers))
+            if not found:
                 break
-            last = min(designs, key=lambda one: one.result.merit)
+            last = min(found, key=lambda design: design.result.merit)
             starts, before = [last.result], factors
-            factors = [_corrected(*one, last) for one in zip(targets, factors, strict=True)]
+            factors = [_corrected(*pair, last) for pair in zip(targets, factors, strict=True)]
             if factors == before:
                 break
+        best = min(designs, key=rank)
         if not interrupted and best.lack(targets) > 0.0:  # the greatest yield comes nearest
             search_on([best.result, plain.best], {})
     except KeyboardInterrupt:
         interrupted = True
-    searches = place(Searches([best.result], interrupted))
-    if searches.rounded is not None:
-        best = counted(searches.rounded)
+        if not designs:
+            return Searches([plain.best], True), ()
+    searches = place(Searches([min(designs, key=rank).result], interrupted))
+    (best,) = count([searches.rounded]) if searches.rounded else [min(designs, key=rank)]
     return searches, tuple(
-        YieldOf(one.title, one.wanted, *best.part(one), first.part(one)[0])
-        for one in (every, *single)
+        YieldOf(one.title, one.wanted, *best.part(one), designs[0].part(one)[0])
+        for one in (of_all, *single)
     )
-
-
-def _wanted(wish: Wish) -> float | None:
-    assert isinstance(wish.asked, DesignConstraint)
-    return wish.asked.wanted_yield
 
 
 def _holds(
@@ -392,8 +369,8 @@ def _holds(
 ) -> dict[int, Hold]:
     """Return how every constraint is to hold: by the largest factor of those that it needs."""
     holds: dict[int, Hold] = {}
-    for one, factor in sorted(zip(targets, factors, strict=True), key=lambda pair: pair[1]):
-        holds |= {numbers[column]: Hold(one.wanted or 0.0, factor) for column in one.columns}
+    for target, factor in sorted(zip(targets, factors, strict=True), key=lambda pair: pair[1]):
+        holds |= {numbers[column]: Hold(target.wanted or 0.0, factor) for column in target.columns}
     return holds
 
 

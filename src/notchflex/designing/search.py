@@ -82,15 +82,6 @@ class Searches:
         """The best on the grid, or of all."""
         return self.rounded or self.optimum
 
-    def has_agreed(self, problem: DesignProblem, count: int) -> bool:
-        """Return whether so many searches of a form have settled at the best robot that it has."""
-        settled = [one for one in self.outcomes if one.problem is problem and one.is_stationary]
-        best = min(settled, key=lambda result: result.merit, default=None)
-        if best is None:
-            return False
-        apart = [np.abs(one.evaluation.z - best.evaluation.z).max(initial=0.0) for one in settled]
-        return sum(distance < _SAME for distance in apart) >= count
-
 
 def search(
     problems: Sequence[DesignProblem], options: SearchOptions, progress: Progress | None
@@ -113,10 +104,13 @@ def search(
         for number, problem in enumerate(problems):
             report("ranking robots", number, len(problems))
             firsts = starts(problem, several, candidates, options.seed)
+            settled: list[SearchResult] = []
             for done, first in enumerate(firsts):
                 report("searching", number * several + done, several * len(problems))
-                searches.outcomes += search_from(problem, first, options.iterations)
-                if searches.has_agreed(problem, max(2, (several + 1) // 2)):
+                ends = search_from(problem, first, options.iterations)
+                searches.outcomes += ends
+                settled += [end for end in ends if end.is_stationary]
+                if _agreed(settled) >= max(2, (several + 1) // 2):
                     break
     except KeyboardInterrupt:
         searches.interrupted = True
@@ -130,6 +124,12 @@ def search(
             f"{most.splitlines()[0]} Change the limits or the loads."
         )
     return searches
+
+
+def _agreed(settled: Sequence[SearchResult]) -> int:
+    """Return how many searches have settled at the best robot."""
+    places = [end.evaluation.z for end in sorted(settled, key=lambda end: end.merit)]
+    return sum(np.abs(z - places[0]).max(initial=0.0) < _SAME for z in places)
 
 
 def search_from(
@@ -167,7 +167,7 @@ def _least_squares(
     """
     if not problem.count:
         return first, True
-    size = len(problem.residuals(first).values)
+    size = len(problem.residuals(first))
     failed = np.column_stack([np.full(size, _PENALTY), np.zeros((size, problem.count))])
 
     @cache
@@ -175,8 +175,8 @@ def _least_squares(
         return problem.evaluate(np.frombuffer(key))
 
     def table(z: Vector) -> np.ndarray:
-        one = evaluated(z.tobytes())
-        return failed if one is None else problem.residuals(one).table
+        here = evaluated(z.tobytes())
+        return failed if here is None else problem.residuals(here)
 
     result = least_squares(
         lambda z: table(z)[:, 0],
@@ -195,13 +195,12 @@ def _least_squares(
 
 def starts(problem: DesignProblem, several: int, most: int, seed: int) -> list[DesignEvaluation]:
     """Return robots to start from: the robot as it is, then the best drawn ones, far apart."""
-    firsts = [one for one in (problem.initial,) if one is not None]
+    firsts = [] if problem.initial is None else [problem.initial]
     if len(firsts) < several:
-        drawn = problem.evaluate_all(drawn_robots(problem, most, seed))
-        firsts += sorted((one for one in drawn if one is not None), key=problem.merit)
+        candidates = problem.evaluate_all(drawn_robots(problem, most, seed))
+        firsts += sorted(filter(None, candidates), key=problem.merit)
     problem.set_sizes(firsts)
-    chosen = spread_out([one.z for one in firsts], several)
-    return [firsts[number] for number in chosen]
+    return [firsts[number] for number in spread_out([first.z for first in firsts], several)]
 
 
 def drawn_robots(problem: DesignProblem, most: int, seed: int) -> Float[np.ndarray, "most v"]:
@@ -209,11 +208,11 @@ def drawn_robots(problem: DesignProblem, most: int, seed: int) -> Float[np.ndarr
 
     Good designs are smooth, and among many values drawn one by one none is.
     """
-    names = [_NUMBER.sub("", column.name) for column in problem.solver.variables.columns]
+    names = [_NUMBER.sub("", column.title) for column in problem.solver.variables.columns]
     groups = list(dict.fromkeys(names))
     group = [groups.index(name) for name in names]
-    place = np.array([names[:number].count(name) for number, name in enumerate(names)])
-    along = place / np.maximum([names.count(name) - 1 for name in names], 1)
+    place = [names[:number].count(name) for number, name in enumerate(names)]
+    along = np.divide(place, np.maximum([names.count(name) - 1 for name in names], 1))
     half = max(1, most // 2) if groups else 1
     first, last = np.split(sobol_points(2 * len(groups), seed, 0, half, half), 2, axis=1)
     last = np.where(np.arange(len(first))[:, None] % 2, last, first)
@@ -248,7 +247,7 @@ def on_grid(searches: Searches, grid: float) -> Searches:
     places = np.array([*itertools.product(*sides)])
     z = (np.where(variables.lengths, places * grid, exact) - variables.lower) / variables.span
     inside = z[(np.abs(z - 0.5) <= 0.5 + 1e-9).all(axis=1)]
-    robots = [one for one in map(problem.evaluate, inside) if one is not None]
+    robots = list(filter(None, map(problem.evaluate, inside)))
     if not robots:
         reasons = "; ".join(problem.failures) or "all lie beyond the limits of the variables"
         raise InputError.UNSUPPORTED(

@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import KW_ONLY
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -19,8 +18,8 @@ from notchflex.specification import (
     OldWords,
     Varied,
     as_list,
-    made,
     record,
+    with_robot,
 )
 from notchflex.support import (
     Float,
@@ -28,8 +27,6 @@ from notchflex.support import (
     Int,
     ProblemError,
     Tolerances,
-    read_specification,
-    robot_named,
     schema_of,
 )
 
@@ -39,10 +36,7 @@ Pair = Annotated[tuple[Float, ...], Field(min_length=2, max_length=2)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=40)]
 Take = Literal["each", "largest", "smallest", "sum", "mean", "range", "steps", "rms"]
 Seed = Annotated[Int, Field(ge=0, le=2**31)]
-WantedYield = Annotated[
-    Float | None,
-    Field(ge=0.5, le=0.9999),
-]
+WantedYield = Annotated[Float | None, Field(ge=0.5, le=0.9999)]
 
 _NONE = (0.0, 0.0, 0.0)
 
@@ -64,9 +58,7 @@ class DesignQuantity(Measured):
     _: KW_ONLY
     minus: str | None = None
     direction: Vector | None = None
-    take: Literal["each", "largest", "smallest", "sum", "mean", "range", "steps", "rms"] | None = (
-        None
-    )
+    take: Take | None = None
 
     @model_validator(mode="after")
     def _can_be(self) -> DesignQuantity:
@@ -362,24 +354,7 @@ def read_design(path: str | os.PathLike[str]) -> tuple[DesignSpec, Robot]:
     Raises:
         InputError: The file or its robot cannot be read, or a value in it is not allowed.
     """
-    spec = read_specification(path, "design file", spec_from_table)
-    return spec, robot_named(spec.robot, Path(path).parent)
-
-
-def spec_from_table(table: Mapping[str, Any]) -> DesignSpec:
-    """Make a specification from the plain table of a design file.
-
-    Raises:
-        InputError: A key is missing, not known, or its value is not allowed.
-
-    Example:
-        >>> wish = {"quantity": "notch.height", "goal": "minimise"}
-        >>> height = {"value": "notch.height", "lower": 0.3, "upper": 1.0}
-        >>> table = {"robot": "pacheco2021-a", "variable": [height], "objective": [wish]}
-        >>> spec_from_table(table).variable[0].along
-        'all'
-    """
-    return made(DesignSpec, table)
+    return with_robot(path, DesignSpec, "design file")
 
 
 def design_schema() -> dict[str, Any]:

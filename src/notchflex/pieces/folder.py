@@ -89,8 +89,8 @@ class Manifest:
         text = read_text(file, "manifest")
         try:
             document = json.loads(text)
-            needed = kind, FORMAT, -(-document["rows"] // document["piece"])
-            there = tuple(document[key] for key in ("kind", "format", "pieces"))
+            needed = [kind, FORMAT, -(-document["rows"] // document["piece"])]
+            there = [document[key] for key in ("kind", "format", "pieces")]
             if there != needed or not dict(document["versions"]):
                 raise ValueError
         except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError):
@@ -202,29 +202,27 @@ def open_folder(folder: str | os.PathLike[str], manifest: Manifest) -> None:
         write_text(file, manifest.text)
     stored = Manifest.read(folder, manifest.kind)
     if stored.digest != manifest.digest:
-        difference = _difference("", manifest.document, stored.document)
+        there, here = _values(stored.document), _values(manifest.document)
+        differing = (name for name in here | there if here.get(name) != there.get(name))
+        name = next(differing, "format")
+        words = [json.dumps(of[name]) if name in of else "not given" for of in (there, here)]
         raise InputError.CONFLICT(
-            f"{folder} holds another {manifest.kind}: {difference}; give what it was begun "
-            "with, or take another folder."
+            f"{folder} holds another {manifest.kind}: `{name}` is {words[0]} there and {words[1]} "
+            "here; give what it was begun with, or take another folder."
         )
 
 
-def _difference(path: str, here: Any, there: Any) -> str:
-    """Return the first difference of two documents in words."""
-    mine, theirs = _parts(path, here), _parts(path, there)
-    for name in {**mine, **theirs} if mine and theirs else ():
-        if mine.get(name) != theirs.get(name):
-            return _difference(name, mine.get(name), theirs.get(name))
-    words = ["not given" if one is None else json.dumps(one)[:60] for one in (there, here)]
-    return f"`{path}` is {words[0]} there and {words[1]} here"
-
-
-def _parts(path: str, document: Any) -> dict[str, Any]:
-    """Return the parts of a document by their paths."""
+def _values(document: Any, path: str = "") -> dict[str, Any]:
+    """Return the values of a document by their paths."""
     if isinstance(document, list):
-        return {f"{path}[{place}]": part for place, part in enumerate(document, start=1)}
-    parts = document.items() if isinstance(document, Mapping) else ()
-    return {f"{path}.{key}".lstrip("."): part for key, part in parts}
+        parts = {f"{path}[{place}]": part for place, part in enumerate(document, start=1)}
+    elif isinstance(document, Mapping):
+        parts = {f"{path}.{key}".lstrip("."): part for key, part in document.items()}
+    else:
+        return {path: document}
+    return {
+        name: value for key, part in parts.items() for name, value in _values(part, key).items()
+    }
 
 
 @contextlib.contextmanager
@@ -292,22 +290,16 @@ def write_piece(task: PieceTask, folder: str | os.PathLike[str], piece: int) -> 
     data, head = encoded(task, piece)
     with replacing(piece_file(folder, piece)) as temporary:
         temporary.write_bytes(data)
-    return piece, _lost(head)
-
-
-def _lost(head: dict[str, Any]) -> int:
-    """Return how many rows of a piece have no result."""
-    return sum(head["codes"][FAILED:])
+    return piece, sum(head["codes"][FAILED:])
 
 
 def stored_piece(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> int | None:
     """Return the rows without a result of a piece, None where its file is missing or damaged."""
-    head = _head(folder, manifest, piece)
-    if head is None:
+    if (head := _head(folder, manifest, piece)) is None:
         return None
     data = bytearray(piece_file(folder, piece).read_bytes())
     _, there, needed = _checksum(memoryview(data))
-    return _lost(head) if there == needed else None
+    return sum(head["codes"][FAILED:]) if there == needed else None
 
 
 def heads(
@@ -318,10 +310,8 @@ def heads(
     Raises:
         InputError: A piece was written for another manifest, or a needed one is not there.
     """
-    pieces = range(manifest.pieces) if needed is None else needed
-    for piece in pieces:
-        head = _head(folder, manifest, piece)
-        if head is not None:
+    for piece in range(manifest.pieces) if needed is None else needed:
+        if (head := _head(folder, manifest, piece)) is not None:
             yield head
         elif needed is not None:
             raise InputError.FILE_DAMAGED(

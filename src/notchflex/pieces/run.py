@@ -36,7 +36,8 @@ from notchflex.pieces.folder import (
     versions,
     write_piece,
 )
-from notchflex.support import check_integer, need, on_cores, short_repr
+from notchflex.specification import whole
+from notchflex.support import need, on_cores, short_repr
 
 T = TypeVar("T")
 
@@ -88,8 +89,8 @@ class PieceFolder:
         need("polars", "data", "pieces")
         if self.workers is not None and self.scheduler is not None:
             raise InputError.CONFLICT("workers and a scheduler exclude each other; give one.")
-        if self.workers is not None and not 1 <= check_integer(self.workers, "workers") <= 1024:
-            raise InputError.OUT_OF_RANGE(f"workers must be 1 to 1024; got {self.workers}")
+        if self.workers is not None:
+            whole(self.workers, "workers", 1, 1024)
         if self.scheduler is not None:
             need("distributed", "cluster", "scheduler")
             if not re.fullmatch(r"(\w+://)?[^\s/]+:\d{1,5}", self.scheduler):

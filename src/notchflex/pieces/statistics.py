@@ -25,11 +25,13 @@ _HALF = 1024
 _MAX_BIN = 64 * _HALF
 
 
+Numbers = Float[np.ndarray, " k"]
+Integers = Int[np.ndarray, " k"]
 Scale = tuple[float, float]
 """Range of the values of a sample: a finite middle, and half the range, above 0."""
 
 
-def scale_of(values: Float[np.ndarray, " k"]) -> Scale:
+def scale_of(values: Numbers) -> Scale:
     """Find the scale of a sample; NaN is left out."""
     finite = values[np.isfinite(values)]
     if not len(finite):
@@ -63,27 +65,21 @@ class Sketch:
     scale: Scale = (0.0, 1.0)
 
     @classmethod
-    def of(cls, values: Float[np.ndarray, " k"], start: int, scale: Scale, keep: int) -> Sketch:
+    def of(cls, values: Numbers, start: int, scale: Scale, keep: int) -> Sketch:
         """Describe a column whose first row has the number `start`; NaN is left out."""
-        rows = np.arange(start, start + len(values))
-        is_finite = np.isfinite(values)
-        if not is_finite.all():
-            values, rows = values[is_finite], rows[is_finite]
+        rows = np.flatnonzero(np.isfinite(values))
+        values, rows = values[rows], rows + start
         if not len(values):
             return cls(scale=scale)
         middle, half = scale
         moved = values - middle
         bins = _bins(moved / half)
         first = int(bins.min())
-        counts = np.bincount(bins - first)
         with np.errstate(over="ignore"):
             total, squares = float(moved.sum()), float(np.square(moved).sum())
-        # Extremes are in the outermost bins: never are all values put in order.
-        below = np.cumsum(counts)
-        low = bins - first <= np.searchsorted(below, keep)
-        high = bins - first >= np.searchsorted(below, len(values) - keep, side="right")
-        smallest = _least(values[low], rows[low], keep)
-        largest = [[-value, row] for value, row in _least(-values[high], rows[high], keep)]
+        smallest = _least(values, rows, keep)
+        largest = [[-value, row] for value, row in _least(-values, rows, keep)]
+        counts = np.bincount(bins - first)
         return cls(len(values), total, squares, smallest, largest, first, counts, scale)
 
     def merged(self, more: Sketch, keep: int) -> Sketch:
@@ -145,7 +141,7 @@ class Sketch:
         return middle + half * np.where(size > 1.0, far, position)
 
 
-def _bins(position: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
+def _bins(position: Numbers) -> Integers:
     """Return the bins of values less the middle, in halves of the range."""
     bins = np.floor(position * _HALF)
     beyond = np.abs(position) > 1.0
@@ -155,17 +151,18 @@ def _bins(position: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
     return np.clip(bins, -_MAX_BIN, _MAX_BIN).astype(np.int64)
 
 
-def _least(
-    values: Float[np.ndarray, " k"], rows: Int[np.ndarray, " k"], keep: int
-) -> list[list[Any]]:
+def _least(values: Numbers, rows: Integers, keep: int) -> list[list[Any]]:
     """Return the smallest values with their rows; of equal ones those of the first rows."""
+    if keep < len(values):  # never are all values put in order
+        near = values <= np.partition(values, keep)[keep]
+        values, rows = values[near], rows[near]
     order = np.argsort(values, kind="stable")[:keep]
     return list(map(list, zip(values[order].tolist(), rows[order].tolist(), strict=True)))
 
 
 def summed_up(
-    columns: Mapping[str, Float[np.ndarray, " k"]],
-    codes: Int[np.ndarray, " k"],
+    columns: Mapping[str, Numbers],
+    codes: Integers,
     start: int,
     scales: Mapping[str, Scale],
     keep: int,
@@ -181,22 +178,13 @@ def summed_up(
         keep: So many rows with the smallest and the largest values are told.
         more: Further entries.
     """
-    sketches = {
-        name: Sketch.of(values, start, scales[name], keep) for name, values in columns.items()
-    }
-    return {
-        "codes": np.bincount(codes, minlength=len(CODES)).tolist(),
-        **more,
-        "scales": scales,
-        "columns": {
-            name: {
-                key: value.tolist() if key == "counts" else value
-                for key, value in vars(sketch).items()
-                if key != "scale"
-            }
-            for name, sketch in sketches.items()
-        },
-    }
+    documents: dict[str, dict[str, Any]] = {}
+    for name, values in columns.items():
+        sketch = Sketch.of(values, start, scales[name], keep)
+        documents[name] = vars(sketch) | {"counts": sketch.counts.tolist()}
+        del documents[name]["scale"]
+    counts = np.bincount(codes, minlength=len(CODES)).tolist()
+    return {"codes": counts, **more, "scales": scales, "columns": documents}
 
 
 def add_to(sketches: dict[str, Sketch], head: Mapping[str, Any], keep: int) -> None:

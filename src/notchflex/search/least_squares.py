@@ -18,6 +18,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
+Vector = Float[np.ndarray, " n"]
+
 # What a violated limit counts beside the residuals: in a step as a part of the Hessian, and in the
 # merit of a point.
 _STIFF, _PENALTY = 1e10, 1e4
@@ -43,12 +45,12 @@ KEPT = 1e-7
 
 def bounded_step(
     hessian: Float[np.ndarray, "n n"],
-    gradient: Float[np.ndarray, " n"],
-    low: Float[np.ndarray, " n"],
-    high: Float[np.ndarray, " n"],
+    gradient: Vector,
+    low: Vector,
+    high: Vector,
     limits: Float[np.ndarray, "c n"],
     room: Float[np.ndarray, " c"],
-) -> Float[np.ndarray, " n"]:
+) -> Vector:
     r"""Minimise $d^T H d / 2 + g^T d$ where $l \le d \le h$ and $C d \le b$, with $l \le 0 \le h$.
 
     The problem is turned into one of least distance and that into non-negative least squares
@@ -94,7 +96,7 @@ class SearchPoint:
         across: Factor by which the residuals may grow on the way here, across a plateau.
     """
 
-    variables: Float[np.ndarray, " n"]
+    variables: Vector
     residuals: Float[np.ndarray, " m"]
     slopes: Float[np.ndarray, "m n"]
     limits: Float[np.ndarray, "c n"]
@@ -112,7 +114,7 @@ class SearchPoint:
         """Largest violation of a limit; 0 where all are kept."""
         return max(0.0, -float(self.room.min())) if self.room.size else 0.0
 
-    def merit(self, step: Float[np.ndarray, " n"] | None = None) -> float:
+    def merit(self, step: Vector | None = None) -> float:
         """Return squared residuals and a penalty of violated limits, after a step by the slopes."""
         residuals, room = self.residuals, self.room
         if step is not None:
@@ -167,15 +169,15 @@ class BoundedLeastSquares:
         weak: Weight of a step, for variables that change no residual.
     """
 
-    move: Callable[[SearchPoint, Float[np.ndarray, " n"]], SearchPoint | None]
-    low: Float[np.ndarray, " n"]
-    high: Float[np.ndarray, " n"]
+    move: Callable[[SearchPoint, Vector], SearchPoint | None]
+    low: Vector
+    high: Vector
     tolerance: float
     reach: float
     small: bool = False
     weak: float = 0.0
 
-    def step(self, point: SearchPoint, radius: float = np.inf) -> Float[np.ndarray, " n"]:
+    def step(self, point: SearchPoint, radius: float = np.inf) -> Vector:
         """Return the step that the slopes of a point suggest, of no more than a radius."""
         slopes, variables = point.slopes, point.variables
         hessian = slopes.T @ slopes
@@ -195,7 +197,7 @@ class BoundedLeastSquares:
         high = np.minimum(self.high - variables, radius)
         return bounded_step(hessian, gradient, low, high, point.limits, point.room)
 
-    def size(self, variables: Float[np.ndarray, " n"]) -> float:
+    def size(self, variables: Vector) -> float:
         """Return the size of some variables, and of the largest step from them."""
         return max(float(np.abs(variables).max()), self.reach)
 

@@ -12,7 +12,16 @@ from notchflex.specification.entries import (
     load_named,
 )
 from notchflex.specification.loads import LOAD_KEYS, LoadTables, read_load
-from notchflex.specification.reading import OldWords, coded, known, made, placed, record
+from notchflex.specification.reading import (
+    OldWords,
+    coded,
+    known,
+    made,
+    placed,
+    record,
+    whole,
+    with_robot,
+)
 from notchflex.specification.records import (
     Between,
     LimitedQuantity,
@@ -45,4 +54,6 @@ __all__ = [
     "placed",
     "read_load",
     "record",
+    "whole",
+    "with_robot",
 ]

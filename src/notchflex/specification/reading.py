@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import inspect
+import os
 import re
 import sys
 import warnings
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
 from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
 
 from pydantic import Field, model_validator
 from pydantic_core import ArgsKwargs
 
-from notchflex import ErrorCode, InputError
-from notchflex.support import nearest, part, validated
+from notchflex import ErrorCode, InputError, Robot, load_robot
+from notchflex.support import (
+    check_integer,
+    nearest,
+    part,
+    read_specification,
+    robot_named,
+    short_repr,
+    validated,
+)
 
 Record = TypeVar("Record")
 
@@ -128,6 +139,32 @@ def made(
         raise refuse(text) from None
 
 
+def with_robot(
+    given: Any, record: type[Record], what: str, robot: Robot | None = None
+) -> tuple[Record, Robot]:
+    """Return a specification, and the robot that it names or another one.
+
+    Args:
+        given: The specification, its table, or the path of its file.
+        record: Its class, with the name of the robot as `robot`.
+        what: What messages call its file.
+        robot: The robot, where it is not the one that is named.
+
+    Raises:
+        InputError: The file or its robot cannot be read, or a value is not allowed.
+    """
+    if isinstance(given, str | os.PathLike):
+        asked: Any = read_specification(given, what, partial(made, record))
+        return asked, robot or robot_named(asked.robot, Path(given).parent)
+    asked = made(record, given) if isinstance(given, Mapping) else given
+    if not isinstance(asked, record):
+        raise InputError.WRONG_TYPE(
+            f"a notchflex.{record.__name__} is needed, its table, or the path of a file; got "
+            f"{short_repr(given)}"
+        )
+    return asked, robot or load_robot(vars(asked)["robot"])
+
+
 @contextmanager
 def placed(place: str) -> Generator[None]:
     """Begin the message of an error with the place of what is refused."""
@@ -135,6 +172,17 @@ def placed(place: str) -> Generator[None]:
         yield
     except InputError as error:
         raise type(error)(f"{place}: {error}", error.code) from None
+
+
+def whole(value: Any, name: str, least: int, most: int) -> int:
+    """Return a whole number within limits.
+
+    Raises:
+        InputError: It is none.
+    """
+    if not least <= check_integer(value, name) <= most:
+        raise InputError.OUT_OF_RANGE(f"{name} must be from {least:,} to {most:,}; got {value}")
+    return value
 
 
 def known(name: Any, allowed: Mapping[str, Any], what: str) -> Any:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
 from dataclasses import KW_ONLY
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter, model_validator
@@ -17,15 +15,13 @@ from notchflex.specification import (
     LimitedQuantity,
     LoadTables,
     Varied,
-    made,
     record,
+    with_robot,
 )
 from notchflex.support import (
     Float,
     Int,
     ProblemError,
-    read_specification,
-    robot_named,
     schema_of,
 )
 
@@ -206,28 +202,11 @@ def read_plan(path: str | os.PathLike[str]) -> tuple[SweepPlan, Robot]:
     Raises:
         InputError: The file or its robot cannot be read, or a value in it is not allowed.
     """
-    plan = read_specification(path, "plan file", plan_from_table)
-    return plan, robot_named(plan.robot, Path(path).parent)
-
-
-def plan_from_table(table: Mapping[str, Any]) -> SweepPlan:
-    """Make a plan from the plain table of a plan file.
-
-    Raises:
-        InputError: A key is missing, not known, or its value is not allowed.
-
-    Example:
-        >>> depth = {"value": "notch.depth", "lower": 1.36, "upper": 1.42, "count": 7}
-        >>> load, keep = {"pulled": {"tension": 1.0}}, [{"quantity": "total_angle"}]
-        >>> table = {"robot": "pacheco2021-a", "variable": [depth], "load": load, "keep": keep}
-        >>> plan_from_table(table).rows
-        7
-    """
-    return made(SweepPlan, table)
+    return with_robot(path, SweepPlan, "plan file")
 
 
 def plan_table(plan: SweepPlan) -> dict[str, Any]:
-    """Return a plan as a plain table, which `plan_from_table` reads back."""
+    """Return a plan as a plain table, which `made` reads back."""
     return TypeAdapter(SweepPlan).dump_python(plan, mode="json", exclude_none=True)
 
 

@@ -1,4 +1,4 @@
-"""Runs a sweep, or what is left of it; estimates before it starts.
+"""Sweeps: runs one, or what is left of it, reads it from its folder, and estimates it before.
 
 What a row gives depends on the plan alone: not on the process, on the rows before, or on cores.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
-from notchflex import ErrorCode, InputError, Robot, load_robot, simulate
+from notchflex import ErrorCode, InputError, Robot, simulate
 from notchflex.pieces import (
     CODES,
     FAILED,
@@ -28,19 +28,36 @@ from notchflex.pieces import (
     PieceTask,
     Progress,
     Scale,
+    Sketch,
+    add_to,
     check_target,
+    damaged,
     encoded,
+    heads,
+    piece_file,
     scale_of,
     sobol_points,
     summed_up,
 )
-from notchflex.specification import Criterion, entry_names, limited_numbers, placed, read_load
+from notchflex.specification import (
+    Criterion,
+    entry_names,
+    limited_numbers,
+    made,
+    placed,
+    read_load,
+    whole,
+    with_robot,
+)
 from notchflex.support import (
-    check_integer,
+    Displayed,
+    Summary,
+    from_table,
+    nearest,
     need,
     number_at,
     number_of_cores,
-    short_repr,
+    short,
     to_table,
     write_json,
 )
@@ -48,15 +65,250 @@ from notchflex.sweeping.plan import (
     Sampling,
     SweepPlan,
     SweepVariable,
-    plan_from_table,
     plan_table,
-    read_plan,
 )
-from notchflex.sweeping.result import KIND, Sweep, read_sweep
 from notchflex.tolerancing import Study, piece_rows
 
 if TYPE_CHECKING:
-    from polars import DataFrame
+    from polars import DataFrame, LazyFrame
+    from xarray import Dataset
+
+KIND = "sweep"
+_MAX_XARRAY = 100_000_000
+"""Rows of a data set at most, which is in memory."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep(Displayed):
+    """A sweep in its folder, finished or not.
+
+    Attributes:
+        directory: The folder.
+        manifest: What the sweep is.
+        plan: The plan; its robot is only a name.
+        robot: The robot that is varied.
+        pieces: Numbers of the pieces that are there.
+        counts: How many rows have each code.
+        failures: Numbers of the first rows without a result, as many as the plan asks for.
+        sketches: Statistics of every kept quantity.
+    """
+
+    directory: Path
+    manifest: Manifest
+    plan: SweepPlan
+    robot: Robot
+    pieces: tuple[int, ...]
+    counts: dict[str, int]
+    failures: list[int]
+    sketches: dict[str, Sketch]
+
+    @property
+    def rows(self) -> int:
+        """Rows that are there."""
+        return sum(self.counts.values())
+
+    @property
+    def finished(self) -> bool:
+        """Whether all pieces are there."""
+        return len(self.pieces) == self.manifest.pieces
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the kept quantities, with their units."""
+        return list(self.sketches)
+
+    def lazy(self) -> LazyFrame:
+        """Return the rows as a lazy frame of polars, in their order.
+
+        Columns are `row`, the variables, `code` and the kept quantities, in the units of files.
+        `code` is "accepted", "rejected" (outside of a limit), "NOT_CONVERGED" or "INVALID_ROBOT";
+        the last two have no quantities.
+
+        Raises:
+            InputError: No piece is there.
+        """
+        import polars
+
+        if not self.pieces:
+            raise InputError.NO_DATA(f"{self.directory} has no finished piece yet.")
+        return polars.concat([self._piece(piece) for piece in self.pieces])
+
+    def _piece(self, piece: int) -> LazyFrame:
+        """Return the rows of a piece with their numbers."""
+        import polars
+
+        frame = polars.scan_parquet(piece_file(self.directory, piece))
+        if not self.plan.output.rows:
+            return frame
+        row = polars.int_range(polars.len(), dtype=polars.Int64) + self.manifest.between(piece)[0]
+        return frame.select(row.alias("row"), polars.all())
+
+    def to_xarray(self) -> Dataset:
+        """Return the rows as a data set: a dimension for each variable of a grid, and `point`.
+
+        Raises:
+            InputError: The sweep is not finished, keeps not all rows, has more than 1e8, or xarray
+                is not installed.
+        """
+        need("xarray", "data", "to_xarray")
+        import xarray
+
+        if not self.finished or not self.plan.output.rows or self.rows > _MAX_XARRAY:
+            raise InputError.UNSUPPORTED(
+                "to_xarray needs all rows of a finished sweep, at most 1e8; use lazy()."
+            )
+        plan, frame = self.plan, self.lazy().collect()
+        axes: dict[str, Any] = {
+            variable.value: frame[variable.value].unique(maintain_order=True).to_numpy()
+            for variable in plan.grid
+        }
+        dimensions, sizes = list(axes), [len(values) for values in axes.values()]
+        if plan.sampled:
+            dimensions, sizes = [*dimensions, "point"], [*sizes, -1]
+
+        def column(name: str) -> np.ndarray:
+            return frame[name].to_numpy().reshape(sizes)
+
+        code = frame["code"].cast(str).to_numpy().reshape(sizes).astype(str)
+        values: dict[str, Any] = {name: (dimensions, column(name)) for name in self.columns}
+        values["code"] = dimensions, code
+        for variable in plan.sampled:
+            values[variable.value] = ["point"], column(variable.value)[(0,) * len(axes)]
+        attributes = {"sweep": plan.name, "robot": self.robot.name}
+        return xarray.Dataset(values, coords=axes, attrs=attributes)
+
+    def worst(self, column: str, *, largest: bool = True) -> DataFrame:
+        """Return the rows with the largest values of a kept quantity, or with the smallest.
+
+        Args:
+            column: Name of the quantity, as in `columns`.
+            largest: Whether the largest are meant.
+
+        Raises:
+            InputError: There is no such quantity.
+        """
+        sketch = self._sketch(column)
+        pairs = (sketch.largest if largest else sketch.smallest)[: self.plan.output.extremes]
+        rows = self._rows([row for _, row in pairs])
+        return rows.sort(column, descending=largest, maintain_order=True)
+
+    def first_failures(self) -> DataFrame:
+        """Return the first rows without a result."""
+        return self._rows(self.failures)
+
+    def quantiles(self, column: str, parts: Sequence[float] | None = None) -> list[float]:
+        """Return quantiles of a kept quantity, exact to 1/1000 of half the range of most values.
+
+        Args:
+            column: Name of the quantity, as in `columns`.
+            parts: Numbers between 0 and 1; those of the plan if None.
+        """
+        levels = self.plan.output.quantiles if parts is None else parts
+        return [self._sketch(column).quantile(part) for part in levels]
+
+    def histogram(self, column: str, bins: int | None = None) -> tuple[list[float], list[int]]:
+        """Return edges and counts of a histogram of a kept quantity.
+
+        Args:
+            column: Name of the quantity, as in `columns`.
+            bins: Number of bins; that of the plan if None.
+        """
+        return self._sketch(column).histogram(self.plan.output.bins if bins is None else bins)
+
+    def _sketch(self, name: str) -> Sketch:
+        if name not in self.sketches:
+            raise InputError.UNKNOWN_NAME(
+                f'no quantity "{name}" is kept{nearest(name, self.columns)}; there are '
+                f"{', '.join(self.columns)}."
+            )
+        return self.sketches[name]
+
+    def _rows(self, rows: Sequence[int]) -> DataFrame:
+        """Read rows by their numbers, from the pieces that hold them."""
+        import polars
+
+        size = self.manifest.document["piece"]
+        pieces = sorted({row // size for row in rows}) or self.pieces[:1]
+        frame = polars.concat([self._piece(piece) for piece in pieces])
+        return frame.filter(polars.col("row").is_in(list(rows))).collect()
+
+    def document(self) -> dict[str, Any]:
+        """Return what is summed up of all rows, as plain values."""
+        columns: dict[str, Any] = {}
+        for name, sketch in self.sketches.items():
+            mean, sd = sketch.moments
+            smallest, largest = sketch.ends
+            edges, counts = self.histogram(name)
+            levels = [f"{part:g}" for part in self.plan.output.quantiles]
+            columns[name] = {
+                "count": sketch.count,
+                "mean": mean,
+                "sd": sd,
+                "smallest": smallest,
+                "largest": largest,
+                "quantiles": dict(zip(levels, self.quantiles(name), strict=True)),
+                "histogram": {"edges": edges, "counts": counts},
+            }
+        return {
+            "name": self.plan.name,
+            "program": "notchflex",
+            "version": self.manifest.document["versions"]["notchflex"],
+            "robot": self.robot.name,
+            "rows": self.rows,
+            "pieces": len(self.pieces),
+            "finished": self.finished,
+            "codes": self.counts,
+            "first_failures": self.failures,
+            "columns": columns,
+        }
+
+    def _summary(self) -> Summary:
+        done = "" if self.finished else f" of {self.manifest.rows}"
+        title = f"Sweep {self.plan.name}: {self.rows}{done} rows"
+        rows = [(code, str(count)) for code, count in self.counts.items() if count]
+        for name, sketch in self.sketches.items():
+            if sketch.count:
+                rows.append((name, " to ".join(map(short, sketch.ends))))
+        return Summary(title, rows, ".lazy() is a frame of polars, .to_xarray() a data set")
+
+
+def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
+    """Read a sweep, which may be unfinished.
+
+    Args:
+        directory: Its folder.
+
+    Returns:
+        The sweep: `lazy` and `to_xarray` are its rows.
+
+    Raises:
+        InputError: It is not a folder of a sweep, its `sweep.json` was changed, or polars is not
+            installed.
+    """
+    need("polars", "data", "read_sweep")
+    manifest = Manifest.read(directory, KIND)
+    content = manifest.document
+    try:
+        robot = from_table(content["robot"])
+        plan = made(SweepPlan, {**content["plan"], "robot": robot.name})
+        sketches = {str(name): Sketch() for name in content["columns"]}
+    except (InputError, LookupError, TypeError, AttributeError):
+        raise damaged(Path(directory, "sweep.json")) from None
+    pieces: list[int] = []
+    codes = np.zeros(len(CODES), int)
+    failures: list[int] = []
+    keep = max(plan.output.extremes, 1)
+    for head in heads(directory, manifest):
+        pieces.append(head["piece"])
+        codes += head["codes"]
+        failures += head["failures"][: plan.output.failures - len(failures)]
+        add_to(sketches, head, keep)
+    counts: dict[str, int] = dict(zip(CODES, codes.tolist(), strict=True))
+    return Sweep(Path(directory), manifest, plan, robot, tuple(pieces), counts, failures, sketches)
+
+
+Columns = dict[str, Float[np.ndarray, " k"]]
+"""Numbers of rows by name."""
 
 _MAX_LATIN = 20_000_000
 """A Latin hypercube is made whole: so many numbers fit into memory beside all else."""
@@ -79,7 +331,7 @@ def _ends(variable: SweepVariable) -> tuple[float, float]:
     return min(values), max(values)  # pyright: ignore
 
 
-def numbers_between(plan: SweepPlan, start: int, stop: int) -> dict[str, Float[np.ndarray, " k"]]:
+def numbers_between(plan: SweepPlan, start: int, stop: int) -> Columns:
     """Return the numbers of rows by name; points change fastest, then the last axis of the grid.
 
     Args:
@@ -89,8 +341,6 @@ def numbers_between(plan: SweepPlan, start: int, stop: int) -> dict[str, Float[n
     """
     each = 1 if plan.sampling is None else plan.sampling.points
     places, points = np.divmod(np.arange(start, stop), each)
-    if plan.sampling is None:
-        return _numbers(plan, places, points)
     if each <= len(points):  # all points, more than once
         return _numbers(plan, places, _levels(plan, 0, each)[points])
     turns = np.flatnonzero(np.diff(points) < 0) + 1  # where the sequence begins anew
@@ -98,19 +348,19 @@ def numbers_between(plan: SweepPlan, start: int, stop: int) -> dict[str, Float[n
     return _numbers(plan, places, np.concatenate(parts))
 
 
-def _sample(plan: SweepPlan) -> dict[str, Float[np.ndarray, " k"]]:
+def _sample(plan: SweepPlan) -> Columns:
     """Return the numbers of some rows: the first points, at places all over the grid."""
     each = 1 if plan.sampling is None else plan.sampling.points
     count = min(4 * _SAMPLE, plan.rows)
     places = np.random.default_rng(0).integers(0, plan.rows // each, count)
-    levels = np.zeros((1, 0)) if plan.sampling is None else _levels(plan, 0, min(count, each))
+    levels = _levels(plan, 0, min(count, each))
     step = max(count // _SAMPLE, 1)
     return _numbers(plan, places[::step], levels[np.arange(count) % len(levels)][::step])
 
 
 def _numbers(
     plan: SweepPlan, places: Int[np.ndarray, " k"], levels: Float[np.ndarray, "k d"]
-) -> dict[str, Float[np.ndarray, " k"]]:
+) -> Columns:
     """Return numbers by name at places of the grid and sampled levels."""
     numbers: dict[str, np.ndarray] = {}
     for variable in plan.grid[::-1]:
@@ -128,7 +378,8 @@ def _numbers(
 def _levels(plan: SweepPlan, start: int, stop: int) -> Float[np.ndarray, "k d"]:
     """Return sampled points, between 0 and 1."""
     sampling, dimension = plan.sampling, len(plan.sampled)
-    assert sampling is not None
+    if sampling is None:
+        return np.zeros((stop - start, 0))
     if sampling.method == "latin-hypercube":
         return _latin(sampling, dimension)[start:stop]
     return sobol_points(dimension, sampling.seed, start, stop, sampling.points)
@@ -144,29 +395,6 @@ def _latin(sampling: Sampling, dimension: int) -> Float[np.ndarray, "k d"]:
         )
     engine = qmc.LatinHypercube(dimension, rng=np.random.default_rng(sampling.seed))  # pyright: ignore
     return engine.random(sampling.points)
-
-
-def _study_of(plan: SweepPlan, robot: Robot) -> Study:
-    """Make the study of a plan.
-
-    Raises:
-        InputError: The robot has no such number, load, quantity or entry.
-    """
-    base = _middle(plan, robot.replace(tolerance=None))
-    for variable in plan.variable:
-        number_at(base, variable.value)
-    loads = {name: read_load(table, name, base) for name, table in plan.load.items()}
-    paths = {name: simulate(base, load, refinement=plan.refinement) for name, load in loads.items()}
-    criteria: dict[str, Criterion] = {}
-    for number, kept in enumerate(plan.keep, start=1):
-        with placed(f"`keep[{number}]`"):
-            for entry in limited_numbers(kept.in_python, paths):
-                if entry.name in criteria:
-                    raise InputError.CONFLICT(f"{entry.name} is kept twice; keep it once.")
-                criteria[entry.name] = entry
-    if not criteria:
-        raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
-    return Study(base, (), paths, tuple(criteria.values()), None, plan.refinement, 1)
 
 
 def _middle(plan: SweepPlan, robot: Robot) -> Robot:
@@ -206,8 +434,28 @@ class SweepTask(PieceTask):
 
     @cached_property
     def study(self) -> Study:
-        """The robot under its loads, and the numbers that are kept."""
-        return _study_of(self.plan, self.robot)
+        """The robot under its loads, and the numbers that are kept.
+
+        Raises:
+            InputError: The robot has no such number, load, quantity or entry.
+        """
+        plan, base = self.plan, _middle(self.plan, self.robot.replace(tolerance=None))
+        for variable in plan.variable:
+            number_at(base, variable.value)
+        loads = {name: read_load(table, name, base) for name, table in plan.load.items()}
+        paths = {
+            name: simulate(base, load, refinement=plan.refinement) for name, load in loads.items()
+        }
+        criteria: dict[str, Criterion] = {}
+        for number, kept in enumerate(plan.keep, start=1):
+            with placed(f"`keep[{number}]`"):
+                for entry in limited_numbers(kept.in_python, paths):
+                    if entry.name in criteria:
+                        raise InputError.CONFLICT(f"{entry.name} is kept twice; keep it once.")
+                    criteria[entry.name] = entry
+        if not criteria:
+            raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
+        return Study(base, (), paths, tuple(criteria.values()), None, plan.refinement, 1)
 
     @cached_property
     def columns(self) -> list[str]:
@@ -237,7 +485,7 @@ class SweepTask(PieceTask):
 
     def _solved(
         self, numbers: Mapping[str, Float[np.ndarray, " k"]]
-    ) -> tuple[dict[str, Float[np.ndarray, " k"]], Int[np.ndarray, " k"]]:
+    ) -> tuple[Columns, Int[np.ndarray, " k"]]:
         """Solve robots; return columns in the units of files, NaN where there is no result."""
         values, codes = self.study.solved(numbers, len(next(iter(numbers.values()))))
         scales = np.array([criterion.quantity.scale for criterion in self.study.criteria])
@@ -311,8 +559,11 @@ def sweep(
         7
     """
     folder = PieceFolder(directory, workers, scheduler)
-    first, count = _checked_part(part)
-    task = SweepTask(*_plan_and_robot(plan))
+    if not isinstance(part, tuple) or len(part) != 2:  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError.WRONG_TYPE(f"part must be two numbers, such as (7, 100); got {part!r}")
+    count = whole(part[1], "parts", 1, 10**9)
+    first = whole(part[0], "part", 1, count)
+    task = SweepTask(*with_robot(plan, SweepPlan, "plan file"))
     check_target(directory, KIND, "-o", [plan] if isinstance(plan, str | Path) else [])
     with threadpool_limits(1):  # more threads may give other last digits
         number = task.manifest.pieces
@@ -323,39 +574,6 @@ def sweep(
     if result.finished:
         write_json(str(result.directory / "summary.json"), result.document())
     return result
-
-
-def _plan_and_robot(
-    plan: SweepPlan | Mapping[str, Any] | str | os.PathLike[str],
-) -> tuple[SweepPlan, Robot]:
-    """Return a plan and the robot that it names.
-
-    Raises:
-        InputError: It is not a plan, or its file or its robot cannot be read.
-    """
-    if isinstance(plan, Mapping):
-        plan = plan_from_table(plan)
-    if isinstance(plan, SweepPlan):
-        return plan, load_robot(plan.robot)
-    if not isinstance(plan, str | os.PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InputError.WRONG_TYPE(
-            f"a notchflex.SweepPlan is needed, or the path of a file; got {short_repr(plan)}"
-        )
-    return read_plan(plan)
-
-
-def _checked_part(part: tuple[int, int]) -> tuple[int, int]:
-    """Return which part of how many, checked.
-
-    Raises:
-        InputError: They are not two whole numbers, or not 1 <= part <= parts.
-    """
-    if not isinstance(part, tuple) or len(part) != 2:  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InputError.WRONG_TYPE(f"part must be two numbers, such as (7, 100); got {part!r}")
-    first, count = (check_integer(one, "part") for one in part)
-    if not 1 <= first <= count <= 10**9:
-        raise InputError.OUT_OF_RANGE(f"part {first} of {count}: give one from 1 to {count}.")
-    return first, count
 
 
 _LONG = 1.0
@@ -398,11 +616,14 @@ def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = 
         workers: As for `sweep`.
     """
     need("polars", "data", "sweep")
-    task = SweepTask(*_plan_and_robot(plan))
+    task = SweepTask(*with_robot(plan, SweepPlan, "plan file"))
     manifest = task.manifest
-    data, head, taken = _timed(task)
-    if taken < _LONG:
-        data, head, taken = _timed(task)
+    data, head, taken = memoryview(b""), dict[str, Any](), 0.0
+    for _ in range(2):
+        if taken < _LONG:
+            start = time.perf_counter()
+            data, head = encoded(task, 0)
+            taken = time.perf_counter() - start
     solved = manifest.between(0)[1]
     cores = min(workers or number_of_cores(), manifest.pieces)
     more = manifest.rows / solved if task.plan.output.rows else manifest.pieces
@@ -418,10 +639,3 @@ def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = 
         solved=solved,
         unsolved=sum(head["codes"][FAILED:]),
     )
-
-
-def _timed(task: SweepTask) -> tuple[memoryview, dict[str, Any], float]:
-    """Return the bytes of the first piece, its head, and the seconds that it took."""
-    start = time.perf_counter()
-    data, head = encoded(task, 0)
-    return data, head, time.perf_counter() - start

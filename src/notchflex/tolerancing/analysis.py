@@ -1,9 +1,9 @@
-"""The tolerance analysis of a robot: worst case, yield, sensitivity, remedies."""
+"""The tolerance analysis of a robot: worst case, yield, sensitivity, remedies; its documents."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
@@ -11,17 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.optimize import brentq
-from scipy.stats import qmc, sobol_indices
 
 from notchflex import EquilibriumPath, InputError, Robot, Settings
-from notchflex.pieces import CODES, FAILED, INVALID, PieceFolder
+from notchflex.pieces import CODES, FAILED, INVALID, PieceFolder, sobol_points
+from notchflex.specification import whole
 from notchflex.support import (
     Displayed,
     Summary,
     Tolerance,
-    check_integer,
     check_is_robot,
     deviation,
+    document_head,
     moments,
     short,
     short_repr,
@@ -35,11 +35,17 @@ from notchflex.tolerancing.study import (
     ToleranceTask,
     draw,
     draw_in_pieces,
+    drawn_numbers,
+    limited_columns,
     study_of,
     tolerances_for,
     yield_interval,
 )
 
+BySource = Float[np.ndarray, "k d"]
+"""A number for each limit and source."""
+
+ByLimit = Float[np.ndarray, " k"]
 WORST_SD = 3.0
 """Number of standard deviations in the worst case of an untruncated normal distribution."""
 
@@ -55,11 +61,11 @@ class LinearEffects(NamedTuple):
         high: The same toward larger values, not negative.
     """
 
-    nominal: Float[np.ndarray, " k"]
-    shift: Float[np.ndarray, "k d"]
-    spread: Float[np.ndarray, "k d"]
-    low: Float[np.ndarray, "k d"]
-    high: Float[np.ndarray, "k d"]
+    nominal: ByLimit
+    shift: BySource
+    spread: BySource
+    low: BySource
+    high: BySource
 
     @property
     def worst_case(self) -> Float[np.ndarray, "k 2"]:
@@ -68,17 +74,17 @@ class LinearEffects(NamedTuple):
         return np.stack(ends, axis=-1)
 
     @property
-    def mean(self) -> Float[np.ndarray, " k"]:
+    def mean(self) -> ByLimit:
         """Mean of the robots."""
         return self.nominal + self.shift.sum(axis=1)
 
     @property
-    def sd(self) -> Float[np.ndarray, " k"]:
+    def sd(self) -> ByLimit:
         """Standard deviation of the robots: the root of the sum of squares."""
         return np.sqrt((self.spread**2).sum(axis=1))
 
     @property
-    def share(self) -> Float[np.ndarray, "k d"]:
+    def share(self) -> BySource:
         """Part of each source in the variance of each number; 0 where nothing varies."""
         total = (self.spread**2).sum(axis=1, keepdims=True)
         return np.divide(self.spread**2, total, out=np.zeros_like(self.spread), where=total > 0.0)
@@ -92,15 +98,12 @@ def linear_effects(study: Study) -> LinearEffects:
     """
     names = [name for source in study.sources for name in source.nominal]
     slopes, nominal = np.empty((len(study.criteria), len(names))), np.empty(len(study.criteria))
-    for load, path in study.loads.items():
-        places, outputs = study.of_load(load)
-        solved = study.paths[load][: len(path)]
-        jacobian = solved.jacobian(names, outputs)
-        for place in places:
-            criterion = study.criteria[place]
+    for path, criteria, outputs in study.loads.values():
+        jacobian = path.jacobian(names, outputs)
+        for place, criterion in criteria.items():
             quantity = criterion.quantity.name
             slopes[place] = criterion.of(np.moveaxis(jacobian[quantity], -1, 0))
-            nominal[place] = criterion.of(np.asarray(solved.quantity(quantity))[None])[0]
+            nominal[place] = criterion.of(np.asarray(path.quantity(quantity))[None])[0]
     # Mean, standard deviation and both ends of each name, which moves with its source alone.
     deviations = np.zeros((4, len(names), len(study.sources)))
     for column, source in enumerate(study.sources):
@@ -157,8 +160,9 @@ def control(
         progress: Called with the sources done and all of them.
     """
     points = min(2 ** int(np.log2(draws)), _POINTS)
-    sampler = qmc.Sobol(len(study.sources), scramble=True, rng=np.random.default_rng(seed))
-    numbers = study.drawn(sampler.random(points))
+    numbers = drawn_numbers(
+        study.sources, sobol_points(len(study.sources), seed, 0, points, points)
+    )
     exact, factors = [], []
     for index, source in enumerate(study.sources):
 
@@ -197,11 +201,11 @@ class SobolIndices(NamedTuple):
         first: Part of the variance that a source makes alone, (k + 1, d); NaN where nothing varies.
         total: The same with what it makes together with others, (k + 1, d).
         robots: How many robots were solved.
-        failed: How many of them had no result; a neighbour's stands in for it.
+        failed: How many of them had no result; they and their counterparts are left out.
     """
 
-    first: Float[np.ndarray, "k d"]
-    total: Float[np.ndarray, "k d"]
+    first: BySource
+    total: BySource
     robots: int
     failed: int
 
@@ -219,30 +223,24 @@ def sobol(
     """
     sources = len(study.sources)
     points = min(2 ** int(np.log2(max(draws / (sources + 2), _LEAST_POINTS))), _POINTS)
-    sampler = qmc.Sobol(2 * sources, scramble=True, rng=np.random.default_rng(seed))
-    first, second = np.split(sampler.random(points), 2, axis=1)
+    first, second = np.split(sobol_points(2 * sources, seed, 0, points, points), 2, axis=1)
     mixed = np.where(np.eye(sources, dtype=bool)[:, None], second, first)
     levels = np.concatenate([first, second, *mixed])
     outcomes = study.at_levels(levels, progress)
     values = np.column_stack([outcomes.values, outcomes.accepted])
     failed = int(np.isnan(values).any(axis=1).sum())
     sets = np.moveaxis(values.reshape(sources + 2, points, -1), 1, 2)
-    is_finite = np.isfinite(sets).all(axis=(0, 1))
-    if not is_finite.any():
+    sets = sets[..., np.isfinite(sets).all(axis=(0, 1))]
+    if not sets.size:
         nothing = np.full((sets.shape[1], sources), np.nan)
         return SobolIndices(nothing, nothing, len(levels), failed)
-    # A set of robots with one that failed is replaced by the good set before it.
-    last = np.maximum.accumulate(np.where(is_finite, np.arange(points), -1))
-    sets = sets[..., np.where(last >= 0, last, np.argmax(is_finite))]
     sets = sets - sets[:2].mean(axis=(0, 2))[:, None]  # smaller errors than about a distant mean
+    (one, other), mixed = sets[:2], sets[2:]
     varies = np.ptp(sets[:2], axis=(0, 2)) > 0.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        indices = sobol_indices(func={"f_A": sets[0], "f_B": sets[1], "f_AB": sets[2:]}, n=points)
-    orders = [
-        np.where(varies[:, None], order.reshape(-1, sources), np.nan)
-        for order in (indices.first_order, indices.total_order)
-    ]
-    return SobolIndices(orders[0], orders[1], len(levels), failed)
+    variance = np.where(varies, sets[:2].var(axis=(0, 2)), np.nan)
+    alone = (other * (mixed - one)).mean(axis=2) / variance
+    together = 0.5 * ((mixed - one) ** 2).mean(axis=2) / variance
+    return SobolIndices(alone.T, together.T, len(levels), failed)
 
 
 @dataclass(frozen=True, repr=False)
@@ -298,16 +296,16 @@ class ToleranceAnalysis(Displayed):
         return dict(zip(CODES, self.drawn.codes.tolist(), strict=True))
 
     @property
-    def below(self) -> Float[np.ndarray, " k"]:
+    def below(self) -> ByLimit:
         """Part of the drawn robots below the lower limit of each number."""
         return self.drawn.below / self.draws
 
     @property
-    def above(self) -> Float[np.ndarray, " k"]:
+    def above(self) -> ByLimit:
         """Part of the drawn robots above the upper limit of each number."""
         return self.drawn.above / self.draws
 
-    def percentile(self, part: float) -> Float[np.ndarray, " k"]:
+    def percentile(self, part: float) -> ByLimit:
         """Return the value of each number that a part of the drawn robots stays below.
 
         Args:
@@ -355,7 +353,6 @@ class ToleranceAnalysis(Displayed):
         return Summary(title, rows, ".linear, .drawn, .sobol, .control; nf.plot(it) draws them")
 
 
-_MIN_DRAWS = 2 * REPLICATES
 _MAX_DRAWS, _MAX_IN_PIECES = 10_000_000, 10_000_000_000
 """Draws in memory at most, and in pieces."""
 
@@ -407,12 +404,7 @@ def tolerance_analysis(
         200
     """
     check_is_robot(robot)
-    most = _MAX_DRAWS if folder is None else _MAX_IN_PIECES
-    if not _MIN_DRAWS <= check_integer(draws, "draws") <= most:
-        more = ", or more in pieces (give a folder)" if folder is None else ""
-        raise InputError.OUT_OF_RANGE(
-            f"draws must be from {_MIN_DRAWS} to {most:,}{more}; got {draws}"
-        )
+    whole(draws, "draws", 2 * REPLICATES, _MAX_DRAWS if folder is None else _MAX_IN_PIECES)
     if isinstance(spec, str | os.PathLike):
         spec = read_tolerance_spec(spec, robot)
     elif not isinstance(spec, ToleranceSpec):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -447,3 +439,114 @@ def tolerance_analysis(
         wanted_yield=spec.wanted_yield,
         seed=seed,
     )
+
+
+PERCENTILES = (2.5, 50.0, 97.5)
+
+
+def tolerance_document(analysis: ToleranceAnalysis) -> dict[str, Any]:
+    """Return a tolerance analysis as a document of plain values, at the edge units.
+
+    Args:
+        analysis: The analysis.
+
+    Returns:
+        `yield` (with `interval`), `limits`, one for each number that has limits, and `sources`, one
+        for each deviation. Angles in deg, lengths in mm, forces in N.
+    """
+    return {
+        **document_head(analysis.robot),
+        "draws": analysis.draws,
+        "seed": analysis.seed,
+        "tolerances": {one.value: one.written for one in analysis.tolerances},
+        "assumed": list(analysis.assumed),
+        "yield": {
+            "accepted": analysis.accepted_fraction,
+            "interval": list(analysis.interval),
+            "wanted": analysis.wanted_yield,
+            "counts": analysis.counts,
+        },
+        "worst_case_sd": WORST_SD,
+        "limits": _limits(analysis),
+        "sources": _sources(analysis),
+        "sobol_robots": analysis.sobol.robots,
+        "sobol_failed": analysis.sobol.failed,
+        "control_robots": analysis.control.robots,
+    }
+
+
+def _limits(analysis: ToleranceAnalysis) -> list[dict[str, Any]]:
+    linear = analysis.linear
+    values = {
+        "drawing": linear.nominal,
+        "worst_case": linear.worst_case,
+        "rss_mean": linear.mean,
+        "rss_sd": linear.sd,
+    }
+    parts = {f"{level:g}": analysis.percentile(level / 100.0) for level in PERCENTILES}
+    documents: list[dict[str, Any]] = []
+    for index, criterion in enumerate(analysis.criteria):
+        scale = criterion.quantity.scale
+        # A limit that was turned to rad and back has a rounding error.
+        ends = {end: float(f"{getattr(criterion, end) * scale:.12g}") for end in ("lower", "upper")}
+        documents.append(
+            {
+                "name": criterion.name,
+                "quantity": criterion.quantity.name,
+                "unit": criterion.quantity.unit,
+                "load": criterion.load,
+                "step": criterion.step + 1,
+                **{end: value if np.isfinite(value) else None for end, value in ends.items()},
+                **{name: column[index] * scale for name, column in values.items()},
+                "percentiles": {level: part[index] * scale for level, part in parts.items()},
+                "below": analysis.below[index],
+                "above": analysis.above[index],
+            }
+        )
+    return documents
+
+
+def _sources(analysis: ToleranceAnalysis) -> list[dict[str, Any]]:
+    """Return what is found of every deviation; lists are in the order of `limits`."""
+    sobol, control = analysis.sobol, analysis.control
+    scales = np.array([criterion.quantity.scale for criterion in analysis.criteria])
+    return [
+        {
+            "name": name,
+            "one_sd": analysis.linear.spread[:, index] * scales,
+            "variance_share": analysis.linear.share[:, index],
+            "sobol_first": sobol.first[:-1, index],
+            "sobol_total": sobol.total[:-1, index],
+            "sobol_total_of_acceptance": sobol.total[-1, index],
+            "yield_if_exact": control.exact[index],
+            "allowed_factor": None if control.factor is None else control.factor[index],
+        }
+        for index, name in enumerate(analysis.sources)
+    ]
+
+
+def tolerance_columns(analysis: ToleranceAnalysis) -> dict[str, Sequence[Any]]:
+    """Return the drawn robots as columns: their numbers, those with limits, and what became of it.
+
+    Args:
+        analysis: The analysis.
+
+    Returns:
+        `robot` from 1, the numbers that deviate by name (mm, N, MPa, deg), the numbers that have
+        limits with their unit, empty where there is no result, and `outcome`: accepted, rejected,
+        NOT_CONVERGED or INVALID_ROBOT.
+
+    Raises:
+        InputError: They were drawn in pieces.
+    """
+    drawn = analysis.drawn
+    if isinstance(drawn, DrawnPieces):
+        raise InputError.UNSUPPORTED(
+            f"the drawn robots are rows of the files in {drawn.directory}; read those."
+        )
+    columns = {**drawn.numbers, **limited_columns(analysis.criteria, drawn.outcomes.values)}
+    return {
+        "robot": range(1, analysis.draws + 1),
+        **{name: values.tolist() for name, values in columns.items()},
+        "outcome": [CODES[code] for code in drawn.outcomes.codes],
+    }

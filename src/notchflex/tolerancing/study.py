@@ -20,7 +20,6 @@ from notchflex import (
     EquilibriumPath,
     ErrorCode,
     InputError,
-    LoadPath,
     Robot,
     Settings,
     batch,
@@ -64,6 +63,13 @@ standard deviations."""
 Counts = Int[np.ndarray, " k"]
 
 
+def drawn_numbers(
+    sources: Sequence[ToleranceSource], levels: Float[np.ndarray, "robots d"]
+) -> dict[str, Float[np.ndarray, " robots"]]:
+    """Return the numbers of robots by name, at levels of the sources; see `TAIL`."""
+    return values_at(sources, np.clip(levels, TAIL, 1.0 - TAIL))
+
+
 class Outcomes(NamedTuple):
     """Outcomes of robots.
 
@@ -79,6 +85,14 @@ class Outcomes(NamedTuple):
     def accepted(self) -> Bool[np.ndarray, " robots"]:
         """Which robots meet all limits."""
         return self.codes == ACCEPTED
+
+
+class StudyLoad(NamedTuple):
+    """A load of a study."""
+
+    path: EquilibriumPath  # of the drawing
+    criteria: Mapping[int, Criterion]  # by their places
+    outputs: tuple[str, ...]  # their quantities
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,22 +133,16 @@ class Study:
         return [source for source in sources_of(self.exact, self.tolerances) if deviates(source)]
 
     @cached_property
-    def loads(self) -> dict[str, LoadPath]:
+    def loads(self) -> dict[str, StudyLoad]:
         """The loads that any limit is about, each up to the last step that has one."""
-        last: dict[str, int] = {}
-        for criterion in self.criteria:
-            last[criterion.load] = max(last.get(criterion.load, 0), criterion.step + 1)
-        return {name: self.paths[name].load[:steps] for name, steps in last.items()}
-
-    def of_load(self, load: str) -> tuple[list[int], tuple[str, ...]]:
-        """Return the places of the criteria of a load, and their quantities."""
-        places = [place for place, one in enumerate(self.criteria) if one.load == load]
-        names = [self.criteria[place].quantity.name for place in places]
-        return places, tuple(dict.fromkeys(names))
-
-    def drawn(self, levels: Float[np.ndarray, "robots d"]) -> dict[str, Float[np.ndarray, " r"]]:
-        """Return the numbers of robots by name, at levels of the sources; see `TAIL`."""
-        return values_at(self.sources, np.clip(levels, TAIL, 1.0 - TAIL))
+        loads: dict[str, StudyLoad] = {}
+        for name, path in self.paths.items():
+            criteria = {k: one for k, one in enumerate(self.criteria) if one.load == name}
+            if criteria:
+                last = max(criterion.step for criterion in criteria.values())
+                outputs = dict.fromkeys(one.quantity.name for one in criteria.values())
+                loads[name] = StudyLoad(path[: last + 1], criteria, tuple(outputs))
+        return loads
 
     def at_levels(
         self,
@@ -142,7 +150,7 @@ class Study:
         progress: Callable[[int, int], None] | None = None,
     ) -> Outcomes:
         """Solve robots at levels of the sources, each between 0 and 1."""
-        return self.solved(self.drawn(levels), len(levels), progress)
+        return self.solved(drawn_numbers(self.sources, levels), len(levels), progress)
 
     def solved(
         self,
@@ -159,8 +167,7 @@ class Study:
         """
         values = np.full((count, len(self.criteria)), np.nan)
         codes = np.full(count, ACCEPTED)
-        for turn, (name, load) in enumerate(self.loads.items()):
-            places, outputs = self.of_load(name)
+        for turn, (path, criteria, outputs) in enumerate(self.loads.values()):
 
             def report(done: int, total: int, turn: int = turn) -> None:
                 if progress is not None:
@@ -168,7 +175,7 @@ class Study:
 
             try:
                 quantities = batch(
-                    self.exact, numbers, load, outputs=outputs, settings=self.settings,
+                    self.exact, numbers, path.load, outputs=outputs, settings=self.settings,
                     refinement=self.refinement, cores=self.cores, progress=report,
                 )  # fmt: skip
             except InputError as error:
@@ -176,29 +183,20 @@ class Study:
                     raise
                 return Outcomes(values, np.full(count, INVALID))
             converged = quantities["converged"]
-            for place in places:
-                criterion = self.criteria[place]
+            for place, criterion in criteria.items():
                 result = criterion.of(quantities[criterion.quantity.name])
                 values[:, place] = np.where(converged[:, criterion.step], result, np.nan)
             codes[~converged.all(axis=1)] = FAILED
             codes[~quantities.valid] = INVALID
-        lower, upper = self.limits
-        within = ((values >= lower) & (values <= upper)).all(axis=1)
-        codes[(codes == ACCEPTED) & ~within] = REJECTED
+        below, above = self.beyond(values)
+        outside = (below | above | np.isnan(values)).any(axis=1)
+        codes[(codes == ACCEPTED) & outside] = REJECTED
         return Outcomes(values, codes)
 
-    @property
-    def limits(self) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-        """Lower and upper limits."""
+    def beyond(self, values: Float[np.ndarray, "r k"]) -> tuple[np.ndarray, np.ndarray]:
+        """Return which numbers are below the lower limits, and above the upper ones."""
         lower, upper = np.array([[one.lower, one.upper] for one in self.criteria]).T
-        return lower, upper
-
-    def counts(self, outcomes: Outcomes) -> tuple[Counts, Counts, Counts]:
-        """Return how many robots have each code, and are below and above each limit."""
-        lower, upper = self.limits
-        codes = np.bincount(outcomes.codes, minlength=len(CODES))
-        values = outcomes.values
-        return codes, (values < lower).sum(axis=0), (values > upper).sum(axis=0)
+        return values < lower, values > upper
 
 
 def tolerances_for(
@@ -245,10 +243,11 @@ _MAX_BYTES = 2**27
 
 def piece_rows(rows: int, study: Study) -> int:
     """Return the rows of a piece, a power of two, for so many rows of a study."""
-    numbers = 0  # that the solver returns of a row
-    for name, load in study.loads.items():
-        for quantity in study.of_load(name)[1]:
-            numbers += len(load) * max(study.paths[name].quantity(quantity)[0].size, 1)
+    numbers = sum(  # that the solver returns of a row
+        len(path) * max(path.quantity(name)[0].size, 1)
+        for path, _, outputs in study.loads.values()
+        for name in outputs
+    )
     size = 2 ** math.ceil(math.log2(max(rows / _PIECES, 1)))
     most = 2 ** int(math.log2(max(_MAX_BYTES / (8 * numbers), 16)))
     return min(max(size, _MIN_ROWS), _MAX_ROWS, most)
@@ -316,6 +315,17 @@ def yield_interval(accepted: Int[np.ndarray, " replicates"], each: int) -> tuple
     )
 
 
+def drawn_levels(sources: int, draws: int, seed: int) -> Float[np.ndarray, "draws d"]:
+    """Return levels of about so many robots, one set of points after the other."""
+    return np.concatenate(replicates(sources, points_of_each(draws), seed))
+
+
+def yield_of(accepted: Bool[np.ndarray, " draws"]) -> tuple[float, tuple[float, float]]:
+    """Return which part of robots at `drawn_levels` is accepted, and its 95 % interval."""
+    sets = accepted.reshape(REPLICATES, -1)
+    return float(accepted.mean()), yield_interval(sets.sum(axis=1), sets.shape[1])
+
+
 @dataclass(frozen=True, eq=False)
 class DrawnCounts:
     """Counts of drawn robots, k numbers with limits.
@@ -347,30 +357,28 @@ class DrawnRobots(DrawnCounts):
 
     def percentile(self, part: float) -> Float[np.ndarray, " k"]:
         """Return the value of each number that a part of the robots stays below."""
-        values = self.outcomes.values
-        values = values[np.isfinite(values).all(axis=1)]
-        size = values.shape[1]
-        return np.quantile(values, part, axis=0) if len(values) else np.full(size, np.nan)
+        values = self.outcomes.values[np.isfinite(self.outcomes.values).all(axis=1)]
+        return np.quantile(values if len(values) else self.outcomes.values[:1], part, axis=0)
 
     def histogram(self, index: int, bins: int) -> tuple[np.ndarray, np.ndarray]:
         """Return edges and counts of the values of a number; both empty without a result."""
         values = self.outcomes.values[:, index]
         values = values[np.isfinite(values)]
-        if not len(values):
-            return np.zeros(0), np.zeros(0, int)
         counts, edges = np.histogram(values, bins)
-        return edges, counts
+        return (edges, counts) if len(values) else (np.zeros(0), np.zeros(0, int))
 
 
 def draw(
     study: Study, draws: int, seed: int, progress: Callable[[int, int], None] | None
 ) -> DrawnRobots:
     """Draw robots in memory; arguments as for `tolerance_analysis`."""
-    levels = np.concatenate(replicates(len(study.sources), points_of_each(draws), seed))
+    levels = drawn_levels(len(study.sources), draws, seed)
     outcomes = study.at_levels(levels, progress)
-    codes, below, above = study.counts(outcomes)
+    codes = np.bincount(outcomes.codes, minlength=len(CODES))
     accepted = outcomes.accepted.reshape(REPLICATES, -1).sum(axis=1)
-    return DrawnRobots(codes, accepted, below, above, study.drawn(levels), outcomes)
+    below, above = (part.sum(axis=0) for part in study.beyond(outcomes.values))
+    numbers = drawn_numbers(study.sources, levels)
+    return DrawnRobots(codes, accepted, below, above, numbers, outcomes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -428,7 +436,7 @@ class ToleranceTask(PieceTask):
             min(piece_rows(rows, study), each),
             robot=to_table(study.exact),
             tolerances=study.tolerances,
-            loads=study.loads,
+            loads={name: load.path.load for name, load in study.loads.items()},
             limits=[[one.name, one.load, one.step, one.lower, one.upper] for one in study.criteria],
             settings=study.settings,
             refinement=study.refinement,
@@ -457,7 +465,7 @@ class ToleranceTask(PieceTask):
         last = first + stop - start
         levels = sobol_points(len(study.sources), self.seed, first, last, each, which)
         outcomes = study.at_levels(levels)
-        _, below, above = study.counts(outcomes)
+        below, above = (part.sum(axis=0) for part in study.beyond(outcomes.values))
         solved = np.isfinite(outcomes.values).all(axis=1)
         columns = dict(zip(self.scales, np.where(solved, outcomes.values.T, np.nan), strict=True))
         counts = {"replicate": which, "below": below.tolist(), "above": above.tolist()}

@@ -4,15 +4,12 @@ from notchflex.workspaces.cloud import (
     Overlap,
     Workspace,
     hull_of,
-    overlap_documents,
     overlaps,
     save_netcdf,
-    sphere_directions,
     workspace_document,
 )
-from notchflex.workspaces.explore import largest_tensions, workspace
-from notchflex.workspaces.limits import in_python
+from notchflex.workspaces.explore import in_python, largest_tensions, workspace
 
 __all__ = ["Overlap", "Workspace", "hull_of", "in_python", "largest_tensions"]
-__all__ += ["overlap_documents", "overlaps", "save_netcdf", "sphere_directions"]
+__all__ += ["overlaps", "save_netcdf"]
 __all__ += ["workspace", "workspace_document"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.spatial import ConvexHull, Delaunay, QhullError
+from scipy.spatial import ConvexHull, Delaunay, KDTree
 
 from notchflex import InputError, Robot
 from notchflex.specification import LimitedQuantity
@@ -30,6 +30,9 @@ from notchflex.support import (
 if TYPE_CHECKING:
     from xarray import Dataset
 
+
+Points = Float[np.ndarray, "n 3"]
+States = Float[np.ndarray, " n"]
 
 # A cloud thinner than this part of its size is flat, or a curve.
 _FLAT = 1e-6
@@ -63,7 +66,7 @@ class Hull:
         return ("", "mm", "mm²", "mm³")[self.dimension]
 
 
-def hull_of(points: Float[np.ndarray, "n 3"]) -> Hull:
+def hull_of(points: Points) -> Hull:
     """Return the convex hull of points, mm."""
     origin, axes = _frame(points)
     flat = (points - origin) @ axes.T
@@ -81,7 +84,7 @@ def hull_of(points: Float[np.ndarray, "n 3"]) -> Hull:
     return Hull(dimension, size, points[places], faces, origin, axes, equations)
 
 
-def alpha_size(points: Float[np.ndarray, "n 3"], radius: float) -> float:
+def alpha_size(points: Points, radius: float) -> float:
     """Return volume (mm³) or area (mm²) of the alpha shape of points.
 
     It is the union of the simplices of their Delaunay triangulation whose circumscribed sphere is
@@ -95,10 +98,7 @@ def alpha_size(points: Float[np.ndarray, "n 3"], radius: float) -> float:
     if len(axes) < 2:
         return 0.0
     flat = (points - origin) @ axes.T
-    try:
-        simplices = flat[Delaunay(flat).simplices]
-    except QhullError:
-        return 0.0
+    simplices = flat[Delaunay(flat).simplices]
     edges = simplices[:, 1:] - simplices[:, :1]
     sizes = np.abs(np.linalg.det(edges)) / (2.0 if len(axes) == 2 else 6.0)
     is_regular = sizes > 1e-12 * sizes.max()
@@ -108,9 +108,7 @@ def alpha_size(points: Float[np.ndarray, "n 3"], radius: float) -> float:
     return float(sizes[is_regular][small].sum())
 
 
-def inside(
-    hull: Hull, points: Float[np.ndarray, "n 3"], slack: float = 1e-3
-) -> Bool[np.ndarray, " n"]:
+def inside(hull: Hull, points: Points, slack: float = 1e-3) -> Bool[np.ndarray, " n"]:
     """Return which points lie in a hull with a volume or an area.
 
     Args:
@@ -131,7 +129,7 @@ def inside(
 
 
 def _frame(
-    points: Float[np.ndarray, "n 3"],
+    points: Points,
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, "d 3"]]:
     """Return the middle of points and the axes along which they spread."""
     origin = points.mean(axis=0)
@@ -174,9 +172,9 @@ class VoxelMap:
 
 
 def voxel_map(
-    points: Float[np.ndarray, "n 3"],
-    directions: Float[np.ndarray, "n 3"],
-    values: Mapping[str, Float[np.ndarray, " n"]],
+    points: Points,
+    directions: Points,
+    values: Mapping[str, States],
     size: float,
 ) -> VoxelMap:
     """Sort states into voxels.
@@ -194,16 +192,14 @@ def voxel_map(
     dexterity = np.bincount(reached // DIRECTIONS) / DIRECTIONS
     maps: dict[str, np.ndarray] = {}
     for name, column in values.items():
-        is_finite = np.isfinite(column)
-        of_finite, finite = of_state[is_finite], column[is_finite]
+        is_finite, count = np.isfinite(column), len(occupied)
+        places, finite = of_state[is_finite], column[is_finite]
         if name == "hysteresis":
-            maps[name] = np.full(len(occupied), np.nan)
-            np.fmax.at(maps[name], of_finite, finite)
+            maps[name] = np.full(count, np.nan)
+            np.fmax.at(maps[name], places, finite)
         else:
-            count, total = (
-                np.bincount(of_finite, weights, len(occupied)) for weights in (None, finite)
-            )
-            maps[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+            with np.errstate(invalid="ignore"):  # none of 0
+                maps[name] = np.bincount(places, finite, count) / np.bincount(places, None, count)
     return VoxelMap(size, (occupied + 0.5) * size, states, dexterity, maps, of_state)
 
 
@@ -217,15 +213,9 @@ def sphere_directions() -> Float[np.ndarray, "directions 3"]:
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
 
 
-def nearest_directions(directions: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
-    """Return the nearest of the directions of the dexterity, piece by piece.
-
-    Args:
-        directions: Unit vectors.
-    """
-    sphere = sphere_directions().T
-    pieces = [directions[start : start + 65536] for start in range(0, len(directions), 65536)]
-    return np.concatenate([(one @ sphere).argmax(axis=1) for one in pieces])
+def nearest_directions(directions: Points) -> Int[np.ndarray, " n"]:
+    """Return the nearest of the directions of the dexterity to unit vectors."""
+    return np.asarray(KDTree(sphere_directions()).query(directions)[1])
 
 
 _VOXELS = 32
@@ -268,13 +258,13 @@ class Workspace(Displayed):
     failed: int
     beyond: int
     tension: Float[np.ndarray, "n t"]
-    tip: Float[np.ndarray, "n 3"]
-    direction: Float[np.ndarray, "n 3"]
+    tip: Points
+    direction: Points
     loading: Bool[np.ndarray, " n"]
-    strain: Float[np.ndarray, " n"]
-    angle: Float[np.ndarray, " n"]
-    hysteresis: Float[np.ndarray, " n"]
-    stiffness: Float[np.ndarray, " n"]
+    strain: States
+    angle: States
+    hysteresis: States
+    stiffness: States
 
     def __len__(self) -> int:
         """Number of states."""
@@ -295,7 +285,7 @@ class Workspace(Displayed):
         return np.stack([self._some.min(axis=0), self._some.max(axis=0)])
 
     @property
-    def _some(self) -> Float[np.ndarray, "n 3"]:
+    def _some(self) -> Points:
         if not len(self):
             raise InputError.NO_DATA(
                 "no state is left: none converged within the limits; give wider limits"
@@ -333,11 +323,9 @@ class Workspace(Displayed):
         """
         if size is None:
             size = self._voxel_size()
-        elif not 0.0 < check_number(size, "size", "mm") < np.inf:
-            raise InputError.OUT_OF_RANGE(f"the size of a voxel must be above 0 mm; got {size:g}")
-        elif (np.ptp(self.extent, axis=0) / size).max() > 1e6:
+        elif not 1e-6 * np.ptp(self.extent) < check_number(size, "size", "mm") < np.inf:
             raise InputError.OUT_OF_RANGE(
-                f"voxels of {size:g} mm are more than a million along a side; give a larger size"
+                f"a voxel must have a size above 0 mm, at most a million along a side; got {size:g}"
             )
         values = {
             "tension": self.tension.max(axis=1),
@@ -434,28 +422,26 @@ def overlaps(found: Mapping[str, Workspace]) -> list[Overlap]:
     """
     if empty := [label for label, one in found.items() if not len(one)]:
         raise InputError.NO_DATA(f"{empty[0]}: no state is left within the limits")
-    pairs = combinations(found.items(), 2)
-    return [_overlap(first, second, a, b) for (first, a), (second, b) in pairs]
+    compared: list[Overlap] = []
+    for (first, a), (second, b) in combinations(found.items(), 2):
+        size = max(float(np.ptp(one.extent, axis=0).max()) for one in (a, b)) / _VOXELS
+        cells = (np.unique(np.floor(one.tip / size), axis=0).tolist() for one in (a, b))
+        in_a, in_b = (set(map(tuple, each)) for each in cells)
+        overlap = Overlap(
+            first,
+            second,
+            size,
+            both=len(in_a & in_b),
+            first_alone=len(in_a - in_b),
+            second_alone=len(in_b - in_a),
+            first_in_second=float(inside(b.hull, a.tip).mean()),
+            second_in_first=float(inside(a.hull, b.tip).mean()),
+        )
+        compared.append(overlap)
+    return compared
 
 
-def _overlap(first: str, second: str, a: Workspace, b: Workspace) -> Overlap:
-    size = max(float(np.ptp(one.extent, axis=0).max()) for one in (a, b)) / _VOXELS
-    in_a, in_b = (
-        set(map(tuple, np.unique(np.floor(one.tip / size), axis=0).tolist())) for one in (a, b)
-    )
-    return Overlap(
-        first,
-        second,
-        size,
-        both=len(in_a & in_b),
-        first_alone=len(in_a - in_b),
-        second_alone=len(in_b - in_a),
-        first_in_second=float(inside(b.hull, a.tip).mean()),
-        second_in_first=float(inside(a.hull, b.tip).mean()),
-    )
-
-
-_PARTS = (0.05, 0.5, 0.95, 1.0)
+_PARTS = {"p5": 0.05, "p50": 0.5, "p95": 0.95, "largest": 1.0}
 
 
 def workspace_document(explored: Workspace) -> dict[str, Any]:
@@ -495,16 +481,8 @@ def workspace_document(explored: Workspace) -> dict[str, Any]:
 
 def _spread(values: np.ndarray) -> dict[str, float | None]:
     finite = values[np.isfinite(values)]
-    if not len(finite):
-        return dict.fromkeys(("p5", "p50", "p95", "largest"))
-    return dict(
-        zip(("p5", "p50", "p95", "largest"), np.quantile(finite, _PARTS).tolist(), strict=True)
-    )
-
-
-def overlap_documents(overlaps: Sequence[Overlap]) -> list[dict[str, Any]]:
-    """Return comparisons as plain values."""
-    return [vars(one) for one in overlaps]
+    parts = np.quantile(finite, list(_PARTS.values())).tolist() if len(finite) else [None] * 4
+    return dict(zip(_PARTS, parts, strict=True))
 
 
 def save_netcdf(workspaces: Mapping[str, Workspace], target: str) -> None:

@@ -7,6 +7,7 @@ pulled at a time: what more would add is pressed together, not moved.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -34,17 +35,22 @@ from notchflex.pieces import (
     piece_file,
     sobol_points,
 )
-from notchflex.specification import LimitedQuantity
+from notchflex.specification import (
+    LimitedQuantity,
+    check_quantity,
+    coded,
+    made,
+    placed,
+    whole,
+)
 from notchflex.support import (
     ExternalLoad,
-    check_integer,
     check_is_robot,
     check_number,
     short_repr,
     to_table,
 )
 from notchflex.workspaces.cloud import Workspace, hull_of, nearest_directions
-from notchflex.workspaces.limits import all_hold, limits_of
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -68,6 +74,8 @@ _FINE = 64
 
 _Columns = dict[str, Any]
 """States as columns: arrays by the names of the attributes of `Workspace`."""
+_Counts = Int[np.ndarray, " 3"]
+"""How many states are kept, break a limit or follow one that does, and did not converge."""
 _SHAPES = ("tension", "tip", "direction")
 """Columns that hold several numbers of a state, which have columns of their own in files."""
 
@@ -89,23 +97,54 @@ def largest_tensions(robot: Robot, tension: ArrayLike | None) -> Float[np.ndarra
                 "pull; give the largest tension"
             )
         return np.full(tendons, closed.max())
-    try:
-        values = np.array(tension, float)
-    except (TypeError, ValueError):
-        raise InputError.WRONG_TYPE(
-            f"tension must be a number of N, or one per tendon; got {short_repr(tension)}"
-        ) from None
-    if values.shape not in ((), (tendons,)):
+    values = LoadPath([np.atleast_1d(tension)]).tension[0]  # pyright: ignore[reportArgumentType]
+    if len(values) not in (1, tendons):
         raise InputError.WRONG_SHAPE(
             f"tension must be one number or {tendons}, one per tendon; got {short_repr(tension)}"
         )
-    if not np.isfinite(values).all():
-        raise InputError.NOT_FINITE(f"tension must be finite, N; got {short_repr(tension)}")
-    if (values < 0.0).any() or not (values > 0.0).any():
+    if not (values >= 0.0).all() or not values.any():
         raise InputError.OUT_OF_RANGE(
             f"a tendon only pulls: give a largest tension above 0 N; got {short_repr(tension)}"
         )
     return np.broadcast_to(values, tendons).copy()
+
+
+def limits_of(given: Mapping[str, object] | None) -> tuple[LimitedQuantity, ...]:
+    """Check limits.
+
+    Args:
+        given: By name of a quantity its largest value, or its smallest and largest as a pair with
+            None for none.
+
+    Raises:
+        InputError: No such quantity, a bound that is not a number, or bounds that are reversed.
+    """
+    if given is not None and not isinstance(given, Mapping):  # pyright: ignore
+        raise InputError.WRONG_TYPE(
+            'limits are given by quantity, such as {"peak_strain": 0.08, "gap": (0.0, None)}; '
+            f"got {short_repr(given)}"
+        )
+    return tuple(_limit(name, bounds) for name, bounds in (given or {}).items())
+
+
+def _limit(name: str, bounds: Any) -> LimitedQuantity:
+    with placed(f"the limit of {name}"):
+        pair = bounds if isinstance(bounds, tuple | list) else (None, bounds)
+        ends = [None if end in (math.inf, -math.inf) else end for end in pair]
+        if len(ends) != 2 or ends == [None, None]:
+            raise InputError.WRONG_SHAPE(
+                f"give its largest value, or the smallest and the largest; got {short_repr(bounds)}"
+            )
+        keys = ("quantity", "lower", "upper")
+        limit = made(LimitedQuantity, dict(zip(keys, (name, *ends), strict=True)), coded)
+        check_quantity(limit)
+    return limit
+
+
+def in_python(given: Mapping[str, object]) -> dict[str, tuple[float | None, float | None]]:
+    """Return limits in the units of files (deg) in those inside Python (rad)."""
+    limits = (limit.in_python for limit in limits_of(given))
+    return {limit.quantity: (limit.lower, limit.upper) for limit in limits}
 
 
 def rays(
@@ -217,14 +256,11 @@ class WorkspaceTask(PieceTask):
         side = float(np.ptp(tips, axis=0).max()) if len(tips) else 1.0
         return max(side, 1e-6) / _FINE
 
-    def states(
-        self, start: int, stop: int, total: int | None = None
-    ) -> tuple[_Columns, Int[np.ndarray, " 3"]]:
+    def states(self, start: int, stop: int, total: int | None = None) -> tuple[_Columns, _Counts]:
         """Solve the rays from `start` to `stop` (not included) of a sequence.
 
         Returns:
-            The states that are kept; how many are kept, break a limit or follow one that does, and
-            did not converge.
+            The states that are kept, and counts.
         """
 
         def points(dimension: int) -> Float[np.ndarray, "r d"]:
@@ -277,7 +313,12 @@ class WorkspaceTask(PieceTask):
             settings=_SETTINGS,
             cores=self.cores,
         )
-        return outputs, all_hold(self.limits, outputs)
+        within = np.asarray(outputs["converged"], bool)
+        for limit in self.limits:
+            values, (low, high) = outputs[limit.quantity], limit.ends
+            outside = (values < low) | (values > high)  # NaN marks a missing entry
+            within = within & ~outside.reshape(*within.shape, -1).any(axis=-1)
+        return outputs, within
 
     def piece(self, number: int) -> tuple[DataFrame, dict[str, Any]]:
         """Solve the rays of one piece, and thin their states."""
@@ -294,6 +335,10 @@ class WorkspaceTask(PieceTask):
             for place, values in enumerate(vectors.T, start=1):
                 columns[f"{name}_{place}"] = np.ascontiguousarray(values)
         return polars.DataFrame(columns), {"codes": [*counts.tolist(), 0]}
+
+
+def _joined(pieces: Sequence[_Columns]) -> _Columns:
+    return {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[-1]}
 
 
 def _thinned(columns: _Columns, size: float) -> _Columns:
@@ -314,13 +359,17 @@ def _thinned(columns: _Columns, size: float) -> _Columns:
 
 def _explored_in_pieces(
     task: WorkspaceTask, folder: PieceFolder, cores: int | None, progress: Progress
-) -> tuple[_Columns, Int[np.ndarray, " 3"]]:
+) -> tuple[_Columns, _Counts]:
     """Solve rays in pieces, and join the states that are kept; returns as `states` of the task."""
     import polars
 
     assert task.voxel  # all threads need it
-    folder.run(task, cores=cores, progress=lambda done, total, *_: progress(done, total))
-    counts, joined = np.zeros(3, int), {}
+
+    def report(done: int, total: int, *_: int) -> None:
+        progress(done // _STATES, total // _STATES)
+
+    folder.run(task, cores=cores, progress=report)
+    counts, joined = np.zeros(3, int), dict[str, Any]()
     for head in heads(folder.directory, task.manifest, range(task.manifest.pieces)):
         counts += head["codes"][:3]
         frame = polars.read_parquet(piece_file(folder.directory, head["piece"]))
@@ -330,9 +379,7 @@ def _explored_in_pieces(
             else frame[name].to_numpy()
             for name in (*_SHAPES, "loading", "strain", "angle", "hysteresis", "corner")
         }
-        if joined:
-            columns = {name: np.concatenate([joined[name], columns[name]]) for name in columns}
-        joined = _thinned(columns, task.voxel)
+        joined = _thinned(_joined([joined, columns] if joined else [columns]), task.voxel)
     del joined["corner"]
     return joined, counts
 
@@ -426,37 +473,30 @@ def workspace(
     """
     checked = limits_of(limits)
     largest = largest_tensions(check_is_robot(robot), tension)
-    most = _MAX_STATES if folder is None else _MAX_IN_PIECES
-    if not _STATES <= check_integer(states, "states") <= most:
-        more = ", or more in pieces (give a folder)" if folder is None else ""
-        raise InputError.OUT_OF_RANGE(
-            f"states must be from {_STATES} to {most:,}{more}; got {states}"
-        )
+    whole(states, "states", _STATES, _MAX_STATES if folder is None else _MAX_IN_PIECES)
     if not 0.0 <= check_number(pretension, "pretension") < largest.max():
         raise InputError.OUT_OF_RANGE(
             "pretension must be 0 N or more and below the largest tension, "
             f"{largest.max():g} N; got {pretension:g}"
         )
-    if not 0 <= check_integer(stiffness, "stiffness") <= _MAX_STIFFNESS:
-        raise InputError.OUT_OF_RANGE(
-            f"stiffness is a number of states from 0 to {_MAX_STIFFNESS}; got {stiffness}"
-        )
-    if check_integer(seed, "seed") < 0:
-        raise InputError.OUT_OF_RANGE(f"seed must be 0 or more; got {seed}")
+    whole(stiffness, "stiffness", 0, _MAX_STIFFNESS)
+    whole(seed, "seed", 0, 2**63 - 1)
     load = ExternalLoad() if load is None else load
     if not isinstance(load, ExternalLoad):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InputError.WRONG_TYPE(
             f"load must be a notchflex.Load with external loads; got {short_repr(load)}"
         )
     number = -(-states // _STATES)
-
-    def report(done: int, total: int) -> None:
-        if progress is not None:
-            progress(done // _STATES, total // _STATES)
-
+    report: Progress = progress or (lambda done, total: None)
     task = WorkspaceTask(robot, checked, load, largest, number, pretension, seed, cores)
     if folder is None:
-        columns, counts = _explored(task, report)
+        pieces: list[tuple[_Columns, _Counts]] = []
+        for start in range(0, number, _PIECE):
+            stop = min(start + _PIECE, number)
+            pieces.append(task.states(start, stop))
+            report(stop, number)
+        columns = _joined([piece for piece, _ in pieces])
+        counts = np.sum([counts for _, counts in pieces], axis=0)
     else:
         task = replace(task, cores=1)
         columns, counts = _explored_in_pieces(task, PieceFolder.of(folder), cores, report)
@@ -466,14 +506,3 @@ def workspace(
         robot, checked, load, largest, tried, failed, beyond, **columns, stiffness=unknown
     )
     return with_stiffness(explored, stiffness)
-
-
-def _explored(task: WorkspaceTask, progress: Progress) -> tuple[_Columns, Int[np.ndarray, " 3"]]:
-    """Solve rays piece by piece, and join their states; returns as `states` of the task."""
-    pieces: list[tuple[_Columns, Int[np.ndarray, " 3"]]] = []
-    for start in range(0, task.number, _PIECE):
-        stop = min(start + _PIECE, task.number)
-        pieces.append(task.states(start, stop))
-        progress(_STATES * stop, _STATES * task.number)
-    columns = {name: np.concatenate([piece[name] for piece, _ in pieces]) for name in pieces[0][0]}
-    return columns, np.sum([counts for _, counts in pieces], axis=0)

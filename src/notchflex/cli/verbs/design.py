@@ -38,9 +38,9 @@ def design(
         grid: Step of all lengths that are chosen [mm], such as 0.005; the numbers are those of the
             robot on this grid.
     """
-    from notchflex.designing.result import file_names
+    from notchflex.designing import FILES
 
-    outputs.check([spec], folder=("-o", output, file_names()))
+    outputs.check([spec], folder=("-o", output, FILES))
     with terminal.progress("loading the solver"):
         import notchflex.designing as designing
     if front and (grid or robust):
@@ -52,14 +52,14 @@ def design(
         with terminal.progress("spreading over the front") as progress:
             points = designing.design_front(spec, progress=progress)
         if output is not None:
-            terminal.note_written(designing.write_front(points, output, inputs=[spec]))
+            terminal.note_written(points.save(output, inputs=[spec]))
         outputs.write(points, _front_document, _print_front)
         reason = points.reason
     else:
         with terminal.progress("ranking robots") as progress:
             result = designing.design(spec, robust=robust, grid=grid, progress=progress)
         if output is not None:
-            terminal.note_written(designing.write_design(result, output, inputs=[spec]))
+            terminal.note_written(result.save(output, inputs=[spec]))
         outputs.write(result, designing.design_document, _print)
         reason = "" if result.converged else result.reason
     return terminal.failed(f"{reason}.") if reason else DONE
@@ -79,8 +79,7 @@ def _print_front(front: DesignFront) -> None:
 
 
 def _print(design: Design) -> None:
-    from notchflex.designing import design_document
-    from notchflex.designing.result import numbers
+    from notchflex.designing import design_document, numbers
 
     document = design_document(design)
     wishes = [

@@ -54,7 +54,7 @@ def schema(*, design: bool = False, sweep: bool = False) -> None:
 
         document = plan_schema()
     elif design:
-        from notchflex.designing.specification import design_schema
+        from notchflex.designing import design_schema
 
         document = design_schema()
     else:

@@ -148,13 +148,13 @@ def workspace(
 
 def _write(explored: Mapping[str, Workspace], outputs: WorkspaceOutputs) -> None:
     from notchflex.workspaces import (
-        overlap_documents,
         overlaps,
         save_netcdf,
         workspace_document,
     )
 
-    compared = overlap_documents(overlaps(explored) if all(map(len, explored.values())) else [])
+    pairs = overlaps(explored) if all(map(len, explored.values())) else []
+    compared = [vars(overlap) for overlap in pairs]
     documents = {label: workspace_document(each) for label, each in explored.items()}
     (_, alone), *others = documents.items()
     more = {"beside": dict(others), "overlaps": compared} if others else {}

@@ -1,1 +1,0 @@
-"""Robots and states as a function of the variables of a design, with exact derivatives."""
