@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
@@ -14,7 +14,7 @@ from notchflex.plotting import BLUE, GREEN, ORANGE
 from notchflex.sensing import SensedForce, SensorNoise, sense
 from notchflex.viewer.colours import add_arrows, rgb
 from notchflex.viewer.controls import POINTING, ControlRanges, Controls
-from notchflex.viewer.session import LoopHistory, Session
+from notchflex.viewer.session import Session, Step
 from notchflex.workspaces import Workspace, workspace
 
 _POINT = 0.004  # size of a point of the cloud, in lengths of the robot
@@ -211,9 +211,10 @@ def turning_points(rows: Float[np.ndarray, "s k"]) -> Int[np.ndarray, " r"]:
     return np.append(turns, len(rows) - 1)
 
 
-def read(history: LoopHistory) -> tuple[Float[np.ndarray, "r t"], Float[np.ndarray, "r t"]]:
+def read(history: Sequence[Step]) -> tuple[Float[np.ndarray, "r t"], Float[np.ndarray, "r t"]]:
     """Return tensions (N) and strokes (mm) of a history, where its loads turn round."""
-    tension, stroke = np.array(history.tension), np.array(history.stroke)
+    tension = np.array([step.tension for step in history])
+    stroke = np.array([step.stroke for step in history])
     if len(tension) < 2:
         return tension[:0], stroke[:0]
     # Between turns tendons and force change in proportion, as `sense` takes them to.

@@ -11,7 +11,7 @@ from notchflex import Robot
 from notchflex.plotting import BLUE, COLOUR, VERMILLION, Curve, Mark, Panel, branches, dots
 from notchflex.support import QUANTITIES
 from notchflex.viewer.colours import BEYOND, STRAIN, TENDON, contact_colours, legend
-from notchflex.viewer.session import Session
+from notchflex.viewer.session import Session, hysteresis
 
 _BEFORE, _NOW = "#b5b5b5", "#111111"
 _MAX_CLOSED = 8  # numbers of closed notches in one line
@@ -35,10 +35,10 @@ def loop(session: Session, tendon: int) -> Panel:
     by = session.controls.by[tendon]
     units = [1.0, QUANTITIES["total_angle"].scale]
     items: list[Mark] = []
-    if session.before is not None:
-        points = session.before.loop(tendon, by) * units
+    if session.before:
+        points = hysteresis(session.before, tendon, by) * units
         items.append(Curve(points, _BEFORE, name="before the change"))
-    points = session.history.loop(tendon, by) * units
+    points = hysteresis(session.history, tendon, by) * units
     for part, way in branches(points[:, 0]) if len(points) > 1 else ():
         items.append(Curve(points[part], COLOUR[way], name=way))
     items.append(dots(points[-1:], _NOW, 6.0, name="now"))
