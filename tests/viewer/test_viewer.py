@@ -94,7 +94,6 @@ def test_a_law_that_is_refused_leaves_the_law_before_on_the_page_too(start, monk
     viewer.ask(lambda: viewer.set(0, 0.5, "tension"))
     wait(lambda: reached(viewer, 0.5))
     robot, angle = viewer.session.robot, float(viewer.session.state.total_angle)
-    kind = viewer.page.parts["friction"].kind
     kind = viewer.page.laws[0]
     law = kind.handle
 

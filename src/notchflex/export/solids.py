@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.spatial.transform import Rotation, Slerp
 
 from notchflex import EquilibriumPath, InputError, Robot, RobotShape, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
@@ -199,13 +198,6 @@ class Zone(NamedTuple):
     direction: Points
     places: Points
     poses: Points
-
-    def pose_at(self, height: float) -> Points:
-        """Return rotation and displacement at a height of a spine, between two sections [mm]."""
-        between = Slerp(self.places, Rotation.from_matrix(self.poses[..., :3]))
-        turn = between(np.clip(height, self.places[0], self.places[-1])).as_matrix()
-        middle = np.array([[0.0, 0.0, height]])
-        return np.column_stack([turn, self.moved(middle)[0] - turn @ middle[0]])
 
     def moved(self, points: Points) -> Points:
         """Return points of the zone where they are in the state [mm], (v, 3)."""
