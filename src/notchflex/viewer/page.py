@@ -372,19 +372,18 @@ class Page:
         self._charted.put(str(tendon + 1))
         self.update()
 
-    def update(self, charts: bool = True) -> None:
-        """Update numbers, controls and notice, and charts: a browser takes long to draw them."""
+    def update(self) -> None:
+        """Update numbers, charts, controls and notice."""
         session = self.viewer.session
         self._readout.content = readout(session)
-        if charts:
-            self._loop.figure = chart_of(loop(session, self.active))
-            self._along.figure = chart_of(along_tendon(session, self.active))
+        self._loop.figure = chart_of(loop(session, self.active))
+        self._along.figure = chart_of(along_tendon(session, self.active))
         self.follow()
 
     def follow(self) -> None:
         """Update controls and notice."""
         viewer = self.viewer
-        self._notice.content = notice(viewer.message or viewer.note)
+        self._notice.content = notice(viewer.message)
         for follow in self._follow:
             follow()
 
