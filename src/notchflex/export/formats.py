@@ -234,19 +234,26 @@ class Format:
 
 _EZDXF, _MATPLOTLIB = ("ezdxf", "export"), ("matplotlib", "plot")
 _MANIFOLD, _TRIMESH = ("manifold3d", "export"), ("trimesh", "export")
+_SHAPELY = ("shapely", "export")
 _BUILD123D = ("build123d", "cad")
 
 FORMATS: dict[str, Format] = {
     "dxf": Format(
-        "flat pattern for the laser", (".dxf",), "drawing:dxf_pattern", PatternOptions, (_EZDXF,)
+        "flat pattern for the laser",
+        (".dxf",),
+        "drawing:dxf_pattern",
+        PatternOptions,
+        (_EZDXF, _SHAPELY),
     ),
-    "svg": Format("flat pattern at full size", (".svg",), "drawing:svg_pattern", PatternOptions),
+    "svg": Format(
+        "flat pattern at full size", (".svg",), "drawing:svg_pattern", PatternOptions, (_SHAPELY,)
+    ),
     "pdf": Format(
         "sheet with the pattern, a table of the cuts and a dimensioned drawing",
         (".pdf",),
         "sheet:pattern_sheet",
         PatternOptions,
-        (_MATPLOTLIB,),
+        (_MATPLOTLIB, _SHAPELY),
     ),
     "stl": Format(
         "solid as triangles",

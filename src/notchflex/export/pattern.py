@@ -15,9 +15,6 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from notchflex import InputError, Robot, Tube
 from notchflex.export.cuts import PlacedCut, angle_at, cuts_of, naming
 from notchflex.export.formats import PatternOptions, Subject
@@ -134,10 +131,6 @@ def _without_straight(points: Sequence[Point]) -> list[Point]:
     return [point for point, *ends in neighbours if _distance(point, *ends) > _STRAIGHT]
 
 
-Outline = NDArray[np.complex128]
-"""Corners of a closed line, x + i y [mm]."""
-
-
 class Web(NamedTuple):
     """The thinnest material.
 
@@ -161,47 +154,20 @@ def smallest_web(
         start: Where the tube is cut off [mm].
         end: Where it ends at the tip [mm].
     """
-    outlines = {name: np.array(edge) @ [1.0, 1.0j] for name, edge in edges.items()}
-    webs = [Web(line.real.min() - start, (name, "cut-off")) for name, line in outlines.items()]
-    webs += [Web(end - line.real.max(), (name, "tip")) for name, line in outlines.items()]
+    from shapely import Polygon
+    from shapely.affinity import translate
+
+    cuts = {name: Polygon(edge) for name, edge in edges.items()}
+    webs = [Web(cut.bounds[0] - start, (name, "cut-off")) for name, cut in cuts.items()]
+    webs += [Web(end - cut.bounds[2], (name, "tip")) for name, cut in cuts.items()]
     best = min(webs, key=lambda web: web.width)
-    for (name, line), (second, neighbour) in combinations_with_replacement(outlines.items(), 2):
-        if line.real.min() - neighbour.real.max() >= best.width:
+    for (name, cut), (second, neighbour) in combinations_with_replacement(cuts.items(), 2):
+        if cut.bounds[0] - neighbour.bounds[2] >= best.width:
             continue  # they lie farther apart along the tube
         for turn in (1,) if name == second else (-1, 0, 1):
-            web = Web(_gap(line, neighbour + 1j * turn * around), (name, second))
-            best = min(best, web, key=lambda web: web.width)
+            width = cut.distance(translate(neighbour, yoff=turn * around))
+            best = min(best, Web(width, (name, second)), key=lambda web: web.width)
     return best
-
-
-def _gap(line: Outline, other: Outline) -> float:
-    """Return the distance of two outlines, 0 where they cross or one holds the other."""
-    start, step = line[:, None], (np.roll(line, -1) - line)[:, None]
-    first, way = other, np.roll(other, -1) - other
-
-    def sides(points: Outline, begin: Outline, along: Outline) -> NDArray[np.float64]:
-        return (np.conj(along) * (points - begin)).imag
-
-    beside = sides(first, start, step) * sides(first + way, start, step)
-    across = sides(start, first, way) * sides(start + step, first, way)
-    if ((beside < 0.0) & (across < 0.0)).any() or _holds(line, other[0]) or _holds(other, line[0]):
-        return 0.0
-    # Two closed lines that do not cross are nearest at a corner of one.
-    return min(_to_line(line, other), _to_line(other, line))
-
-
-def _to_line(points: Outline, line: Outline) -> float:
-    """Return the least distance of points from a closed line."""
-    step, away = np.roll(line, -1) - line, points[:, None] - line
-    part = np.clip((away * np.conj(step)).real / np.abs(step) ** 2, 0.0, 1.0)
-    return float(np.abs(away - part * step).min())
-
-
-def _holds(line: Outline, point: complex) -> bool:
-    """Whether a closed line runs round a point: seen from there it turns once."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turns = np.angle((np.roll(line, -1) - point) / (line - point))
-    return bool(abs(turns.sum()) > 1.5 * math.pi)
 
 
 @dataclass(frozen=True)

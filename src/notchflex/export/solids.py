@@ -297,16 +297,21 @@ def _zone(rest: RobotShape, bent: RobotShape, cuts: RobotCuts, notch: int) -> Zo
     return Zone(cut.end, cuts.cuts[first + 1].start, direction, places, poses[kept])
 
 
-def bent_solid(straight: Manifold, motion: DeformationMap) -> Manifold:
+def bent_solid(straight: Manifold, motion: DeformationMap, cuts: RobotCuts) -> Manifold:
     """Bend the straight solid of a robot.
 
-    Its edges are refined to the length of a piece of a flexure. Lengths of tube between flexures,
-    which stay straight, are shortened meanwhile, so that they get few triangles.
+    Its edges are refined to the length of a piece of a flexure. Lengths of tube without cuts, which
+    stay straight, are shortened meanwhile, so that they get few triangles.
     """
     length = min(float(np.ptp(zone.places)) for zone in motion.zones) / _STEPS
     box = straight.bounding_box()
-    zones = [end for zone in motion.zones for end in (zone.start, zone.end)]
-    whole = np.array([box[2] - 1.0, *zones, box[5]])  # from below the tube: a zone may start there
+    knots = [box[2] - 1.0]  # below the tube: a cut may start at its very end
+    for cut in sorted(cuts.cuts, key=lambda cut: cut.start):
+        if cut.start > knots[-1]:
+            knots += [cut.start, cut.end]
+        else:  # it overlaps along the tube with the one before
+            knots[-1] = max(knots[-1], cut.end)
+    whole = np.array([*knots, box[5]])
     steps = np.diff(whole)
     steps[::2] = np.minimum(steps[::2], 2.0 * length)
     short = whole[0] + np.append(0.0, np.cumsum(steps))
@@ -394,7 +399,7 @@ def stl_solid(subject: Subject, options: SolidOptions) -> Document:
     check_one_piece(len(solid.decompose()))
     warnings = cuts.warnings
     if bent:
-        solid = bent_solid(solid, DeformationMap(subject, cuts))
+        solid = bent_solid(solid, DeformationMap(subject, cuts), cuts)
         if not robot.geometry.has_spine.all():
             warnings += (
                 "the model's strips overlap with the walls that they turn into; in the bent solid "
