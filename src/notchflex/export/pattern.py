@@ -53,6 +53,8 @@ def unrolled(
     Raises:
         InputError: The kerf or the radius does not fit the cut.
     """
+    from shapely import LinearRing
+
     # In the plane of a radial cut, height is minus the arc length from the middle of the cut.
     corners = cut.corners
     if cut.radial:
@@ -68,7 +70,9 @@ def unrolled(
     curves = [_on_surface(piece, cut.radial, radius) for piece in pieces(corners, radii, inside)]
     half = [point for curve in curves for point in _flattened(curve, chord)] + [curves[-1](1.0)]
     # `half` has positive y and goes toward the tip, which is clockwise.
-    return _without_straight([*reversed(half), *((x, -y) for x, y in half)])
+    whole = LinearRing([*reversed(half), *((x, -y) for x, y in half)])
+    corners = whole.simplify(_STRAIGHT, preserve_topology=False).coords[:-1]
+    return [(x, y) for x, y in corners]
 
 
 def _on_surface(piece: Line | Arc, radial: bool, radius: float) -> Curve:
@@ -117,18 +121,6 @@ def _distance(point: Point, start: Point, end: Point) -> float:
         return math.dist(point, start)
     (x, y), (u, v) = start, end
     return abs((u - x) * (point[1] - y) - (v - y) * (point[0] - x)) / length
-
-
-def _without_straight(points: Sequence[Point]) -> list[Point]:
-    """Leave out corners of a closed line that are none, and points that stand twice."""
-    kept: list[Point] = []
-    for point in points:
-        if not kept or math.dist(point, kept[-1]) > _STRAIGHT:
-            kept.append(point)
-    while math.dist(kept[0], kept[-1]) <= _STRAIGHT:
-        kept.pop()
-    neighbours = zip(kept, [kept[-1], *kept], [*kept[1:], kept[0]], strict=False)
-    return [point for point, *ends in neighbours if _distance(point, *ends) > _STRAIGHT]
 
 
 class Web(NamedTuple):
@@ -317,20 +309,14 @@ def _split(whole: Sequence[Point], low: float, high: float) -> list[Sequence[Poi
     """Split a closed outline at the seam; the part beyond it comes in on the other side."""
     if all(low - _EPSILON <= y <= high + _EPSILON for _, y in whole):
         return [whole]
-    around = high - low
-    above = [(x, y - around) for x, y in _clipped(whole, high, 1.0)]
-    below = [(x, y + around) for x, y in _clipped(whole, low, -1.0)]
-    inside = _clipped(_clipped(whole, low, 1.0), high, -1.0)
-    return [part for part in (inside, above, below) if part]
+    from shapely import Polygon, box, get_parts
+    from shapely.affinity import translate
+    from shapely.geometry.polygon import orient
 
-
-def _clipped(points: Sequence[Point], level: float, side: float) -> list[Point]:
-    """Return the part of a closed outline above a level of y (side 1) or below it (side -1)."""
-    kept: list[Point] = []
-    for (x, y), (u, v) in zip(points, [*points[1:], points[0]], strict=True):
-        begin, end = side * (y - level), side * (v - level)
-        if begin >= 0.0:
-            kept.append((x, y))
-        if begin * end < 0.0:
-            kept.append((x + begin / (begin - end) * (u - x), level))
-    return kept if any(side * (y - level) > _EPSILON for _, y in kept) else []
+    outline = Polygon(whole)
+    start, _, end, _ = outline.bounds
+    tube = box(start - 1.0, low, end + 1.0, high)
+    turned = (translate(outline, yoff=turn * (high - low)) for turn in (0, -1, 1))
+    parts = [part for outline in turned for part in get_parts(outline & tube)]
+    rings = (orient(part).exterior.coords[:-1] for part in parts if part.area > _EPSILON)
+    return [[(x, y) for x, y in ring] for ring in rings]
