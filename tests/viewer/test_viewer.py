@@ -169,3 +169,12 @@ def test_what_is_done_again_can_be_stopped(start):
     assert "stopped after step 2" in viewer.message
     assert len(viewer.session.history) == 2 < count
     assert not viewer.interrupted.is_set()
+
+
+def test_fields_take_decimals_whatever_their_first_value(start):
+    """A field that began at 3 N made 37 of 3.7 mm."""
+    viewer = start(nf.load_robot("pacheco2021-a"))
+    handles = viewer.server.gui._gui_input_handle_from_uuid.values()
+    fields = {handle.label: handle for handle in handles if hasattr(handle, "precision")}
+    assert fields["slider to"].value == 3.0
+    assert all(fields[label].precision > 5 for label in ("slider to", "μ"))
