@@ -284,6 +284,16 @@ FORMATS: dict[str, Format] = {
 """Name of a format, which is also that of its option, to what writes it."""
 
 
+def plain(text: str) -> str:
+    """Return a text in one line, without characters that no file takes."""
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+def plain_name(robot: Robot) -> str:
+    """Return the name of a robot as `plain` text."""
+    return plain(robot.name) or "robot"
+
+
 def format_of(file: str) -> str:
     """Return the name of the format that a file has by its suffix.
 

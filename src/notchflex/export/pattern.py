@@ -15,6 +15,10 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
+from shapely import LinearRing, Polygon, box, get_parts
+from shapely.affinity import translate
+from shapely.geometry.polygon import orient
+
 from notchflex import InputError, Robot, Tube
 from notchflex.export.cuts import PlacedCut, angle_at, cuts_of, naming
 from notchflex.export.formats import PatternOptions, Subject
@@ -53,8 +57,6 @@ def unrolled(
     Raises:
         InputError: The kerf or the radius does not fit the cut.
     """
-    from shapely import LinearRing
-
     # In the plane of a radial cut, height is minus the arc length from the middle of the cut.
     corners = cut.corners
     if cut.radial:
@@ -146,9 +148,6 @@ def smallest_web(
         start: Where the tube is cut off [mm].
         end: Where it ends at the tip [mm].
     """
-    from shapely import Polygon
-    from shapely.affinity import translate
-
     cuts = {name: Polygon(edge) for name, edge in edges.items()}
     webs = [Web(cut.bounds[0] - start, (name, "cut-off")) for name, cut in cuts.items()]
     webs += [Web(end - cut.bounds[2], (name, "tip")) for name, cut in cuts.items()]
@@ -179,8 +178,8 @@ class PatternCut:
     @property
     def middle(self) -> Point:
         """The middle of its box, where its number is written."""
-        xs, ys = zip(*self.outlines[0], strict=True)
-        return 0.5 * (min(xs) + max(xs)), 0.5 * (min(ys) + max(ys))
+        left, low, right, high = LinearRing(self.outlines[0]).bounds
+        return 0.5 * (left + right), 0.5 * (low + high)
 
 
 @dataclass(frozen=True)
@@ -229,7 +228,7 @@ class FlatPattern:
             "stock_diameters_mm": [self.tube.outer_diameter, self.tube.inner_diameter],
             "cuts": len(self.cuts),
             "cut_order_notches": [cut.placed.notch for cut in self.cuts],
-            "cut_length_mm": sum(sum(map(math.dist, [*x[1:], x[0]], x)) for x in lines),
+            "cut_length_mm": sum(LinearRing(line).length for line in lines),
             "tip_mm": self.end,
             "cut_off_mm": self.start,
             "thinnest_web_mm": self.web.width,
@@ -309,10 +308,6 @@ def _split(whole: Sequence[Point], low: float, high: float) -> list[Sequence[Poi
     """Split a closed outline at the seam; the part beyond it comes in on the other side."""
     if all(low - _EPSILON <= y <= high + _EPSILON for _, y in whole):
         return [whole]
-    from shapely import Polygon, box, get_parts
-    from shapely.affinity import translate
-    from shapely.geometry.polygon import orient
-
     outline = Polygon(whole)
     start, _, end, _ = outline.bounds
     tube = box(start - 1.0, low, end + 1.0, high)

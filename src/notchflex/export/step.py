@@ -15,8 +15,7 @@ import numpy as np
 
 from notchflex import InputError, Robot, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
-from notchflex.export.drawing import plain_name
-from notchflex.export.formats import Document, SolidOptions, Subject
+from notchflex.export.formats import Document, SolidOptions, Subject, plain_name
 from notchflex.export.solids import (
     REACH,
     DeformationMap,
