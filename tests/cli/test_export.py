@@ -113,6 +113,7 @@ def test_the_robot_file_is_not_replaced(call, tmp_path):
     ("option", "package", "extra"),
     [
         ("--dxf", "ezdxf", "export"),
+        ("--svg", "shapely", "export"),
         ("--stl", "manifold3d", "export"),
         ("--step", "build123d", "cad"),
     ],

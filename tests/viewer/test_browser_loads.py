@@ -140,7 +140,7 @@ def test_a_new_number_is_obeyed_at_once_whatever_the_robot_was_on_its_way_to(vis
     )
     visit.type(TENSION, f"{0.1 * end:g}")
     visit.wait_for("tension_1", f"{0.1 * end:.3f}")
-    most = max(values[0] for values in visit.viewer.session.history.tension)
+    most = max(step.tension[0] for step in visit.viewer.session.history)
     assert most < 0.9 * end
 
 
@@ -149,7 +149,7 @@ def test_typing_slowly_does_not_pass_the_numbers_that_are_typed_on_the_way(visit
     visit.set_tension(0.8 * end)
     wanted = round(0.7 * end, 1)  # 2.1 and 10.5 begin with 2 and 1, which are below
     visit.set(TENSION, wanted, delay=120)
-    tension = [values[0] for values in visit.viewer.session.history.tension]
+    tension = [step.tension[0] for step in visit.viewer.session.history]
     after = tension[tension.index(max(tension)) :]
     assert min(after) == pytest.approx(wanted)
 

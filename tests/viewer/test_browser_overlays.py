@@ -10,6 +10,7 @@ import pytest
 import notchflex as nf
 from notchflex.plotting import LOADING, UNLOADING
 from notchflex.viewer.overlays import text
+from notchflex.viewer.session import hysteresis
 from visit import Visit, changed
 
 image = pytest.importorskip("matplotlib.image")
@@ -98,7 +99,7 @@ def test_the_tip_follows_the_mouse_with_its_friction_history(visit, record_prope
     assert rate > 15.0
     # Back at the first angles with less tension than on the way there: the loop shows both ways.
     visit.loop_is("tension", LOADING, UNLOADING)
-    tension = visit.viewer.session.history.loop(0)
+    tension = hysteresis(visit.viewer.session.history, 0)
     up = np.interp(np.radians(back["total_angle"]), *tension[: np.argmax(tension[:, 0])].T[::-1])
     assert back["tension_1"] < up - 0.05
     visit.no_notice()

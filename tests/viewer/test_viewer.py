@@ -94,7 +94,7 @@ def test_a_law_that_is_refused_leaves_the_law_before_on_the_page_too(start, monk
     viewer.ask(lambda: viewer.set(0, 0.5, "tension"))
     wait(lambda: reached(viewer, 0.5))
     robot, angle = viewer.session.robot, float(viewer.session.state.total_angle)
-    kind = viewer.page.parts["friction"].kind
+    kind = viewer.page.laws[0]
     law = kind.handle
 
     def refuse(*_, **__):
@@ -134,20 +134,20 @@ def test_corner_friction_by_the_chord_on_arc_notches_never_spoils_the_viewer(sta
 def test_a_number_beyond_its_slider_is_set_to_the_end_and_told(start):
     viewer = start(nf.load_robot("pacheco2021-a"))
     viewer.ask(lambda: viewer.set(0, 1e9, "tension"))
-    wait(lambda: viewer.note)
-    assert "1e+09 N is outside" in viewer.note
+    wait(lambda: viewer.message)
+    assert "1e+09 N is outside" in viewer.message
     assert viewer.targets.end.value == (3.0,)
     viewer.ask(lambda: viewer.set(0, -1.0, "tension"))
-    wait(lambda: "-1 N" in viewer.note)
+    wait(lambda: "-1 N" in viewer.message)
     assert viewer.targets.end.value == (0.0,)
     viewer.ask(lambda: viewer.set(4, 1e6))
-    wait(lambda: "hung weight" in viewer.note)
+    wait(lambda: "hung weight" in viewer.message)
     assert viewer.targets.end.tip_mass == viewer.reach.mass
     viewer.ask(lambda: viewer.stretch(0, "tension", 1e9))
-    wait(lambda: "The end of the slider" in viewer.note)
+    wait(lambda: "The end of the slider" in viewer.message)
     assert viewer.reach.tension == (30.0,)
     viewer.ask(viewer.reset)
-    wait(lambda: viewer.note == "")
+    wait(lambda: viewer.message == "")
 
 
 def test_friction_that_is_changed_on_the_way_does_not_end_the_way(start):
@@ -169,3 +169,12 @@ def test_what_is_done_again_can_be_stopped(start):
     assert "stopped after step 2" in viewer.message
     assert len(viewer.session.history) == 2 < count
     assert not viewer.interrupted.is_set()
+
+
+def test_fields_take_decimals_whatever_their_first_value(start):
+    """A field that began at 3 N made 37 of 3.7 mm."""
+    viewer = start(nf.load_robot("pacheco2021-a"))
+    handles = viewer.server.gui._gui_input_handle_from_uuid.values()
+    fields = {handle.label: handle for handle in handles if hasattr(handle, "precision")}
+    assert fields["slider to"].value == 3.0
+    assert all(fields[label].precision > 5 for label in ("slider to", "μ"))

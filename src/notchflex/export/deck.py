@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -28,6 +28,8 @@ from notchflex.export.formats import DeckOptions, Document, Subject
 from notchflex.export.mesh import TubeMesh, mesh_of
 from notchflex.support import ExternalLoad, Material, robot_digest, unchecked_dimensions
 
+Array = NDArray[np.float64]
+
 _MAX_STRAIN = 0.2  # strain up to which a curve is continued
 # A node is the tendon's point if it is so near, as a part of the tendon's radius.
 _NEAR = 0.01
@@ -39,7 +41,7 @@ _PER_LINE = 12  # numbers
 _STEPS = 9  # of the pull to a usual tension
 
 
-def material_cards(material: Material) -> list[str]:
+def material_cards(material: Material) -> str:
     """Return the cards of a material.
 
     A material with a plateau is given as plastic with hardening: right while it is loaded, not when
@@ -51,28 +53,29 @@ def material_cards(material: Material) -> list[str]:
     modulus: float = getattr(material, "elastic_modulus", 0.0)
     match material:
         case Linear():
-            curve = []
+            strain = stress = np.zeros(0)
         case Superelastic():
             first, slope = material.transition_strain, material.superelastic_modulus
-            curve = _plateau(modulus, first, slope)
+            strain, stress = _plateau(modulus, first, slope)
         case Nitinol():
-            curve = _plateau(modulus, material.plateau_stress / modulus, material.plateau_modulus)
+            first, slope = material.plateau_stress / modulus, material.plateau_modulus
+            strain, stress = _plateau(modulus, first, slope)
         case StressStrain():
-            curve = zip(*material.in_tension, strict=True)
+            strain, stress = map(np.array, material.in_tension)
         case _:
             raise InputError.UNSUPPORTED(
                 f"a material of kind {material.kind!r} has no cards for CalculiX; use a linear, "
                 "superelastic, nitinol or stress-strain one"
             )
-    points = [f"{stress:.10g},{strain - stress / modulus:.10g}" for strain, stress in curve]
-    cards = ["*ELASTIC", f"{modulus:.10g},{material.poisson_ratio:.10g}"]
-    return [*cards, "*PLASTIC", *points] if points else cards
+    cards = f"*ELASTIC\n{modulus:.10g},{material.poisson_ratio:.10g}"
+    points = _rows(np.stack([stress, strain - stress / modulus], axis=1))
+    return f"{cards}\n*PLASTIC\n{points}" if points else cards
 
 
-def _plateau(modulus: float, first: float, slope: float) -> list[tuple[float, float]]:
+def _plateau(modulus: float, first: float, slope: float) -> tuple[Array, Array]:
     """Return strains and stresses (MPa) from the end of the elastic line on."""
-    strains = first, max(_MAX_STRAIN, 2.0 * first)
-    return [(strain, modulus * first + slope * (strain - first)) for strain in strains]
+    strain = np.array([first, max(_MAX_STRAIN, 2.0 * first)])
+    return strain, modulus * first + slope * (strain - first)
 
 
 class TendonPoint(NamedTuple):
@@ -103,9 +106,7 @@ class TendonSpan(NamedTuple):
     tension: float
 
 
-def tendon_spans(
-    robot: Robot, mesh: TubeMesh, number: int, tension: NDArray[np.float64]
-) -> list[TendonSpan]:
+def tendon_spans(robot: Robot, mesh: TubeMesh, number: int, tension: Array) -> list[TendonSpan]:
     """Return the pieces of a tendon.
 
     Args:
@@ -167,73 +168,105 @@ def deck(
     points = [point for span in spans for point in span.ends if len(point.ties) != 1]
     number = {point: first + count for count, point in enumerate(dict.fromkeys(points))}
     plate = first + len(number)  # and the next number
-    lines = [f"** {line}" for line in comment.splitlines()]
-    lines += ["*NODE,NSET=NALL", *_nodes(mesh.place, 1)]
+    sets, tendons = ["NALL"], ""
     if number:
-        lines += ["*NODE,NSET=NTENDON", *_nodes([point.place for point in number], first)]
-    lines += ["*ELEMENT,TYPE=C3D20R,ELSET=TUBE"]
-    for element, nodes in enumerate(mesh.elements.tolist(), start=1):
-        text = list(map(str, [element, *nodes]))
-        lines += [",".join(text[:11]) + ",", ",".join(text[11:])]
-    lines += _sets(mesh, options)
-    lines += ["*MATERIAL,NAME=TUBE", *material_cards(robot.material)]
-    lines += ["*SOLID SECTION,ELSET=TUBE,MATERIAL=TUBE"]
-    lines += _springs(mesh, spans, number)
-    lines += _hangers(number, (1, 3) if is_half else (1, 2, 3))
-    if options.tip_moment:
-        lines += _tip_plate(mesh, plate)
-    if options.contact:
-        lines += _contact(mesh, robot.material)
-    lines += ["*BOUNDARY", "NCLAMP,1,3"] + (["NPLANE,2,2"] if is_half else [])
-    lines += [f"{node},1,3" for point, node in number.items() if not point.ties]
-    lines += [f"{node},2,2" for point, node in number.items() if point.ties and is_half]
-    sets = ["NALL", "NTENDON"] if number else ["NALL"]
-    lines += ["*INITIAL CONDITIONS,TYPE=TEMPERATURE", *(f"{name},0." for name in sets)]
-    lines += ["*STEP,NLGEOM,INC=400", "*STATIC", "0.1,1.,1e-6,0.25"]
+        sets.append("NTENDON")
+        tendons = f"*NODE,NSET=NTENDON\n{_rows([point.place for point in number], first)}"
+    held = ["NCLAMP,1,3", *(["NPLANE,2,2"] if is_half else [])]
+    held += [f"{node},1,3" for point, node in number.items() if not point.ties]
+    held += [f"{node},2,2" for point, node in number.items() if point.ties and is_half]
+    comments = (f"** {line}" for line in comment.splitlines())
     # The tension of the springs grows with the temperature, from 0 to 1; nothing else does.
-    lines += ["*TEMPERATURE", *(f"{name},1." for name in sets)]
-    if options.tip_moment:
-        side = np.radians(robot.notches[0].direction_deg - mesh.x_deg)
-        moment = mesh.share * options.tip_moment * np.array([-np.sin(side), np.cos(side)])
-        lines += ["*CLOAD", *(f"{plate + 1},{k},{m:.10g}" for k, m in enumerate(moment, 1) if m)]
-    lines += ["*NODE FILE", "U,RF", "*EL FILE", "S,E"]
-    lines += ["*NODE PRINT,NSET=NCLAMP,TOTALS=ONLY", "RF"]
-    lines += ["*NODE PRINT,NSET=NRINGS", "U", "*END STEP", ""]
-    return "\n".join(lines)
+    text = f"""{_lines(comments)}
+*NODE,NSET=NALL
+{_rows(mesh.place, 1)}
+{tendons}
+*ELEMENT,TYPE=C3D20R,ELSET=TUBE
+{_elements(mesh)}
+{_sets(mesh, options)}
+*MATERIAL,NAME=TUBE
+{material_cards(robot.material)}
+*SOLID SECTION,ELSET=TUBE,MATERIAL=TUBE
+{_springs(mesh, spans, number)}
+{_hangers(number, (1, 3) if is_half else (1, 2, 3))}
+{_tip_plate(mesh, plate) if options.tip_moment else ""}
+{_contact(mesh, robot.material) if options.contact else ""}
+*BOUNDARY
+{_lines(held)}
+*INITIAL CONDITIONS,TYPE=TEMPERATURE
+{_lines(f"{name},0." for name in sets)}
+*STEP,NLGEOM,INC=400
+*STATIC
+0.1,1.,1e-6,0.25
+*TEMPERATURE
+{_lines(f"{name},1." for name in sets)}
+{_moment(robot, mesh, options, plate + 1) if options.tip_moment else ""}
+*NODE FILE
+U,RF
+*EL FILE
+S,E
+*NODE PRINT,NSET=NCLAMP,TOTALS=ONLY
+RF
+*NODE PRINT,NSET=NRINGS
+U
+*END STEP
+"""
+    return _lines(filter(None, text.splitlines())) + "\n"
 
 
-def _nodes(places: Iterable[Sequence[float]] | NDArray[Any], first: int) -> Iterator[str]:
-    for number, (x, y, z) in enumerate(places, start=first):
-        yield f"{number},{x:.10g},{y:.10g},{z:.10g}"
+_lines = "\n".join
 
 
-def _in_lines(items: Sequence[str], count: int) -> Iterator[str]:
-    """Yield items with commas between, so many in a line."""
-    for start in range(0, len(items), count):
-        yield ",".join(items[start : start + count])
+def _rows(rows: Iterable[Any], first: int | None = None) -> str:
+    """Return rows of numbers, each behind its own number from the first one on."""
+    texts = (",".join(f"{value:.10g}" for value in row) for row in rows)
+    if first is None:
+        return _lines(texts)
+    return _lines(f"{number},{text}" for number, text in enumerate(texts, start=first))
 
 
-def _hangers(number: Mapping[TendonPoint, int], axes: Sequence[int]) -> Iterator[str]:
+def _elements(mesh: TubeMesh) -> str:
+    numbered = np.column_stack([1 + np.arange(len(mesh.elements)), mesh.elements])
+    return _lines(_in_lines(row, 11) for row in numbered.tolist())
+
+
+def _in_lines(items: Iterable[Any], count: int, end: str = ",\n") -> str:
+    """Return items with commas between, so many in a line."""
+    texts = list(map(str, items))
+    rows = (texts[start : start + count] for start in range(0, len(texts), count))
+    return end.join(map(",".join, rows))
+
+
+def _moment(robot: Robot, mesh: TubeMesh, options: DeckOptions, node: int) -> str:
+    side = np.radians(robot.notches[0].direction_deg - mesh.x_deg)
+    moment = mesh.share * options.tip_moment * np.array([-np.sin(side), np.cos(side)])
+    lines = (f"{node},{axis},{size:.10g}" for axis, size in enumerate(moment, 1) if size)
+    return f"*CLOAD\n{_lines(lines)}"
+
+
+def _hangers(number: Mapping[TendonPoint, int], axes: Sequence[int]) -> str:
     """Hang the points of tendons on the nodes of the wall."""
+    lines, end = list[str](), "\n"
     for point, node in number.items():
         terms = [(node, -1.0), *point.ties]
         for axis in axes if point.ties else ():
-            yield from ("*EQUATION", str(len(terms)))
-            yield from _in_lines([f"{tied},{axis},{weight:.12g}" for tied, weight in terms], 4)
+            items = (f"{tied},{axis},{weight:.12g}" for tied, weight in terms)
+            lines.append(f"*EQUATION\n{len(terms)}\n{_in_lines(items, 4, end)}")
+    return _lines(lines)
 
 
-def _sets(mesh: TubeMesh, options: DeckOptions) -> Iterator[str]:
-    sets = {"NCLAMP": mesh.layer(0)}
+def _sets(mesh: TubeMesh, options: DeckOptions) -> str:
+    sets: dict[str, Any] = {"NCLAMP": mesh.layer(0)}
+    tip = {"NTIP": mesh.layer(-1)} if options.tip_moment else {}
     if mesh.is_half:
         # The plate at the tip holds its own nodes.
-        held = [sets["NCLAMP"], *([mesh.layer(-1)] if options.tip_moment else [])]
-        sets["NPLANE"] = np.setdiff1d(mesh.in_plane(), np.concatenate(held))
+        held = np.concatenate([sets["NCLAMP"], *tip.values()])
+        sets["NPLANE"] = np.setdiff1d(mesh.in_plane(), held)
     rings = {f"NRING{k}": mesh.layer(layer) for k, layer in enumerate(ring_layers(mesh))}
-    tip = {"NTIP": mesh.layer(-1)} if options.tip_moment else {}
-    for name, nodes in (sets | rings | {"NRINGS": list(rings)} | tip).items():
-        yield f"*NSET,NSET={name}"
-        count = 1 if name == "NRINGS" else _PER_LINE
-        yield from (f"{line}," for line in _in_lines(list(map(str, nodes)), count))
+    return _lines(
+        f"*NSET,NSET={name}\n{_in_lines(nodes, 1 if name == 'NRINGS' else _PER_LINE)},"
+        for name, nodes in (sets | rings | {"NRINGS": rings} | tip).items()
+    )
 
 
 def ring_layers(mesh: TubeMesh) -> list[int]:
@@ -246,44 +279,47 @@ def ring_layers(mesh: TubeMesh) -> list[int]:
     return [int(np.argmin(np.abs(mesh.heights - height))) for height in middle]
 
 
-def _springs(
-    mesh: TubeMesh, spans: Sequence[TendonSpan], extra: Mapping[TendonPoint, int]
-) -> Iterator[str]:
+def _springs(mesh: TubeMesh, spans: Sequence[TendonSpan], extra: Mapping[TendonPoint, int]) -> str:
     """Springs of constant force: their tension follows the line between their moving ends."""
+    lines: list[str] = []
     for number, span in enumerate(spans, start=1):
         first, last = (extra[end] if end in extra else end.ties[0][0] for end in span.ends)
-        name, force = f"SPAN{number}", f"{mesh.share * span.tension:.10g}"
-        yield f"*ELEMENT,TYPE=SPRINGA,ELSET={name}"
-        yield f"{len(mesh.elements) + number},{first},{last}"
-        yield f"*SPRING,ELSET={name},NONLINEAR"
-        yield from ("0.,-100,0.", "0.,100,0.", f"{force},-100,1.", f"{force},100,1.")
+        force = f"{mesh.share * span.tension:.10g}"
+        lines.append(f"""*ELEMENT,TYPE=SPRINGA,ELSET=SPAN{number}
+{len(mesh.elements) + number},{first},{last}
+*SPRING,ELSET=SPAN{number},NONLINEAR
+0.,-100,0.
+0.,100,0.
+{force},-100,1.
+{force},100,1.""")
+    return _lines(lines)
 
 
-def _tip_plate(mesh: TubeMesh, node: int) -> list[str]:
+def _tip_plate(mesh: TubeMesh, node: int) -> str:
     """A rigid plate on the end of the tube; on half a tube it turns about y alone."""
     place = f"0.,0.,{mesh.heights[-1]:.10g}"
-    lines = ["*NODE", f"{node},{place}", f"{node + 1},{place}"]
-    lines += [f"*RIGID BODY,NSET=NTIP,REF NODE={node},ROT NODE={node + 1}"]
-    held = ["*BOUNDARY", f"{node},2,2", f"{node + 1},1,1", f"{node + 1},3,3"]
-    return [*lines, *(held if mesh.is_half else [])]
+    held = f"*BOUNDARY\n{node},2,2\n{node + 1},1,1\n{node + 1},3,3"
+    return f"""*NODE
+{node},{place}
+{node + 1},{place}
+*RIGID BODY,NSET=NTIP,REF NODE={node},ROT NODE={node + 1}
+{held if mesh.is_half else ""}"""
 
 
-def _contact(mesh: TubeMesh, material: Any) -> list[str]:
+def _contact(mesh: TubeMesh, material: Any) -> str:
     """Both faces of every notch, over the outer half of the opening, where they meet."""
-    lines: list[str] = []
-    pairs: list[str] = []
-    for notch, faces in enumerate(mesh.lips, start=1):
-        if all(map(len, faces)):
-            names = f"LOWER{notch}", f"UPPER{notch}"
-            pairs += ["*CONTACT PAIR,INTERACTION=FACES,TYPE=SURFACE TO SURFACE", ",".join(names)]
-            for name, elements, face in zip(names, faces, ("S2", "S1"), strict=True):
-                lines += [f"*SURFACE,NAME={name},TYPE=ELEMENT"]
-                lines += [f"{element},{face}" for element in elements]
-    if pairs:
-        lines += ["*SURFACE INTERACTION,NAME=FACES"]
-        lines += ["*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=LINEAR"]
-        lines += [f"{_CONTACT * material.elastic_modulus:.10g}"]
-    return [*lines, *pairs]
+    surfaces, pairs = list[str](), list[str]()
+    for notch, lips in enumerate(mesh.lips, start=1):
+        if all(map(len, lips)):
+            pairs.append(f"""*CONTACT PAIR,INTERACTION=FACES,TYPE=SURFACE TO SURFACE
+LOWER{notch},UPPER{notch}""")
+            for name, elements, face in zip(("LOWER", "UPPER"), lips, ("S2", "S1"), strict=True):
+                faces = _lines(f"{element},{face}" for element in elements)
+                surfaces.append(f"*SURFACE,NAME={name}{notch},TYPE=ELEMENT\n{faces}")
+    behaviour = f"""*SURFACE INTERACTION,NAME=FACES
+*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=LINEAR
+{_CONTACT * material.elastic_modulus:.10g}"""
+    return _lines([*surfaces, behaviour, *pairs]) if pairs else ""
 
 
 _NO_LOAD = "a deck of finite elements needs a load: give a tension above 0 N"

@@ -8,8 +8,10 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 from xml.sax.saxutils import escape
 
-from notchflex import Robot, __version__
-from notchflex.export.formats import Document, PatternOptions, Subject
+from shapely import MultiPoint
+
+from notchflex import __version__
+from notchflex.export.formats import Document, PatternOptions, Subject, plain_name
 from notchflex.export.pattern import FlatPattern, flat_pattern
 from notchflex.support import Point, robot_digest
 
@@ -88,18 +90,7 @@ def _box(lines: Sequence[DrawnLine], texts: Sequence[DrawnText]) -> tuple[float,
     points = [point for line in lines for point in line.points]
     for text, (x, y), height, centred in texts:
         points += [(x, y), (x + (0.0 if centred else 0.75 * height * len(text)), y + height)]
-    xs, ys = zip(*points, strict=True)
-    return min(xs), min(ys), max(xs), max(ys)
-
-
-def plain(text: str) -> str:
-    """Return a text in one line, without characters that no file takes."""
-    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
-
-
-def plain_name(robot: Robot) -> str:
-    """Return the name of a robot as `plain` text."""
-    return plain(robot.name) or "robot"
+    return MultiPoint(points).bounds
 
 
 def title_lines(pattern: FlatPattern) -> list[str]:

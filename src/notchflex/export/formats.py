@@ -20,21 +20,13 @@ if TYPE_CHECKING:
     from notchflex import EquilibriumPath, Robot
 
 
-_LONGEST = 1e4  # mm; longer than any tube
-
-
-def _length(text: str, most: float = 10.0) -> Any:
-    return quantity("mm", text, at_least=0.0, at_most=most)
-
-
-_Width = Annotated[Float, _length("width of the beam")]
+_Length = Annotated[Float, quantity("mm", "length", at_least=0.0, at_most=10.0)]
+_Tube = Annotated[Float, quantity("mm", "length of tube", at_least=0.0, at_most=1e4)]
 _Kerf = Annotated[
-    tuple[_Width, _Width],
+    tuple[_Length, _Length],
     BeforeValidator(lambda kerf: kerf if isinstance(kerf, tuple | list) else (kerf, kerf)),
     Field(validate_default=True),
 ]
-_Polishing = Annotated[Float, _length("what polishing removes from every surface")]
-_Shank = Annotated[Float, _length("uncut tube on the base side", _LONGEST)]
 _Chord = Annotated[
     Float, quantity("mm", "distance of a curve from its chords", at_least=1e-5, at_most=1.0)
 ]
@@ -72,18 +64,18 @@ class PatternOptions:
     """
 
     kerf: _Kerf = 0.0  # pyright: ignore[reportAssignmentType] - made two widths
-    corner_radius: Annotated[Float, _length("radius of sharp corners")] = 0.0
-    polishing: _Polishing = 0.0
-    seam: Annotated[Literal["past", "split"], Field(description='"past" or "split"')] = "past"
+    corner_radius: _Length = 0.0
+    polishing: _Length = 0.0
+    seam: Literal["past", "split"] = "past"
     seam_deg: Annotated[
         Float, quantity("deg", "side of the seam", at_least=-360.0, at_most=360.0)
     ] = 180.0
     two_axis: Annotated[bool, Field(strict=True)] = False
-    y_unit: Annotated[Literal["mm", "deg"], Field(description='"mm" or "deg"')] = "mm"
-    shank: _Shank = 10.0
+    y_unit: Literal["mm", "deg"] = "mm"
+    shank: _Tube = 10.0
     chord: _Chord = 0.001
-    dxf_version: Annotated[Literal["R2000", "R12"], Field(description='"R2000" or "R12"')] = "R2000"
-    paper: Annotated[Literal["a4", "a3"], Field(description='"a4" or "a3"')] = "a4"
+    dxf_version: Literal["R2000", "R12"] = "R2000"
+    paper: Literal["a4", "a3"] = "a4"
 
     @property
     def inside(self) -> tuple[float, float]:
@@ -112,10 +104,10 @@ class SolidOptions:
         0.0
     """
 
-    channels: Annotated[Float, _length("diameter of the channels", _LONGEST)] = 0.0
-    shank: _Shank = 10.0
+    channels: _Tube = 0.0
+    shank: _Tube = 10.0
     chord: _Chord = 0.001
-    polishing: _Polishing = 0.0
+    polishing: _Length = 0.0
 
 
 Mesh = Literal["coarse", "medium", "fine"]
@@ -123,7 +115,7 @@ Mesh = Literal["coarse", "medium", "fine"]
 _MESHES = {"coarse": (1, 3, 4, 3, 4), "medium": (1, 5, 6, 6, 8), "fine": (2, 8, 8, 10, 12)}
 
 
-_Elements = Annotated[Int, Field(ge=1, le=100, description="number of elements")]
+_Elements = Annotated[Int, Field(ge=1, le=100)]
 
 
 @part(kw_only=False, refuse=InputError)
@@ -242,19 +234,26 @@ class Format:
 
 _EZDXF, _MATPLOTLIB = ("ezdxf", "export"), ("matplotlib", "plot")
 _MANIFOLD, _TRIMESH = ("manifold3d", "export"), ("trimesh", "export")
+_SHAPELY = ("shapely", "export")
 _BUILD123D = ("build123d", "cad")
 
 FORMATS: dict[str, Format] = {
     "dxf": Format(
-        "flat pattern for the laser", (".dxf",), "drawing:dxf_pattern", PatternOptions, (_EZDXF,)
+        "flat pattern for the laser",
+        (".dxf",),
+        "drawing:dxf_pattern",
+        PatternOptions,
+        (_EZDXF, _SHAPELY),
     ),
-    "svg": Format("flat pattern at full size", (".svg",), "drawing:svg_pattern", PatternOptions),
+    "svg": Format(
+        "flat pattern at full size", (".svg",), "drawing:svg_pattern", PatternOptions, (_SHAPELY,)
+    ),
     "pdf": Format(
         "sheet with the pattern, a table of the cuts and a dimensioned drawing",
         (".pdf",),
         "sheet:pattern_sheet",
         PatternOptions,
-        (_MATPLOTLIB,),
+        (_MATPLOTLIB, _SHAPELY),
     ),
     "stl": Format(
         "solid as triangles",
@@ -283,6 +282,16 @@ FORMATS: dict[str, Format] = {
     ),
 }
 """Name of a format, which is also that of its option, to what writes it."""
+
+
+def plain(text: str) -> str:
+    """Return a text in one line, without characters that no file takes."""
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+def plain_name(robot: Robot) -> str:
+    """Return the name of a robot as `plain` text."""
+    return plain(robot.name) or "robot"
 
 
 def format_of(file: str) -> str:

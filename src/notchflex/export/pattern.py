@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from shapely import LinearRing, Polygon, box, get_parts
+from shapely.affinity import translate
+from shapely.geometry.polygon import orient
 
 from notchflex import InputError, Robot, Tube
 from notchflex.export.cuts import PlacedCut, angle_at, cuts_of, naming
@@ -71,7 +72,9 @@ def unrolled(
     curves = [_on_surface(piece, cut.radial, radius) for piece in pieces(corners, radii, inside)]
     half = [point for curve in curves for point in _flattened(curve, chord)] + [curves[-1](1.0)]
     # `half` has positive y and goes toward the tip, which is clockwise.
-    return _without_straight([*reversed(half), *((x, -y) for x, y in half)])
+    whole = LinearRing([*reversed(half), *((x, -y) for x, y in half)])
+    corners = whole.simplify(_STRAIGHT, preserve_topology=False).coords[:-1]
+    return [(x, y) for x, y in corners]
 
 
 def _on_surface(piece: Line | Arc, radial: bool, radius: float) -> Curve:
@@ -122,22 +125,6 @@ def _distance(point: Point, start: Point, end: Point) -> float:
     return abs((u - x) * (point[1] - y) - (v - y) * (point[0] - x)) / length
 
 
-def _without_straight(points: Sequence[Point]) -> list[Point]:
-    """Leave out corners of a closed line that are none, and points that stand twice."""
-    kept: list[Point] = []
-    for point in points:
-        if not kept or math.dist(point, kept[-1]) > _STRAIGHT:
-            kept.append(point)
-    while math.dist(kept[0], kept[-1]) <= _STRAIGHT:
-        kept.pop()
-    neighbours = zip(kept, [kept[-1], *kept], [*kept[1:], kept[0]], strict=False)
-    return [point for point, *ends in neighbours if _distance(point, *ends) > _STRAIGHT]
-
-
-Outline = NDArray[np.complex128]
-"""Corners of a closed line, x + i y [mm]."""
-
-
 class Web(NamedTuple):
     """The thinnest material.
 
@@ -161,47 +148,17 @@ def smallest_web(
         start: Where the tube is cut off [mm].
         end: Where it ends at the tip [mm].
     """
-    outlines = {name: np.array(edge) @ [1.0, 1.0j] for name, edge in edges.items()}
-    webs = [Web(line.real.min() - start, (name, "cut-off")) for name, line in outlines.items()]
-    webs += [Web(end - line.real.max(), (name, "tip")) for name, line in outlines.items()]
+    cuts = {name: Polygon(edge) for name, edge in edges.items()}
+    webs = [Web(cut.bounds[0] - start, (name, "cut-off")) for name, cut in cuts.items()]
+    webs += [Web(end - cut.bounds[2], (name, "tip")) for name, cut in cuts.items()]
     best = min(webs, key=lambda web: web.width)
-    for (name, line), (second, neighbour) in combinations_with_replacement(outlines.items(), 2):
-        if line.real.min() - neighbour.real.max() >= best.width:
+    for (name, cut), (second, neighbour) in combinations_with_replacement(cuts.items(), 2):
+        if cut.bounds[0] - neighbour.bounds[2] >= best.width:
             continue  # they lie farther apart along the tube
         for turn in (1,) if name == second else (-1, 0, 1):
-            web = Web(_gap(line, neighbour + 1j * turn * around), (name, second))
-            best = min(best, web, key=lambda web: web.width)
+            width = cut.distance(translate(neighbour, yoff=turn * around))
+            best = min(best, Web(width, (name, second)), key=lambda web: web.width)
     return best
-
-
-def _gap(line: Outline, other: Outline) -> float:
-    """Return the distance of two outlines, 0 where they cross or one holds the other."""
-    start, step = line[:, None], (np.roll(line, -1) - line)[:, None]
-    first, way = other, np.roll(other, -1) - other
-
-    def sides(points: Outline, begin: Outline, along: Outline) -> NDArray[np.float64]:
-        return (np.conj(along) * (points - begin)).imag
-
-    beside = sides(first, start, step) * sides(first + way, start, step)
-    across = sides(start, first, way) * sides(start + step, first, way)
-    if ((beside < 0.0) & (across < 0.0)).any() or _holds(line, other[0]) or _holds(other, line[0]):
-        return 0.0
-    # Two closed lines that do not cross are nearest at a corner of one.
-    return min(_to_line(line, other), _to_line(other, line))
-
-
-def _to_line(points: Outline, line: Outline) -> float:
-    """Return the least distance of points from a closed line."""
-    step, away = np.roll(line, -1) - line, points[:, None] - line
-    part = np.clip((away * np.conj(step)).real / np.abs(step) ** 2, 0.0, 1.0)
-    return float(np.abs(away - part * step).min())
-
-
-def _holds(line: Outline, point: complex) -> bool:
-    """Whether a closed line runs round a point: seen from there it turns once."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turns = np.angle((np.roll(line, -1) - point) / (line - point))
-    return bool(abs(turns.sum()) > 1.5 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -221,8 +178,8 @@ class PatternCut:
     @property
     def middle(self) -> Point:
         """The middle of its box, where its number is written."""
-        xs, ys = zip(*self.outlines[0], strict=True)
-        return 0.5 * (min(xs) + max(xs)), 0.5 * (min(ys) + max(ys))
+        left, low, right, high = LinearRing(self.outlines[0]).bounds
+        return 0.5 * (left + right), 0.5 * (low + high)
 
 
 @dataclass(frozen=True)
@@ -271,7 +228,7 @@ class FlatPattern:
             "stock_diameters_mm": [self.tube.outer_diameter, self.tube.inner_diameter],
             "cuts": len(self.cuts),
             "cut_order_notches": [cut.placed.notch for cut in self.cuts],
-            "cut_length_mm": sum(sum(map(math.dist, [*x[1:], x[0]], x)) for x in lines),
+            "cut_length_mm": sum(LinearRing(line).length for line in lines),
             "tip_mm": self.end,
             "cut_off_mm": self.start,
             "thinnest_web_mm": self.web.width,
@@ -351,20 +308,10 @@ def _split(whole: Sequence[Point], low: float, high: float) -> list[Sequence[Poi
     """Split a closed outline at the seam; the part beyond it comes in on the other side."""
     if all(low - _EPSILON <= y <= high + _EPSILON for _, y in whole):
         return [whole]
-    around = high - low
-    above = [(x, y - around) for x, y in _clipped(whole, high, 1.0)]
-    below = [(x, y + around) for x, y in _clipped(whole, low, -1.0)]
-    inside = _clipped(_clipped(whole, low, 1.0), high, -1.0)
-    return [part for part in (inside, above, below) if part]
-
-
-def _clipped(points: Sequence[Point], level: float, side: float) -> list[Point]:
-    """Return the part of a closed outline above a level of y (side 1) or below it (side -1)."""
-    kept: list[Point] = []
-    for (x, y), (u, v) in zip(points, [*points[1:], points[0]], strict=True):
-        begin, end = side * (y - level), side * (v - level)
-        if begin >= 0.0:
-            kept.append((x, y))
-        if begin * end < 0.0:
-            kept.append((x + begin / (begin - end) * (u - x), level))
-    return kept if any(side * (y - level) > _EPSILON for _, y in kept) else []
+    outline = Polygon(whole)
+    start, _, end, _ = outline.bounds
+    tube = box(start - 1.0, low, end + 1.0, high)
+    turned = (translate(outline, yoff=turn * (high - low)) for turn in (0, -1, 1))
+    parts = [part for outline in turned for part in get_parts(outline & tube)]
+    rings = (orient(part).exterior.coords[:-1] for part in parts if part.area > _EPSILON)
+    return [[(x, y) for x, y in ring] for ring in rings]

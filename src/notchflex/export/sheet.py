@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.patches import Rectangle
 
 from notchflex import __version__
-from notchflex.export.drawing import pattern_drawing, plain, title_lines
-from notchflex.export.formats import Document, PatternOptions, Subject
+from notchflex.export.drawing import pattern_drawing, title_lines
+from notchflex.export.formats import Document, PatternOptions, Subject, plain
 from notchflex.export.pattern import FlatPattern, PatternCut, flat_pattern
 from notchflex.plotting import (
     INK,

@@ -16,7 +16,8 @@ import importlib.util
 from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
-from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
+from xml.etree.ElementTree import TreeBuilder, XMLParser, fromstring, indent, tostring
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
@@ -44,8 +45,9 @@ _TIME_STEP = 5e-4  # s
 # friction and needs more inertia for the same time step.
 _YIELD = 3e-3
 _RESOLVED = (_TIME_STEP / 0.5) ** 2  # s²; the largest natural frequency times the step is 0.5
+_STOP = "0.002 1"  # four time steps, s, and the damping ratio of stops and drums
 _FAR = 10.0  # rad; no hinge turns so far
-_FASTEST = 100.0  # rad/s; URDF needs a limit, and quasi-static joints know none
+_FASTEST = 100  # rad/s; URDF needs a limit, and quasi-static joints know none
 _ANGLES = 11  # of a joint in the table
 _FIRST_WITH_YIELD = 4
 _LEVELS = 24  # up, and as many down
@@ -56,31 +58,26 @@ _NO_LOOP = 1e-9  # of tension times angle; a loop with less area is none
 _MAX_ERROR = 0.02  # of the total angle, as a part of its range, beyond which the user is warned
 
 
-def _add(parent: Element, tag: str, /, **keys: object) -> Element:
-    """Add an element; numbers and lists of numbers are written with nine digits."""
-    return SubElement(parent, tag, {name: _text(value) for name, value in keys.items()})
+def _digits(*values: object) -> str:
+    """Return numbers and lists of numbers as an attribute has them, with nine digits."""
+    numbers = (np.ravel(np.asarray(value, float)) for value in values)
+    return " ".join(f"{number:.9g}" for number in np.concatenate([*numbers]))
 
 
-def _text(value: object) -> str:
-    if isinstance(value, str):
-        return value
-    return " ".join(f"{number:.9g}" for number in np.atleast_1d(np.asarray(value, float)))
+def _xml(root: str) -> str:
+    """Indent a document."""
+    tree = fromstring(root, XMLParser(target=TreeBuilder(insert_comments=True)))
+    indent(tree)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{tostring(tree, "unicode")}\n'
 
 
-def _root(tag: str, head: str, **keys: str) -> Element:
-    """Return a root with a comment; XML allows no two hyphens in one, nor control characters."""
-
-    def printable(text: str) -> str:
-        return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
-
-    root: Any = Element(tag, {name: printable(value) for name, value in keys.items()})
-    root.append(Comment(f"\n{printable(head).replace('--', '- -')}\n"))
-    return root
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
 
 
-def _xml(root: Element) -> str:
-    indent(root)
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{tostring(root, "unicode")}\n'
+def _comment(head: str) -> str:
+    """Return a comment; XML allows no two hyphens in one, nor control characters."""
+    return f"<!--\n{_printable(head).replace('--', '- -')}\n-->"
 
 
 def _inertia(model: JointModel, body: int) -> tuple[float, Array, float, float]:
@@ -105,176 +102,137 @@ def mjcf(model: JointModel, head: str = "", numbers: Mapping[str, float] | None 
         head: What stands at the head of the file.
         numbers: Named numbers that the file carries as `<custom><numeric>`.
     """
-    root = _root("mujoco", head, model=model.robot.name)
-    _add(root, "compiler", angle="radian", autolimits="true")
-    _add(
-        root,
-        "option",
-        timestep=_TIME_STEP,
-        integrator="implicitfast",
-        gravity=[0, 0, 0],
-        iterations=50,
-    )
-    custom = _add(root, "custom")
-    for name, value in (numbers or {}).items():
-        _add(custom, "numeric", name=name, data=value)
     drums = {j: drum for j, spring in enumerate(model.springs, start=1) if (drum := spring.drum())}
-    world = _add(root, "worldbody")
-    _bodies(world, model, drums)
-    _tendons(root, model)
-    equality = _add(root, "equality")
+    custom = "".join(
+        f'<numeric name="{name}" data="{_digits(value)}"/>'
+        for name, value in (numbers or {}).items()
+    )
+    frictions = equalities = ""
     for j, (moment, _, powers) in drums.items():
-        body = _add(world, "body", name=f"friction_{j}", pos=[0, 0, 0])
-        _add(body, "inertial", pos=[0, 0, 0], mass=1e-6, diaginertia=[1e-12] * 3)
         stiffness = _METRE * moment / _YIELD
-        _add(
-            body,
-            "joint",
-            name=f"drum_{j}",
-            type="hinge",
-            axis=[0, 0, 1],
-            stiffness=stiffness,
-            springyield=_YIELD,
-            armature=stiffness * _RESOLVED,
-        )
-        _add(
-            equality,
-            "joint",
-            joint1=f"drum_{j}",
-            joint2=f"notch_{j}",
-            polycoef=powers,
-            solref=[4 * _TIME_STEP, 1],
-            solimp=[0.999, 0.9999, 1e-3],
-        )
-    _keyframes(root, model, drums)
-    _drives(root, model)
-    return _xml(root)
+        frictions += f"""<body name="friction_{j}" pos="0 0 0">
+            <inertial pos="0 0 0" mass="1e-06" diaginertia="1e-12 1e-12 1e-12"/>
+            <joint name="drum_{j}" type="hinge" axis="0 0 1" stiffness="{_digits(stiffness)}"
+                springyield="{_YIELD}" armature="{_digits(stiffness * _RESOLVED)}"/>
+        </body>"""
+        equalities += f"""<joint joint1="drum_{j}" joint2="notch_{j}" polycoef="{_digits(powers)}"
+            solref="{_STOP}" solimp="0.999 0.9999 0.001"/>"""
+    return _xml(
+        f"""<mujoco model={quoteattr(_printable(model.robot.name))}>{_comment(head)}
+            <compiler angle="radian" autolimits="true"/>
+            <option timestep="{_TIME_STEP}" integrator="implicitfast" gravity="0 0 0"
+                iterations="50"/>
+            <custom>{custom}</custom>
+            <worldbody>{_bodies(model, drums)}{frictions}</worldbody>
+            <tendon>{_tendons(model)}</tendon>
+            <equality>{equalities}</equality>
+            <keyframe>{_keyframes(model, drums)}</keyframe>
+            {_drives(model)}
+        </mujoco>"""
+    )
 
 
-def _bodies(world: Element, model: JointModel, drums: Drums) -> None:
-    """Write the bodies one inside the other, each with the hinge before it."""
-    hinges = model.hinges
-    parent = _add(world, "body", name="body_0", pos=[0, 0, 0])
-    _piece(parent, model, 0)
-    for j, spring in enumerate(model.springs, start=1):
-        free, lever, limit = hinges.free_rotation[j - 1], hinges.lever[j - 1], model.limit[j - 1]
+def _bodies(model: JointModel, drums: Drums) -> str:
+    """Return the bodies one inside the other, each with the hinge before it."""
+    hinges, end = model.hinges, _METRE * model.robot.geometry.body_length[-1]
+    inner = f'<site name="tip" pos="{_digits(0, 0, end)}" size="0.0001"/>'
+    for j in range(len(model.springs), 0, -1):
+        free, lever, spring = hinges.free_rotation[j - 1], hinges.lever[j - 1], model.springs[j - 1]
         quat = Rotation.from_matrix(free).as_quat(canonical=True, scalar_first=True)
-        pos = _METRE * hinges.offset[j - 1]
-        parent = _add(parent, "body", name=f"body_{j}", pos=pos, quat=quat)
         stiffness = _METRE * spring.largest_stiffness
         armature = with_drum = stiffness * _RESOLVED
         if j in drums:
             moment, slope, _ = drums[j]
             with_drum += _METRE * moment / _YIELD * _RESOLVED * slope**2
-        joint = _add(
-            parent,
-            "joint",
-            name=f"notch_{j}",
-            type="hinge",
-            pos=-_METRE * free.T @ lever,
-            axis=free.T @ hinges.axis[j - 1],
-            stiffness=_METRE * spring.stiffness,
-            armature=armature,
-            damping=2.0 * np.sqrt(stiffness * with_drum),
-        )
-        if np.isfinite(limit):
-            joint.set("range", _text([-np.pi, limit]))
-            joint.set("solreflimit", _text([4 * _TIME_STEP, 1]))
-            joint.set("solimplimit", _text([0.9995, 0.9995, 1e-4]))
-        _piece(parent, model, j)
-    end = [0, 0, _METRE * model.robot.geometry.body_length[-1]]
-    _add(parent, "site", name="tip", pos=end, size=1e-4)
+        limit = model.limit[j - 1]
+        stop = f'range="{_digits(-np.pi, limit)}" solreflimit="{_STOP}"'
+        stop += ' solimplimit="0.9995 0.9995 0.0001"'
+        inner = f"""<body name="body_{j}" pos="{_digits(_METRE * hinges.offset[j - 1])}"
+                quat="{_digits(quat)}">
+            <joint name="notch_{j}" type="hinge" pos="{_digits(-_METRE * free.T @ lever)}"
+                axis="{_digits(free.T @ hinges.axis[j - 1])}"
+                stiffness="{_digits(_METRE * spring.stiffness)}" armature="{_digits(armature)}"
+                damping="{_digits(2.0 * np.sqrt(stiffness * with_drum))}"
+                {stop if np.isfinite(limit) else ""}/>
+            {_piece(model, j)}{inner}
+        </body>"""
+    return f'<body name="body_0" pos="0 0 0">{_piece(model, 0)}{inner}</body>'
 
 
-def _piece(parent: Element, model: JointModel, body: int) -> None:
-    """Write mass, shape and tendon holes of one body."""
+def _piece(model: JointModel, body: int) -> str:
+    """Return mass, shape and tendon holes of one body."""
     mass, centre, across, along = _inertia(model, body)
-    _add(parent, "inertial", pos=centre, mass=mass, diaginertia=[across, across, along])
     half = 0.5 * _METRE * float(model.robot.geometry.body_length[body])
+    parts = [
+        f"""<inertial pos="{_digits(centre)}" mass="{_digits(mass)}"
+            diaginertia="{_digits(across, across, along)}"/>"""
+    ]
     if half > 0.0:
-        _add(
-            parent,
-            "geom",
-            type="cylinder",
-            size=[_METRE * model.robot.tube.outer_radius, half],
-            pos=[0, 0, half],
-            contype=0,
-            conaffinity=0,
-            rgba=[0.7, 0.7, 0.75, 0.5],
+        radius = _METRE * model.robot.tube.outer_radius
+        parts.append(
+            f"""<geom type="cylinder" size="{_digits(radius, half)}" pos="{_digits(0, 0, half)}"
+                contype="0" conaffinity="0" rgba="0.7 0.7 0.75 0.5"/>"""
         )
-    for k, holes in enumerate(model.holes, start=1):
-        for number, hole in enumerate(holes, start=1):
-            if hole.body == body:
-                name = f"tendon_{k}_hole_{number}"
-                _add(parent, "site", name=name, pos=_METRE * hole.place, size=5e-5)
+    parts += [
+        f'<site name="tendon_{k}_hole_{number}" pos="{_digits(_METRE * hole.place)}" size="5e-05"/>'
+        for k, holes in enumerate(model.holes, start=1)
+        for number, hole in enumerate(holes, start=1)
+        if hole.body == body
+    ]
+    return "".join(parts)
 
 
-def _tendons(root: Element, model: JointModel) -> None:
-    """Write the tendons, and the springs that begin at an angle."""
-    tendons = _add(root, "tendon")
+def _tendons(model: JointModel) -> str:
+    """Return the tendons, and the springs that begin at an angle."""
+    text = ""
     for k, holes in enumerate(model.holes, start=1):
-        spatial = _add(tendons, "spatial", name=f"tendon_{k}", width=5e-5)
-        for number in range(1, len(holes) + 1):
-            _add(spatial, "site", site=f"tendon_{k}_hole_{number}")
+        sites = (f'<site site="tendon_{k}_hole_{hole + 1}"/>' for hole in range(len(holes)))
+        text += f'<spatial name="tendon_{k}" width="5e-05">{"".join(sites)}</spatial>'
     for j, spring in enumerate(model.springs, start=1):
         springs = zip(spring.knots, spring.further, strict=True)
         for number, (knot, stiffness) in enumerate(springs, start=1):
             dead = [-_FAR, knot] if knot > 0.0 else [knot, _FAR]
-            fixed = _add(
-                tendons,
-                "fixed",
-                name=f"spring_{j}_{number}",
-                stiffness=_METRE * stiffness,
-                springlength=dead,
-            )
-            _add(fixed, "joint", joint=f"notch_{j}", coef=1)
+            text += f"""<fixed name="spring_{j}_{number}"
+                    stiffness="{_digits(_METRE * stiffness)}" springlength="{_digits(dead)}">
+                <joint joint="notch_{j}" coef="1"/>
+            </fixed>"""
+    return text
 
 
-def _keyframes(root: Element, model: JointModel, drums: Drums) -> None:
-    """Write the free robot, and each tendon pulled from rest to thirds of its range.
+def _keyframes(model: JointModel, drums: Drums) -> str:
+    """Return the free robot, and each tendon pulled from rest to thirds of its range.
 
     While a notch turns its drum yields, so that the spring of the drum lags by what it yields at.
     """
-    frames = _add(root, "keyframe")
-    _add(frames, "key", name="free")
+    text = '<key name="free"/>'
     for k, path in enumerate(model.pulls):
         tension, angles = path.commanded_tension, turned(path)
         for third in (1, 2, 3):
             step = int(np.argmin(np.abs(tension[:STEPS, k] - third / 3 * model.top)))
-            drum_angle = np.array(
-                [polyval(angles[step, j - 1], powers) for j, (_, _, powers) in drums.items()]
-            )
-            key = _add(
-                frames,
-                "key",
-                name=f"tendon_{k + 1}_at_{tension[step, k]:.4g}_N",
-                qpos=[*angles[step], *drum_angle],
-                ctrl=np.nan_to_num(tension[step]),
-            )
-            if drums:
-                yields = np.clip(drum_angle, -_YIELD, _YIELD)
-                key.set("plastic", _text(drum_angle - yields))
+            angle = np.array([polyval(angles[step, j - 1], drums[j][2]) for j in drums])
+            plastic = _digits(angle - np.clip(angle, -_YIELD, _YIELD))
+            text += f"""<key name="tendon_{k + 1}_at_{tension[step, k]:.4g}_N"
+                qpos="{_digits(angles[step], angle)}" ctrl="{_digits(np.nan_to_num(tension[step]))}"
+                {f'plastic="{plastic}"' if drums else ""}/>"""
+    return text
 
 
-def _drives(root: Element, model: JointModel) -> None:
-    """Write the motors that pull the tendons, and the sensors."""
-    actuators, sensors = _add(root, "actuator"), _add(root, "sensor")
+def _drives(model: JointModel) -> str:
+    """Return the motors that pull the tendons, and the sensors."""
+    motors = sensors = ""
     for k in range(1, len(model.holes) + 1):
         # A motor pushes along a tendon; a tendon pulls.
-        _add(
-            actuators,
-            "motor",
-            name=f"tension_{k}",
-            tendon=f"tendon_{k}",
-            gear=-1,
-            ctrlrange=[0, model.top],
-        )
-        _add(sensors, "tendonpos", name=f"tendon_length_{k}", tendon=f"tendon_{k}")
-        _add(sensors, "actuatorfrc", name=f"tendon_force_{k}", actuator=f"tension_{k}")
+        motors += f"""<motor name="tension_{k}" tendon="tendon_{k}" gear="-1"
+            ctrlrange="{_digits(0, model.top)}"/>"""
+        sensors += f"""<tendonpos name="tendon_length_{k}" tendon="tendon_{k}"/>
+            <actuatorfrc name="tendon_force_{k}" actuator="tension_{k}"/>"""
     for j in range(1, len(model.springs) + 1):
-        _add(sensors, "jointpos", name=f"angle_{j}", joint=f"notch_{j}")
-    _add(sensors, "framepos", name="tip_position", objtype="site", objname="tip")
-    _add(sensors, "framequat", name="tip_rotation", objtype="site", objname="tip")
+        sensors += f'<jointpos name="angle_{j}" joint="notch_{j}"/>'
+    return f"""<actuator>{motors}</actuator>
+        <sensor>{sensors}
+            <framepos name="tip_position" objtype="site" objname="tip"/>
+            <framequat name="tip_rotation" objtype="site" objname="tip"/>
+        </sensor>"""
 
 
 def urdf(model: JointModel, head: str = "") -> str:
@@ -284,55 +242,53 @@ def urdf(model: JointModel, head: str = "") -> str:
         model: The robot as bodies and hinges.
         head: What stands at the head of the file.
     """
-    root, hinges = _root("robot", head, name=model.robot.name.replace(" ", "_")), model.hinges
+    hinges, last = model.hinges, len(model.springs)
     # A link's frame is that of the joint before it: in the hinge, turned as the body.
     position = np.zeros(3)
-    _link(root, model, 0, position)
+    text = _link(model, 0, position)
     for j, spring in enumerate(model.springs):
         free, lever = hinges.free_rotation[j], hinges.lever[j]
-        joint = _joint(root, f"notch_{j + 1}", "revolute", f"body_{j}", f"body_{j + 1}")
-        origin = _METRE * (hinges.offset[j] - lever - position)
-        _add(joint, "origin", xyz=origin, rpy=Rotation.from_matrix(free).as_euler("xyz"))
-        _add(joint, "axis", xyz=free.T @ hinges.axis[j])
         effort = np.abs(spring.moment(spring.range)) + np.abs(spring.friction_moment(spring.range))
-        _add(
-            joint,
-            "limit",
-            lower=spring.low,
-            upper=min(float(model.limit[j]), np.pi),
-            effort=_METRE * float(effort.max()),
-            velocity=_FASTEST,
-        )
+        text += f"""<joint name="notch_{j + 1}" type="revolute">
+            <parent link="body_{j}"/><child link="body_{j + 1}"/>
+            <origin xyz="{_digits(_METRE * (hinges.offset[j] - lever - position))}"
+                rpy="{_digits(Rotation.from_matrix(free).as_euler("xyz"))}"/>
+            <axis xyz="{_digits(free.T @ hinges.axis[j])}"/>
+            <limit lower="{_digits(spring.low)}" upper="{_digits(min(model.limit[j], np.pi))}"
+                effort="{_digits(_METRE * effort.max())}" velocity="{_FASTEST}"/>
+        </joint>"""
         position = -free.T @ lever
-        _link(root, model, j + 1, position)
-    _add(root, "link", name="tip")
-    joint = _joint(root, "tip_fixed", "fixed", f"body_{len(model.springs)}", "tip")
+        text += _link(model, j + 1, position)
     end = np.array([0.0, 0.0, model.robot.geometry.body_length[-1]]) - position
-    _add(joint, "origin", xyz=_METRE * end, rpy=[0, 0, 0])
-    return _xml(root)
+    name = quoteattr(_printable(model.robot.name.replace(" ", "_")))
+    return _xml(
+        f"""<robot name={name}>{_comment(head)}{text}
+            <link name="tip"/>
+            <joint name="tip_fixed" type="fixed">
+                <parent link="body_{last}"/><child link="tip"/>
+                <origin xyz="{_digits(_METRE * end)}" rpy="0 0 0"/>
+            </joint>
+        </robot>"""
+    )
 
 
-def _joint(root: Element, name: str, kind: str, parent: str, child: str) -> Element:
-    joint = _add(root, "joint", name=name, type=kind)
-    _add(joint, "parent", link=parent)
-    _add(joint, "child", link=child)
-    return joint
-
-
-def _link(root: Element, model: JointModel, body: int, position: Array) -> None:
-    """Add a link; its frame lies at a place of the body's frame, mm."""
-    link, length = _add(root, "link", name=f"body_{body}"), model.robot.geometry.body_length[body]
+def _link(model: JointModel, body: int, position: Array) -> str:
+    """Return a link; its frame lies at a place of the body's frame, mm."""
+    length, radius = model.robot.geometry.body_length[body], model.robot.tube.outer_radius
     mass, centre, across, along = _inertia(model, body)
-    inertial = _add(link, "inertial")
-    _add(inertial, "origin", xyz=centre - _METRE * position, rpy=[0, 0, 0])
-    _add(inertial, "mass", value=mass)
-    _add(inertial, "inertia", ixx=across, iyy=across, izz=along, ixy=0, ixz=0, iyz=0)
-    if length > 0.0:
-        visual = _add(link, "visual")
-        middle = np.array([0.0, 0.0, 0.5 * length]) - position
-        _add(visual, "origin", xyz=_METRE * middle, rpy=[0, 0, 0])
-        radius = _METRE * model.robot.tube.outer_radius
-        _add(_add(visual, "geometry"), "cylinder", radius=radius, length=_METRE * length)
+    middle = np.array([0.0, 0.0, 0.5 * length]) - position
+    visual = f"""<visual><origin xyz="{_digits(_METRE * middle)}" rpy="0 0 0"/><geometry>
+        <cylinder radius="{_digits(_METRE * radius)}" length="{_digits(_METRE * length)}"/>
+    </geometry></visual>"""
+    return f"""<link name="body_{body}">
+        <inertial>
+            <origin xyz="{_digits(centre - _METRE * position)}" rpy="0 0 0"/>
+            <mass value="{_digits(mass)}"/>
+            <inertia ixx="{_digits(across)}" iyy="{_digits(across)}" izz="{_digits(along)}"
+                ixy="0" ixz="0" iyz="0"/>
+        </inertial>
+        {visual if length > 0.0 else ""}
+    </link>"""
 
 
 def _has_mujoco() -> bool:

@@ -11,6 +11,7 @@ of the straight solid, refined, so that the surface stays closed.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache, partial
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +20,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.spatial.transform import Rotation, Slerp
 
 from notchflex import EquilibriumPath, InputError, Robot, RobotShape, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
@@ -39,10 +39,7 @@ _FEWEST_SIDES, _MAX_SIDES = 48, 2000  # flat sides of the tube
 _FEWEST_SIDES_OF_CHANNELS = 24
 REACH = 2.0
 """How far a cutting solid reaches, in outer radii."""
-_COARSE, _COARSEST = 3e-3, 0.05
-"""Distance of the flat sides of a scene from the round surface, in outer radii and in mm."""
 _STEPS_OF_SCENES = 6
-_ROUNDING_OF_ZONES = 1e-6  # mm
 _PIECES = 16
 """Sections of the model's flexures at least, between which points are interpolated."""
 _STEPS = 10
@@ -128,7 +125,7 @@ def straight_solid(robot: Robot, cuts: RobotCuts, options: SolidOptions) -> Mani
     Raises:
         InputError: A channel does not fit the wall, or no solid of a cut is known.
     """
-    from manifold3d import Manifold, OpType
+    from manifold3d import Manifold
 
     sides = 4 * math.ceil(_sides(cuts.tube.outer_radius, options.chord, _FEWEST_SIDES) / 4)
     if sides > _MAX_SIDES:
@@ -136,15 +133,34 @@ def straight_solid(robot: Robot, cuts: RobotCuts, options: SolidOptions) -> Mani
             f"chord: with {options.chord:g} mm the tube would have more than {_MAX_SIDES} flat "
             "sides; give a larger chord."
         )
-    solid = tube_wall(cuts.tube, (cuts.start, cuts.end), sides, fair=True)
-    outer, length = cuts.tube.outer_radius, cuts.end - cuts.start
-    removed = [_removed(placed.cut, outer, sides, options.chord) for placed in cuts.cuts]
+    drills: list[Manifold] = []
     radius, places = channels(robot, options)
     for place in places:
         count = _sides(radius, options.chord, _FEWEST_SIDES_OF_CHANNELS)
-        drill = Manifold.cylinder(length, fair_growth(count) * radius, circular_segments=count)
-        removed.append(drill.translate((*place, cuts.start)))
-    return solid - Manifold.batch_boolean(removed, OpType.Add)
+        length, grown = cuts.end - cuts.start, fair_growth(count) * radius
+        drill = Manifold.cylinder(length, grown, circular_segments=count)
+        drills.append(drill.translate((*place, cuts.start)))
+    return _wall(cuts, cuts.start, cuts.end, sides, options.chord, drills)
+
+
+def _wall(
+    cuts: RobotCuts,
+    low: float,
+    high: float,
+    sides: int,
+    chord: float,
+    drills: Sequence[Manifold] = (),
+) -> Manifold:
+    """Return a length of the straight tube without the cuts that reach into it."""
+    from manifold3d import Manifold, OpType
+
+    removed = [
+        _removed(placed.cut, cuts.tube.outer_radius, sides, chord)
+        for placed in cuts.cuts
+        if placed.start < high and placed.end > low
+    ]
+    wall = tube_wall(cuts.tube, (low, high), sides, fair=True)
+    return wall - Manifold.batch_boolean([*removed, *drills], OpType.Add)
 
 
 def _removed(cut: NotchCut, outer: float, sides: int, chord: float) -> Manifold:
@@ -182,13 +198,6 @@ class Zone(NamedTuple):
     direction: Points
     places: Points
     poses: Points
-
-    def pose_at(self, height: float) -> Points:
-        """Return rotation and displacement at a height of a spine, between two sections [mm]."""
-        between = Slerp(self.places, Rotation.from_matrix(self.poses[..., :3]))
-        turn = between(np.clip(height, self.places[0], self.places[-1])).as_matrix()
-        middle = np.array([[0.0, 0.0, height]])
-        return np.column_stack([turn, self.moved(middle)[0] - turn @ middle[0]])
 
     def moved(self, points: Points) -> Points:
         """Return points of the zone where they are in the state [mm], (v, 3)."""
@@ -326,6 +335,8 @@ class MovingSolids:
     Args:
         robot: The robot.
         shank: Uncut tube on the base side [mm].
+        sides: Flat sides of a body, as large in volume as the round tube. Flexures have half as
+            many, because they change with every state.
 
     Attributes:
         bodies: Surfaces of the bodies, base first.
@@ -343,26 +354,24 @@ class MovingSolids:
         (6, 5, True)
     """
 
-    def __init__(self, robot: Robot, shank: float = 0.0) -> None:
+    def __init__(self, robot: Robot, shank: float = 0.0, sides: int = 96) -> None:
         self._cuts = cuts = cuts_of(robot, shank)
-        chord = min(_COARSE * cuts.tube.outer_radius, _COARSEST)
-        solid = straight_solid(robot, cuts, SolidOptions(chord=chord))
         zones = DeformationMap(Subject(robot), cuts).zones
-        # Faces of cuts lie at the ends of the zones; of them nothing goes with the flexures.
-        ends = [(zone.start + _ROUNDING_OF_ZONES, zone.end - _ROUNDING_OF_ZONES) for zone in zones]
-        knots = [cuts.start, *(end for pair in ends for end in pair), cuts.end]
-        parts = [
-            solid.trim_by_plane((0.0, 0.0, 1.0), low).trim_by_plane((0.0, 0.0, -1.0), -high)
-            for low, high in pairwise(knots)
-        ]
+        knots = [cuts.start, *(end for zone in zones for end in (zone.start, zone.end)), cuts.end]
+        ends = list(pairwise(knots))
+        chord = 0.5 * cuts.tube.outer_radius * (1.0 - math.cos(math.pi / sides))
         places = _straight(robot, "tendons").position
-        self.bodies = [
-            (points - place, faces)
-            for (points, faces), place in zip(map(_surface, parts[::2]), places, strict=True)
-        ]
+        self.bodies: list[tuple[Points, NDArray[np.int64]]] = []
+        for pair, place in zip(ends[::2], places, strict=True):
+            points, faces = _surface(_wall(cuts, *pair, sides, chord))
+            self.bodies.append((points - place, faces))
         self.flexures = [
-            _surface(part.refine_to_length(float(np.ptp(zone.places)) / _STEPS_OF_SCENES))
-            for part, zone in zip(parts[1::2], zones, strict=True)
+            _surface(
+                _wall(cuts, *pair, sides // 2, chord).refine_to_length(
+                    float(np.ptp(zone.places)) / _STEPS_OF_SCENES
+                )
+            )
+            for pair, zone in zip(ends[1::2], zones, strict=True)
         ]
 
     def at(self, path: EquilibriumPath, step: int = 0) -> tuple[RobotShape, list[Points]]:

@@ -15,8 +15,7 @@ import numpy as np
 
 from notchflex import InputError, Robot, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
-from notchflex.export.drawing import plain_name
-from notchflex.export.formats import Document, SolidOptions, Subject
+from notchflex.export.formats import Document, SolidOptions, Subject, plain_name
 from notchflex.export.solids import (
     REACH,
     DeformationMap,
@@ -29,7 +28,7 @@ from notchflex.export.solids import (
 from notchflex.support import Line, NotchCut, Point, pieces, robot_digest
 
 _SECTIONS = 9
-"""Sections of a bent spine."""
+"""Sections of a bent spine, of those of the model."""
 _STAMP = "2000-01-01T00:00:00"
 """Instead of the time of writing: the same robot gives the same file."""
 
@@ -133,14 +132,14 @@ def _bent(straight: Any, motion: DeformationMap, cuts: RobotCuts) -> Any:
         found = [part for solid in straight.solids() for part in solid.intersect(disc).solids()]
         check_one_piece(len(found))
         if number % 2:
-            parts.append(_spine(found[0], motion.zones[number // 2], low, high))
+            parts.append(_spine(found[0], motion.zones[number // 2]))
         else:
             parts.append(found[0].moved(_location(motion.bodies[number // 2])))
     solids = parts[0].fuse(*parts[1:]).solids()
     return solids[0] if len(solids) == 1 else cad.Compound(solids)
 
 
-def _spine(piece: Any, zone: Zone, low: float, high: float) -> Any:
+def _spine(piece: Any, zone: Zone) -> Any:
     """Return a spine through its sections, each that of the straight one at its pose."""
     cad = import_module("build123d")
     foot = piece.faces().sort_by(cad.Axis.Z)[0]
@@ -149,8 +148,9 @@ def _spine(piece: Any, zone: Zone, low: float, high: float) -> Any:
             "a STEP file of a bent robot needs spines without holes; leave channels out, or write "
             "an STL file."
         )
-    poses = ((zone.pose_at(height), height - low) for height in np.linspace(low, high, _SECTIONS))
-    places = [_location(pose, lift) for pose, lift in poses]
+    shown = np.linspace(0, len(zone.places) - 1, _SECTIONS).round().astype(int)
+    lifts = zone.places[shown] - zone.start
+    places = [_location(*pair) for pair in zip(zone.poses[shown], lifts, strict=True)]
     return cad.Solid.make_loft([foot.outer_wire().moved(place) for place in places])
 
 

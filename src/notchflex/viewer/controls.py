@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from notchflex import Load, Robot, solve
 
-TENSION, STROKE = "tension", "stroke"
+TENSION: Final = "tension"
+STROKE: Final = "stroke"
 UNITS = {TENSION: "N", STROKE: "mm"}
 _AT_TIP = (("force x", "N"), ("force y", "N"), ("force z", "N"), ("hung weight", "g"))
 

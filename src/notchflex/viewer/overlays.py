@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
@@ -14,7 +14,7 @@ from notchflex.plotting import BLUE, GREEN, ORANGE
 from notchflex.sensing import SensedForce, SensorNoise, sense
 from notchflex.viewer.colours import add_arrows, rgb
 from notchflex.viewer.controls import POINTING, ControlRanges, Controls
-from notchflex.viewer.session import LoopHistory, Session
+from notchflex.viewer.session import Session, Step
 from notchflex.workspaces import Workspace, workspace
 
 _POINT = 0.004  # size of a point of the cloud, in lengths of the robot
@@ -30,7 +30,7 @@ Ask = Callable[[Callable[[], None]], None]
 
 
 class Background:
-    """Work beside the solver thread; of requests that wait the last one counts.
+    """Work beside the solver thread, on what was requested last.
 
     Args:
         ask: Adds a task of the solver thread.
@@ -40,18 +40,20 @@ class Background:
         self._ask = ask
         self._pool = ThreadPoolExecutor(1)
         self._last: Future[Any] | None = None
+        self.key: Any = None
+        """What is computed; None for nothing, whose result is dropped."""
 
-    def request(self, work: Callable[[], Any], use: Callable[[Any], None]) -> None:
+    def request(self, key: Any, work: Callable[[], Any], use: Callable[[Any], None]) -> None:
         """Work, and hand the result to `use` in the solver thread, which gets errors as well."""
 
-        def deliver(done: Future[Any]) -> None:
-            if not done.cancelled():
-                self._ask(lambda: use(done.result()))
+        def finish(done: Future[Any]) -> None:
+            if key == self.key and not done.cancelled():
+                use(done.result())
 
         if self._last is not None:
             self._last.cancel()
-        self._last = self._pool.submit(work)
-        self._last.add_done_callback(deliver)
+        self.key, self._last = key, self._pool.submit(work)
+        self._last.add_done_callback(lambda done: self._ask(lambda: finish(done)))
 
 
 class TipHandle:
@@ -90,18 +92,14 @@ class ReachableCloud:
     def __init__(self, scene: Any, length: float, ask: Ask) -> None:
         self._scene, self._length = scene, length
         self._background = Background(ask)
-        self._wanted: Any = None
         self._node: Any = None
 
     def update(self, robot: Robot, controls: Controls, ends: ControlRanges, shown: bool) -> None:
         """Show or hide the points; compute them where they are not known."""
         key = (robot, controls.tip_force, controls.tip_mass, controls.pointing, ends.tension)
-        if shown and key != self._wanted:
+        if shown and key != self._background.key:
             self.remove()
-            self._wanted = key
-            self._background.request(
-                lambda: explored(robot, controls, ends), lambda cloud: self._show(key, cloud)
-            )
+            self._background.request(key, lambda: explored(robot, controls, ends), self._show)
         if self._node is not None:
             self._node.visible = shown
 
@@ -109,7 +107,7 @@ class ReachableCloud:
         """Remove the points."""
         if self._node is not None:
             self._node.remove()
-        self._node = self._wanted = None
+        self._node = self._background.key = None
 
     @property
     def points(self) -> Float[np.ndarray, "n 3"]:
@@ -117,13 +115,12 @@ class ReachableCloud:
         node: Any = self._node
         return np.zeros((0, 3)) if node is None or not node.visible else np.asarray(node.points)
 
-    def _show(self, key: Any, cloud: Workspace) -> None:
-        if key == self._wanted:
-            colours = np.where(cloud.loading[:, None], rgb(BLUE), rgb(ORANGE)).astype(np.uint8)
-            self._node = self._scene.add_point_cloud(
-                "/cloud", cloud.tip, colours, precision="float32",
-                point_size=_POINT * self._length, point_shape="circle",
-            )  # fmt: skip
+    def _show(self, cloud: Workspace) -> None:
+        colours = np.where(cloud.loading[:, None], rgb(BLUE), rgb(ORANGE)).astype(np.uint8)
+        self._node = self._scene.add_point_cloud(
+            "/cloud", cloud.tip, colours, precision="float32",
+            point_size=_POINT * self._length, point_shape="circle",
+        )  # fmt: skip
 
 
 def explored(robot: Robot, controls: Controls, ends: ControlRanges) -> Workspace:
@@ -152,7 +149,6 @@ class SensedArrow:
     def __init__(self, scene: Any, radius: float, longest: float, ask: Ask) -> None:
         self._longest = longest
         self._background = Background(ask)
-        self._wanted: Any = None
         self.sensed: SensedForce | None = None
         # Below the tip, beside the arrows of the loads and of the handle.
         self._start, self._bar, label = np.outer(_BELOW, [0.0, 0.0, -radius])
@@ -165,31 +161,29 @@ class SensedArrow:
 
     def update(self, session: Session, shown: bool, still: bool) -> None:
         """Show or hide the arrow; sense again where the robot stands still and has moved."""
-        # Each solved state has its own path.
-        if not shown or session.solved is not self._wanted:
-            self._root.visible, self.sensed, self._wanted = False, None, None
-        if not shown or not still or session.solved is self._wanted:
+        solved = session.solved
+        if not shown or solved != self._background.key:
+            self._root.visible, self.sensed, self._background.key = False, None, None
+        if not shown or not still or solved == self._background.key:
             return
-        self._wanted = solved = session.solved
         robot, load = session.robot, Load(base_rotation=POINTING[session.pointing])
         tension, stroke = read(session.history)
         if tension.any():
             self._background.request(
+                solved,
                 lambda: sense(robot, tension, stroke, noise=NOISE, known=load),
-                lambda force: self._show(solved, force),
+                lambda force: self._show(solved.tip_position[0], force),
             )
 
     def remove(self) -> None:
         """Remove all of it."""
         self._root.remove()
-        self._wanted = None
+        self._background.key = None
 
-    def _show(self, solved: Any, force: SensedForce) -> None:
-        if self._wanted is not solved:
-            return  # the robot has moved on
+    def _show(self, tip: Float[np.ndarray, " 3"], force: SensedForce) -> None:
         self.sensed = force
         self._label.text = text(force)
-        self._root.position, self._root.visible = solved.tip_position[0], True
+        self._root.position, self._root.visible = tip, True
         self._arrow.visible = self._interval.visible = bool(force.converged[-1])
         if force.converged[-1]:
             ends = np.abs([force.low[-1], force.high[-1], force.force[-1]])
@@ -211,9 +205,10 @@ def turning_points(rows: Float[np.ndarray, "s k"]) -> Int[np.ndarray, " r"]:
     return np.append(turns, len(rows) - 1)
 
 
-def read(history: LoopHistory) -> tuple[Float[np.ndarray, "r t"], Float[np.ndarray, "r t"]]:
+def read(history: Sequence[Step]) -> tuple[Float[np.ndarray, "r t"], Float[np.ndarray, "r t"]]:
     """Return tensions (N) and strokes (mm) of a history, where its loads turn round."""
-    tension, stroke = np.array(history.tension), np.array(history.stroke)
+    tension = np.array([step.tension for step in history])
+    stroke = np.array([step.stroke for step in history])
     if len(tension) < 2:
         return tension[:0], stroke[:0]
     # Between turns tendons and force change in proportion, as `sense` takes them to.

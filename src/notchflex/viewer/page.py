@@ -14,7 +14,7 @@ from notchflex import InputError, Robot, list_robots, load_robot
 from notchflex.plotting import chart_of
 from notchflex.support import robot_from_text
 from notchflex.viewer import saving
-from notchflex.viewer.controls import POINTING, UNITS, Controls, name_of
+from notchflex.viewer.controls import POINTING, UNITS, name_of
 from notchflex.viewer.readout import along_tendon, legend_html, loop, notice, readout
 from notchflex.viewer.session import SECTIONS, kinds, numbers
 from notchflex.viewer.tasks import PAUSE
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _FINE = 200  # steps of a slider from end to end
 _JUMP = 0.03  # a larger part of the slider at once was typed or clicked, not dragged
+_DECIMALS = 9  # that a field takes
 _DIGITS = 3  # of the smallest step that a field shows, at least
 
 
@@ -106,6 +107,13 @@ class Slider(Input):
         super().put(min(max(float(value), self.handle.min), self.handle.max))
 
 
+def add_number(gui: Any, label: str, value: float, hint: str, **options: Any) -> Any:
+    """Add a field for a number; viser itself takes no more decimals than the first value has."""
+    handle = gui.add_number(label, value, hint=hint, **options)
+    handle.precision = _DECIMALS
+    return handle
+
+
 def add_button(gui: Any, label: str, act: Callable[[Any], None], hint: str | None = None) -> None:
     """Add a button; `act` is called with the browser's handle, in the event loop."""
 
@@ -139,99 +147,102 @@ _OVERLAYS = {
 _CHOOSE = "choose ..."
 
 
-class LoadControls:
-    """The folders "Tendons" and "At the tip", with the current loads."""
-
-    def __init__(self, viewer: Viewer) -> None:
-        self._viewer = viewer
-        gui, controls = viewer.server.gui, viewer.session.controls
-        count = len(controls.by)
-        with gui.add_folder("Tendons", order=1.0) as tendons:
-            self._drives = [self._drive(tendon, count) for tendon in range(count)]
-            names = tuple(str(tendon + 1) for tendon in range(count))
-            tendon = gui.add_dropdown("charts show tendon", names, visible=count > 1)
-            self.charted = Input(viewer, tendon, lambda name: viewer.page.chart(int(name) - 1))
-            for label, ask, act, hint in (
-                ("Play a cycle", viewer.ask, lambda: viewer.cycle(viewer.page.active),
-                 "load and unload the tendon of the charts"),
-                ("Stop", viewer.interrupt, viewer.halt, "stop at this state"),
-                ("Reset", viewer.interrupt, viewer.reset, "the free robot, without history"),
-            ):  # fmt: skip
-                add_button(gui, label, lambda _, ask=ask, act=act: ask(act), hint)
-        with gui.add_folder("At the tip", order=2.0) as tip:
-            self._at_tip = [Slider(viewer, number) for number in range(count, count + 4)]
-            hint = "a weight hangs down; the load history is repeated"
-            pointing = gui.add_dropdown("tube points", tuple(POINTING), hint=hint)
-            self._pointing = Input(viewer, pointing, viewer.point)
-        self.folders: list[Any] = [tendons, tip]
-        self.follow(controls)
-
-    def _drive(self, tendon: int, count: int) -> tuple[Input, Slider, Input]:
-        """Add a tendon by tension or stroke, its slider, and the end of the slider."""
-        viewer, gui = self._viewer, self._viewer.server.gui
-        of = f" {tendon + 1}" if count > 1 else ""
-
-        def now(label: str) -> None:  # so that the next value belongs to the new choice
-            slider.prescribe(_BY[label])
-            slider.put(viewer.session.where(tendon, slider.by))
-
-        by = gui.add_dropdown(f"tendon{of} by", tuple(_BY))
-        slider = Slider(viewer, tendon, viewer.session.controls.by[tendon])
-        end = gui.add_number(
-            f"slider{of} to", float(slider.handle.max), hint="end of this slider", min=0.0
-        )
-        return (
-            Input(viewer, by, lambda label: viewer.drive_by(tendon, _BY[label]), now=now),
-            slider,
-            Input(viewer, end, lambda end: viewer.stretch(tendon, slider.by, end), PAUSE),
-        )
-
-    def follow(self, controls: Controls) -> None:
-        """Show the settings."""
-        pairs = zip(self._drives, controls.by, controls.value, strict=True)
-        for (choice, slider, end), by, value in pairs:
-            choice.put(f"{by} [{UNITS[by]}]")
-            if _BY[choice.shown] == by:  # no other one waits
-                slider.prescribe(by)
-                slider.put(value)
-            end.put(slider.handle.max)
-        for slider in self._at_tip:
-            slider.put(controls.numbers[slider.number])
-        self._pointing.put(controls.pointing)
+Follow = Callable[[], None]
+"""Shows the current settings."""
 
 
-class PartControls:
-    """The folder of the friction law or the material: its kind and the numbers of this kind."""
+def add_load_folders(viewer: Viewer) -> tuple[list[Any], Follow, Input]:
+    """Add the folders "Tendons" and "At the tip"; return them, and the choice of the charts."""
+    gui, count = viewer.server.gui, viewer.session.robot.number_of_tendons
+    with gui.add_folder("Tendons", order=1.0) as tendons:
+        drives = [_add_drive(viewer, tendon, count) for tendon in range(count)]
+        names = tuple(str(tendon + 1) for tendon in range(count))
+        tendon = gui.add_dropdown("charts show tendon", names, visible=count > 1)
+        charted = Input(viewer, tendon, lambda name: viewer.page.chart(int(name) - 1))
+        for label, ask, act, hint in (
+            ("Play a cycle", viewer.ask, lambda: viewer.cycle(viewer.page.active),
+             "load and unload the tendon of the charts"),
+            ("Stop", viewer.interrupt, viewer.halt, "stop at this state"),
+            ("Reset", viewer.interrupt, viewer.reset, "the free robot, without history"),
+        ):  # fmt: skip
+            add_button(gui, label, lambda _, ask=ask, act=act: ask(act), hint)
+    with gui.add_folder("At the tip", order=2.0) as tip:
+        at_tip = [Slider(viewer, number) for number in range(count, count + 4)]
+        hint = "a weight hangs down; the load history is repeated"
+        handle = gui.add_dropdown("tube points", tuple(POINTING), hint=hint)
+        pointing = Input(viewer, handle, viewer.point)
 
-    def __init__(self, viewer: Viewer, section: str, order: float) -> None:
-        self._viewer, self._section = viewer, section
-        self._fields: dict[str, Input] = {}
-        self.folder: Any = viewer.server.gui.add_folder(
-            section.capitalize(), order=order, expand_by_default=section == "friction"
-        )
-        with self.folder:
-            laws = viewer.server.gui.add_dropdown("law", tuple(kinds(section)))
-        self.kind = Input(viewer, laws, lambda kind: viewer.change_part(section, kind))
-        self.follow(viewer.session.robot)
+    def follow() -> None:
+        goal = viewer.goal
+        for drive in drives:
+            drive()
+        for slider in at_tip:
+            slider.put(goal.numbers[slider.number])
+        pointing.put(goal.pointing)
 
-    def _field(self, key: str, value: float, unit: str, hint: str) -> Input:
-        viewer, name = self._viewer, f"{self._section}.{key}"
+    return [tendons, tip], follow, charted
+
+
+def _add_drive(viewer: Viewer, tendon: int, count: int) -> Follow:
+    """Add a tendon by tension or stroke, its slider, and the end of the slider."""
+    gui, of = viewer.server.gui, f" {tendon + 1}" if count > 1 else ""
+
+    def now(label: str) -> None:  # so that the next value belongs to the new choice
+        slider.prescribe(_BY[label])
+        slider.put(viewer.session.where(tendon, slider.by))
+
+    handle = gui.add_dropdown(f"tendon{of} by", tuple(_BY))
+    slider = Slider(viewer, tendon, viewer.session.controls.by[tendon])
+    most, hint = float(slider.handle.max), "end of this slider"
+    field = add_number(gui, f"slider{of} to", most, hint, min=0.0)
+    choice = Input(viewer, handle, lambda label: viewer.drive_by(tendon, _BY[label]), now=now)
+    end = Input(viewer, field, lambda most: viewer.stretch(tendon, slider.by, most), PAUSE)
+
+    def follow() -> None:
+        goal = viewer.goal
+        by = goal.by[tendon]
+        choice.put(f"{by} [{UNITS[by]}]")
+        if _BY[choice.shown] == by:  # no other one waits
+            slider.prescribe(by)
+            slider.put(goal.value[tendon])
+        end.put(slider.handle.max)
+
+    return follow
+
+
+def add_part_folder(viewer: Viewer, section: str, order: float) -> tuple[Any, Follow, Input]:
+    """Add the folder of the friction law or the material; return it, and the choice of its kind.
+
+    It has the numbers of this kind.
+    """
+    gui = viewer.server.gui
+    folder = gui.add_folder(
+        section.capitalize(), order=order, expand_by_default=section == "friction"
+    )
+    with folder:
+        laws = gui.add_dropdown("law", tuple(kinds(section)))
+    kind = Input(viewer, laws, lambda kind: viewer.change_part(section, kind))
+    fields: dict[str, Input] = {}
+
+    def add_field(key: str, value: float, unit: str, hint: str) -> Input:
         label = "μ" if key == "coefficient" else key.replace("_", " ")
-        label += f" [{unit}]" if unit else ""
-        with self.folder:
-            handle = viewer.server.gui.add_number(label, value, hint=hint)
+        with folder:
+            handle = add_number(gui, f"{label} [{unit}]" if unit else label, value, hint)
+        name = f"{section}.{key}"
         return Input(viewer, handle, lambda value: viewer.change_number(name, value), PAUSE)
 
-    def follow(self, robot: Robot) -> None:
-        """Show the kind and its numbers."""
-        self.kind.put(getattr(robot, self._section).kind)
-        shown = {number.key: number for number in numbers(robot, self._section)}
+    def follow() -> None:
+        robot = viewer.session.robot
+        kind.put(getattr(robot, section).kind)
+        shown = {number.key: number for number in numbers(robot, section)}
         for key, number in shown.items():
-            if key not in self._fields:
-                self._fields[key] = self._field(*number)
-            self._fields[key].put(number.value)
-        for key, field in self._fields.items():
+            if key not in fields:
+                fields[key] = add_field(*number)
+            fields[key].put(number.value)
+        for key, field in fields.items():
             field.handle.visible = key in shown
+
+    return folder, follow, kind
 
 
 def add_robot_folders(viewer: Viewer) -> list[Any]:
@@ -339,13 +350,11 @@ class Page:
         viewer, self.active = self.viewer, 0
         for folder in self._folders:
             folder.remove()
-        self.loads = LoadControls(viewer)
-        self.parts = {
-            section: PartControls(viewer, section, order)
-            for order, section in enumerate(SECTIONS, start=3)
-        }
-        folders = [part.folder for part in self.parts.values()]
-        self._folders = [*self.loads.folders, *folders, *add_robot_folders(viewer)]
+        loads, follow, self._charted = add_load_folders(viewer)
+        parts = [add_part_folder(viewer, part, order) for order, part in enumerate(SECTIONS, 3)]
+        folders, follows, self.laws = zip(*parts, strict=True)
+        self._follow = [follow, *follows]
+        self._folders = [*loads, *folders, *add_robot_folders(viewer)]
         self.name()
         eye = viewer.scene.eye(viewer.session.pointing)
         camera = viewer.server.initial_camera
@@ -360,25 +369,23 @@ class Page:
     def chart(self, tendon: int) -> None:
         """Show a tendon (from 0) in the charts."""
         self.active = tendon
-        self.loads.charted.put(str(tendon + 1))
+        self._charted.put(str(tendon + 1))
         self.update()
 
-    def update(self, charts: bool = True) -> None:
-        """Update numbers, controls and notice, and charts: a browser takes long to draw them."""
+    def update(self) -> None:
+        """Update numbers, charts, controls and notice."""
         session = self.viewer.session
         self._readout.content = readout(session)
-        if charts:
-            self._loop.figure = chart_of(loop(session, self.active))
-            self._along.figure = chart_of(along_tendon(session, self.active))
+        self._loop.figure = chart_of(loop(session, self.active))
+        self._along.figure = chart_of(along_tendon(session, self.active))
         self.follow()
 
     def follow(self) -> None:
         """Update controls and notice."""
         viewer = self.viewer
-        self._notice.content = notice(viewer.message or viewer.note)
-        self.loads.follow(viewer.goal)
-        for part in self.parts.values():
-            part.follow(viewer.session.robot)
+        self._notice.content = notice(viewer.message)
+        for follow in self._follow:
+            follow()
 
     def busy(self, sentence: str) -> None:
         """Show at once what takes longer."""

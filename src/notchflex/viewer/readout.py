@@ -11,7 +11,7 @@ from notchflex import Robot
 from notchflex.plotting import BLUE, COLOUR, VERMILLION, Curve, Mark, Panel, branches, dots
 from notchflex.support import QUANTITIES
 from notchflex.viewer.colours import BEYOND, STRAIN, TENDON, contact_colours, legend
-from notchflex.viewer.session import Session
+from notchflex.viewer.session import Session, hysteresis
 
 _BEFORE, _NOW = "#b5b5b5", "#111111"
 _MAX_CLOSED = 8  # numbers of closed notches in one line
@@ -35,10 +35,10 @@ def loop(session: Session, tendon: int) -> Panel:
     by = session.controls.by[tendon]
     units = [1.0, QUANTITIES["total_angle"].scale]
     items: list[Mark] = []
-    if session.before is not None:
-        points = session.before.loop(tendon, by) * units
+    if session.before:
+        points = hysteresis(session.before, tendon, by) * units
         items.append(Curve(points, _BEFORE, name="before the change"))
-    points = session.history.loop(tendon, by) * units
+    points = hysteresis(session.history, tendon, by) * units
     for part, way in branches(points[:, 0]) if len(points) > 1 else ():
         items.append(Curve(points[part], COLOUR[way], name=way))
     items.append(dots(points[-1:], _NOW, 6.0, name="now"))
@@ -66,12 +66,12 @@ def rows(session: Session) -> list[tuple[str, str, str]]:
     state, robot = session.state, session.robot
     count = robot.number_of_tendons
     table = [
-        (f"{name}_{tendon + 1}", axis(name, tendon, count), fixed(value, 3))
+        (f"{name}_{tendon + 1}", axis(name, tendon, count), f"{value:z.3f}")
         for name in ("tension", "stroke")
         for tendon, value in enumerate(getattr(state, name).tolist())
     ]
     angle = QUANTITIES["total_angle"].scale * float(state.total_angle)
-    position = ", ".join(fixed(value, 2) for value in np.asarray(state.tip_position).tolist())
+    position = ", ".join(f"{value:z.2f}" for value in np.asarray(state.tip_position).tolist())
     closed = [str(number) for number in np.flatnonzero(state.closed) + 1]
     text = ", ".join(closed) if len(closed) <= _MAX_CLOSED else str(len(closed))
     largest, allowed = _strain(session)
@@ -80,7 +80,7 @@ def rows(session: Session) -> list[tuple[str, str, str]]:
         limit = f" {'>' if largest > allowed else 'of'} {100.0 * allowed:g} % allowed"
     return [
         *table,
-        ("total_angle", axis("total_angle"), fixed(angle, 2)),
+        ("total_angle", axis("total_angle"), f"{angle:z.2f}"),
         ("tip_position", axis("tip_position"), position),
         ("peak_strain", "largest strain", f"{100.0 * largest:.2f} %{limit}"),
         ("closed", f"closed notches of {robot.number_of_notches}", text or "none"),
@@ -106,16 +106,6 @@ def readout(session: Session) -> str:
         for name, label, value in rows(session)
     )
     return f'<table style="width:98%;font-size:12px;border-collapse:collapse">{cells}</table>'
-
-
-def fixed(value: float, digits: int) -> str:
-    """Return a number with some decimals, without a sign before a zero.
-
-    Example:
-        >>> fixed(-1e-9, 2), fixed(-0.126, 2)
-        ('0.00', '-0.13')
-    """
-    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def notice(text: str, waiting: bool = False) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, cast
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -19,38 +20,23 @@ from notchflex import (
     simulate,
 )
 from notchflex.control import Limits, TargetSearch, reach
-from notchflex.control.limits import Drive
 from notchflex.robot.part import unit_of
 from notchflex.support import Friction, Material, fields_of, is_list, kinds_of, to_table
 from notchflex.viewer.controls import STROKE, TENSION, ControlRanges, Controls
 
 
-@dataclass
-class LoopHistory:
-    """Solved steps in order; each is one entry of every list."""
+class Step(NamedTuple):
+    """A solved step: tension [N] and stroke [mm] of every tendon, total angle [rad]."""
 
-    controls: list[Controls] = field(default_factory=list[Controls])
-    tension: list[np.ndarray] = field(default_factory=list[np.ndarray])  # of every tendon [N]
-    stroke: list[np.ndarray] = field(default_factory=list[np.ndarray])  # of every tendon [mm]
-    total_angle: list[float] = field(default_factory=list[float])  # [rad]
+    controls: Controls
+    tension: np.ndarray
+    stroke: np.ndarray
+    total_angle: float
 
-    def __len__(self) -> int:
-        """Number of steps."""
-        return len(self.controls)
 
-    def add(self, controls: Controls, state: Equilibrium) -> None:
-        """Append a solved step."""
-        self.controls.append(controls)
-        self.tension.append(np.asarray(state.tension, float))
-        self.stroke.append(np.asarray(state.stroke, float))
-        self.total_angle.append(float(state.total_angle))
-
-    def loop(self, tendon: int, by: str = TENSION) -> np.ndarray:
-        """Return tension [N] or stroke [mm] of a tendon (from 0) and total angle [rad], (S, 2)."""
-        steps = self.tension if by == TENSION else self.stroke
-        pairs = zip(steps, self.total_angle, strict=True)
-        rows = [(values[tendon], angle) for values, angle in pairs if tendon < len(values)]
-        return np.array(rows, float).reshape(-1, 2)
+def hysteresis(history: Sequence[Step], tendon: int, by: str = TENSION) -> np.ndarray:
+    """Return tension [N] or stroke [mm] of a tendon (from 0) and total angle [rad], (S, 2)."""
+    return np.array([(getattr(step, by)[tendon], step.total_angle) for step in history])
 
 
 class Session:
@@ -75,17 +61,21 @@ class Session:
         """Solve the robot at rest."""
         self.robot = robot
         self.pointing = pointing
-        self._compiled: set[tuple[object, ...]] = set()
+        self._compiled: set[tuple[bool, ...]] = set()
         self.reset()
 
     def reset(self) -> None:
         """Return to the robot at rest and clear all history."""
-        self.before: LoopHistory | None = None  # the loop before the robot was last changed
-        self.controls = Controls.at_rest(self.robot, self.pointing)
-        self.solved = simulate(self.robot, self.controls.load())
-        self.history = LoopHistory()
-        self.history.add(self.controls, self.state)
-        self._compiled.add(self._form(self.controls))
+        self.before: list[Step] = []  # the loop before the robot was last changed
+        self.history: list[Step] = []
+        rest = Controls.at_rest(self.robot, self.pointing)
+        self._keep(rest, simulate(self.robot, rest.load()))
+
+    def _keep(self, controls: Controls, solved: EquilibriumPath) -> None:
+        self.controls, self.solved, state = controls, solved, solved[0]
+        self._compiled.add(_form(controls))
+        angle = float(state.total_angle)
+        self.history.append(Step(controls, state.tension, state.stroke, angle))
 
     @property
     def state(self) -> Equilibrium:
@@ -101,23 +91,14 @@ class Session:
         """Solve a setting from the current state; the direction of the tube stays."""
         controls = replace(controls, pointing=self.pointing)
         solved = simulate(self.robot, controls.load(), from_state=self.solved.state)
-        self._compiled.add(self._form(controls))
         if not solved.converged[0]:
             return solved.reason[0]
-        self.controls, self.solved = controls, solved
-        self.history.add(controls, self.state)
+        self._keep(controls, solved)
         return ""
 
     def is_new(self, controls: Controls) -> bool:
         """Return whether a setting may need a program that is not compiled, which takes seconds."""
-        return self._form(controls) not in self._compiled
-
-    def _form(self, controls: Controls) -> tuple[object, ...]:
-        """Return what selects the program; rather too fine than too coarse."""
-        robot = self.robot
-        kinds = (robot.material.kind, robot.friction.kind, *(one.kind for one in robot.notches))
-        tip = (any(controls.tip_force), any(controls.tip_force[:2]), controls.tip_mass > 0.0)
-        return (*kinds, STROKE in controls.by, controls.pointing if any(tip) else "", *tip)
+        return _form(controls) not in self._compiled
 
     def change(
         self,
@@ -134,17 +115,14 @@ class Session:
         Raises:
             InputError: The other robot cannot be solved; this one is unchanged.
         """
-        past = self.history
-        changed = self.robot if robot is None else robot
+        past, changed = self.history, robot or self.robot
         # First: a robot that cannot be solved leaves this one unchanged.
-        again = Session(changed, self.pointing if pointing is None else pointing)
-        again._compiled |= self._compiled
-        reason = ""
+        again = Session(changed, pointing or self.pointing)
+        reason, count = "", len(past)
         if changed.number_of_tendons == self.robot.number_of_tendons:
-            again.before = past if len(past) > 1 else None
-            count = len(past.controls)
-            for number, controls in enumerate(past.controls[1:], start=2):
-                if reason := again.go(controls):
+            again.before = past if count > 1 else []
+            for number, step in enumerate(past[1:], start=2):
+                if reason := again.go(step.controls):
                     reason = f"step {number} of {count} repeated: {reason}"
                     break
                 if go_on is not None and not go_on(number, count) and number < count:
@@ -155,7 +133,13 @@ class Session:
 
     def path(self) -> EquilibriumPath:
         """Return the whole history as one path from rest, as `notchflex.simulate` finds it."""
-        return simulate(self.robot, [one.load() for one in self.history.controls])
+        return simulate(self.robot, [step.controls.load() for step in self.history])
+
+
+def _form(controls: Controls) -> tuple[bool, ...]:
+    """Return what selects the program of a load; rather too fine than too coarse."""
+    x, y, z = (force != 0.0 for force in controls.tip_force)
+    return STROKE in controls.by, x or y, z, controls.tip_mass > 0.0
 
 
 # Finer than a screen shows, and never longer than an update may take.
@@ -183,7 +167,7 @@ def steer(
     away = float(np.linalg.norm(session.solved.tip_position - point))
     if away <= _SEARCH.tolerance:
         return controls, away
-    drive: Drive = TENSION if TENSION in controls.by else STROKE
+    drive = TENSION if TENSION in controls.by else STROKE
     driven = [by == drive for by in controls.by]
     load = replace(controls.load(), **{drive: [None] * len(driven)})
     limits = zip(*(ends.ends(tendon, drive) for tendon in range(len(driven))), strict=True)
@@ -193,7 +177,7 @@ def steer(
         state=session.solved.state,
         load=load,
         drive=drive,
-        limits=Limits(**cast(dict[str, Any], {drive: tuple(limits)})),
+        limits=replace(Limits(), **{drive: tuple(limits)}),
         approach="direct",
         search=_SEARCH,
     )
@@ -231,11 +215,8 @@ def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = No
     """
     if original is not None and getattr(original, section).kind == kind:
         return robot.replace(**{section: getattr(original, section)})
-    try:
+    with suppress(InputError):
         return robot.with_value(f"{section}.kind", kind)
-    except InputError:
-        if kind not in kinds(section):
-            raise
     present = to_table(robot)[section]
     for ready in list_robots():
         table = to_table(load_robot(ready))[section]
@@ -243,10 +224,8 @@ def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = No
             shared = {key: present.get(key, value) for key, value in table.items()}
             for values in (shared, table):  # values of both kinds need not fit together
                 named = {f"{section}.{key}": value for key, value in values.items()}
-                try:
+                with suppress(InputError):
                     return robot.with_values({**named, f"{section}.kind": kind})
-                except InputError:
-                    continue
     raise InputError.UNKNOWN_NAME(
         f'no ready robot has a {section} of the kind "{kind}" to take values from'
     )
@@ -260,9 +239,7 @@ def numbers(robot: Robot, section: str) -> Iterator[PartNumber]:
         ['coefficient']
     """
     part = getattr(robot, section)
-    fields: dict[str, Any] = getattr(type(part), "__pydantic_fields__", {})
-    for key, info in fields.items():
+    for key, info in fields_of(type(part)).items():
         value = getattr(part, key)
         if isinstance(value, float):
-            unit = unit_of(info)
-            yield PartNumber(key, value, unit, str(info.description))
+            yield PartNumber(key, value, unit_of(info), str(info.description))

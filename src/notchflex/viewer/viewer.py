@@ -21,8 +21,8 @@ from notchflex.viewer.tasks import TargetQueue, Task, Tasks, WatchedFile
 # A browser does not show more steps a second than this.
 MAX_STEPS = 60.0
 # Intervals in which numbers and charts are updated while the robot moves, and in which the file is
-# checked [s].
-_TEXT, _CHARTS, _LOOK = 0.1, 0.5, 0.5
+# checked [s]: a browser takes long to draw charts.
+_SHOW, _LOOK = 0.3, 0.5
 # Distance of the tip from its target that is worth a note, in outer radii.
 _SEEN = 0.05
 
@@ -60,12 +60,11 @@ class Viewer:
         stride = self.reach.stride(self.session.controls.by)
         self.targets = TargetQueue(self.session.controls, stride)
         self.shown = Shown()
-        self.message = ""  # why something was not done
-        self.note = ""  # how the last number was changed
+        self.message = ""  # why something was not done, or how a number was changed
         self._playing = False
         self._read = read
         self._file = WatchedFile(file) if file is not None and read is not None else None
-        self._looked = self._updated = self._charted = 0.0
+        self._looked = self._updated = 0.0
         self.server, self.address = serve(host, port)
         self._make_scene(robot)
         self.page = Page(self)
@@ -128,15 +127,13 @@ class Viewer:
         """Move the robot, and update numbers and charts; while it moves, not at every step."""
         self.scene.update(self.session, still=not moving)
         now = time.monotonic()
-        if not moving or now - self._updated > _TEXT:
+        if not moving or now - self._updated > _SHOW:
             self._updated = now
-            charts = not moving or now - self._charted > _CHARTS
-            self._charted = now if charts else self._charted
-            self.page.update(charts)
+            self.page.update()
 
     def _begin(self) -> None:
-        """Begin something else: clear message and note, end a cycle."""
-        self.message = self.note = ""
+        """Begin something else: clear the message, end a cycle."""
+        self.message = ""
         self._playing = False
 
     def set(self, number: int, value: float, by: str = "") -> None:
@@ -153,7 +150,7 @@ class Viewer:
         if kept != value:
             name, unit = name_of(number, by, count)
             remedy = "; change the end under 'slider to'" if by and value > high else ""
-            self.note = (
+            self.message = (
                 f"{name}: {value:g} {unit} is outside its slider, from {low:g} to {high:g} {unit}. "
                 f"It is set to {kept:g} {unit}{remedy}."
             )
@@ -170,7 +167,7 @@ class Viewer:
         self._begin()
         controls, error = steer(self.session, self.reach, point)
         if error > _SEEN * self.session.robot.tube.outer_radius:
-            self.note = f"Out of reach: the tip stays {error:.2g} mm away."
+            self.message = f"Out of reach: the tip stays {error:.2g} mm away."
         self.targets.clear(controls)
         self.advance(controls, goes_on=not last)
 
@@ -194,7 +191,6 @@ class Viewer:
 
     def halt(self) -> None:
         """Stop at the current state."""
-        self.note = ""
         self.targets.clear(self.session.controls)
         self._restart()
 
@@ -233,7 +229,7 @@ class Viewer:
             InputError: The robot cannot be solved; the one before stays.
         """
         old = self.session.robot
-        self.message = self.note = ""
+        self.message = ""
         self.page.busy("preparing the robot")
         reason = self.session.change(robot, go_on=self._go_on)
         if (old.tube, old.notch, old.tendon) != (robot.tube, robot.notch, robot.tendon):
@@ -299,9 +295,9 @@ class Viewer:
         now = abs(self.targets.end.value[tendon]) if is_commanded else 0.0
         low, high = max(now, first / STRETCH), first * STRETCH
         kept = min(max(end, low), high)
-        self.message = self.note = ""
+        self.message = ""
         if kept != end:
-            self.note = f"The end of the slider must lie between {low:g} and {high:g}."
+            self.message = f"The end of the slider must lie between {low:g} and {high:g}."
         self.reach = self.scene.reach = self.reach.stretched(tendon, by, kept)
         self.targets.stride = self.reach.stride(self.session.controls.by)
         self.page.follow()
