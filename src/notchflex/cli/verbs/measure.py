@@ -190,7 +190,7 @@ def _check_files(
     outputs: Outputs,
 ) -> Sequence[Path]:
     """Check the files of a call before anything is measured; return those of the overlays."""
-    from notchflex.photographs.overlay import overlay_names
+    from notchflex.photographs.measured import overlay_names
 
     output = written["-o"]
     if overlays is None and output not in (None, "-"):
@@ -234,7 +234,7 @@ def _write_overlays(
     measured: MeasuredPhotographs | MeasuredCut, files: Sequence[Path], *lines: Any
 ) -> None:
     """Write each photograph with its fitted outline."""
-    from notchflex.photographs.overlay import write_overlay
+    from notchflex.photographs.measured import write_overlay
     from notchflex.photographs.reading import read_photograph
 
     for file, photograph in zip(files, measured.photographs, strict=False):
@@ -264,7 +264,7 @@ def _write_cut(
     cut: MeasuredCut, outputs: Outputs, written: dict[str, str | None], overlays: Sequence[Path]
 ) -> int:
     """Write and print the notches as they were cut; return the exit code."""
-    from notchflex.photographs.overlay import cut_lines
+    from notchflex.photographs.measured import cut_lines
 
     _write_overlays(cut, overlays, cut_lines(cut))
     targets = [target for target in written.values() if target is not None]
