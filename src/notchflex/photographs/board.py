@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import approx_fprime, least_squares
 
 from notchflex import InputError
 from notchflex.photographs.edges import Contrast, Numbers
@@ -104,8 +104,7 @@ class Board:
         need("cv2", "photographs", "a board of markers")
         import cv2
 
-        name = self.dictionary if self.dictionary.startswith("april") else self.dictionary.upper()
-        name = name.replace("apriltag", "APRILTAG")
+        name = self.dictionary.upper().replace("H", "h")
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{name}"))
         if len(dictionary.bytesList) < self.columns * self.rows:
             raise InputError.OUT_OF_RANGE(
@@ -226,8 +225,7 @@ class Sighting:
             return float(numbers[3]) - math.log1p(near * depth)
 
         scale = log_scale(self.numbers)
-        steps = self.numbers + _STEP * np.eye(7)
-        slopes = np.array([log_scale(numbers) - scale for numbers in steps]) / _STEP
+        slopes: Any = approx_fprime(self.numbers, log_scale, _STEP)
         deviation = np.sqrt(np.diag(self.spread))
         away = math.exp(self.numbers[3] - scale)
         return ViewPrior(

@@ -200,8 +200,8 @@ class Lines:
     """Lines of an outline with N points.
 
     Args:
-        names: Name of the line of each point, (N,).
-        place: Place of each point along it, (N,).
+        names: Name of the line of each point, (N, k).
+        place: Place of each point along it, from and to the same distance of 0.5, (N,).
         shift: How far blur and shading may shift all lines alike, px.
 
     Attributes:
@@ -212,11 +212,10 @@ class Lines:
     """
 
     def __init__(self, names: NDArray[np.int_], place: Numbers, shift: float) -> None:
-        self.which = np.unique(names, return_inverse=True)[1]
+        self.which = np.unique(names, axis=0, return_inverse=True)[1].ravel()
         self.number, self._shift = int(self.which.max()) + 1, shift
-        lines = [place[self.which == line] for line in range(self.number)]
-        low, high = np.array([(places.min(), places.max()) for places in lines])[self.which].T
-        self.place = 2.0 * (place - low) / (high - low) - 1.0
+        spans = [np.ptp(place[self.which == line]) for line in range(self.number)]
+        self.place = (2.0 * place - 1.0) / np.array(spans)[self.which]
         on_line = np.eye(self.number)[self.which]
         common = np.ones((len(place), 1))
         self.columns = np.hstack([on_line, on_line * self.place[:, None], common])

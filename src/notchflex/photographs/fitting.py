@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -48,22 +47,8 @@ _COMMON = 0.025  # of the width of the tube: how far all lines may be shifted ou
 _LINE = np.array([0.1, 0.06])  # px: usual shift and turn of a line
 
 
-class _Known(NamedTuple):
-    """What is known of all numbers: mean and spread of their priors, bounds, usual steps."""
-
-    centre: Numbers
-    spread: Numbers
-    low: Numbers
-    high: Numbers
-    step: Numbers
-
-
-class _Weights(NamedTuple):
-    """Weights of edges (1/px^2, (N,)), columns of errors of lines, and their spreads, px."""
-
-    edges: Numbers
-    columns: Numbers
-    spreads: Numbers
+Weights = tuple[Numbers, Numbers, Numbers]
+"""Weights of edges (1/px^2, (N,)), columns of errors of lines (N, m), and their spreads (px)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +94,8 @@ class Fit:
         return _noise_of(self._apart())
 
     @cached_property
-    def known(self) -> _Known:
-        """What is known of the numbers before the fit."""
+    def known(self) -> Numbers:
+        """Means and spreads of the priors of all numbers, low and high bounds, usual steps."""
         outer, n, prior = 2.0 * self.model.planar.outer, self.model.planar.notches, self.model.prior
         inf, pixel = math.inf, 1.0 / self.contrast.factor
         mm = pixel * math.exp(-self.numbers[3])
@@ -136,7 +121,7 @@ class Fit:
             *n * lengths[1:],
             *(n + 1) * lengths[:1],
         ]
-        return _Known(*np.array(rows[: len(self.numbers)]).T)
+        return np.array(rows[: len(self.numbers)]).T
 
     def misfit(self, noise: float) -> float:
         """Return how unlikely residuals are: a sum of squares in which those far away are capped.
@@ -149,7 +134,7 @@ class Fit:
         errors, left = self.model.lines.errors(self.residual, 1.0)
         capped = np.minimum(np.nan_to_num(np.abs(left) / noise, nan=np.inf), _CAP) ** 2
         of_lines = float(np.nansum(2.0 * np.log1p((from_median(errors) / _LINE) ** 2 / 2.0)))
-        unlikely = float((((self.numbers - self.known.centre) / self.known.spread) ** 2).sum())
+        unlikely = float((((self.numbers - self.known[0]) / self.known[1]) ** 2).sum())
         return float(capped[self.edges.looked].sum()) / _ALIKE + of_lines + unlikely
 
     def covariance(self) -> Numbers:
@@ -163,12 +148,12 @@ class Fit:
         inverse = np.linalg.pinv(normal * scale[:, None] * scale, hermitian=True)
         return (inverse * scale[:, None] * scale)[:count, :count]
 
-    def quick_weights(self, reach: float) -> _Weights:
+    def quick_weights(self, reach: float) -> Weights:
         """Weigh edges by their distance alone."""
         weight = 1.0 / (1.0 + (self.residual / (0.25 * reach)) ** 2) / _EDGE**2
-        return _Weights(np.nan_to_num(weight), np.zeros((len(weight), 0)), np.zeros(0))
+        return np.nan_to_num(weight), np.zeros((len(weight), 0)), np.zeros(0)
 
-    def weights(self, fitted: int | None) -> _Weights:
+    def weights(self, fitted: int | None) -> Weights:
         """Weigh edges by their distance from their line, and lines by their distance from others.
 
         `fitted` is as in `Lines.spreads`.
@@ -179,39 +164,41 @@ class Fit:
             noise = _noise_of(left)
             errors, left = lines.errors(self.residual, _ROBUST * noise, strength)
         weight = np.nan_to_num(strength**2 / (1.0 + (left / (_ROBUST * noise)) ** 2) / noise**2)
-        return _Weights(weight, lines.columns, lines.spreads(errors, fitted))
+        return weight, lines.columns, lines.spreads(errors, fitted)
 
-    def step(self, weights: _Weights) -> Numbers:
+    def step(self, weights: Weights) -> Numbers:
         """Return the numbers after one damped Gauss-Newton step within the bounds."""
-        count, known, lines = len(self.numbers), self.known, len(weights.spreads)
+        count, (_, _, low, high, usual) = len(self.numbers), self.known
         normal, pull = self._normal(weights)
-        scales = np.append(known.step, np.ones(lines))
-        normal = normal * scales[:, None] * scales
+        scales = np.append(usual, np.ones(len(pull) - count))
+        normal, pull = normal * scales[:, None] * scales, pull * scales
         # Errors of lines leave little of the diagonal: more damping would hardly let numbers move.
-        normal += np.diag((_LITTLE if lines else _DAMPING) * np.diag(normal) + 1e-9)
-        free, step = np.ones(len(scales), bool), np.zeros(len(scales))
+        damping = _LITTLE if len(pull) > count else _DAMPING
+        normal += np.diag(damping * np.diag(normal) + 1e-9)
+        room = np.full((2, len(pull)), [[-np.inf], [np.inf]])
+        room[:, :count] = (np.array([low, high]) - self.numbers) / usual
+        free, step = np.ones(len(pull), bool), np.zeros(len(pull))
         for _ in range(3):
-            right = (scales * pull)[free] - normal[np.ix_(free, ~free)] @ (step / scales)[~free]
-            step[free] = scales[free] * np.linalg.solve(normal[np.ix_(free, free)], right)
-            within = np.clip(self.numbers + step[:count], known.low, known.high) - self.numbers
-            beyond = free[:count] & (np.abs(within - step[:count]) > 1e-12)
-            step[:count] = within
-            if not beyond.any():
+            right = pull[free] - normal[np.ix_(free, ~free)] @ step[~free]
+            step[free] = np.linalg.solve(normal[np.ix_(free, free)], right)
+            is_beyond = step != np.clip(step, *room)
+            step = np.clip(step, *room)
+            if not is_beyond.any():
                 break
-            free[:count] &= ~beyond  # numbers at a bound stay there, the others are solved again
-        moved = step[:count]
+            free &= ~is_beyond  # numbers at a bound stay there, the others are solved again
+        moved = step[:count] * usual
         turned = float(np.abs(moved[NUMBERS : NUMBERS + self.model.planar.notches]).max())
-        moved *= min(1.0, _MAX_TURN / max(turned, 1e-12))
-        return np.clip(self.numbers + moved, known.low, known.high)
+        return np.clip(self.numbers + moved * min(1.0, _MAX_TURN / max(turned, 1e-12)), low, high)
 
-    def _normal(self, weights: _Weights) -> tuple[Numbers, Numbers]:
+    def _normal(self, weights: Weights) -> tuple[Numbers, Numbers]:
         """Return the normal matrix and right side, for the numbers and the errors of lines."""
-        rows = np.hstack([self.jacobian, weights.columns])
-        heavy, count = rows * weights.edges[:, None], len(self.numbers)
-        inverse = np.append(1.0 / self.known.spread, 1.0 / weights.spreads) ** 2
-        pull = heavy.T @ np.nan_to_num(self.residual)
-        pull[:count] -= (self.numbers - self.known.centre) * inverse[:count]
-        return heavy.T @ rows + np.diag(inverse), pull
+        weight, columns, spreads = weights
+        rows, count = np.hstack([self.jacobian, columns]), len(self.numbers)
+        heavy = (rows * weight[:, None]).T
+        inverse = np.append(1.0 / self.known[1], 1.0 / spreads) ** 2
+        pull = heavy @ np.nan_to_num(self.residual)
+        pull[:count] -= (self.numbers - self.known[0]) * inverse[:count]
+        return heavy @ rows + np.diag(inverse), pull
 
     def _apart(self) -> Numbers:
         """Return residuals less the shift of their line, as far as lines shift."""
@@ -245,10 +232,10 @@ def refine(
         fit = _beside(model, contrast, numbers, reach)
         if np.count_nonzero(np.isfinite(fit.residual)) < 2 * len(numbers):
             break
-        is_early = quick or number < _EARLY
-        weights = fit.quick_weights(reach) if quick else None
-        numbers = fit.step(weights or fit.weights(None if is_early else len(numbers)))
-        if not is_early and np.abs((numbers - fit.numbers) / fit.known.step).max() < _DONE:
+        is_late = number >= _EARLY and not quick
+        fitted = len(numbers) if is_late else None
+        numbers = fit.step(fit.quick_weights(reach) if quick else fit.weights(fitted))
+        if is_late and np.abs((numbers - fit.numbers) / fit.known[4]).max() < _DONE:
             break
     return _beside(model, contrast, numbers, max(reaches[-1], 3.0))
 

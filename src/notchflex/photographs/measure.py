@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import approx_fprime
 from threadpoolctl import threadpool_limits
 
 from notchflex import InputError, Robot, tip_from_angles
@@ -191,11 +192,13 @@ def judged_photograph(name: str, fit: Fit, spread: Numbers, reason: str) -> Meas
     }
     if reason:
         return MeasuredPhotograph.refused(name, planar.notches, reason, **view)
-    steps = 1e-4 * np.vstack([np.zeros(len(angles)), np.eye(len(angles))])
-    tips, _ = tip_from_angles(planar.robot, angles + steps)
-    slopes = (tips[1:] - tips[0]).T / 1e-4
+
+    def tip(angles: Numbers) -> Numbers:
+        return tip_from_angles(planar.robot, angles[None])[0][0]
+
+    slopes: Any = approx_fprime(angles, tip, 1e-4)
     variance = np.einsum("an,nm,am->a", slopes, spread, slopes)
     deviation = np.where(variance > 1e-18, np.sqrt(np.maximum(variance, 0.0)), np.nan)
     return MeasuredPhotograph(
-        name, "", angles, np.sqrt(np.diag(spread)), tips[0], deviation, **view
+        name, "", angles, np.sqrt(np.diag(spread)), tip(angles), deviation, **view
     )

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import approx_fprime, least_squares
 from threadpoolctl import threadpool_limits
 
 from notchflex import ArcNotch, InputError, Robot
@@ -37,6 +38,7 @@ from notchflex.photographs.outline import (
     View,
     spine_edge,
 )
+from notchflex.support import check_number
 
 _WIDTH = 300.0  # of the tube beyond which a photograph is made smaller, px
 _REACH, _LAST = 0.08, 4.0  # of the width of the tube, and px, within which edges are looked for
@@ -50,11 +52,14 @@ _SHIFT = 0.2
 and all notches look lower, or the other way round. Nothing else in the photograph shows it."""
 
 
+_NOTHING = np.zeros(0)
+
+
 class StraightFit(NamedTuple):
     """Notches of a robot measured in one photograph. Lengths mm.
 
     Attributes:
-        photograph: The fit as a photograph, with the reason if it was refused.
+        photograph: The fit as a photograph; with a reason nothing else is said.
         lengths: Heights and uncut lengths less those of the robot file, (2 n,).
         spread: Their covariance, (2 n, 2 n).
         edge: How high over the axis the inner edge of every spine is seen, (n,).
@@ -62,10 +67,10 @@ class StraightFit(NamedTuple):
     """
 
     photograph: MeasuredPhotograph
-    lengths: Numbers
-    spread: Numbers
-    edge: Numbers
-    edge_spread: Numbers
+    lengths: Numbers = _NOTHING
+    spread: Numbers = _NOTHING
+    edge: Numbers = _NOTHING
+    edge_spread: Numbers = _NOTHING
 
 
 # Of matrices this small, threads of the linear algebra only cost.
@@ -77,10 +82,10 @@ def fit_straight(
     n = planar.notches
     located = see(picture, planar, ruler)
     if isinstance(located, str):
-        return _refused(name, n, located)
+        return StraightFit(MeasuredPhotograph.refused(name, n, located))
     first, angles = located.fit, slice(NUMBERS, NUMBERS + n)
     if np.abs(first.numbers[angles]).max() > 1.5 * _MAX_ANGLE:
-        return _refused(name, n, _BENT)
+        return StraightFit(MeasuredPhotograph.refused(name, n, _BENT))
     width = planar.width(first.numbers)
     image = located.contrast.reduced(_WIDTH / width)
     reaches = [*3 * [max(_LAST, _REACH * width * image.factor)], *_ROUNDS * [_LAST]]
@@ -96,18 +101,11 @@ def fit_straight(
         reason = _BENT
     photograph = judged_photograph(name, fit, spread[angles, angles], reason)
     lengths = _lengths(planar, fit.numbers)
-    steps = fit.numbers + _STEP * np.eye(len(start))
-    slopes = np.stack([_lengths(planar, numbers) - lengths for numbers in steps], axis=1) / _STEP
+    slopes: Any = approx_fprime(fit.numbers, partial(_lengths, planar), _STEP)
     spread, edge = slopes @ spread @ slopes.T, slice(2 * n, None)
     return StraightFit(
         photograph, lengths[: 2 * n], spread[: 2 * n, : 2 * n], lengths[edge], spread[edge, edge]
     )
-
-
-def _refused(name: str, n: int, reason: str) -> StraightFit:
-    photograph = MeasuredPhotograph.refused(name, n, reason)
-    nothing = np.full((2 * n, 2 * n), np.nan)
-    return StraightFit(photograph, nothing[0], nothing, nothing[0, :n], nothing[:n, :n])
 
 
 def _tilted(planar: PlanarRobot, numbers: Numbers) -> Numbers:
@@ -232,13 +230,9 @@ def measure_cut(
 
 
 def _turns(count: int, turn_deg: float | Sequence[float]) -> Numbers:
-    try:
-        turns: NDArray[np.float64] = np.atleast_1d(np.asarray(turn_deg, float))
-    except (TypeError, ValueError):
-        raise InputError.WRONG_TYPE(
-            f"turn_deg must be a number or a list of numbers, not {turn_deg!r}"
-        ) from None
-    if turns.ndim > 1 or len(turns) != count - 1:
+    form, given = "a number or a list of numbers", np.ravel(np.asarray(turn_deg, object))
+    turns = np.array([check_number(turn, "turn_deg", form) for turn in given])
+    if len(turns) != count - 1:
         raise InputError.WRONG_SHAPE(
             f"{count} photographs need {count - 1} turns, one for each after the first; got "
             f"{turns.size}"

@@ -130,32 +130,27 @@ class View:
         """Project points of camera axes, mm from the start of the first notch, (b, N, 3)."""
         return (self._place + self._scale * point[..., :2]) / (1.0 + self._near * point[..., 2:])
 
-    def ray(self, point: Numbers) -> Numbers:
-        """Return unit vectors from the camera to points, (b, N, 3)."""
-        across = point[..., :2] + self._place / self._scale
-        return _unit(np.concatenate([self._near * across, 1.0 + self._near * point[..., 2:]], -1))
+    def frames(self, start: Numbers, turned: Numbers, along: Numbers) -> tuple[Numbers, ...]:
+        """Return points on the axis of the tube and unit vectors there, (b, N, 3).
 
+        Args:
+            start: Points (x, z) in the plane in which the robot bends, (b, N, 2).
+            turned: Directions of the axis there, rad, (b, N).
+            along: Lengths along that axis from `start`, mm, (N,) or (b, N).
 
-class Frame:
-    """Frames of points in the plane (x, z), (b, N, 2), turned by angles, (b, N); camera axes."""
-
-    def __init__(self, view: View, start: Numbers, turned: Numbers) -> None:
+        Returns:
+            The points; the directions of the axis, across it in the plane, and from the camera; and
+            across axis and line of sight, and across the axis toward the camera.
+        """
         cos, sin = np.cos(turned)[..., None], np.sin(turned)[..., None]
-        self.view = view
-        self.origin = start[..., :1] * view.x + start[..., 1:] * view.z
-        self.axis = cos * view.z + sin * view.x
-        self.x = cos * view.x - sin * view.z
-
-    def on_axis(self, along: Numbers) -> Numbers:
-        """Return points on the tube axis, at lengths from the start of the body, mm."""
-        return self.origin + along[..., None] * self.axis
-
-    def lateral(self, centre: Numbers) -> tuple[Numbers, Numbers]:
-        """Return unit vectors across the axis: across the line of sight too, and toward the eye."""
-        ray = self.view.ray(centre)
-        across = _unit(np.cross(self.axis, ray))
-        across *= np.where(_dot(across, self.x) < 0.0, -1.0, 1.0)[..., None]
-        return across, _unit(_dot(ray, self.axis)[..., None] * self.axis - ray)
+        axis, across = cos * self.z + sin * self.x, cos * self.x - sin * self.z
+        point = start[..., :1] * self.x + start[..., 1:] * self.z + along[..., None] * axis
+        flat = self._near * (point[..., :2] + self._place / self._scale)
+        ray = _unit(np.concatenate([flat, 1.0 + self._near * point[..., 2:]], axis=-1))
+        lateral = _unit(np.cross(axis, ray))
+        lateral *= np.where(_dot(lateral, across) < 0.0, -1.0, 1.0)[..., None]
+        toward = _unit(_dot(ray, axis)[..., None] * axis - ray)
+        return point, axis, across, ray, lateral, toward
 
 
 def _dot(left: NDArray[Any], right: NDArray[Any]) -> Numbers:
@@ -244,10 +239,10 @@ class OutlineModel:
             for which in sides
             for number, place in enumerate(places)
         ]
-        self.kind, self.ring, self.which = np.array([point[:3] for point in points]).T
+        names = np.array([point[:3] for point in points])
+        self.kind, self.ring, self.which = names.T
         self.place = np.array([point[4] for point in points])
-        names_of_lines = self.kind * 10000 + self.ring * 2 + (self.which > 0)
-        self.lines = Lines(names_of_lines, self.place, shift)
+        self.lines = Lines(names, self.place, shift)
         row = {point[:4]: number for number, point in enumerate(points)}
         # The other end of the tube before the first notch is hidden: its sides give the inside.
         hidden = row[SIDE, 0, -1, 0]
@@ -255,6 +250,11 @@ class OutlineModel:
         self._facing = np.array(
             [row.get((k, r + w, -w, p), -1) if k == FACE else -1 for k, r, w, p in row]
         )
+        is_end = self.which > 0
+        notch = self.ring - 1 + ((self.kind == FACE) & is_end)
+        self._is_tip = notch == planar.notches
+        self._notch = np.clip(notch, 0, planar.notches - 1)
+        self._part = np.where(self.kind == FACE, is_end, self.place)
 
     def outline(self, numbers: Numbers, factor: float = 1.0) -> Outline:
         """Return the outline of views and angles in a photograph made smaller by a factor.
@@ -264,33 +264,39 @@ class OutlineModel:
                 their lengths (mm), (b, NUMBERS + n) or (b, NUMBERS + 4 n + 1).
             factor: The factor.
         """
-        view = View(np.atleast_2d(numbers), self.planar.notches, factor)
-        poses = self.planar.poses(view.angles)
-        point = np.zeros((len(view.angles), len(self.kind), 3))
-        tangent = np.zeros_like(point)
-        for kind, positions in enumerate((self._sides, self._faces, self._spines)):
-            part = self.kind == kind
-            point[:, part], tangent[:, part] = positions(view, *poses, part)
+        planar, r, notch = self.planar, self.planar.outer, self._notch
+        view = View(np.atleast_2d(numbers), planar.notches, factor)
+        poses = planar.poses(view.angles)
+        is_face, is_spine = self.kind == FACE, self.kind == SPINE
+        begin, end = (ends[:, self.ring] for ends in self._ends(view))
+        along = np.where(is_spine, 0.0, begin + (end - begin) * self._part)
+        start, turned = (pose[:, self.ring] for pose in poses)
+        start[:, is_spine], turned[:, is_spine] = self._spines(*poses)
+        centre, axis, across, ray, lateral, toward = view.frames(start, turned, along)
+        side = planar.side[notch]
+        x, y = _dot(lateral, across) * side, np.abs(_dot(lateral, view.y))
+        edge = spine_edge(planar, notch, view.cut[:, notch], x, y)
+        # The part of an end beside the notch; the whole end at the tip.
+        low = np.where(self._is_tip, -0.9 * r, np.minimum(edge + self.corner * r, 0.8 * r))
+        sine = side * (low + (0.92 * r - low) * self.place) / r
+        # The half of the circle that bulges out of the ring.
+        bulge = np.where((_dot(axis, ray) > 0.0) == (self.which > 0), 1.0, -1.0)
+        cosine = bulge * np.sqrt(1.0 - sine**2)
+        is_inner = is_spine & (self.which * side > 0.0)
+        aside = np.select([is_face, is_inner], [r * sine, side * edge], r * self.which)
+        point = centre + aside[..., None] * lateral + (r * is_face * cosine)[..., None] * toward
         projected = view.seen(point)
+        on_face = np.abs(cosine)[..., None] * lateral - (bulge * sine)[..., None] * toward
+        tangent = np.where(is_face[:, None], on_face, axis)[:1]
         first = projected[0]
-        along = view.seen(point[:1] + 1e-4 * tangent[:1])[0] - first
-        length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-        normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / length
+        ahead = view.seen(point[:1] + 1e-4 * tangent)[0] - first
+        length = np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
+        normal = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1) / length
         inward = _dot(first[self._across] - first, normal)
         normal *= np.where(inward > 0.0, -1.0, 1.0)[:, None]
         room = _dot(first[self._facing] - first, normal)
         room[self._facing < 0] = np.inf
         return Outline(projected, normal, room, np.abs(inward))
-
-    def _sides(
-        self, view: View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
-    ) -> tuple[Numbers, Numbers]:
-        ring = self.ring[part]
-        first, last = (ends[:, ring] for ends in self._ends(view))
-        frame = Frame(view, start[:, ring], turned[:, ring])
-        centre = frame.on_axis(first + (last - first) * self.place[part])
-        lateral, _ = frame.lateral(centre)
-        return centre + (self.planar.outer * self.which[part])[:, None] * lateral, frame.axis
 
     def _ends(self, view: View) -> tuple[Numbers, Numbers]:
         """Return where the rings begin and end, along each from its start, mm, (b, n + 1)."""
@@ -299,54 +305,17 @@ class OutlineModel:
         begin[:, 0] = -BASE * self.planar.outer
         return begin, np.append(0.0, self.planar.uncut) + view.moved - half[:, 1:]
 
-    def _faces(
-        self, view: View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
-    ) -> tuple[Numbers, Numbers]:
-        ring, is_end, r = self.ring[part], self.which[part] > 0, self.planar.outer
-        begin, end = (ends[:, ring] for ends in self._ends(view))
-        frame = Frame(view, start[:, ring], turned[:, ring])
-        centre = frame.on_axis(np.where(is_end, end, begin))
-        lateral, toward = frame.lateral(centre)
-        notch = ring - 1 + is_end
-        is_tip = notch == self.planar.notches
-        notch[is_tip] -= 1
-        side = self.planar.side[notch]
-        # The part of an end beside the notch; the whole end at the tip.
-        edge = self._spine_edge(view, lateral, frame, notch)
-        low = np.where(is_tip, -0.9 * r, np.minimum(edge * side + self.corner * r, 0.8 * r))
-        q = side * (low + (0.92 * r - low) * self.place[part]) / r
-        # The half of the circle that bulges out of the ring.
-        is_far = (_dot(frame.axis, view.ray(centre)) > 0.0) != is_end
-        sign, depth = np.where(is_far, -1.0, 1.0), np.sqrt(1.0 - q**2)
-        point = centre + r * (q[..., None] * lateral + (sign * depth)[..., None] * toward)
-        return point, depth[..., None] * lateral - (sign * q)[..., None] * toward
-
-    def _spines(
-        self, view: View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
-    ) -> tuple[Numbers, Numbers]:
-        notch, place = self.ring[part] - 1, self.place[part]
+    def _spines(self, start: Numbers, turned: Numbers) -> tuple[Numbers, Numbers]:
+        """Return where the points of spines lie on the tube axis, and its direction there."""
+        is_spine = self.kind == SPINE
+        notch, place = self._notch[is_spine], self.place[is_spine]
+        angle, bend = turned[:, notch], (turned[:, 1:] - turned[:, :-1])[:, notch]
         uncut = np.append(0.0, self.planar.uncut)[notch]
-        angle = turned[:, notch]
         before = start[:, notch] + uncut[:, None] * _heading(angle)
-        bend = turned[:, notch + 1] - angle
         length = np.linalg.norm(start[:, notch + 1] - before, axis=-1) / np.sinc(0.5 * bend / np.pi)
         bent = place * bend
         chord = length * place * np.sinc(0.5 * bent / np.pi)
-        corner = before + chord[..., None] * _heading(angle + 0.5 * bent)
-        frame = Frame(view, corner, angle + bent)
-        lateral, _ = frame.lateral(frame.origin)
-        side = self.planar.side[notch]
-        inner = self._spine_edge(view, lateral, frame, notch)
-        across = np.where(self.which[part] * side < 0.0, -side * self.planar.outer, inner)
-        return frame.origin + across[..., None] * lateral, frame.axis
-
-    def _spine_edge(
-        self, view: View, lateral: Numbers, frame: Frame, notch: NDArray[np.int_]
-    ) -> Numbers:
-        """Return where the inner edge of a spine is seen, along `lateral` from the axis, mm."""
-        side = self.planar.side[notch]
-        x, y = _dot(lateral, frame.x) * side, np.abs(_dot(lateral, view.y))
-        return side * spine_edge(self.planar, notch, view.cut[:, notch], x, y)
+        return before + chord[..., None] * _heading(angle + 0.5 * bent), angle + bent
 
 
 def _heading(angle: Numbers) -> Numbers:
@@ -391,10 +360,10 @@ def axis_points(planar: PlanarRobot, numbers: Numbers) -> Numbers:
     behind a notch; the last one is the tip.
     """
     view = View(numbers[None], planar.notches)
-    start, turned = planar.poses(view.angles)
     bodies = [0, *range(planar.notches + 1)]
-    frame = Frame(view, start[:, bodies], turned[:, bodies])
-    return view.seen(frame.on_axis(np.array([-BASE * planar.outer, 0.0, *planar.uncut])))[0]
+    start, turned = (pose[:, bodies] for pose in planar.poses(view.angles))
+    along = np.array([-BASE * planar.outer, 0.0, *planar.uncut])
+    return view.seen(view.frames(start, turned, along)[0])[0]
 
 
 def on_axis_points(planar: PlanarRobot, points: Numbers) -> list[Numbers]:

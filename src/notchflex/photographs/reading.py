@@ -10,8 +10,9 @@ import struct
 import warnings
 import zlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,54 +31,33 @@ _DAMAGED = (
 _SIDES, _EXIF_PART = (256, 257), 0x8769  # tags of TIFF
 
 
-class Head(NamedTuple):
-    """Head of an image file.
+def _head_of(data: bytes, exif: bool = False) -> tuple[int, int, dict[int, Any], str]:
+    """Read the head of a file: width, height, tags of its EXIF by number, order of the bytes.
 
-    Attributes:
-        width: Width, pixels; 0 where it is not stated.
-        height: Height, pixels; likewise.
-        tags: Values of the tags of its EXIF, by their numbers; of a TIFF always.
-        order: Order of the bytes in them, "<" or ">".
-    """
-
-    width: int
-    height: int
-    tags: Mapping[int, Any]
-    order: str
-
-
-def head_of(data: bytes, exif: bool = False) -> Head | None:
-    """Read the head of a file; None if it is damaged, or neither PNG, JPEG nor TIFF.
-
-    The picture is decoded only if the EXIF of a PNG is asked for and does not stand before the
-    picture, and never if it has more than `MOST_PIXELS`.
+    Where it is damaged, or neither PNG, JPEG nor TIFF, width and height are 0. The picture is
+    decoded only if the EXIF of a PNG is asked for and does not stand before the picture, and never
+    if it has more than `MOST_PIXELS`.
     """
     need("PIL", "photographs", "reading photographs")
     from PIL import Image, JpegImagePlugin, PngImagePlugin
 
-    block = Image.Exif()
-    with warnings.catch_warnings():  # Pillow warns of damaged tags, which it leaves out
-        warnings.simplefilter("ignore")
-        try:
-            if data[:4] in (b"II*\0", b"MM\0*"):
-                block.load(data)
-                sides = [block.get(tag) for tag in _SIDES]
-            else:
-                # `Image.open` would refuse large pictures without telling how large they are.
-                is_jpeg, file = data[:2] == b"\xff\xd8", io.BytesIO(data)
-                picture: Any = (
-                    JpegImagePlugin.JpegImageFile(file)
-                    if is_jpeg
-                    else PngImagePlugin.PngImageFile(file)
-                )
-                sides = picture.size
-                if exif and math.prod(sides) <= MOST_PIXELS:
-                    block = picture.getexif()
-            tags = {**block.get_ifd(_EXIF_PART), **block}
-        except _DAMAGED:
-            return None
+    block, sides, tags = Image.Exif(), (0, 0), dict[int, Any]()
+    with warnings.catch_warnings(), suppress(*_DAMAGED):
+        warnings.simplefilter("ignore")  # Pillow warns of damaged tags, which it leaves out
+        if data[:4] in (b"II*\0", b"MM\0*"):
+            block.load(data)
+            sides = tuple(block.get(tag) for tag in _SIDES)
+        else:
+            # `Image.open` would refuse large pictures without telling how large they are.
+            is_jpeg, file = data[:2] == b"\xff\xd8", io.BytesIO(data)
+            plugin: Any = JpegImagePlugin if is_jpeg else PngImagePlugin
+            picture = (plugin.JpegImageFile if is_jpeg else plugin.PngImageFile)(file)
+            sides = picture.size
+            if exif and math.prod(sides) <= MOST_PIXELS:
+                block = picture.getexif()
+        tags = {**block.get_ifd(_EXIF_PART), **block}
     width, height = (side if isinstance(side, int) and side > 0 else 0 for side in sides)
-    return Head(width, height, tags, block.endian or "<")
+    return width, height, tags, block.endian or "<"
 
 
 LARGEST_FILE = 400_000_000
@@ -92,34 +72,25 @@ def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
         InputError: There is no such file, it is not a photograph, or it is too large or too small.
     """
     need("cv2", "photographs", "measuring photographs")
+    import cv2
+
     name = os.fspath(source)
     data = photograph_bytes(name)
-    head = head_of(data)
-    image = None
-    if head is not None and head.width * head.height > 0:
-        _check_size(name, head.width, head.height)
-        image = _decoded(data)
-    if image is None or image.ndim != 3:
+    width, height, *_ = _head_of(data)
+    image: Any = None
+    if width * height > 0:
+        _check_size(name, width, height)
+        log: Any = cv2.utils.logging  # OpenCV's own words on bad files are not shown
+        level = log.setLogLevel(log.LOG_LEVEL_SILENT)
+        with suppress(cv2.error):
+            image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        log.setLogLevel(level)
+    if image is None:
         raise InputError.FILE_FORMAT(
             f"{name} is not a photograph that can be read; give a PNG, JPEG or TIFF file"
         )
     _check_size(name, image.shape[1], image.shape[0])
     return image
-
-
-def _decoded(data: bytes) -> Any:
-    """Return the picture, or None; OpenCV's own words on bad files are not shown."""
-    import cv2
-
-    logging: Any = getattr(cv2.utils, "logging", None)
-    level = None if logging is None else logging.setLogLevel(logging.LOG_LEVEL_SILENT)
-    try:
-        return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    except cv2.error:
-        return None
-    finally:
-        if logging is not None:
-            logging.setLogLevel(level)
 
 
 def photograph_bytes(name: str) -> bytes:
@@ -129,23 +100,16 @@ def photograph_bytes(name: str) -> bytes:
         InputError: There is no such file, it cannot be read, or it is too large.
     """
     try:
-        path = Path(name)
-        is_folder, size = path.is_dir(), path.stat().st_size
-        data = b"" if is_folder or size > LARGEST_FILE else bounded_bytes(path, LARGEST_FILE)
+        return bounded_bytes(name, LARGEST_FILE)
     except (FileNotFoundError, NotADirectoryError):
         raise InputError.FILE_NOT_FOUND(
             f"there is no photograph {name}; check the name and the folder it is in"
         ) from None
+    except IsADirectoryError:
+        raise InputError.FILE_FORMAT(f"{name} is a folder; name the photographs in it") from None
     except (OSError, ValueError) as problem:
         words = getattr(problem, "strerror", None) or problem
         raise InputError.FILE_UNREADABLE(f"{name} cannot be read: {words}") from None
-    if is_folder:
-        raise InputError.FILE_FORMAT(f"{name} is a folder; name the photographs in it")
-    if size > LARGEST_FILE:
-        raise InputError.OUT_OF_RANGE(
-            f"{name} is larger than {LARGEST_FILE / 1e6:.0f} MB; give a smaller photograph"
-        )
-    return data
 
 
 def _check_size(name: str, width: int, height: int) -> None:
@@ -169,14 +133,12 @@ def exif_texts(photograph: bytes) -> list[str]:
 
     Nothing is raised for files that are damaged or have no EXIF: there are then no texts.
     """
-    head = head_of(photograph, exif=True)
-    if head is None:
-        return []
-    comment, description = (_bytes(head.tags.get(tag)) for tag in (_COMMENT, _DESCRIPTION))
+    _, _, tags, order = _head_of(photograph, exif=True)
+    comment, description = (_bytes(tags.get(tag)) for tag in (_COMMENT, _DESCRIPTION))
     code = _CODES.get(comment[:8])
     text = comment[8:] if code else comment
     if code == "utf-16":
-        code = "utf-16-le" if head.order == "<" else "utf-16-be"
+        code = "utf-16-le" if order == "<" else "utf-16-be"
     texts = text.decode(code or "utf-8", "replace"), description.decode("utf-8", "replace")
     return [words for text in texts if (words := text.replace("\0", " ").strip())]
 
