@@ -137,8 +137,9 @@ class Fit:
         unlikely = float((((self.numbers - self.known[0]) / self.known[1]) ** 2).sum())
         return float(capped[self.edges.looked].sum()) / _ALIKE + of_lines + unlikely
 
+    @cached_property
     def covariance(self) -> Numbers:
-        """Return the covariance of all numbers.
+        """Covariance of all numbers.
 
         Errors of lines are among the unknowns (`Lines`): neighbouring edges are correlated.
         """
@@ -147,6 +148,11 @@ class Fit:
         scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-200))
         inverse = np.linalg.pinv(normal * scale[:, None] * scale, hermitian=True)
         return (inverse * scale[:, None] * scale)[:count, :count]
+
+    @property
+    def deviation(self) -> Numbers:
+        """Standard deviations of the angles, rad, (n,)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance)[self.model.angles], 0.0))
 
     def quick_weights(self, reach: float) -> Weights:
         """Weigh edges by their distance alone."""
@@ -187,7 +193,7 @@ class Fit:
                 break
             free &= ~is_beyond  # numbers at a bound stay there, the others are solved again
         moved = step[:count] * usual
-        turned = float(np.abs(moved[NUMBERS : NUMBERS + self.model.planar.notches]).max())
+        turned = float(np.abs(moved[self.model.angles]).max())
         return np.clip(self.numbers + moved * min(1.0, _MAX_TURN / max(turned, 1e-12)), low, high)
 
     def _normal(self, weights: Weights) -> tuple[Numbers, Numbers]:
@@ -272,20 +278,16 @@ _MAX_ROLL, _MAX_TILT = math.radians(25.0), math.radians(18.0)
 
 
 def rejection_reason(
-    fit: Fit,
-    rivals: Iterable[tuple[float, float]],
-    deviation: Numbers,
-    uncertainty: float = math.inf,
+    fit: Fit, rivals: Iterable[tuple[float, float]], uncertainty: float = math.inf
 ) -> str:
     """Return why the fit is rejected, or an empty string.
 
     Args:
         fit: The best fit.
         rivals: By how much more other fits miss the edges, and by how much their angles differ.
-        deviation: Standard deviations of its angles, rad.
-        uncertainty: Root mean square of the deviations that is allowed, rad.
+        uncertainty: Root mean square of the standard deviations that is allowed, rad.
     """
-    planar, prior = fit.model.planar, fit.model.prior
+    planar, prior, deviation = fit.model.planar, fit.model.prior, fit.deviation
     roll, tilt, _, *made = np.abs(fit.numbers[4:NUMBERS])
     more, worst = fit.numbers[3] - prior.log_scale[0], int(np.argmax(deviation))
     other = [differs for worse, differs in rivals if worse < _RIVAL and differs > _OTHER]

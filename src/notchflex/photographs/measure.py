@@ -18,7 +18,7 @@ from notchflex.photographs.edges import Numbers, contrast, made_smaller
 from notchflex.photographs.fitting import MAX_RESIDUAL, UNCERTAINTY, Fit, rejection_reason
 from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
-from notchflex.photographs.outline import NUMBERS, PlanarRobot, axis_points
+from notchflex.photographs.outline import PlanarRobot, axis_points
 from notchflex.photographs.reading import loads_of, read_photograph
 from notchflex.support import check_number
 
@@ -150,10 +150,8 @@ def measure_picture(
     located = see(picture, planar, ruler, chain)
     if isinstance(located, str):
         return MeasuredPhotograph.refused(name, planar.notches, located)
-    spread = located.fit.covariance()[NUMBERS:, NUMBERS:]
-    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
-    reason = rejection_reason(located.fit, located.rivals, deviation, uncertainty)
-    return judged_photograph(name, located.fit, spread, reason)
+    reason = rejection_reason(located.fit, located.rivals, uncertainty)
+    return judged_photograph(name, located.fit, reason)
 
 
 def see(
@@ -169,17 +167,9 @@ def see(
     return locate(planar, whole, prior, None if chain is None else chain - whole.centre)
 
 
-def judged_photograph(name: str, fit: Fit, spread: Numbers, reason: str) -> MeasuredPhotograph:
-    """Return what a fit says about a photograph.
-
-    Args:
-        name: What the photograph is called.
-        fit: The fit.
-        spread: Covariance of the angles, rad^2, (n, n).
-        reason: Why the photograph is refused; "" if it is not.
-    """
-    planar, picture = fit.model.planar, fit.contrast
-    angles = fit.numbers[NUMBERS : NUMBERS + planar.notches].copy()
+def judged_photograph(name: str, fit: Fit, reason: str) -> MeasuredPhotograph:
+    """Return what a fit says about a photograph; with a reason it is refused."""
+    planar, picture, of_angles = fit.model.planar, fit.contrast, fit.model.angles
     view: dict[str, Any] = {
         "scale": math.exp(fit.numbers[3]),
         "roll": math.remainder(fit.numbers[4], math.pi),
@@ -196,9 +186,8 @@ def judged_photograph(name: str, fit: Fit, spread: Numbers, reason: str) -> Meas
     def tip(angles: Numbers) -> Numbers:
         return tip_from_angles(planar.robot, angles[None])[0][0]
 
+    angles, spread = fit.numbers[of_angles].copy(), fit.covariance[of_angles, of_angles]
     slopes: Any = approx_fprime(angles, tip, 1e-4)
     variance = np.einsum("an,nm,am->a", slopes, spread, slopes)
     deviation = np.where(variance > 1e-18, np.sqrt(np.maximum(variance, 0.0)), np.nan)
-    return MeasuredPhotograph(
-        name, "", angles, np.sqrt(np.diag(spread)), tip(angles), deviation, **view
-    )
+    return MeasuredPhotograph(name, "", angles, fit.deviation, tip(angles), deviation, **view)

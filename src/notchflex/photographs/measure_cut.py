@@ -31,7 +31,6 @@ from notchflex.photographs.measure import (
 )
 from notchflex.photographs.measured import MeasuredCut, MeasuredPhotograph
 from notchflex.photographs.outline import (
-    NUMBERS,
     USUAL_DISTANCE,
     OutlineModel,
     PlanarRobot,
@@ -83,8 +82,8 @@ def fit_straight(
     located = see(picture, planar, ruler)
     if isinstance(located, str):
         return StraightFit(MeasuredPhotograph.refused(name, n, located))
-    first, angles = located.fit, slice(NUMBERS, NUMBERS + n)
-    if np.abs(first.numbers[angles]).max() > 1.5 * _MAX_ANGLE:
+    first = located.fit
+    if np.abs(first.numbers[first.model.angles]).max() > 1.5 * _MAX_ANGLE:
         return StraightFit(MeasuredPhotograph.refused(name, n, _BENT))
     width = planar.width(first.numbers)
     image = located.contrast.reduced(_WIDTH / width)
@@ -94,15 +93,13 @@ def fit_straight(
     fits = [refine(model, image, view, reaches) for view in _tilted(planar, start)]
     noise = max(EDGE_NOISE, min(fit.noise for fit in fits))
     fit = min(fits, key=lambda fit: fit.misfit(noise))
-    spread = fit.covariance()
-    deviation = np.sqrt(np.maximum(np.diag(spread)[angles], 0.0))
-    reason = rejection_reason(fit, located.rivals, deviation)
-    if not reason and np.abs(fit.numbers[angles]).max() > _MAX_ANGLE:
+    reason = rejection_reason(fit, located.rivals)
+    if not reason and np.abs(fit.numbers[model.angles]).max() > _MAX_ANGLE:
         reason = _BENT
-    photograph = judged_photograph(name, fit, spread[angles, angles], reason)
+    photograph = judged_photograph(name, fit, reason)
     lengths = _lengths(planar, fit.numbers)
     slopes: Any = approx_fprime(fit.numbers, partial(_lengths, planar), _STEP)
-    spread, edge = slopes @ spread @ slopes.T, slice(2 * n, None)
+    spread, edge = slopes @ fit.covariance @ slopes.T, slice(2 * n, None)
     return StraightFit(
         photograph, lengths[: 2 * n], spread[: 2 * n, : 2 * n], lengths[edge], spread[edge, edge]
     )

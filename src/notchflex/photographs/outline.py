@@ -210,6 +210,7 @@ class OutlineModel:
         which: Its side or end: -1 or 1, (N,).
         place: Place along it, 0 to 1, (N,).
         lines: The lines on which the points lie.
+        angles: Which numbers of a view are the notch angles.
     """
 
     def __init__(
@@ -222,6 +223,7 @@ class OutlineModel:
         prior: ViewPrior = NO_PRIOR,
     ) -> None:
         self.planar, self.corner, self.prior = planar, corner, prior
+        self.angles = slice(NUMBERS, NUMBERS + planar.notches)
         rings = range(planar.notches + 1)
         along = np.linspace(0.06, 0.94, per_side)
         across = np.linspace(0.0, 1.0, per_face)
