@@ -48,11 +48,11 @@ class PlanarRobot:
 
     def __init__(self, robot: Robot) -> None:
         arcs = [notch for notch in robot.notches if isinstance(notch, ArcNotch)]
-        if len(arcs) < len(robot.notches):
-            kind = next(notch.kind for notch in robot.notches if not isinstance(notch, ArcNotch))
+        others = {notch.kind for notch in robot.notches} - {"arc"}
+        if others:
             raise InputError.UNSUPPORTED(
-                f"{robot.name} has notches of kind {kind!r}; photographs are measured for robots "
-                'whose notches are all of kind "arc"'
+                f"{robot.name} has notches of kind {min(others)!r}; photographs are measured for "
+                'robots whose notches are all of kind "arc"'
             )
         directions = np.radians([arc.direction_deg for arc in arcs])
         if np.abs(np.sin(directions - directions[0])).max() > _IN_PLANE:
