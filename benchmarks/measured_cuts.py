@@ -19,8 +19,9 @@ from harness import options, rms, share, show, trials
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import notchflex as nf
-from notchflex.photographs.chain_table import chain_table
-from notchflex.photographs.measure_cut import LENGTHS, combined, fit_straight
+from notchflex.photographs.measure_cut import combined, fit_straight
+from notchflex.photographs.measured import LENGTHS
+from notchflex.photographs.outline import PlanarRobot
 from photographs.renderer import Scene, render
 
 TURN = 20.0  # deg
@@ -57,7 +58,7 @@ def drawn(seed: int) -> tuple[nf.Robot, Scene, np.random.Generator]:
 
 def trial(seed: int) -> dict[str, object]:
     """Measure a wrist: by length and number of photographs its errors over standard deviations."""
-    table = chain_table(ROBOT)
+    table = PlanarRobot(ROBOT)
     true, first, random = drawn(seed)
     fits = []
     for turn in (0.0, TURN):

@@ -20,12 +20,12 @@ from harness import options, rms, share, show, timed, trials
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import notchflex as nf
-from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.measure import measure_picture
+from notchflex.photographs.outline import PlanarRobot
 from photographs.renderer import Scene, render
 
 ROBOT = nf.load_robot("pacheco2021-a")
-TABLE = chain_table(ROBOT)
+TABLE = PlanarRobot(ROBOT)
 WRONG = 1.0  # deg
 MOST = 32.0  # deg: a notch of this wrist closes soon after
 

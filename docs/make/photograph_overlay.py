@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 import notchflex as nf
-from notchflex.photographs.overlay import write_overlay
+from notchflex.photographs.measured import write_overlay
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 

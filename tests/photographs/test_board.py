@@ -10,9 +10,9 @@ import pytest
 import notchflex as nf
 from notchflex.cli.app import run
 from notchflex.photographs import board_of
-from notchflex.photographs.chain_table import chain_table
+from notchflex.photographs.board import NOT_FLAT, NOT_SEEN, Ruler, sight
 from notchflex.photographs.measure import measure_picture
-from notchflex.photographs.sighting import NOT_FLAT, NOT_SEEN, Ruler, sight
+from notchflex.photographs.outline import PlanarRobot
 from photographs.renderer import Scene, _camera, _project, render
 from photographs.test_measure import ANGLES, ROBOT
 from refusals import refused
@@ -55,30 +55,32 @@ def test_a_board_gives_scale_tilt_and_distance(photograph):
     """Known is where the renderer's camera stood: at the first notch, px/mm, deg, 1/mm."""
     seen = sight(photograph, BOARD)
     assert len(seen.corners) == 4
-    known = seen.prior(np.array(SCENE.place))
-    assert known.scale == pytest.approx(SCENE.scale, rel=0.003)
-    tilt = np.degrees(known.tilt(np.radians(SCENE.direction)))
+    known = seen.prior(np.array(SCENE.place) - np.array(SCENE.size) / 2.0)
+    assert np.exp(known.log_scale[0]) == pytest.approx(SCENE.scale, rel=0.003)
+    direction = np.radians(SCENE.direction)
+    tilt = np.degrees(np.arctan(known.slope @ np.array([np.cos(direction), np.sin(direction)])))
     assert tilt == pytest.approx(SCENE.tilt, abs=2.0)
-    assert abs(known.perspective - 1.0 / SCENE.distance) < 3.0 * known.perspective_deviation
-    assert known.perspective_deviation < 0.004
+    perspective, deviation = known.perspective
+    assert abs(perspective - 1.0 / SCENE.distance) < 3.0 * deviation
+    assert deviation < 0.004
 
 
 @pytest.mark.nightly
 def test_angles_beside_a_board(photograph):
     """The board itself is not taken for the robot; its scale and tilt enter the fit."""
-    table = chain_table(ROBOT)
+    table = PlanarRobot(ROBOT)
     found = measure_picture(photograph, table, "wrist", Ruler(board=BOARD))
     assert found.reason == ""
     np.testing.assert_allclose(found.notch_angle, ANGLES, atol=np.radians(0.3))
     assert found.scale == pytest.approx(SCENE.scale, rel=0.003)
     thick = ROBOT.with_value("tube.outer_diameter", 1.75)
-    wrong = measure_picture(photograph, chain_table(thick), "wrist", Ruler(board=BOARD))
+    wrong = measure_picture(photograph, PlanarRobot(thick), "wrist", Ruler(board=BOARD))
     assert wrong.reason
 
 
 @pytest.mark.nightly
 def test_a_given_scale_that_contradicts_the_diameter(photograph):
-    found = measure_picture(photograph, chain_table(ROBOT), "wrist", Ruler(scale=43.0))
+    found = measure_picture(photograph, PlanarRobot(ROBOT), "wrist", Ruler(scale=43.0))
     assert "outer diameter" in found.reason
 
 
@@ -88,7 +90,7 @@ def test_photographs_without_the_board_are_refused(photograph):
     assert sight(blank, BOARD) == NOT_SEEN
     assert sight(photograph, replace(BOARD, dictionary="apriltag_36h11")) == NOT_SEEN
     assert sight(photograph, other) == NOT_FLAT
-    found = measure_picture(blank, chain_table(ROBOT), "wrist", Ruler(board=BOARD))
+    found = measure_picture(blank, PlanarRobot(ROBOT), "wrist", Ruler(board=BOARD))
     assert found.reason == NOT_SEEN
 
 
@@ -109,7 +111,7 @@ def test_the_drawing_is_the_board_in_its_size(tmp_path, dictionary, capsys):
         image[place] = 255 if white else 0
     seen = sight(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), board)
     assert len(seen.corners) == 6
-    assert seen.prior(np.array([340.0, 260.0])).scale == pytest.approx(20.0, rel=0.005)
+    assert np.exp(seen.prior(np.zeros(2)).log_scale[0]) == pytest.approx(20.0, rel=0.005)
     assert board_of(board.text()) == board
 
 

@@ -5,15 +5,19 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.photographs.camera import NUMBERS
-from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.measure import measure_picture
-from notchflex.photographs.outline import axis_points, on_axis_points, straight_chain
+from notchflex.photographs.outline import (
+    NUMBERS,
+    PlanarRobot,
+    axis_points,
+    on_axis_points,
+    straight_chain,
+)
 from photographs.renderer import Scene, render
 from refusals import refused
 
 ROBOT = nf.load_robot("pacheco2021-a")
-TABLE = chain_table(ROBOT)
+TABLE = PlanarRobot(ROBOT)
 ANGLES = np.radians([14.0, 22.0, 18.0, 9.0, 16.0])
 SCENE = Scene(
     size=(720, 620), scale=46.0, place=(450.0, 150.0), direction=75.0, roll=8.0, tilt=5.0, seed=3

@@ -9,14 +9,14 @@ import pytest
 
 import notchflex as nf
 from notchflex.cli.app import run
-from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.measure_cut import StraightFit, combined, depths, seen_edges
 from notchflex.photographs.measured import MeasuredPhotograph
+from notchflex.photographs.outline import PlanarRobot
 from photographs.renderer import Scene, render
 from refusals import refused
 
 ROBOT = nf.load_robot("pacheco2021-a")
-TABLE = chain_table(ROBOT)
+TABLE = PlanarRobot(ROBOT)
 N = ROBOT.number_of_notches
 OUTER = ROBOT.tube.outer_diameter
 SCALE = 130.0 / OUTER
@@ -74,11 +74,11 @@ def test_photographs_that_contradict_each_other_are_refused():
 def test_depths_that_count_from_the_inner_surface():
     """A depth read elsewhere than at the outer surface changes less than the section."""
     inner = ROBOT.with_values({"notch.cut": "on-axis", "notch.depth_at": "inner"})
-    table = chain_table(inner)
+    table = PlanarRobot(inner)
     cut, turns = np.full(N, 0.03), np.radians([0.0, 20.0])
     fits = [seen(-8.0, cut), seen(12.0, cut)]
     robot = combined(table, fits, turns).as_cut()
-    added = chain_table(robot).depth - table.depth
+    added = PlanarRobot(robot).depth - table.depth
     expected, _, _ = depths(table, fits, turns)
     np.testing.assert_allclose(added, expected, atol=2e-5)
 

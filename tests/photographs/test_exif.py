@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.photographs.loads import exif_texts, loads_of
+from notchflex.photographs.reading import exif_texts, loads_of
 from refusals import refused
 
 ROBOT = nf.load_robot("pacheco2021-a")

@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.photographs.camera import NUMBERS
-from notchflex.photographs.chain_table import chain_table
-from notchflex.photographs.edges import Edges
-from notchflex.photographs.fitting import Fit
-from notchflex.photographs.judging import missing
-from notchflex.photographs.outline import SIDE, SPINE, OutlineModel
+from notchflex.photographs.edges import Contrast, Edges
+from notchflex.photographs.fitting import Fit, missing
+from notchflex.photographs.outline import NUMBERS, SIDE, SPINE, OutlineModel, PlanarRobot
 
-MODEL = OutlineModel(chain_table(nf.load_robot("pacheco2021-a")))
+MODEL = OutlineModel(PlanarRobot(nf.load_robot("pacheco2021-a")))
 SCALE = 60.0  # px/mm
 
 
@@ -25,7 +22,9 @@ def made_up(residual, cut=0.0):
     looked = np.ones(len(offset), bool)
     jacobian = np.random.default_rng(0).normal(size=(len(offset), len(numbers)))
     outline = MODEL.outline(numbers)
-    return Fit(MODEL, numbers, outline, jacobian, Edges(offset, looked, looked.astype(float)))
+    contrast = Contrast(np.zeros((900, 1200), np.float32), 5.0, np.array([1200.0, 900.0]))
+    edges = Edges(offset, looked, looked.astype(float))
+    return Fit(MODEL, numbers, contrast, outline, jacobian, edges)
 
 
 def test_a_shift_of_all_lines_is_no_misfit():

@@ -13,10 +13,9 @@ from PIL import ImageFile
 
 import notchflex as nf
 from notchflex.cli.app import run
-from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.measure import measure_picture
-from notchflex.photographs.outline import OutlineModel
-from notchflex.photographs.overlay import overlay_names
+from notchflex.photographs.measured import overlay_names
+from notchflex.photographs.outline import OutlineModel, PlanarRobot
 from notchflex.photographs.reading import read_photograph
 from photographs.renderer import Scene, render
 from refusals import refused
@@ -65,7 +64,7 @@ def test_verb_writes_what_calibrate_reads(photograph, tmp_path, capsys):
 
 
 def test_nothing_to_see_is_refused():
-    table = chain_table(ROBOT)
+    table = PlanarRobot(ROBOT)
     random = np.random.default_rng(0)
     blank = np.full((300, 400, 3), 150, np.uint8)
     noise = random.integers(0, 256, blank.shape).astype(np.uint8)
@@ -244,7 +243,7 @@ def test_turned_and_printing_colours(tmp_path):
 
 def test_a_picture_of_something_else_is_refused():
     """Blobs of every size on a gradient, as in a picture of fur."""
-    table = chain_table(ROBOT)
+    table = PlanarRobot(ROBOT)
     for seed in range(3):
         random = np.random.default_rng(seed)
         picture = np.zeros((300, 400, 3), np.float32)
@@ -279,7 +278,7 @@ def test_base_and_tip_that_look_alike_are_told_apart_or_refused():
         seed=40351,
     )
     picture = cv2.cvtColor(render(ROBOT, angles, scene), cv2.COLOR_GRAY2BGR)
-    found = measure_picture(picture, chain_table(ROBOT), "wrist")
+    found = measure_picture(picture, PlanarRobot(ROBOT), "wrist")
     if found.reason:
         assert "two shapes fit almost equally well" in found.reason
     else:
@@ -288,7 +287,7 @@ def test_base_and_tip_that_look_alike_are_told_apart_or_refused():
 
 def test_a_line_far_off_counts_less():
     """Shift and turn of every line are found; a line that is shifted far has a larger spread."""
-    lines = OutlineModel(chain_table(ROBOT)).lines
+    lines = OutlineModel(PlanarRobot(ROBOT)).lines
     random = np.random.default_rng(0)
     shift, turn = 0.3 + 0.05 * random.normal(size=(2, lines.number))
     shift[2] += 1.5
@@ -303,7 +302,7 @@ def test_a_line_far_off_counts_less():
 
 def test_weak_edges_count_less():
     """Where a highlight meets an edge it is weak and shifted: a third of the edges do not count."""
-    lines = OutlineModel(chain_table(ROBOT)).lines
+    lines = OutlineModel(PlanarRobot(ROBOT)).lines
     weak = lines.place < -1.0 / 3.0
     offset = np.where(weak, 1.0, 0.2)
     errors, _ = lines.errors(offset, 5.0, np.where(weak, 0.05, 1.0))
@@ -337,7 +336,7 @@ def test_hard_views(seed, monkeypatch):
     monkeypatch.syspath_prepend(str(folder))
     angles, scene = __import__("measured_photographs").drawn(seed)
     picture = cv2.cvtColor(render(ROBOT, angles, scene), cv2.COLOR_GRAY2BGR)
-    found = measure_picture(picture, chain_table(ROBOT), "wrist")
+    found = measure_picture(picture, PlanarRobot(ROBOT), "wrist")
     assert found.reason == ""
     assert np.degrees(np.sqrt(((found.notch_angle - angles) ** 2).mean())) < 0.15
 

@@ -12,9 +12,9 @@ import pytest
 
 from chromium import PATIENCE
 from notchflex.cli.app import run
-from notchflex.photographs.chain_table import chain_table
 from notchflex.photographs.measure import measure_picture
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
+from notchflex.photographs.outline import PlanarRobot
 from photographs.renderer import render
 from photographs.test_chain import ANGLES, BY_HAND, ROBOT, SCENE, cluttered
 
@@ -27,7 +27,7 @@ pytest.importorskip("matplotlib")
 @pytest.fixture
 def unmeasured(tmp_path):
     """Two photographs in which nothing was found."""
-    table = chain_table(ROBOT)
+    table = PlanarRobot(ROBOT)
     files = [str(tmp_path / f"wrist_{number}.png") for number in (1, 2)]
     for file in files:
         cv2.imwrite(file, cluttered())
@@ -70,7 +70,7 @@ def test_what_was_accepted_before_ctrl_c_is_kept(unmeasured, monkeypatch, tmp_pa
     """The first photograph was accepted, the second was shown: one row is written, code 130."""
     from notchflex.viewer.correction import NOT_LOOKED_AT, Correction
 
-    fitted = measure_picture(cluttered(), chain_table(ROBOT), "wrist", chain=BY_HAND)
+    fitted = measure_picture(cluttered(), PlanarRobot(ROBOT), "wrist", chain=BY_HAND)
 
     def accepted(page, count):
         for number in range(count):

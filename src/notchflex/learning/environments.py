@@ -18,7 +18,6 @@ from notchflex.learning.episode import EpisodeRows, EpisodeSettings
 from notchflex.support import check_integer, short_repr
 
 _MODES: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}
-_ROW = np.zeros(1, int)
 
 
 def _check_render_mode(render_mode: str | None) -> str | None:
@@ -72,7 +71,7 @@ class RobotEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             Observation and information.
         """
         super().reset(seed=seed)
-        self._rows.reset(_ROW, [self.np_random])
+        self._rows.reset([0], [self.np_random])
         return self._rows.observation[0], self._information(float(self._rows.distance[0]))
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
@@ -88,7 +87,7 @@ class RobotEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         Raises:
             InputError: An action of another shape, or not finite.
         """
-        outcome: Any = self._rows.step(_ROW, np.asarray(action)[None])
+        outcome: Any = self._rows.step(np.asarray(action)[None])
         reward, reached, last, code, distance = (values.item() for values in outcome)
         information = self._information(distance, code, reached)
         return self._rows.observation[0], reward, reached, last, information
@@ -178,7 +177,7 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._rows = EpisodeRows(self.settings, num_envs, follow=self.follows, cores=cores)
-        self._random: list[np.random.Generator | None] = [None] * num_envs
+        self._random = [np.random.default_rng() for _ in range(num_envs)]
         self._ended = np.zeros(num_envs, bool)
 
     def reset(
@@ -214,14 +213,14 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
                 f"seed is one number or one per row, {count}; got {len(seeds)}"
             )
         for row in np.flatnonzero(is_reset):
-            if seeds[row] is not None or self._random[row] is None:
+            if seeds[row] is not None:
                 self._random[row] = seeding.np_random(seeds[row])[0]
         self._begin(is_reset)
         self._ended[is_reset] = False
-        codes, reached = np.full(count, "", object), np.zeros(count, bool)
-        return self._rows.observation, self._information(
-            is_reset, self._rows.distance, codes, reached
-        )
+        codes = np.full(count, "", object)
+        codes[~is_reset] = None
+        information = self._information(is_reset, self._rows.distance, codes, ~np.ones(count, bool))
+        return self._rows.observation, information
 
     def step(
         self, actions: np.ndarray
@@ -238,10 +237,11 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             InputError: Actions of another shape, or not finite.
         """
         anew = self._ended
-        reward, reached, last, code, distance = self._rows.step(np.flatnonzero(~anew), actions)
+        reward, reached, last, code, distance = self._rows.step(actions, anew)
         if anew.any():
             self._begin(anew)
-            distance[anew] = self._rows.distance[anew]
+            distance[anew], reward[anew], code[anew] = self._rows.distance[anew], 0.0, ""
+            reached[anew] = last[anew] = False
         self._ended = reached | last
         information = self._information(np.ones(len(anew), bool), distance, code, reached.copy())
         return self._rows.observation, reward, reached, last, information
@@ -250,24 +250,22 @@ class RobotVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         """Return a picture of every row; None without a mode of rendering."""
         return tuple(map(self._rows.picture, range(self.num_envs))) if self.render_mode else None
 
-    def _begin(self, rows: NDArray[np.bool_]) -> None:
-        which = np.flatnonzero(rows)
-        sources = [self._random[row] or np.random.default_rng() for row in which]
-        self._rows.reset(which, sources)
+    def _begin(self, is_begun: NDArray[np.bool_]) -> None:
+        rows = np.flatnonzero(is_begun).tolist()
+        self._rows.reset(rows, [self._random[row] for row in rows])
 
     def _information(
         self,
-        shown: NDArray[np.bool_],
+        is_given: NDArray[np.bool_],
         distance: NDArray[np.float64],
         code: NDArray[Any],
         reached: NDArray[np.bool_],
     ) -> dict[str, Any]:
         """Information in the form of gymnasium: an array, and which of its rows are given."""
-        code[~shown] = None
-        values = {"distance": np.where(shown, distance, 0.0), "code": code}
+        values = {"distance": np.where(is_given, distance, 0.0), "code": code}
         if not self.follows:
             values["is_success"] = reached
-        return values | {f"_{name}": shown.copy() for name in values}
+        return values | {f"_{name}": is_given.copy() for name in values}
 
 
 class FollowVectorEnv(RobotVectorEnv):

@@ -84,13 +84,11 @@ class EpisodeSettings:
 
     def spaces(self) -> tuple[Box, Box]:
         """Return the spaces of one observation and of one action."""
-        every = np.ones(self.model.number_of_tendons)
         # No point of a robot is further from its base than its length; targets are states too.
-        far = np.full(3, 2.0)
-        low, high = np.append(0.0 * every, -far), np.append(every, far)
-        low, high = (np.tile(end, 1 + self.history) for end in (low, high))
-        observation = Box(np.append(low, -far), np.append(high, far), dtype=np.float64)
-        return observation, Box(-every, every, dtype=np.float64)
+        full, far = np.ones(self.model.number_of_tendons), np.full(3, 2.0)
+        high = np.append(np.tile(np.append(full, far), 1 + self.history), far)
+        low = np.append(np.tile(np.append(0.0 * full, -far), 1 + self.history), -far)
+        return Box(low, high, dtype=np.float64), Box(-full, full, dtype=np.float64)
 
     def random_pull(self, random: np.random.Generator) -> Array:
         """Return tensions toward a random side by a random amount, N, (t,)."""
@@ -101,19 +99,16 @@ class EpisodeSettings:
 
     def random_way(self, random: np.random.Generator) -> Array:
         """Return tensions from 0 to one random pull after the other, N, (steps, t)."""
-        begin, parts, count = np.zeros(len(self.largest)), list[Array](), 0
-        while count < self.steps:
-            end = self.random_pull(random)
-            steps = np.abs(end - begin).max() / (_PART_OF_RATE * self.change)
-            number = max(1, int(np.ceil(steps)))
-            way = np.arange(1, number + 1)[:, None] / number
-            parts.append(begin + way * (end - begin))
-            begin, count = end, count + number
-        return np.concatenate(parts)[: self.steps]
+        way = [np.zeros((1, len(self.largest)))]
+        while sum(map(len, way)) <= self.steps:
+            begin, end = way[-1][-1], self.random_pull(random)
+            number = np.ceil(np.abs(end - begin).max() / (_PART_OF_RATE * self.change))
+            way.append(np.linspace(begin, end, max(1, int(number)) + 1)[1:])
+        return np.concatenate(way)[1 : 1 + self.steps]
 
 
 class Outcome(NamedTuple):
-    """Outcome of a step, by row; rows that did not step have neither reward nor end.
+    """Outcome of a step, by row.
 
     Attributes:
         reward: Its reward.
@@ -158,7 +153,7 @@ class EpisodeRows:
         """Return states and tips of rows at rest."""
         return np.repeat(self._rest, rows, axis=0), np.repeat(self._tip_at_rest, rows, axis=0)
 
-    def reset(self, which: NDArray[np.int_], random: Sequence[np.random.Generator]) -> None:
+    def reset(self, which: Sequence[int], random: Sequence[np.random.Generator]) -> None:
         """Begin episodes anew, at rest and with other targets.
 
         Args:
@@ -170,36 +165,32 @@ class EpisodeRows:
         self._targets[which] = self._random_targets(random)
         self._past[which] = self._seen()[which][:, None]
 
-    def step(self, which: NDArray[np.int_], actions: Any) -> Outcome:
-        """Change the tensions of some rows.
+    def step(self, actions: Any, ignored: NDArray[np.bool_] | None = None) -> Outcome:
+        """Change the tensions of all rows.
 
         Args:
-            which: Their numbers.
             actions: Change of every tension of all rows, as a part of the largest in one step.
+            ignored: Rows whose actions are not looked at, and count as 0.
 
         Raises:
             InputError: Actions of another shape, or not finite.
         """
-        settings, count = self.settings, len(self._count)
-        change = settings.change * np.clip(self._checked(actions, which), -1.0, 1.0)
-        tension = np.clip(self.tension[which] + change, 0.0, settings.largest)
+        settings = self.settings
+        change = settings.change * np.clip(self._checked(actions, ignored), -1.0, 1.0)
+        tension = np.clip(self.tension + change, 0.0, settings.largest)
         past = np.concatenate([self._seen()[:, None], self._past], axis=1)
-        self._past[which] = past[which, : settings.history]
-        step = self._stepper.step(self._states[which], tension)
-        self._states[which] = step.state
+        self._past = past[:, : settings.history]
+        step = self._stepper.step(self._states, tension)
+        self._states, converged = step.state, step.converged
         # Tensions without equilibrium are refused: the robot stays where it is.
-        moved = which[step.converged]
-        self.tension[moved] = tension[step.converged]
-        self.tip[moved] = step.values["tip_position"][step.converged]
+        self.tension = np.where(converged[:, None], tension, self.tension)
+        self.tip = np.where(converged[:, None], step.values["tip_position"], self.tip)
         distance = self.distance  # before the target moves on
-        self._count[which] += 1
-        steps, converged = np.isin(np.arange(count), which), np.ones(count, bool)
-        code = np.full(count, "", object)
-        converged[which], code[which] = step.converged, step.code
-        reached = steps & converged & (distance <= settings.tolerance) & (not self._follow)
-        last = steps & ~reached & (self._count >= settings.steps)
+        self._count += 1
+        reached = converged & (distance <= settings.tolerance) & (not self._follow)
+        last = ~reached & (self._count >= settings.steps)
         reward = _REACHED * reached - distance / settings.length - _FAILED * ~converged
-        return Outcome(np.where(steps, reward, 0.0), reached, last, code, distance)
+        return Outcome(reward, reached, last, np.array(step.code, object), distance)
 
     @property
     def target(self) -> Array:
@@ -240,8 +231,8 @@ class EpisodeRows:
             tips.append(tip)
         return np.stack(tips if self._follow else tips[-1:], axis=1)
 
-    def _checked(self, actions: Any, which: NDArray[np.int_]) -> Array:
-        """Return the actions of some rows."""
+    def _checked(self, actions: Any, ignored: NDArray[np.bool_] | None) -> Array:
+        """Return the actions of all rows, 0 where they are ignored."""
         try:
             numbers = np.asarray(actions, float)
         except (TypeError, ValueError):
@@ -252,9 +243,11 @@ class EpisodeRows:
             raise InputError.WRONG_SHAPE(
                 f"actions need the shape {self.tension.shape}, rows by tendons; got {numbers.shape}"
             )
-        if not np.isfinite(numbers[which]).all():
+        if ignored is not None:
+            numbers = np.where(ignored[:, None], 0.0, numbers)
+        if not np.isfinite(numbers).all():
             raise InputError.NOT_FINITE("an action is not finite; give numbers from -1 to 1")
-        return numbers[which]
+        return numbers
 
     def picture(self, row: int) -> NDArray[np.uint8]:
         """Return a picture of one row, (h, w, 3).

@@ -2,8 +2,8 @@
 
 from notchflex.photographs.board import Board, board_of
 from notchflex.photographs.measure import measure
-from notchflex.photographs.measure_cut import MeasuredCut, measure_cut
-from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
+from notchflex.photographs.measure_cut import measure_cut
+from notchflex.photographs.measured import MeasuredCut, MeasuredPhotograph, MeasuredPhotographs
 
 __all__ = [
     "Board",

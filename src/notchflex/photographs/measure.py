@@ -4,34 +4,33 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import approx_fprime
 from threadpoolctl import threadpool_limits
 
 from notchflex import InputError, Robot, tip_from_angles
-from notchflex.photographs.board import Board
-from notchflex.photographs.camera import NUMBERS
-from notchflex.photographs.chain_table import ChainTable, Numbers, chain_table
-from notchflex.photographs.edges import Contrast, contrast
-from notchflex.photographs.fitting import MAX_RESIDUAL
-from notchflex.photographs.judging import UNCERTAINTY, rejection_reason
-from notchflex.photographs.loads import loads_of
+from notchflex.photographs.board import NO_RULER, Board, Ruler
+from notchflex.photographs.edges import Numbers, contrast, made_smaller
+from notchflex.photographs.fitting import MAX_RESIDUAL, UNCERTAINTY, Fit, rejection_reason
 from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
-from notchflex.photographs.outline import axis_points
-from notchflex.photographs.reading import read_photograph
-from notchflex.photographs.sighting import NO_RULER, Ruler
+from notchflex.photographs.outline import PlanarRobot, axis_points
+from notchflex.photographs.reading import loads_of, read_photograph
 from notchflex.support import check_number
+
+Photographs = Sequence[str | os.PathLike[str]] | str | os.PathLike[str]
+Progress = Callable[[str, int, int], None]
 
 MOST_PIXELS = 8.0e6
 """A photograph of more pixels is made smaller before it is measured."""
 
 
 def measure(
-    photographs: Sequence[str | os.PathLike[str]] | str | os.PathLike[str],
+    photographs: Photographs,
     robot: Robot,
     *,
     loads: str | os.PathLike[str] | None = None,
@@ -41,7 +40,7 @@ def measure(
     scale: float | None = None,
     board: Board | None = None,
     uncertainty_deg: float = math.degrees(UNCERTAINTY),
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> MeasuredPhotographs:
     """Measure the angle of every notch in photographs of a robot from the side.
 
@@ -79,19 +78,17 @@ def measure(
         >>> found.write_csv("measured.csv")  # doctest: +SKIP
     """
     names = names_of(photographs)
-    table, ruler = chain_table(robot), Ruler(scale, board)
+    planar, ruler = PlanarRobot(robot), Ruler(scale, board)
     uncertainty = checked_uncertainty(uncertainty_deg)
     columns_of_loads = loads_of(names, robot, loads, pattern, exif, columns)
-    measured: list[MeasuredPhotograph] = []
-    for number, name in enumerate(names, 1):
-        picture = read_photograph(name)
-        measured.append(measure_picture(picture, table, name, ruler, uncertainty=uncertainty))
-        if progress is not None:
-            progress("measuring", number, len(names))
-    return MeasuredPhotographs(robot, tuple(measured), columns_of_loads)
+    measured = tuple(
+        measure_picture(picture, planar, name, ruler, uncertainty=uncertainty)
+        for name, picture in pictures_of(names, progress)
+    )
+    return MeasuredPhotographs(robot, measured, columns_of_loads)
 
 
-def names_of(photographs: Sequence[str | os.PathLike[str]] | str | os.PathLike[str]) -> list[str]:
+def names_of(photographs: Photographs) -> list[str]:
     """Return the names of one file or several.
 
     Raises:
@@ -102,6 +99,16 @@ def names_of(photographs: Sequence[str | os.PathLike[str]] | str | os.PathLike[s
     if not names:
         raise InputError.NO_DATA("there is no photograph to measure; name one or more")
     return names
+
+
+def pictures_of(
+    names: Sequence[str], progress: Progress | None
+) -> Iterator[tuple[str, NDArray[np.uint8]]]:
+    """Yield names and pictures of photographs, and tell the progress after each."""
+    for number, name in enumerate(names, 1):
+        yield name, read_photograph(name)
+        if progress is not None:
+            progress("measuring", number, len(names))
 
 
 def checked_uncertainty(value: float) -> float:
@@ -120,7 +127,7 @@ def checked_uncertainty(value: float) -> float:
 @threadpool_limits.wrap(limits=1)
 def measure_picture(
     picture: NDArray[np.uint8],
-    table: ChainTable,
+    planar: PlanarRobot,
     name: str,
     ruler: Ruler = NO_RULER,
     chain: Numbers | None = None,
@@ -130,7 +137,7 @@ def measure_picture(
 
     Args:
         picture: Blue, green and red.
-        table: The robot.
+        planar: The robot.
         name: What the photograph is called.
         ruler: What gives the scale.
         chain: Points of the tube axis from which the fit is started, px, (n + 2, 2), as in
@@ -140,90 +147,47 @@ def measure_picture(
     Raises:
         InputError: The points of the chain are invalid.
     """
-    seen = see(picture, table, ruler, chain)
-    if isinstance(seen, str):
-        return MeasuredPhotograph.refused(name, table.notches, seen)
-    spread = seen.located.fit.covariance()[NUMBERS:, NUMBERS:]
-    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
-    fit, rivals, _ = seen.located
-    reason = rejection_reason(fit, rivals, deviation, uncertainty)
-    return judged_photograph(name, seen, spread, reason)
-
-
-class SeenRobot(NamedTuple):
-    """A robot in a photograph.
-
-    Attributes:
-        located: The fit.
-        contrast: Contrast of the whole photograph, without a board.
-        factor: By how much the photograph was made smaller for it.
-    """
-
-    located: Located
-    contrast: Contrast
-    factor: float
+    located = see(picture, planar, ruler, chain)
+    if isinstance(located, str):
+        return MeasuredPhotograph.refused(name, planar.notches, located)
+    reason = rejection_reason(located.fit, located.rivals, uncertainty)
+    return judged_photograph(name, located.fit, reason)
 
 
 def see(
-    picture: NDArray[np.uint8], table: ChainTable, ruler: Ruler, chain: Numbers | None = None
-) -> SeenRobot | str:
+    picture: NDArray[np.uint8], planar: PlanarRobot, ruler: Ruler, chain: Numbers | None = None
+) -> Located | str:
     """Find the robot in a photograph; return why not if it is not found."""
-    import cv2
-
     factor = min(1.0, math.sqrt(MOST_PIXELS / (picture.shape[0] * picture.shape[1])))
-    smaller: Any = picture
-    if factor < 1.0:
-        smaller = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-    if chain is not None:
-        middle = (np.array(smaller.shape[1::-1]) - 1.0) / 2.0
-        chain = (chain + 0.5) * factor - 0.5 - middle
-    reading = ruler.read(smaller, factor)
+    smaller = made_smaller(picture, factor)
+    reading = ruler.read(smaller, contrast(smaller, factor))
     if isinstance(reading, str):
         return reading
-    whole = reading.hidden(contrast(smaller))
-    located = locate(table, whole, reading, chain)
-    if located is None:
-        return "no tube of the proportions of the robot is seen"
-    return SeenRobot(located, whole, factor)
+    prior, whole = reading
+    return locate(planar, whole, prior, None if chain is None else chain - whole.centre)
 
 
-def judged_photograph(
-    name: str, seen: SeenRobot, spread: Numbers, reason: str
-) -> MeasuredPhotograph:
-    """Return what a fit says about a photograph.
-
-    Args:
-        name: What the photograph is called.
-        seen: The fit.
-        spread: Covariance of the angles, rad^2, (n, n).
-        reason: Why the photograph is refused; "" if it is not.
-    """
-    fit, factor = seen.located.fit, seen.factor * seen.located.factor
-    table = fit.model.table
-    angles = fit.numbers[NUMBERS : NUMBERS + table.notches]
-
-    def placed(points: Numbers) -> Numbers:
-        """Return points of the photograph as it was read, px."""
-        middle = (seen.contrast.middle + 0.5) * seen.located.factor
-        return (points + middle) / factor - 0.5
-
+def judged_photograph(name: str, fit: Fit, reason: str) -> MeasuredPhotograph:
+    """Return what a fit says about a photograph; with a reason it is refused."""
+    planar, picture, of_angles = fit.model.planar, fit.contrast, fit.model.angles
     view: dict[str, Any] = {
-        "scale": math.exp(fit.numbers[3]) / factor,
+        "scale": math.exp(fit.numbers[3]),
         "roll": math.remainder(fit.numbers[4], math.pi),
         "tilt": float(fit.numbers[5]),
-        "noise": fit.noise / factor,
+        "noise": fit.noise / picture.factor,
         "found": fit.score,
-        "outline": placed(fit.outline.point[0]),
-        "chain": placed(axis_points(table, fit.numbers)),
+        "outline": fit.outline.point[0] / picture.factor + picture.centre,
+        "chain": axis_points(planar, fit.numbers) + picture.centre,
         "seen": np.abs(fit.residual) < MAX_RESIDUAL,
     }
     if reason:
-        return MeasuredPhotograph.refused(name, table.notches, reason, **view)
-    steps = 1e-4 * np.vstack([np.zeros(len(angles)), np.eye(len(angles))])
-    tips, _ = tip_from_angles(table.robot, angles + steps)
-    slopes = (tips[1:] - tips[0]).T / 1e-4
+        return MeasuredPhotograph.refused(name, planar.notches, reason, **view)
+
+    def tip(angles: Numbers) -> Numbers:
+        return tip_from_angles(planar.robot, angles[None])[0][0]
+
+    angles, spread = fit.numbers[of_angles].copy(), fit.covariance[of_angles, of_angles]
+    slopes: Any = approx_fprime(angles, tip, 1e-4)
     variance = np.einsum("an,nm,am->a", slopes, spread, slopes)
     deviation = np.where(variance > 1e-18, np.sqrt(np.maximum(variance, 0.0)), np.nan)
-    return MeasuredPhotograph(
-        name, "", angles.copy(), np.sqrt(np.diag(spread)), tips[0], deviation, **view
-    )
+    return MeasuredPhotograph(name, "", angles, fit.deviation, tip(angles), deviation, **view)

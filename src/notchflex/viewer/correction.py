@@ -16,15 +16,12 @@ import viser
 from numpy.typing import NDArray
 
 from notchflex import InputError
-from notchflex.photographs.board import Board
-from notchflex.photographs.chain_table import chain_table
-from notchflex.photographs.judging import UNCERTAINTY
+from notchflex.photographs.board import Board, Ruler
+from notchflex.photographs.fitting import UNCERTAINTY
 from notchflex.photographs.measure import checked_uncertainty, measure_picture
-from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
-from notchflex.photographs.outline import straight_chain
-from notchflex.photographs.overlay import LONGEST
+from notchflex.photographs.measured import LONGEST, MeasuredPhotograph, MeasuredPhotographs
+from notchflex.photographs.outline import PlanarRobot, straight_chain
 from notchflex.photographs.reading import read_photograph
-from notchflex.photographs.sighting import Ruler
 from notchflex.viewer.readout import notice
 from notchflex.viewer.scene import CameraPose, framed
 from notchflex.viewer.server import HOST, PORT, check_host, check_installed, serve
@@ -174,7 +171,7 @@ class Correction:
         self._ruler = Ruler(scale, board)
         self._uncertainty = checked_uncertainty(uncertainty_deg)
         self.results = list(measured.photographs)
-        self._table = chain_table(measured.robot)
+        self._planar = PlanarRobot(measured.robot)
         self._tasks = Tasks()
         self._dragged, self.message = False, ""
         self.server, self.address = serve(host, port)
@@ -221,7 +218,7 @@ class Correction:
         chain = self.plane.chain
         try:
             fitted = measure_picture(
-                self.picture, self._table, now.source, self._ruler, chain, self._uncertainty
+                self.picture, self._planar, now.source, self._ruler, chain, self._uncertainty
             )
         except InputError as problem:
             self.message = str(problem)
@@ -245,7 +242,7 @@ class Correction:
 
     def _refuse(self, number: int, reason: str) -> None:
         source = self.results[number].source
-        self.results[number] = MeasuredPhotograph.refused(source, self._table.notches, reason)
+        self.results[number] = MeasuredPhotograph.refused(source, self._planar.notches, reason)
 
     def look(self) -> None:
         """Move the camera of every browser in front of the photograph."""
@@ -279,7 +276,7 @@ class Correction:
         now = self.results[self.number]
         self.picture = read_photograph(now.source)
         height, width = self.picture.shape[:2]
-        chain = now.chain if len(now.chain) else straight_chain(self._table, width, height)
+        chain = now.chain if len(now.chain) else straight_chain(self._planar, width, height)
         number = self.number
         self.plane = PicturePlane(
             self.server, self.picture, chain, lambda: self._ask(self.moved, number, "drag")

@@ -136,7 +136,7 @@ def measure(
     if correct:
         check_installed()
         check_host(HOST, port or PORT)
-    from notchflex.photographs.overlay import overlay_names
+    from notchflex.photographs.measured import overlay_names
 
     if overlays is None and output not in (None, "-"):
         overlays = f"{Path(output).with_suffix('')}-overlays"
@@ -212,7 +212,7 @@ def _corrected(
 def _write_overlays(measured: MeasuredPhotographs | MeasuredCut, files: Sequence[Path]) -> None:
     """Write each photograph with its fitted outline."""
     from notchflex.photographs import MeasuredCut
-    from notchflex.photographs.overlay import cut_lines, write_overlay
+    from notchflex.photographs.measured import cut_lines, write_overlay
     from notchflex.photographs.reading import read_photograph
 
     lines = cut_lines(measured) if isinstance(measured, MeasuredCut) else []
