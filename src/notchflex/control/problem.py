@@ -91,11 +91,13 @@ class Response(NamedTuple):
         step: The step.
         sliding: Slopes of all quantities by the drives, of tendons that stick as they last slid.
         stuck: Which tendons stick, or may.
+        slid: Which tendons have slid in this search.
     """
 
     step: Step
     sliding: Float[np.ndarray, "m t"]
     stuck: Bool[np.ndarray, " t"]
+    slid: Bool[np.ndarray, " t"]
 
 
 class Problem(NamedTuple):

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from notchflex import Failure
 from notchflex.control.problem import Attempt, Problem, Response
@@ -27,14 +26,12 @@ _NO_SLOPE, _STUCK = 1e-12, 1e-18
 # It slides just beyond its dead band, by this part of the drive.
 _BEYOND = 1e-6
 # Beyond the dead band a notch that is pressed together may hold on: the way so far tells how far it
-# can be.
+# can be, until the tendon has slid once.
 _ONWARD = 0.5
 # Drives within this part of what about closes a notch of a limit, or of an edge, are at it.
 _AT_LIMIT = 1e-10
 # Beside others a tendon stays in its dead band if it must slide by less than this part of it.
 _SMALL_LEAP = 1e-3
-# Beyond the dead band slopes show the way back if the error has grown by less than this factor.
-_ACROSS = 100.0
 # A tendon that was slack is pulled above this part of what about closes a notch.
 _PULLED = 1e-6
 # Steps whose slopes promise less than this part of the squared error bring nothing.
@@ -50,7 +47,7 @@ KEPT = 1e-6
 """Relative tolerance of limits."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class DriveSearch:
     """A target that is searched from a state.
 
@@ -58,36 +55,27 @@ class DriveSearch:
         problem: Target quantities and limits.
         before: The state before.
         goal: The target; NaN where an entry is free.
+        least_squares: The problem for drives.
     """
 
     problem: Problem
     before: Float[np.ndarray, " state"]
     goal: Float[np.ndarray, " m"]
+    least_squares: BoundedLeastSquares = field(init=False)
 
-    @cached_property
-    def least_squares(self) -> BoundedLeastSquares:
-        """The problem for drives."""
-        problem = self.problem
-        return BoundedLeastSquares(
+    def __post_init__(self) -> None:
+        """Select the numbers that are targeted."""
+        problem, rows = self.problem, np.flatnonzero(self.goal == self.goal)
+        self._entries, self._weights = problem.entries[rows], problem.weights[rows]
+        self._goal = self.goal[rows]
+        self.least_squares = BoundedLeastSquares(
             self.move,
             problem.low,
             problem.high,
             problem.search.tolerance,
             reach=_FIRST_PART * problem.unit,
-            small=int(problem.driven.sum()) > len(self._rows),
+            small=np.count_nonzero(problem.driven) > len(rows),
         )
-
-    @cached_property
-    def _rows(self) -> Int[np.ndarray, " k"]:
-        return np.flatnonzero(self.goal == self.goal)
-
-    @cached_property
-    def _entries(self) -> Int[np.ndarray, " k"]:
-        return self.problem.entries[self._rows]
-
-    @cached_property
-    def _weights(self) -> Float[np.ndarray, " k"]:
-        return self.problem.weights[self._rows]
 
     def present(self) -> tuple[Response, int]:
         """Solve the present drives, and others beyond dead bands for slopes; count the solves."""
@@ -95,7 +83,7 @@ class DriveSearch:
         response, solves = self.solve(present), 1
         if response is None:
             step = problem.stepper.step(self.before, present)
-            return Response(step, step.flat_jacobian, problem.driven), solves
+            return Response(step, step.flat_jacobian, problem.driven, ~problem.driven), solves
         low, high = problem.stepper.dead_band(self.before).T
         for edges in ((1.0 + _BEYOND) * high, (1.0 - _BEYOND) * low):
             stuck = response.stuck
@@ -104,7 +92,8 @@ class DriveSearch:
             beyond, solves = self.solve(np.where(stuck, edges, present)), solves + 1
             if beyond is not None:
                 sliding = np.where(stuck, beyond.sliding, response.sliding)
-                response = Response(response.step, sliding, stuck & beyond.stuck)
+                stuck = stuck & beyond.stuck
+                response = Response(response.step, sliding, stuck, ~stuck)
         return response, solves
 
     def solve(
@@ -115,34 +104,33 @@ class DriveSearch:
         if not step.converged:
             return None
         slopes = step.flat_jacobian
-        size = self._size(slopes)
+        steep = self._steepness(slopes)
         if like is None:
-            return Response(step, np.nan_to_num(slopes), self.problem.driven & (size <= _STUCK))
-        stuck = size <= _NO_SLOPE * self._size(like.sliding)
+            stuck = self.problem.driven & (steep <= _STUCK)
+            return Response(step, np.nan_to_num(slopes), stuck, ~stuck)
         # After a step in parts slopes are not known: those of the other one are corrected.
-        unknown = stuck | ~np.isfinite(size)
-        if unknown.any():
-            slopes = np.where(unknown, like.sliding, slopes)
-        return Response(step, slopes, stuck)
+        stuck = ~(steep > _NO_SLOPE * self._steepness(like.sliding))
+        if stuck.any():
+            slopes = np.where(stuck, like.sliding, slopes)
+            stuck &= np.isfinite(steep)
+        return Response(step, slopes, stuck, like.slid | ~stuck)
 
-    def _size(self, slopes: Float[np.ndarray, "m t"]) -> Float[np.ndarray, " t"]:
+    def _steepness(self, slopes: Float[np.ndarray, "m t"]) -> Float[np.ndarray, " t"]:
         """Squares of the slopes of the target by every drive."""
         return np.square(slopes[self._entries]).sum(axis=0)
 
-    def point(self, response: Response, across: float = 0.0) -> SearchPoint:
+    def point(self, response: Response, accepted: float = 0.0) -> SearchPoint:
         """Return a solution as a point of the search."""
-        values, sliding = response.step.flat_values, response.sliding
-        if not self.problem.driven.all():
-            sliding = sliding * self.problem.driven
-        residuals = self._weights * (values[self._entries] - self.goal[self._rows])
+        step, sliding = response.step, response.sliding * self.problem.driven
+        residuals = self._weights * (step.flat_values[self._entries] - self._goal)
         slopes = self._weights[:, None] * sliding[self._entries]
-        limits, room = self.problem.limited(values, sliding)
-        return SearchPoint(response.step.drives, residuals, slopes, limits, room, response, across)
+        limits, room = self.problem.limited(step.flat_values, sliding)
+        return SearchPoint(step.drives, residuals, slopes, limits, room, response, accepted)
 
     def move(self, point: SearchPoint, step: Float[np.ndarray, " t"]) -> SearchPoint | None:
         """Return the point after a step, over the dead bands of tendons that stick."""
         problem, response, drives = self.problem, point.solution, point.variables
-        ahead, leapt = drives + step, []
+        ahead, leapt = drives + step, False
         if response.stuck.any():
             leapt = self._leap(response, step, ahead)
         near = ahead <= problem.low + _AT_LIMIT * problem.unit
@@ -154,27 +142,28 @@ class DriveSearch:
             return None
         # Notches that are pressed together hold on, with or without a dead band on the way.
         holds = (response.stuck & solved.stuck & (ahead != drives)).any()
-        across = 1.0 + 1e-9 if holds else _ACROSS if leapt else 0.0
-        return self.point(solved, across)
+        # Beyond all that holds, slopes show the way back from however far.
+        accepted = (1.0 + 1e-9) * point.error if holds else math.inf if leapt else 0.0
+        return self.point(solved, accepted)
 
     def _leap(
         self, response: Response, step: Float[np.ndarray, " t"], ahead: Float[np.ndarray, " t"]
-    ) -> list[int]:
-        """Move drives of tendons that stick on to the end of the dead band; return which."""
-        problem, drives, leapt = self.problem, response.step.drives, []
-        band = problem.stepper.dead_band(response.step.state).tolist()
+    ) -> bool:
+        """Move drives of tendons that stick on to the end of the dead band; return if any does."""
+        problem, drives, leapt = self.problem, response.step.drives, False
+        band = response.step.dead_band.tolist()
         several = np.count_nonzero(problem.driven) > 1
         for tendon in np.flatnonzero(response.stuck).tolist():
             change = float(step[tendon])
-            leap = band[tendon][int(change > 0.0)] - float(drives[tendon])
-            if abs(leap) <= _AT_LIMIT * problem.unit:
+            leap = band[tendon][change > 0.0] - float(drives[tendon])
+            if abs(leap) <= _AT_LIMIT * problem.unit and not response.slid[tendon]:
                 way = float(drives[tendon] - problem.present(self.before)[tendon])
                 leap = math.copysign(_ONWARD * way, change)
             if several and abs(change) <= _SMALL_LEAP * abs(leap):
                 ahead[tendon] = drives[tendon]
             elif change != 0.0 and leap != 0.0:
                 ahead[tendon] += leap
-                leapt.append(tendon)
+                leapt = True
         return leapt
 
     def moving(self, moved: Bool[np.ndarray, " t"], drives: Float[np.ndarray, " t"]) -> DriveSearch:
@@ -197,9 +186,9 @@ class DriveSearch:
         low, high = self.problem.widest
         unlimited = replace(point, limits=point.limits[:0], room=point.room[:0])
         without = replace(self.least_squares, low=low, high=high)
-        least = (1.0 - _FLAT) * unlimited.merit()
-        stops = unlimited.merit(self.least_squares.step(point)) >= least
-        goes_on = unlimited.merit(without.step(unlimited)) < least
+        least = (1.0 - _FLAT) * unlimited.merit
+        stops = unlimited.promised(self.least_squares.step(point)) >= least
+        goes_on = unlimited.promised(without.step(unlimited)) < least
         return Failure.LIMITS_PREVENT if stops and goes_on else Failure.TARGET_OUT_OF_REACH
 
     def lowered(self, response: Response, tendon: int) -> tuple[Response, int]:
@@ -247,19 +236,16 @@ def find(
         known, solves = search.present()
     if not known.step.converged:
         return Attempt(known, np.nan, np.inf, solves, Failure.NO_EQUILIBRIUM)
-    present = problem.present(before)
-    step = replace(known.step, state=before, drives=present)
-    here = Response(step, known.sliding, problem.driven)
+    present = known.step.drives
     slack = problem.driven & (present <= problem.low)
-    for drives, moved in _starts(problem, present, slack):
+    for drives, moved in _starts(problem, present, slack, elsewhere):
         left = problem.search.solves if budget is None else budget - solves
-        is_present = bool((drives == present).all())
-        if best is not None and (left <= 0 or not (is_present or elsewhere)):
+        if best is not None and left <= 0:
             break
         part = search.moving(moved, drives)
-        start = here._replace(stuck=moved)
-        if not is_present:
-            start, solves = part.solve(drives, here), solves + 1
+        start = known._replace(stuck=moved, slid=~moved)
+        if drives is not present:
+            start, solves = part.solve(drives, start), solves + 1
         if start is None:
             continue
         end = part.least_squares.search(part.point(start), left)
@@ -312,13 +298,18 @@ def go_towards(
 
 
 def _starts(
-    problem: Problem, present: Float[np.ndarray, " t"], slack: Bool[np.ndarray, " t"]
+    problem: Problem,
+    present: Float[np.ndarray, " t"],
+    slack: Bool[np.ndarray, " t"],
+    elsewhere: bool,
 ) -> Iterator[tuple[Float[np.ndarray, " t"], Bool[np.ndarray, " t"]]]:
     """Yield drives to start from, and which tendons move."""
     yield present, problem.driven
     taut = problem.driven & ~slack
     if slack.any() and taut.any():
         yield present, taut
+    if not elsewhere:
+        return
     rest = np.where(problem.driven, 0.0, present)
     alone = 0.15 * problem.unit * np.eye(len(present))[problem.driven]
     for drives in (0.5 * (present + rest), rest, *(rest + alone)):

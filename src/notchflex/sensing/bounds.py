@@ -107,7 +107,7 @@ def _add(
             # What noise does not explain of its distance from the mean is a change of the force.
             ends.force[row] = mean + reading.part * (point.variables - mean)
             forces.append(ends.force[row])
-        least = point.merit()
+        least = point.merit
         for goal in trackers[1:]:
             own = goal is tracker
             if not own and model.size > 1 and tracker.side:

@@ -109,13 +109,13 @@ def best(problem: ReadingProblem, forces: Iterable[Float[np.ndarray, " d"]]) -> 
     points = [point for force in forces if (point := problem.point(force)) is not None]
     if not points:
         return None
-    point = min(points, key=SearchPoint.merit)
+    point = min(points, key=lambda point: point.merit)
     return problem.least_squares.search(point, _MAX_SOLVES).point
 
 
 def fits_badly(point: SearchPoint | None) -> bool:
     """Return whether a force misses the readings by far more than their noise."""
-    return point is None or point.merit() > BAD_FIT * max(len(point.residuals), 1)
+    return point is None or point.merit > BAD_FIT * max(len(point.residuals), 1)
 
 
 def best_of_all(
@@ -130,7 +130,7 @@ def best_of_all(
     scan = np.concatenate([np.outer(np.linspace(-largest, largest, _STARTS), row) for row in axes])
     far = best(problem, [scan[int(np.argmin(problem.misfits(scan)))]])
     points = [point for point in (near, far) if point is not None]
-    return min(points, key=SearchPoint.merit, default=None)
+    return min(points, key=lambda point: point.merit, default=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +213,7 @@ def _farthest(
             )
             search = replace(problem.least_squares, low=low, high=high, tolerance=math.sqrt(most))
             trial = search.search(trial, _FEW_SOLVES).point
-            if trial.merit() <= most:
+            if trial.merit <= most:
                 return trial, None
     if count and others.any():
         point = problem.point(forces[count - 1]) or point
@@ -227,5 +227,5 @@ def _predicted(problem: ReadingProblem, point: SearchPoint, component: int, most
     slopes = point.slopes
     normal = slopes.T @ slopes + problem.least_squares.weak**2 * np.eye(slopes.shape[1])
     lean = float(np.linalg.inv(normal)[component, component])
-    move = math.sqrt(max(most - point.merit(), 0.0) * lean)
+    move = math.sqrt(max(most - point.merit, 0.0) * lean)
     return move if move < problem.model.largest else 0.0

@@ -126,7 +126,7 @@ def _best_place(
     for number, body in enumerate(bodies, 1):
         candidates = estimate(replace(model, unknown=replace(model.unknown, body=body))).best
         whole = len(candidates) == len(model.readings)
-        misfits[body] = sum(point.merit() for point in candidates) if whole else np.inf
+        misfits[body] = sum(point.merit for point in candidates) if whole else np.inf
         if report is not None:
             report(number, len(bodies))
     # Of places that fit as well the tip is taken: it is where robots touch.
@@ -158,7 +158,7 @@ def _result(
         high=_filled(ends.high, (count, size)),
         limited=np.concatenate([ends.limited, np.zeros((rest, size), bool)]),
         stuck=stuck,
-        misfit=_filled([point.merit() for point in candidates], (means,))[group],
+        misfit=_filled([point.merit for point in candidates], (means,))[group],
         read=entries[group],
         no_force=_filled(ends.no_force, (count,)),
         hidden=tuple(hidden),
