@@ -216,8 +216,7 @@ def _approach(
         via = _overshoot(problem, direct, over, rise > 0.0)
         between = problem.stepper.step(before, via)
         solves += 1
-        room = problem.limited(between.flat_values, between.flat_jacobian)[1]
-        if not between.converged or (room < -KEPT).any():
+        if not between.converged or (problem.room(between) < -KEPT).any():
             continue
         last = _met(problem, between.state, goal, None)
         solves += last.solves

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, get_args
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from notchflex import Failure, InputError, Load, Robot, State, Step, Stepper
-from notchflex.control.limits import Bound, Drive, Limits, bounds_of_robot
+from notchflex.control.limits import Drive, Limits, limits_of_robot
 from notchflex.control.targets import Aim, Targets, aim_at
 from notchflex.support import check_integer, check_number, load_path, short_repr
 
@@ -89,15 +89,30 @@ class Response(NamedTuple):
 
     Attributes:
         step: The step.
-        sliding: Slopes of all quantities by the drives, of tendons that stick as they last slid.
+        slopes: Slopes by the drives of what is targeted, then of what is limited; of tendons that
+            stick as they last slid.
         stuck: Which tendons stick, or may.
-        slid: Which tendons have slid in this search.
+        slid: By how much each tendon was moved when it last slid, N or mm; 0 if it has not.
     """
 
     step: Step
-    sliding: Float[np.ndarray, "m t"]
+    slopes: Float[np.ndarray, "m t"]
     stuck: Bool[np.ndarray, " t"]
-    slid: Bool[np.ndarray, " t"]
+    slid: Float[np.ndarray, " t"]
+
+
+class LimitedEntries(NamedTuple):
+    """Limits on quantities beside the drives.
+
+    Attributes:
+        entries: Which numbers of a step are limited.
+        limits: Their limits.
+        factors: One over the size of a limit; negative for a lowest value.
+    """
+
+    entries: Int[np.ndarray, " c"]
+    limits: Float[np.ndarray, " c"]
+    factors: Float[np.ndarray, " c"]
 
 
 class Problem(NamedTuple):
@@ -112,7 +127,7 @@ class Problem(NamedTuple):
         high: Highest drive.
         widest: Lowest and highest drive without the limits of the user.
         rate: Largest change of a drive from target to target, N or mm.
-        bounds: Limits on other quantities.
+        limited: Limits on other quantities.
         unit: Drive that about closes a notch, N or mm.
         by_tension: Whether drives are tensions; otherwise they are strokes.
         search: Tolerance and budget.
@@ -126,7 +141,7 @@ class Problem(NamedTuple):
     high: np.ndarray
     widest: tuple[np.ndarray, np.ndarray]
     rate: float
-    bounds: tuple[Bound, ...]
+    limited: LimitedEntries
     unit: float
     by_tension: bool
     search: TargetSearch
@@ -145,20 +160,18 @@ class Problem(NamedTuple):
         )
         return self._replace(low=low, high=high)
 
-    def limited(
-        self, values: Float[np.ndarray, " m"], slopes: Float[np.ndarray, "m t"]
-    ) -> tuple[Float[np.ndarray, "c t"], Float[np.ndarray, " c"]]:
-        """Return slopes of limited quantities and their distances from the limits, relative."""
-        rows, room = [slopes[:0]], [values[:0]]
-        for bound in self.bounds:
-            place, _ = self.stepper.places[bound.quantity]
-            left = bound.side * (bound.limit - values[place])
-            limited = np.isfinite(left)
-            scale = np.maximum(np.abs(bound.limit), _MIN_LIMIT)[limited]
-            # At a kink some have no slopes.
-            rows.append(bound.side * np.nan_to_num(slopes[place][limited]) / scale[:, None])
-            room.append(left[limited] / scale)
-        return np.concatenate(rows), np.concatenate(room)
+    def slopes(self, step: Step) -> Float[np.ndarray, "m t"]:
+        """Return the slopes of what is targeted, then of what is limited."""
+        rows = step.flat_jacobian[self.entries]
+        if not self.limited.entries.size:
+            return rows
+        # At a kink some limited quantities have no slopes.
+        return np.concatenate([rows, np.nan_to_num(step.flat_jacobian[self.limited.entries])])
+
+    def room(self, step: Step) -> Float[np.ndarray, " c"]:
+        """Return how far limited quantities are from their limits, as parts of them."""
+        entries, limits, factors = self.limited
+        return factors * (limits - step.flat_values[entries]) if entries.size else limits
 
 
 class Attempt(NamedTuple):
@@ -205,8 +218,8 @@ def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tup
             "the load commands every tendon, so that none is left to be driven; "
             "leave the tension of those to be driven out"
         )
-    bounds = tuple(bounds_of_robot(limits, drive, tendons, robot.number_of_notches))
-    outputs = {*targets.outputs, *(bound.quantity for bound in bounds)}
+    limited = limits_of_robot(limits, drive, tendons, robot.number_of_notches)
+    outputs = {*targets.outputs, *(quantity for quantity, _, _ in limited)}
     words = np.where(held, np.where(np.isnan(stroke), "tension", "stroke"), drive).tolist()
     stepper = _stepper(robot, outputs, words, options)
     chain = stepper.prepared.chain
@@ -224,9 +237,26 @@ def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tup
     rate = np.inf if limits.rate is None else limits.rate
     search = options.search or TargetSearch()
     return Problem(
-        stepper, aim.entries, aim.weights, ~held, low, high, (least, most), rate, bounds, unit,
-        by_tension, search,
+        stepper, aim.entries, aim.weights, ~held, low, high, (least, most), rate,
+        _limited_entries(limited, places), unit, by_tension, search,
     ), aim  # fmt: skip
+
+
+def _limited_entries(
+    limited: list[tuple[str, float, np.ndarray]], places: Mapping[str, slice]
+) -> LimitedEntries:
+    rows = [
+        (entry, limit, side / max(abs(limit), _MIN_LIMIT))
+        for quantity, side, values in limited
+        for entry, limit in zip(_numbers(places[quantity]), values.tolist(), strict=True)
+        if np.isfinite(limit)
+    ]
+    entries, limits, factors = np.array(rows).reshape(-1, 3).T
+    return LimitedEntries(entries.astype(int), limits, factors)
+
+
+def _numbers(place: slice) -> range:
+    return range(place.start, place.stop)
 
 
 def _stepper(

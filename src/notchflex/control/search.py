@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -34,6 +34,9 @@ _AT_LIMIT = 1e-10
 _SMALL_LEAP = 1e-3
 # A tendon that was slack is pulled above this part of what about closes a notch.
 _PULLED = 1e-6
+# Where the present drives lead nowhere, each tendon is pulled alone by this part of what about closes
+# a notch: the two-axis wrist of `benchmarks/control.py accuracy` needs it.
+_ALONE = 0.15
 # Steps whose slopes promise less than this part of the squared error bring nothing.
 _FLAT = 1e-6
 # Notches hold on where the target changes by less than this (mm, N or rad, by weights) for a change
@@ -55,35 +58,40 @@ class DriveSearch:
         problem: Target quantities and limits.
         before: The state before.
         goal: The target; NaN where an entry is free.
-        least_squares: The problem for drives.
     """
 
     problem: Problem
     before: Float[np.ndarray, " state"]
     goal: Float[np.ndarray, " m"]
-    least_squares: BoundedLeastSquares = field(init=False)
 
     def __post_init__(self) -> None:
-        """Select the numbers that are targeted."""
-        problem, rows = self.problem, np.flatnonzero(self.goal == self.goal)
-        self._entries, self._weights = problem.entries[rows], problem.weights[rows]
-        self._goal = self.goal[rows]
-        self.least_squares = BoundedLeastSquares(
+        """Weigh the numbers that have a goal."""
+        problem, has_goal = self.problem, self.goal == self.goal
+        self._present = problem.present(self.before)
+        self._goal = np.where(has_goal, self.goal, 0.0)
+        self._weights = problem.weights * has_goal
+        self._squares = np.square(self._weights)
+
+    @property
+    def least_squares(self) -> BoundedLeastSquares:
+        """The problem for drives."""
+        problem = self.problem  # kept in the search it would be a cycle of references
+        return BoundedLeastSquares(
             self.move,
             problem.low,
             problem.high,
             problem.search.tolerance,
             reach=_FIRST_PART * problem.unit,
-            small=np.count_nonzero(problem.driven) > len(rows),
+            small=np.count_nonzero(problem.driven) > np.count_nonzero(self._weights),
         )
 
     def present(self) -> tuple[Response, int]:
         """Solve the present drives, and others beyond dead bands for slopes; count the solves."""
-        problem, present = self.problem, self.problem.present(self.before)
+        problem, present = self.problem, self._present
         response, solves = self.solve(present), 1
         if response is None:
             step = problem.stepper.step(self.before, present)
-            return Response(step, step.flat_jacobian, problem.driven, ~problem.driven), solves
+            return Response(step, problem.slopes(step), problem.driven, 0.0 * present), solves
         low, high = problem.stepper.dead_band(self.before).T
         for edges in ((1.0 + _BEYOND) * high, (1.0 - _BEYOND) * low):
             stuck = response.stuck
@@ -91,9 +99,8 @@ class DriveSearch:
                 break
             beyond, solves = self.solve(np.where(stuck, edges, present)), solves + 1
             if beyond is not None:
-                sliding = np.where(stuck, beyond.sliding, response.sliding)
-                stuck = stuck & beyond.stuck
-                response = Response(response.step, sliding, stuck, ~stuck)
+                slopes = np.where(stuck, beyond.slopes, response.slopes)
+                response = response._replace(slopes=slopes, stuck=stuck & beyond.stuck)
         return response, solves
 
     def solve(
@@ -103,28 +110,31 @@ class DriveSearch:
         step = self.problem.stepper.step(self.before, drives)
         if not step.converged:
             return None
-        slopes = step.flat_jacobian
+        slopes = self.problem.slopes(step)
         steep = self._steepness(slopes)
         if like is None:
-            stuck = self.problem.driven & (steep <= _STUCK)
-            return Response(step, np.nan_to_num(slopes), stuck, ~stuck)
+            stuck = self.problem.driven & (steep <= _STUCK * self._squares.sum())
+            return Response(step, np.nan_to_num(slopes), stuck, 0.0 * drives)
+        slid = drives - self._present
         # After a step in parts slopes are not known: those of the other one are corrected.
-        stuck = ~(steep > _NO_SLOPE * self._steepness(like.sliding))
+        stuck = ~(steep > _NO_SLOPE * self._steepness(like.slopes))
         if stuck.any():
-            slopes = np.where(stuck, like.sliding, slopes)
+            slopes = np.where(stuck, like.slopes, slopes)
             stuck &= np.isfinite(steep)
-        return Response(step, slopes, stuck, like.slid | ~stuck)
+            slid = np.where(stuck, like.slid, slid)
+        return Response(step, slopes, stuck, slid)
 
     def _steepness(self, slopes: Float[np.ndarray, "m t"]) -> Float[np.ndarray, " t"]:
         """Squares of the slopes of the target by every drive."""
-        return np.square(slopes[self._entries]).sum(axis=0)
+        return self._squares @ np.square(slopes[: len(self._goal)])
 
     def point(self, response: Response, accepted: float = 0.0) -> SearchPoint:
         """Return a solution as a point of the search."""
-        step, sliding = response.step, response.sliding * self.problem.driven
-        residuals = self._weights * (step.flat_values[self._entries] - self._goal)
-        slopes = self._weights[:, None] * sliding[self._entries]
-        limits, room = self.problem.limited(step.flat_values, sliding)
+        problem, step, count = self.problem, response.step, len(self._goal)
+        residuals = self._weights * (step.flat_values[problem.entries] - self._goal)
+        slopes = response.slopes * problem.driven
+        limits, room = problem.limited.factors[:, None] * slopes[count:], problem.room(step)
+        slopes = self._weights[:, None] * slopes[:count]
         return SearchPoint(step.drives, residuals, slopes, limits, room, response, accepted)
 
     def move(self, point: SearchPoint, step: Float[np.ndarray, " t"]) -> SearchPoint | None:
@@ -141,7 +151,7 @@ class DriveSearch:
         if solved is None:
             return None
         # Notches that are pressed together hold on, with or without a dead band on the way.
-        holds = (response.stuck & solved.stuck & (ahead != drives)).any()
+        holds = solved.stuck.any() and (response.stuck & solved.stuck & (ahead != drives)).any()
         # Beyond all that holds, slopes show the way back from however far.
         accepted = (1.0 + 1e-9) * point.error if holds else math.inf if leapt else 0.0
         return self.point(solved, accepted)
@@ -150,15 +160,16 @@ class DriveSearch:
         self, response: Response, step: Float[np.ndarray, " t"], ahead: Float[np.ndarray, " t"]
     ) -> bool:
         """Move drives of tendons that stick on to the end of the dead band; return if any does."""
-        problem, drives, leapt = self.problem, response.step.drives, False
-        band = response.step.dead_band.tolist()
-        several = np.count_nonzero(problem.driven) > 1
-        for tendon in np.flatnonzero(response.stuck).tolist():
+        problem, drives = self.problem, response.step.drives
+        # A tendon that goes on as it slid meets no dead band.
+        turning = np.flatnonzero(response.stuck & (response.slid * step <= 0.0)).tolist()
+        band = response.step.dead_band.tolist() if turning else []
+        several, leapt = np.count_nonzero(problem.driven) > 1, False
+        for tendon in turning:
             change = float(step[tendon])
             leap = band[tendon][change > 0.0] - float(drives[tendon])
-            if abs(leap) <= _AT_LIMIT * problem.unit and not response.slid[tendon]:
-                way = float(drives[tendon] - problem.present(self.before)[tendon])
-                leap = math.copysign(_ONWARD * way, change)
+            if abs(leap) <= _AT_LIMIT * problem.unit:
+                leap = math.copysign(_ONWARD * (drives - self._present)[tendon], change)
             if several and abs(change) <= _SMALL_LEAP * abs(leap):
                 ahead[tendon] = drives[tendon]
             elif change != 0.0 and leap != 0.0:
@@ -194,7 +205,7 @@ class DriveSearch:
     def lowered(self, response: Response, tendon: int) -> tuple[Response, int]:
         """Lower the tension of a tendon as far as the target stays met; count the solves."""
         problem, solves = self.problem, 0
-        steep = self._weights * response.step.flat_jacobian[self._entries, tendon]
+        steep = self._weights * response.step.flat_jacobian[problem.entries, tendon]
         slides = not response.stuck[tendon] and float(steep @ steep) > (_HOLDS / problem.unit) ** 2
         if slides:
             return response, solves
@@ -243,7 +254,7 @@ def find(
         if best is not None and left <= 0:
             break
         part = search.moving(moved, drives)
-        start = known._replace(stuck=moved, slid=~moved)
+        start = known._replace(stuck=moved, slid=np.where(known.stuck, 0.0, known.slid))
         if drives is not present:
             start, solves = part.solve(drives, start), solves + 1
         if start is None:
@@ -253,8 +264,8 @@ def find(
         attempt = part.attempt(end, solves)
         best = attempt if best is None or _quality(attempt) < _quality(best) else best
         # Where a slack tendon was pulled the others may suffice.
-        pulls = (best.drives > problem.low + _PULLED * problem.unit)[slack].any()
-        if best.failure is None and not (pulls and moved is problem.driven):
+        pulled = slack.any() and (best.drives - problem.low)[slack].max() > _PULLED * problem.unit
+        if best.failure is None and not (pulled and moved is problem.driven):
             break
     assert best is not None
     return best._replace(solves=solves)
@@ -311,11 +322,8 @@ def _starts(
     if not elsewhere:
         return
     rest = np.where(problem.driven, 0.0, present)
-    alone = 0.15 * problem.unit * np.eye(len(present))[problem.driven]
-    for drives in (0.5 * (present + rest), rest, *(rest + alone)):
-        drives = np.clip(drives, problem.low, problem.high)
-        if (drives != present).any():
-            yield drives, problem.driven
+    for pull in _ALONE * problem.unit * np.eye(len(present))[problem.driven]:
+        yield np.clip(rest + pull, problem.low, problem.high), problem.driven
 
 
 def _quality(attempt: Attempt) -> tuple[bool, bool, float]:

@@ -157,7 +157,7 @@ class SearchEnd(NamedTuple):
     settled: bool
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class BoundedLeastSquares:
     """A bounded least-squares problem.
 
@@ -216,9 +216,7 @@ class BoundedLeastSquares:
             step = self.step(point, radius)
             promised = point.merit - point.promised(step)
             length = float(np.abs(step).max())
-            moves = promised > _FLAT * point.merit and length > _NO_STEP * self.size(
-                point.variables
-            )
+            moves = promised > _FLAT * point.merit and length > _NO_STEP * self.reach
             trial = self.move(point, step) if moves else point
             if trial is point:
                 settled = True
