@@ -12,8 +12,18 @@ from jaxtyping import Bool, Float, Int
 
 from notchflex import Failure, InputError, Load, Robot, State, Step, Stepper
 from notchflex.control.limits import Drive, Limits, limits_of_robot
-from notchflex.control.targets import Aim, Targets, aim_at
+from notchflex.control.targets import Targets, weigh
+from notchflex.search.least_squares import KEPT
 from notchflex.support import check_integer, check_number, load_path, short_repr
+
+Drives = Float[np.ndarray, " t"]
+"""A value for every tendon, N or mm."""
+Which = Bool[np.ndarray, " t"]
+"""Which of the tendons."""
+Goal = Float[np.ndarray, " m"]
+"""Values of all targeted entries, NaN where an entry is free."""
+PackedState = Float[np.ndarray, " state"]
+"""A state as `Stepper` has it."""
 
 # Default limit of drives, as a multiple of about the closing value of a notch.
 _MAX_FACTOR = {"tension": 4.0, "stroke": 2.0}
@@ -97,8 +107,8 @@ class Response(NamedTuple):
 
     step: Step
     slopes: Float[np.ndarray, "m t"]
-    stuck: Bool[np.ndarray, " t"]
-    slid: Float[np.ndarray, " t"]
+    stuck: Which
+    slid: Drives
 
 
 class LimitedEntries(NamedTuple):
@@ -125,7 +135,8 @@ class Problem(NamedTuple):
         driven: Which tendons are driven; the others keep what the load commands.
         low: Lowest drive of every tendon, N or mm.
         high: Highest drive.
-        widest: Lowest and highest drive without the limits of the user.
+        allowed: Both without the limit on the rate.
+        widest: Both without any limits of the user.
         rate: Largest change of a drive from target to target, N or mm.
         limited: Limits on other quantities.
         unit: Drive that about closes a notch, N or mm.
@@ -134,31 +145,37 @@ class Problem(NamedTuple):
     """
 
     stepper: Stepper
-    entries: np.ndarray
-    weights: np.ndarray
-    driven: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    widest: tuple[np.ndarray, np.ndarray]
+    entries: Int[np.ndarray, " m"]
+    weights: Goal
+    driven: Which
+    low: Drives
+    high: Drives
+    allowed: tuple[Drives, Drives]
+    widest: tuple[Drives, Drives]
     rate: float
     limited: LimitedEntries
     unit: float
     by_tension: bool
     search: TargetSearch
 
-    def present(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
+    def present(self, state: PackedState) -> Drives:
         """Return the drives of a state; of held tendons what they are held at."""
         return np.where(self.driven, self.stepper.drives_of(state), self.low)
 
-    def near(self, present: Float[np.ndarray, " t"]) -> Problem:
+    def near(self, present: Drives) -> Problem:
         """Return the problem with drives no farther from the present ones than the rate."""
         if not np.isfinite(self.rate):
             return self
         low, high = (
-            np.where(self.driven, np.clip(present + rate, self.low, self.high), self.low)
+            np.where(self.driven, np.clip(present + rate, *self.allowed), self.low)
             for rate in (-self.rate, self.rate)
         )
         return self._replace(low=low, high=high)
+
+    @property
+    def without_rate(self) -> Problem:
+        """The problem with drives as far from the present ones as they may be at all."""
+        return self._replace(low=self.allowed[0], high=self.allowed[1])
 
     def slopes(self, step: Step) -> Float[np.ndarray, "m t"]:
         """Return the slopes of what is targeted, then of what is limited."""
@@ -192,7 +209,14 @@ class Attempt(NamedTuple):
     failure: Failure | None
 
     @property
-    def drives(self) -> Float[np.ndarray, " t"]:
+    def rank(self) -> tuple[bool, bool, float]:
+        """Order of attempts at one target, the best first."""
+        failed = self.failure is not None
+        size = self.error if failed else float(np.linalg.norm(self.drives))
+        return failed, self.excess > KEPT, float(f"{size:.9g}")
+
+    @property
+    def drives(self) -> Drives:
         """Drives of all tendons, N or mm."""
         return self.response.step.drives
 
@@ -202,8 +226,8 @@ class Attempt(NamedTuple):
         return bool(self.response.step.converged)
 
 
-def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tuple[Problem, Aim]:
-    """Return what a search needs of robot and limits, and the targets as numbers.
+def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> Problem:
+    """Return what a search needs of robot, limits and targets.
 
     Raises:
         InputError: Anything that cannot be used.
@@ -233,30 +257,24 @@ def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tup
     fixed = np.where(np.isnan(stroke), tension, stroke)
     low, high, least, most = (np.where(held, fixed, end) for end in (low, high, least, most))
     places = {name: place for name, (place, _) in stepper.places.items()}
-    aim = aim_at(targets, places, options.weights)
+    entries, weights = weigh(targets, places, options.weights)
     rate = np.inf if limits.rate is None else limits.rate
     search = options.search or TargetSearch()
     return Problem(
-        stepper, aim.entries, aim.weights, ~held, low, high, (least, most), rate,
+        stepper, entries, weights, ~held, low, high, (low, high), (least, most), rate,
         _limited_entries(limited, places), unit, by_tension, search,
-    ), aim  # fmt: skip
+    )  # fmt: skip
 
 
 def _limited_entries(
     limited: list[tuple[str, float, np.ndarray]], places: Mapping[str, slice]
 ) -> LimitedEntries:
-    rows = [
-        (entry, limit, side / max(abs(limit), _MIN_LIMIT))
-        for quantity, side, values in limited
-        for entry, limit in zip(_numbers(places[quantity]), values.tolist(), strict=True)
-        if np.isfinite(limit)
-    ]
-    entries, limits, factors = np.array(rows).reshape(-1, 3).T
+    entries = [np.r_[places[quantity]] for quantity, _, _ in limited]
+    factors = [side / np.maximum(np.abs(limit), _MIN_LIMIT) for _, side, limit in limited]
+    limits = [limit for _, _, limit in limited]
+    rows = np.array([np.concatenate([[], *part]) for part in (entries, limits, factors)])
+    entries, limits, factors = rows[:, np.isfinite(rows[1])]
     return LimitedEntries(entries.astype(int), limits, factors)
-
-
-def _numbers(place: slice) -> range:
-    return range(place.start, place.stop)
 
 
 def _stepper(

@@ -12,10 +12,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from notchflex import Failure
-from notchflex.control.problem import Attempt, Problem, Response
+from notchflex.control.problem import (
+    Attempt,
+    Drives,
+    Goal,
+    PackedState,
+    Problem,
+    Response,
+    Which,
+)
 from notchflex.search.least_squares import BoundedLeastSquares, SearchEnd, SearchPoint
 
 # Smallest reach of a search, as a part of what about closes a notch.
@@ -34,8 +42,8 @@ _AT_LIMIT = 1e-10
 _SMALL_LEAP = 1e-3
 # A tendon that was slack is pulled above this part of what about closes a notch.
 _PULLED = 1e-6
-# Where the present drives lead nowhere, each tendon is pulled alone by this part of what about closes
-# a notch: the two-axis wrist of `benchmarks/control.py accuracy` needs it.
+# Where the present drives lead nowhere, each tendon is pulled alone by this part of what about
+# closes a notch: the two-axis wrist of `benchmarks/control.py accuracy` needs it.
 _ALONE = 0.15
 # Steps whose slopes promise less than this part of the squared error bring nothing.
 _FLAT = 1e-6
@@ -45,9 +53,6 @@ _HOLDS = 0.1
 # Relative accuracy of the lower end of a range of tensions; an edge of a dead band is passed by the
 # second part of it.
 _EXACT, _PASSED = 5e-7, 1e-9
-
-KEPT = 1e-6
-"""Relative tolerance of limits."""
 
 
 @dataclass(eq=False)
@@ -61,8 +66,8 @@ class DriveSearch:
     """
 
     problem: Problem
-    before: Float[np.ndarray, " state"]
-    goal: Float[np.ndarray, " m"]
+    before: PackedState
+    goal: Goal
 
     def __post_init__(self) -> None:
         """Weigh the numbers that have a goal."""
@@ -82,7 +87,7 @@ class DriveSearch:
             problem.high,
             problem.search.tolerance,
             reach=_FIRST_PART * problem.unit,
-            small=np.count_nonzero(problem.driven) > np.count_nonzero(self._weights),
+            small=bool(np.count_nonzero(problem.driven) > np.count_nonzero(self._weights)),
         )
 
     def present(self) -> tuple[Response, int]:
@@ -103,9 +108,7 @@ class DriveSearch:
                 response = response._replace(slopes=slopes, stuck=stuck & beyond.stuck)
         return response, solves
 
-    def solve(
-        self, drives: Float[np.ndarray, " t"], like: Response | None = None
-    ) -> Response | None:
+    def solve(self, drives: Drives, like: Response | None = None) -> Response | None:
         """Solve some drives; slopes of tendons that stick are those of another solution."""
         step = self.problem.stepper.step(self.before, drives)
         if not step.converged:
@@ -124,7 +127,7 @@ class DriveSearch:
             slid = np.where(stuck, like.slid, slid)
         return Response(step, slopes, stuck, slid)
 
-    def _steepness(self, slopes: Float[np.ndarray, "m t"]) -> Float[np.ndarray, " t"]:
+    def _steepness(self, slopes: Float[np.ndarray, "m t"]) -> Drives:
         """Squares of the slopes of the target by every drive."""
         return self._squares @ np.square(slopes[: len(self._goal)])
 
@@ -137,7 +140,7 @@ class DriveSearch:
         slopes = self._weights[:, None] * slopes[:count]
         return SearchPoint(step.drives, residuals, slopes, limits, room, response, accepted)
 
-    def move(self, point: SearchPoint, step: Float[np.ndarray, " t"]) -> SearchPoint | None:
+    def move(self, point: SearchPoint, step: Drives) -> SearchPoint | None:
         """Return the point after a step, over the dead bands of tendons that stick."""
         problem, response, drives = self.problem, point.solution, point.variables
         ahead, leapt = drives + step, False
@@ -156,19 +159,19 @@ class DriveSearch:
         accepted = (1.0 + 1e-9) * point.error if holds else math.inf if leapt else 0.0
         return self.point(solved, accepted)
 
-    def _leap(
-        self, response: Response, step: Float[np.ndarray, " t"], ahead: Float[np.ndarray, " t"]
-    ) -> bool:
+    def _leap(self, response: Response, step: Drives, ahead: Drives) -> bool:
         """Move drives of tendons that stick on to the end of the dead band; return if any does."""
         problem, drives = self.problem, response.step.drives
-        # A tendon that goes on as it slid meets no dead band.
-        turning = np.flatnonzero(response.stuck & (response.slid * step <= 0.0)).tolist()
+        sticks, again = response.stuck, response.slid * step > 0.0
+        if response.step.state is self.before:
+            sticks = sticks & ~again  # a tendon that goes on as it slid meets no dead band
+        turning = np.flatnonzero(sticks).tolist()
         band = response.step.dead_band.tolist() if turning else []
         several, leapt = np.count_nonzero(problem.driven) > 1, False
         for tendon in turning:
             change = float(step[tendon])
             leap = band[tendon][change > 0.0] - float(drives[tendon])
-            if abs(leap) <= _AT_LIMIT * problem.unit:
+            if abs(leap) <= _AT_LIMIT * problem.unit and not again[tendon]:
                 leap = math.copysign(_ONWARD * (drives - self._present)[tendon], change)
             if several and abs(change) <= _SMALL_LEAP * abs(leap):
                 ahead[tendon] = drives[tendon]
@@ -176,14 +179,6 @@ class DriveSearch:
                 ahead[tendon] += leap
                 leapt = True
         return leapt
-
-    def moving(self, moved: Bool[np.ndarray, " t"], drives: Float[np.ndarray, " t"]) -> DriveSearch:
-        """Return the search in which only some tendons move."""
-        problem = self.problem
-        if moved is problem.driven:
-            return self
-        low, high = (np.where(moved, end, drives) for end in (problem.low, problem.high))
-        return replace(self, problem=problem._replace(driven=moved, low=low, high=high))
 
     def attempt(self, end: SearchEnd, solves: int) -> Attempt:
         """Return the end of a search, with why the target is not met."""
@@ -226,13 +221,16 @@ class DriveSearch:
 
 def find(
     problem: Problem,
-    before: Float[np.ndarray, " state"],
-    goal: Float[np.ndarray, " m"],
+    before: PackedState,
+    goal: Goal,
     known: Response | None = None,
     budget: int | None = None,
     elsewhere: bool = True,
 ) -> Attempt:
-    """Search drives that meet a target, from the present ones and where that fails from others.
+    """Search drives that meet a target, within the rate or towards what meets it beyond.
+
+    Friction and notches that are pressed together hold a tip for longer than a step of the rate,
+    and what is nearest within it may lead away (`benchmarks/control.py rate`).
 
     Args:
         problem: Target quantities and limits.
@@ -242,27 +240,55 @@ def find(
         budget: Largest number of solves; where None the number of the problem from every start.
         elsewhere: Whether other drives than the present ones are tried where these fail.
     """
-    search, solves, best = DriveSearch(problem, before, goal), 0, None
+    attempt = _find(problem, before, goal, known, budget, elsewhere)
+    left = None if budget is None else budget - attempt.solves - 1
+    limited = attempt.failure is not None and np.isfinite(problem.rate)
+    if not limited or (left is not None and left <= 0):
+        return attempt
+    ahead = _find(problem.without_rate, before, goal, known, left, True)
+    search, response = DriveSearch(problem, before, goal), None
+    if ahead.failure is None:
+        nearest = np.clip(ahead.drives, problem.low, problem.high)
+        response = search.solve(nearest, ahead.response)
+    attempt = attempt._replace(solves=attempt.solves + ahead.solves + 1)
+    if response is None:
+        return attempt
+    point = search.point(response)
+    return Attempt(response, point.error, point.excess, attempt.solves, Failure.LIMITS_PREVENT)
+
+
+def _find(
+    problem: Problem,
+    before: PackedState,
+    goal: Goal,
+    known: Response | None,
+    budget: int | None,
+    elsewhere: bool,
+) -> Attempt:
+    """Search from the present drives, and where that fails from others."""
+    solves, best = 0, None
     if known is None:
-        known, solves = search.present()
+        known, solves = DriveSearch(problem, before, goal).present()
     if not known.step.converged:
         return Attempt(known, np.nan, np.inf, solves, Failure.NO_EQUILIBRIUM)
     present = known.step.drives
     slack = problem.driven & (present <= problem.low)
+    start = known._replace(slid=np.where(known.stuck, 0.0, known.slid))
     for drives, moved in _starts(problem, present, slack, elsewhere):
         left = problem.search.solves if budget is None else budget - solves
         if best is not None and left <= 0:
             break
-        part = search.moving(moved, drives)
-        start = known._replace(stuck=moved, slid=np.where(known.stuck, 0.0, known.slid))
+        low, high = (np.where(moved, end, drives) for end in (problem.low, problem.high))
+        part = problem._replace(driven=moved, low=low, high=high)
+        search, first = DriveSearch(part, before, goal), start._replace(stuck=moved)
         if drives is not present:
-            start, solves = part.solve(drives, start), solves + 1
-        if start is None:
+            first, solves = search.solve(drives, first), solves + 1
+        if first is None:
             continue
-        end = part.least_squares.search(part.point(start), left)
+        end = search.least_squares.search(search.point(first), left)
         solves += end.solves
-        attempt = part.attempt(end, solves)
-        best = attempt if best is None or _quality(attempt) < _quality(best) else best
+        attempt = search.attempt(end, solves)
+        best = attempt if best is None or attempt.rank < best.rank else best
         # Where a slack tendon was pulled the others may suffice.
         pulled = slack.any() and (best.drives - problem.low)[slack].max() > _PULLED * problem.unit
         if best.failure is None and not (pulled and moved is problem.driven):
@@ -271,49 +297,12 @@ def find(
     return best._replace(solves=solves)
 
 
-def go_towards(
-    problem: Problem,
-    near: Problem,
-    before: Float[np.ndarray, " state"],
-    goal: Float[np.ndarray, " m"],
-    attempt: Attempt,
-    known: Response | None,
-    budget: int | None = None,
-) -> Attempt:
-    """Return an attempt within the rate, or what goes towards drives that meet the target.
-
-    Friction and notches that are pressed together hold a tip for longer than a step of the rate,
-    and what is nearest within it may lead away. What is not met within the rate is sought without.
-
-    Args:
-        problem: The problem without the rate.
-        near: The problem within the rate.
-        before: The state before.
-        goal: The target.
-        attempt: What was found within the rate.
-        known: Values and slopes of the state before, where they are known.
-        budget: Largest number of solves of both, as of `find`.
-    """
-    left = None if budget is None else budget - attempt.solves - 1
-    if attempt.failure is None or near is problem or (left is not None and left <= 0):
-        return attempt
-    ahead = find(problem, before, goal, known, left)
-    solves, response = attempt.solves + ahead.solves + 1, None
-    search = DriveSearch(near, before, goal)
-    if ahead.failure is None:
-        response = search.solve(np.clip(ahead.drives, near.low, near.high), ahead.response)
-    if response is None:
-        return attempt._replace(solves=solves)
-    point = search.point(response)
-    return Attempt(response, point.error, point.excess, solves, Failure.LIMITS_PREVENT)
-
-
 def _starts(
     problem: Problem,
-    present: Float[np.ndarray, " t"],
-    slack: Bool[np.ndarray, " t"],
+    present: Drives,
+    slack: Which,
     elsewhere: bool,
-) -> Iterator[tuple[Float[np.ndarray, " t"], Bool[np.ndarray, " t"]]]:
+) -> Iterator[tuple[Drives, Which]]:
     """Yield drives to start from, and which tendons move."""
     yield present, problem.driven
     taut = problem.driven & ~slack
@@ -326,17 +315,8 @@ def _starts(
         yield np.clip(rest + pull, problem.low, problem.high), problem.driven
 
 
-def _quality(attempt: Attempt) -> tuple[bool, bool, float]:
-    failed = attempt.failure is not None
-    size = attempt.error if failed else float(np.linalg.norm(attempt.drives))
-    return failed, attempt.excess > KEPT, float(f"{size:.9g}")
-
-
 def smallest_tensions(
-    problem: Problem,
-    before: Float[np.ndarray, " state"],
-    goal: Float[np.ndarray, " m"],
-    attempt: Attempt,
+    problem: Problem, before: PackedState, goal: Goal, attempt: Attempt
 ) -> Attempt:
     """Return the smallest tensions that meet a target as those that were found do.
 
