@@ -1,11 +1,12 @@
 """How well targets are met, and how fast a controller is.
 
-    python benchmarks/control.py [accuracy] [speed] [--paths 200] [--seconds 60]
+    python benchmarks/control.py [accuracy] [speed] [rate] [--paths 200] [--seconds 60]
 
 `accuracy`: tips of random forward paths of 20 steps, each to be reached from the state before it.
 `speed`: a controller in a loop of a fixed rate; times of the processor, beside the load of the
-machine, and of the wall. What friction history and feedback are worth is on docs/control.md
-(`docs/make/control.py`).
+machine, and of the wall. `rate`: a controller whose drives change by a twentieth of the largest
+tension in a step, with all notches pulled together and let go. What friction history and feedback
+are worth is on docs/control.md (`docs/make/control.py`).
 """
 
 from __future__ import annotations
@@ -108,9 +109,31 @@ def speed(name: str, seconds: float) -> dict[str, object]:
     }
 
 
+def limited_rate(name: str) -> dict[str, object]:
+    """Follow a pull that closes all notches and a release twice as fast as the rate; then wait."""
+    robot = nf.load_robot(name)
+    largest = 1.3 * float(nf.closing(robot).tension.max())
+    controller = nf.Controller(robot, limits=nf.Limits(rate=0.05 * largest))
+    tension = largest * np.concatenate([np.linspace(0, 1, 27), np.linspace(1, 0, 9), np.zeros(20)])
+    goals = nf.simulate(robot, [nf.Load(tension=float(force)) for force in tension]).tip_position
+    reached, commands = [], []
+    for goal in goals:
+        commands.append(float(controller.step(goal)[0]))
+        reached.append(controller.status.reached)
+    back = reached.index(True, 36) - 26 if any(reached[36:]) else "never"
+    return {
+        "robot": name,
+        "met on the way up": f"{sum(reached[:27])} of 27",
+        "steps from the top to the rest": back,
+        "largest command, last one, N": [round(max(commands), 3), round(commands[-1], 3)],
+    }
+
+
 if __name__ == "__main__":
-    chosen = options(__doc__, ("accuracy", "speed"), paths=200, seconds=60.0)
+    chosen = options(__doc__, ("accuracy", "speed", "rate"), paths=200, seconds=60.0)
     if "accuracy" in chosen.cases:
         show(accuracy(name, chosen.paths) for name in LARGEST)
     if "speed" in chosen.cases:
         show(speed(name, chosen.seconds) for name in LOOPS)
+    if "rate" in chosen.cases:
+        show(limited_rate(name) for name in LARGEST if name.startswith("pacheco"))

@@ -179,16 +179,25 @@ def test_a_huge_target_is_refused_without_a_warning(target, recwarn):
     assert not [one for one in recwarn if issubclass(one.category, RuntimeWarning)]
 
 
-@pytest.mark.parametrize("top", [1.66183818, 1.71])
-def test_a_reversal_with_closed_notches_takes_few_solves(top):
+@pytest.mark.parametrize(
+    ("top", "tension"),
+    [
+        (1.66183818, 1.4046),
+        (1.71, 1.4046),
+        # The notches hold on to just above this: half of the way so far leads far beyond.
+        (1.66183818, 1.40547970),
+        (1.66183818, 1.4051778),
+    ],
+)
+def test_a_reversal_with_closed_notches_takes_few_solves(top, tension):
     # Let go, the first contact slips at 0.87 of the tension; closed notches hold on to 0.84 of it.
     pulled = path(WRIST, [0.5, 1.0, 1.4, top])
-    goal = nf.solve(WRIST, nf.Load(tension=1.4046), from_state=pulled.state).tip_position
+    goal = nf.solve(WRIST, nf.Load(tension=tension), from_state=pulled.state).tip_position
     controller = nf.Controller(WRIST, state=pulled.state)
     command = controller.step(goal)
     assert controller.status.reached
     assert controller.status.solves <= 8
-    assert command[0] == pytest.approx(1.4046, abs=1e-5)
+    assert command[0] == pytest.approx(tension, abs=1e-5)
 
 
 def test_a_limited_rate_leads_back_from_closed_notches():

@@ -7,15 +7,22 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 
-from notchflex import InputError, Load, Robot, State, Stepper
+from notchflex import InputError, Load, Robot, State
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.observer import Observer
-from notchflex.control.problem import ProblemOptions, Response, TargetSearch, make_problem
-from notchflex.control.search import DriveSearch, find, go_towards
+from notchflex.control.problem import (
+    Drives,
+    Goal,
+    ProblemOptions,
+    Response,
+    TargetSearch,
+    make_problem,
+)
+from notchflex.control.search import DriveSearch, find
 from notchflex.control.targets import DIRECTION, LARGEST_TARGET, Targets, target_shapes
-from notchflex.support import check_is_robot, check_number, short_repr
+from notchflex.specification import known
+from notchflex.support import check_is_robot, check_number
 
 
 class ControlStatus(NamedTuple):
@@ -86,22 +93,19 @@ class Controller:
     ) -> None:
         shapes = target_shapes(check_is_robot(robot))
         names = (aim,) if isinstance(aim, str) else tuple(aim)
-        for name in names:
-            if name not in shapes:
-                raise InputError.UNKNOWN_NAME(
-                    f"there is no target {short_repr(name)}; there are {', '.join(shapes)}"
-                )
         if not 0.0 <= check_number(feedback, "feedback") <= 1.0:
             raise InputError.OUT_OF_RANGE(f"feedback is from 0 to 1; got {feedback:g}")
-        self._shapes = {name: shapes[name] for name in names}
+        self._shapes = {name: known(name, shapes, "target") for name in names}
         some = Targets({name: np.zeros((1, *shape)) for name, shape in self._shapes.items()})
         search = search or TargetSearch(tolerance=1e-5, solves=16)
-        self._problem, aims = make_problem(
+        self._problem = make_problem(
             robot, some, ProblemOptions(state, load, drive, limits, weights, search)
         )
         self._feedback, self.observer = feedback, observer
-        self._steppers: dict[int, Stepper] = {}
-        self._deviation = np.zeros(aims.goals.shape[1])
+        models = observer.robots if observer else ()
+        start = replace(self._problem.stepper, from_state=None)
+        self._steppers = [replace(start, robot=model) for model in models]
+        self._deviation = np.zeros(len(self._problem.entries))
         self._before = self._problem.stepper.start()
         self._command = self._problem.present(self._before)
         self.status = _START
@@ -115,7 +119,7 @@ class Controller:
         measured: Any = None,
         tension: Any = None,
         stroke: Any = None,
-    ) -> Float[np.ndarray, " t"]:
+    ) -> Drives:
         """Return drives for a target.
 
         Args:
@@ -131,11 +135,11 @@ class Controller:
         """
         try:
             goal = self._flat(target)
-            if (np.abs(goal) > LARGEST_TARGET).any() or np.isnan(goal).all():
+            if not np.fmax.reduce(np.abs(goal)) <= LARGEST_TARGET:  # NaN where all is free
                 raise InputError.OUT_OF_RANGE("a target is a number of a size that a robot has")
             seen = None if measured is None else self._flat(measured)
             if self.observer is not None and tension is not None and stroke is not None:
-                self._observe(tension, stroke)
+                self._observe(self.observer, tension, stroke)
         except InputError:
             # A control loop must continue after invalid input: the command stays unchanged.
             self.status = ControlStatus(False, "INVALID_INPUT", float("nan"), 0, True)
@@ -146,12 +150,12 @@ class Controller:
         return self._command.copy()
 
     @property
-    def command(self) -> Float[np.ndarray, " t"]:
+    def command(self) -> Drives:
         """The last command, N or mm."""
         return self._command.copy()
 
     @property
-    def values(self) -> Float[np.ndarray, " m"]:
+    def values(self) -> Goal:
         """Model values of the target quantities at the last command, flattened."""
         return self._known.step.flat_values[self._problem.entries]
 
@@ -184,37 +188,24 @@ class Controller:
         change = self._feedback * (deviation - self._deviation)
         self._deviation = np.where(is_measured, self._deviation + change, self._deviation)
 
-    def _observe(self, tension: Any, stroke: Any) -> None:
+    def _observe(self, observer: Observer, tension: Any, stroke: Any) -> None:
         """Continue from the state estimated from measured tension and stroke."""
-        assert self.observer is not None
-        model, state = self.observer.observe(tension, stroke)
-        if not self.observer.accepted:
-            raise InputError.NOT_FINITE(
-                "tension and stroke are finite numbers, one for each tendon"
-            )
+        model, state = observer.observe(tension, stroke)
+        if not observer.accepted:
+            raise InputError.NOT_FINITE("tension and stroke are one finite number for each tendon")
         if state.shape == self._before.shape:
-            if model not in self._steppers:
-                own = replace(
-                    self._problem.stepper, robot=self.observer.robots[model], from_state=None
-                )
-                self._steppers[model] = own
             self._problem = self._problem._replace(stepper=self._steppers[model])
             self._before = state
             self._known = self._present()
 
-    def _seek(self, goal: np.ndarray) -> None:
-        problem, before, budget = self._problem, self._before, self._problem.search.solves
-        near = problem.near(self._command)
-        attempt = find(near, before, goal, self._known, budget, elsewhere=False)
-        attempt = go_towards(problem, near, before, goal, attempt, self._known, budget)
+    def _seek(self, goal: Goal) -> None:
+        problem = self._problem.near(self._command)
+        budget = problem.search.solves
+        attempt = find(problem, self._before, goal, self._known, budget, elsewhere=False)
         if attempt.solved:
             self._known = attempt.response
             self._command, self._before = attempt.drives, attempt.response.step.state
-        failure = attempt.failure
+        code = attempt.failure.name if attempt.failure else ""
         self.status = ControlStatus(
-            failure is None,
-            failure.name if failure else "",
-            attempt.error,
-            attempt.solves,
-            not attempt.solved,
+            not code, code, attempt.error, attempt.solves, not attempt.solved
         )

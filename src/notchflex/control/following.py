@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from notchflex import Equilibrium, EquilibriumPath, Failure, Load, LoadPath, Robot, State, simulate
 from notchflex._summary import vector
-from notchflex.control.problem import Attempt
-from notchflex.control.search import KEPT
-from notchflex.control.targets import DIRECTION, Targets, unit_hint
+from notchflex.control.problem import Attempt, TargetSearch
+from notchflex.control.targets import DIRECTION, Targets, units_of
+from notchflex.search.least_squares import KEPT
 from notchflex.support import (
     DEGREES,
     QUANTITIES,
@@ -23,6 +23,8 @@ from notchflex.support import (
     short,
     whole_document,
 )
+
+PerTarget = Float[np.ndarray, " k"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,9 +39,7 @@ class Following(Displayed):
         attempts: Where the search for each target ended.
         start: The state before the first; None for rest.
         misses: Entries of the robot less those of the targets, mm, N, rad, (k, m); NaN where free.
-        units: Unit of each entry, "mm", "deg" (of angles and directions) or another, (m,).
-        tolerance: Distance from the lengths of a target at which it counts as met, mm.
-        angle_tolerance: Angle from those of a target at which it counts as met, rad.
+        search: Tolerances, within which a target counts as met.
     """
 
     robot: Robot
@@ -47,27 +47,34 @@ class Following(Displayed):
     load: LoadPath
     step: Int[np.ndarray, " k"]
     attempts: tuple[Attempt, ...]
-    start: State | None = None
-    misses: Float[np.ndarray, "k m"] = field(default_factory=lambda: np.zeros((0, 0)))
-    units: tuple[str, ...] = ()
-    tolerance: float = 0.0
-    angle_tolerance: float = 0.0
+    start: State | None
+    misses: Float[np.ndarray, "k m"]
+    search: TargetSearch
 
     def __len__(self) -> int:
         """Number of targets."""
         return len(self.targets)
 
-    @overload
-    def __getitem__(self, target: int) -> Reach: ...
-    @overload
-    def __getitem__(self, target: slice) -> list[Reach]: ...
-    def __getitem__(self, target: int | slice) -> Reach | list[Reach]:
-        """The result for one target, from 0, or for some of them."""
-        if isinstance(target, slice):
-            return [Reach(self, i) for i in range(*target.indices(len(self)))]
+    def __getitem__(self, target: int) -> Reach:
+        """The result for one target, from 0."""
         if not -len(self) <= target < len(self):
             raise IndexError(f"target {target} of {len(self)} targets")
         return Reach(self, target % len(self))
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each entry, "mm", "deg" (of angles and directions) or another, (m,)."""
+        return units_of(self.targets)
+
+    @property
+    def tolerance(self) -> float:
+        """Distance from the lengths of a target at which it counts as met, mm."""
+        return self.search.near
+
+    @property
+    def angle_tolerance(self) -> float:
+        """Angle from those of a target at which it counts as met, rad."""
+        return self.search.near_angle
 
     @cached_property
     def path(self) -> EquilibriumPath:
@@ -91,35 +98,35 @@ class Following(Displayed):
         )
         near &= {*self.units} <= {"mm", "deg"}
         return [
-            None if is_near and attempt.solved and attempt.excess <= KEPT else attempt.failure
+            None if is_near and attempt.excess <= KEPT else attempt.failure
             for attempt, is_near in zip(self.attempts, near, strict=True)
         ]
 
     @property
-    def error_mm(self) -> Float[np.ndarray, " k"]:
+    def error_mm(self) -> PerTarget:
         """Distance from the lengths of each target, mm; 0 without any, NaN without equilibrium."""
         return self._distance("mm")
 
     @property
-    def error_deg(self) -> Float[np.ndarray, " k"]:
+    def error_deg(self) -> PerTarget:
         """Root of the sum of squares of what the angles of each target miss, deg; 0 without."""
-        return self._distance("deg")
+        return self._distance("deg") * DEGREES
 
-    def _distance(self, unit: str) -> Float[np.ndarray, " k"]:
-        of_unit = self.misses[:, [one == unit for one in self.units]]
-        scale = DEGREES if unit == "deg" else 1.0
+    def _distance(self, unit: str) -> PerTarget:
+        of_unit = self.misses[:, np.array(self.units) == unit]
         solved = [attempt.solved for attempt in self.attempts]
-        return np.where(solved, scale * np.sqrt(np.nansum(of_unit**2, axis=1)), np.nan)
+        return np.where(solved, np.sqrt(np.nansum(of_unit**2, axis=1)), np.nan)
 
     def missed(self, targets: int | slice) -> str:
         """Return the distance from a target, or the largest from some, in words with units."""
         return " and ".join(
-            f"{short(float(np.max(self._distance(unit)[targets])))} {unit}"
+            f"{short(float(np.max(scale * self._distance(unit)[targets])))} {unit}"
             for unit in dict.fromkeys(self.units)
+            for scale in (DEGREES if unit == "deg" else 1.0,)
         )
 
     @property
-    def error(self) -> Float[np.ndarray, " k"]:
+    def error(self) -> PerTarget:
         """Weighted distance from each target (mm, N, rad), which the search makes small."""
         return np.array([one.error for one in self.attempts])
 
@@ -144,11 +151,7 @@ class Following(Displayed):
             return ""
         if failure is Failure.NO_EQUILIBRIUM:
             return self.path.reason[int(self.step[target])]
-        hint = ""
-        if failure is not Failure.SEARCH_STOPPED:
-            positions = self.targets.values.get("tip_position")
-            hint = unit_hint(self.robot, None if positions is None else positions[target])
-        return f"{failure.text.format(error=self.missed(target))}; {failure.remedy}{hint}"
+        return f"{failure.text.format(error=self.missed(target))}; {failure.remedy}"
 
     @cached_property
     def tension(self) -> Float[np.ndarray, "k t"]:
@@ -296,12 +299,12 @@ def following_document(following: Following) -> dict[str, Any]:
 def _in_file_units(following: Following, index: int) -> dict[str, Any]:
     """The target with the keys and units of the JSON document."""
     values: dict[str, Any] = {}
-    for name, numbers in following.targets.row(index).items():
+    for name, numbers in following.targets.values.items():
         key, scale = name, 1.0
         if name != DIRECTION:
             quantity = QUANTITIES[name]
             key, scale = quantity.key or name, quantity.scale
-        values[key] = numbers * scale
+        values[key] = numbers[index] * scale
     return values
 
 

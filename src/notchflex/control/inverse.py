@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
@@ -13,14 +13,18 @@ from notchflex.control.following import Following, Reach
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.problem import (
     Attempt,
+    Drives,
+    Goal,
+    PackedState,
     Problem,
     ProblemOptions,
     Response,
     TargetSearch,
     make_problem,
 )
-from notchflex.control.search import KEPT, find, go_towards, smallest_tensions
-from notchflex.control.targets import Targets, make_targets, units_of
+from notchflex.control.search import find, smallest_tensions
+from notchflex.control.targets import Targets, make_targets
+from notchflex.search.least_squares import KEPT
 from notchflex.support import check_is_robot, load_path, short_repr
 
 Approach = Literal["direct", "loading", "unloading", "least"]
@@ -139,34 +143,31 @@ def _follow(
         raise InputError.UNKNOWN_NAME(
             f"approach is one of {', '.join(get_args(Approach))}; got {short_repr(approach)}"
         )
-    problem, aim = make_problem(robot, targets, options)
+    problem, goals = make_problem(robot, targets, options), targets.goals
     before, response = problem.stepper.start(), None
     drives: list[np.ndarray] = []
     last: list[int] = []
     attempts: list[Attempt] = []
-    for goal in aim.goals:
+    for goal in goals:
         near = problem.near(problem.present(before))
-        way = _approach(near, before, goal, approach, response)
-        attempt = go_towards(problem, near, before, goal, way.last, response)
-        via = way.via if attempt.drives is way.last.drives else []
+        via, attempt = _approach(near, before, goal, approach, response)
         drives += [*via, attempt.drives]
         last.append(len(drives) - 1)
         attempts.append(attempt)
         if attempt.solved:
             response = attempt.response
             before = response.step.state
-    values = np.array([attempt.response.step.flat_values[aim.entries] for attempt in attempts])
+    values = [attempt.response.step.flat_values[problem.entries] for attempt in attempts]
+    loads, misses = _load_path(problem, np.array(drives)), np.array(values) - goals
     return Following(
         robot,
         targets,
-        _load_path(problem, np.array(drives)),
+        loads,
         np.array(last),
         tuple(attempts),
         options.state,
-        values - aim.goals,
-        units_of(targets),
-        problem.search.near,
-        problem.search.near_angle,
+        misses,
+        problem.search,
     )
 
 
@@ -179,28 +180,10 @@ def _load_path(problem: Problem, drives: Float[np.ndarray, "k t"]) -> LoadPath:
     return LoadPath(tension, stroke, loads.base_rotation, loads.external * len(drives))
 
 
-class _ApproachPath(NamedTuple):
-    """Loads to a target: drives of an overshoot if any, and where the search ended."""
-
-    via: list[Float[np.ndarray, " t"]]
-    last: Attempt
-
-    @property
-    def rank(self) -> tuple[bool, bool, float, float]:
-        """Order of paths to one target, the best first."""
-        failed = self.last.failure is not None
-        effort = float(np.linalg.norm(self.last.drives))
-        return failed, self.last.excess > KEPT, self.last.error if failed else 0.0, effort
-
-
 def _approach(
-    problem: Problem,
-    before: Float[np.ndarray, " state"],
-    goal: Float[np.ndarray, " m"],
-    approach: Approach,
-    known: Response | None,
-) -> _ApproachPath:
-    """Find drives that meet a target, direct or through an overshoot that reverses friction.
+    problem: Problem, before: PackedState, goal: Goal, approach: Approach, known: Response | None
+) -> tuple[list[Drives], Attempt]:
+    """Find drives that meet a target, and those of an overshoot before, that reverses friction.
 
     At one tension a robot is bent more after unloading than after loading. A target can often be
     met on either branch: by loading up to it, or by overshooting it and unloading.
@@ -209,37 +192,31 @@ def _approach(
     rise = float(np.sum(direct.drives - problem.present(before)))
     right_way = {"loading": rise > 0.0, "unloading": rise < 0.0}.get(approach, approach == "direct")
     if right_way or not direct.solved:
-        return _ApproachPath([], direct)
-    paths, solves = [_ApproachPath([], direct)], direct.solves
+        return [], direct
+    paths: list[tuple[list[Drives], Attempt]] = [([], direct)]
+    solves = direct.solves
     sides = {"loading": (False,), "unloading": (True,)}.get(approach, (True, False))
     for over in sides:
         via = _overshoot(problem, direct, over, rise > 0.0)
         between = problem.stepper.step(before, via)
         solves += 1
-        room = problem.limited(between.flat_values, between.flat_jacobian)[1]
-        if not between.converged or (room < -KEPT).any():
+        if not between.converged or (problem.room(between) < -KEPT).any():
             continue
         last = _met(problem, between.state, goal, None)
         solves += last.solves
         falls = float(np.sum(last.drives - via)) < 0.0
         if falls is over or last.failure is not None:
-            paths.append(_ApproachPath([via], last))
-    best = min(paths if approach == "least" else paths[1:] or paths, key=lambda path: path.rank)
-    return best._replace(last=best.last._replace(solves=solves))
+            paths.append(([via], last))
+    allowed = paths if approach == "least" else paths[1:] or paths
+    vias, best = min(allowed, key=lambda path: path[1].rank)
+    return vias, best._replace(solves=solves)
 
 
-def _met(
-    problem: Problem,
-    before: Float[np.ndarray, " state"],
-    goal: Float[np.ndarray, " m"],
-    known: Response | None,
-) -> Attempt:
+def _met(problem: Problem, before: PackedState, goal: Goal, known: Response | None) -> Attempt:
     return smallest_tensions(problem, before, goal, find(problem, before, goal, known))
 
 
-def _overshoot(
-    problem: Problem, direct: Attempt, over: bool, rises: bool
-) -> Float[np.ndarray, " t"]:
+def _overshoot(problem: Problem, direct: Attempt, over: bool, rises: bool) -> Drives:
     """Drives above or below those of a target, from which all contacts turn round on the way."""
     state, places = direct.response.step.state, problem.stepper.contact_places[1]
     friction = np.where(places >= 0, state[places], 0.0).sum(axis=1) * problem.by_tension

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
@@ -89,34 +89,20 @@ class Limits:
         return np.broadcast_to(numbers, (tendons,)).astype(float)
 
 
-class Bound(NamedTuple):
-    """Limits on quantities of the solved robot beside its drives.
-
-    Attributes:
-        quantity: Its name.
-        side: 1.0 where values must not exceed the limit, -1.0 where they must not fall below.
-        limit: The limit of each entry.
-        text: What a message calls it.
-    """
-
-    quantity: str
-    side: float
-    limit: Float[np.ndarray, " m"]
-    text: str
-
-
-def bounds_of_robot(limits: Limits, drive: Drive, tendons: int, notches: int) -> list[Bound]:
-    """Return the limits that are not on the drives themselves."""
+def limits_of_robot(
+    limits: Limits, drive: Drive, tendons: int, notches: int
+) -> list[tuple[str, float, Float[np.ndarray, " m"]]]:
+    """Return limits beside those of the drives: quantity, 1 if the highest or -1, and values."""
     other: Drive = "stroke" if drive == "tension" else "tension"
     low, high = limits.bounds(other, tendons)
     strain = np.inf if limits.strain is None else limits.strain
     gap = -np.inf if limits.gap is None else limits.gap
-    if other == "tension" and not low.any():
-        low = np.full(tendons, -np.inf)  # a tendon pulls with 0 N or more by itself
-    bounds = [
-        Bound(other, 1.0, high, f"the highest {other}"),
-        Bound(other, -1.0, low, f"the lowest {other}"),
-        Bound("peak_strain", 1.0, np.full(notches, strain), "the largest peak strain"),
-        Bound("gap", -1.0, np.full(notches, gap), "the smallest gap"),
+    if other == "tension":
+        low = np.where(low > 0.0, low, -np.inf)  # a tendon pulls with 0 N or more by itself
+    rows = [
+        (other, 1.0, high),
+        (other, -1.0, low),
+        ("peak_strain", 1.0, np.full(notches, strain)),
+        ("gap", -1.0, np.full(notches, gap)),
     ]
-    return [bound for bound in bounds if np.isfinite(bound.limit).any()]
+    return [row for row in rows if np.isfinite(row[2]).any()]

@@ -8,12 +8,22 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, get_args
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from notchflex import Failure, InputError, Load, Robot, State, Step, Stepper
-from notchflex.control.limits import Bound, Drive, Limits, bounds_of_robot
-from notchflex.control.targets import Aim, Targets, aim_at
+from notchflex.control.limits import Drive, Limits, limits_of_robot
+from notchflex.control.targets import Targets, weigh
+from notchflex.search.least_squares import KEPT
 from notchflex.support import check_integer, check_number, load_path, short_repr
+
+Drives = Float[np.ndarray, " t"]
+"""A value for every tendon, N or mm."""
+Which = Bool[np.ndarray, " t"]
+"""Which of the tendons."""
+Goal = Float[np.ndarray, " m"]
+"""Values of all targeted entries, NaN where an entry is free."""
+PackedState = Float[np.ndarray, " state"]
+"""A state as `Stepper` has it."""
 
 # Default limit of drives, as a multiple of about the closing value of a notch.
 _MAX_FACTOR = {"tension": 4.0, "stroke": 2.0}
@@ -89,13 +99,30 @@ class Response(NamedTuple):
 
     Attributes:
         step: The step.
-        sliding: Slopes of all quantities by the drives, of tendons that stick as they last slid.
+        slopes: Slopes by the drives of what is targeted, then of what is limited; of tendons that
+            stick as they last slid.
         stuck: Which tendons stick, or may.
+        slid: By how much each tendon was moved when it last slid, N or mm; 0 if it has not.
     """
 
     step: Step
-    sliding: Float[np.ndarray, "m t"]
-    stuck: Bool[np.ndarray, " t"]
+    slopes: Float[np.ndarray, "m t"]
+    stuck: Which
+    slid: Drives
+
+
+class LimitedEntries(NamedTuple):
+    """Limits on quantities beside the drives.
+
+    Attributes:
+        entries: Which numbers of a step are limited.
+        limits: Their limits.
+        factors: One over the size of a limit; negative for a lowest value.
+    """
+
+    entries: Int[np.ndarray, " c"]
+    limits: Float[np.ndarray, " c"]
+    factors: Float[np.ndarray, " c"]
 
 
 class Problem(NamedTuple):
@@ -108,55 +135,60 @@ class Problem(NamedTuple):
         driven: Which tendons are driven; the others keep what the load commands.
         low: Lowest drive of every tendon, N or mm.
         high: Highest drive.
-        widest: Lowest and highest drive without the limits of the user.
+        allowed: Both without the limit on the rate.
+        widest: Both without any limits of the user.
         rate: Largest change of a drive from target to target, N or mm.
-        bounds: Limits on other quantities.
+        limited: Limits on other quantities.
         unit: Drive that about closes a notch, N or mm.
         by_tension: Whether drives are tensions; otherwise they are strokes.
         search: Tolerance and budget.
     """
 
     stepper: Stepper
-    entries: np.ndarray
-    weights: np.ndarray
-    driven: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    widest: tuple[np.ndarray, np.ndarray]
+    entries: Int[np.ndarray, " m"]
+    weights: Goal
+    driven: Which
+    low: Drives
+    high: Drives
+    allowed: tuple[Drives, Drives]
+    widest: tuple[Drives, Drives]
     rate: float
-    bounds: tuple[Bound, ...]
+    limited: LimitedEntries
     unit: float
     by_tension: bool
     search: TargetSearch
 
-    def present(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
+    def present(self, state: PackedState) -> Drives:
         """Return the drives of a state; of held tendons what they are held at."""
         return np.where(self.driven, self.stepper.drives_of(state), self.low)
 
-    def near(self, present: Float[np.ndarray, " t"]) -> Problem:
+    def near(self, present: Drives) -> Problem:
         """Return the problem with drives no farther from the present ones than the rate."""
         if not np.isfinite(self.rate):
             return self
         low, high = (
-            np.where(self.driven, np.clip(present + rate, self.low, self.high), self.low)
+            np.where(self.driven, np.clip(present + rate, *self.allowed), self.low)
             for rate in (-self.rate, self.rate)
         )
         return self._replace(low=low, high=high)
 
-    def limited(
-        self, values: Float[np.ndarray, " m"], slopes: Float[np.ndarray, "m t"]
-    ) -> tuple[Float[np.ndarray, "c t"], Float[np.ndarray, " c"]]:
-        """Return slopes of limited quantities and their distances from the limits, relative."""
-        rows, room = [slopes[:0]], [values[:0]]
-        for bound in self.bounds:
-            place, _ = self.stepper.places[bound.quantity]
-            left = bound.side * (bound.limit - values[place])
-            limited = np.isfinite(left)
-            scale = np.maximum(np.abs(bound.limit), _MIN_LIMIT)[limited]
-            # At a kink some have no slopes.
-            rows.append(bound.side * np.nan_to_num(slopes[place][limited]) / scale[:, None])
-            room.append(left[limited] / scale)
-        return np.concatenate(rows), np.concatenate(room)
+    @property
+    def without_rate(self) -> Problem:
+        """The problem with drives as far from the present ones as they may be at all."""
+        return self._replace(low=self.allowed[0], high=self.allowed[1])
+
+    def slopes(self, step: Step) -> Float[np.ndarray, "m t"]:
+        """Return the slopes of what is targeted, then of what is limited."""
+        rows = step.flat_jacobian[self.entries]
+        if not self.limited.entries.size:
+            return rows
+        # At a kink some limited quantities have no slopes.
+        return np.concatenate([rows, np.nan_to_num(step.flat_jacobian[self.limited.entries])])
+
+    def room(self, step: Step) -> Float[np.ndarray, " c"]:
+        """Return how far limited quantities are from their limits, as parts of them."""
+        entries, limits, factors = self.limited
+        return factors * (limits - step.flat_values[entries]) if entries.size else limits
 
 
 class Attempt(NamedTuple):
@@ -177,7 +209,14 @@ class Attempt(NamedTuple):
     failure: Failure | None
 
     @property
-    def drives(self) -> Float[np.ndarray, " t"]:
+    def rank(self) -> tuple[bool, bool, float]:
+        """Order of attempts at one target, the best first."""
+        failed = self.failure is not None
+        size = self.error if failed else float(np.linalg.norm(self.drives))
+        return failed, self.excess > KEPT, float(f"{size:.9g}")
+
+    @property
+    def drives(self) -> Drives:
         """Drives of all tendons, N or mm."""
         return self.response.step.drives
 
@@ -187,8 +226,8 @@ class Attempt(NamedTuple):
         return bool(self.response.step.converged)
 
 
-def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tuple[Problem, Aim]:
-    """Return what a search needs of robot and limits, and the targets as numbers.
+def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> Problem:
+    """Return what a search needs of robot, limits and targets.
 
     Raises:
         InputError: Anything that cannot be used.
@@ -203,8 +242,8 @@ def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tup
             "the load commands every tendon, so that none is left to be driven; "
             "leave the tension of those to be driven out"
         )
-    bounds = tuple(bounds_of_robot(limits, drive, tendons, robot.number_of_notches))
-    outputs = {*targets.outputs, *(bound.quantity for bound in bounds)}
+    limited = limits_of_robot(limits, drive, tendons, robot.number_of_notches)
+    outputs = {*targets.outputs, *(quantity for quantity, _, _ in limited)}
     words = np.where(held, np.where(np.isnan(stroke), "tension", "stroke"), drive).tolist()
     stepper = _stepper(robot, outputs, words, options)
     chain = stepper.prepared.chain
@@ -218,13 +257,24 @@ def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> tup
     fixed = np.where(np.isnan(stroke), tension, stroke)
     low, high, least, most = (np.where(held, fixed, end) for end in (low, high, least, most))
     places = {name: place for name, (place, _) in stepper.places.items()}
-    aim = aim_at(targets, places, options.weights)
+    entries, weights = weigh(targets, places, options.weights)
     rate = np.inf if limits.rate is None else limits.rate
     search = options.search or TargetSearch()
     return Problem(
-        stepper, aim.entries, aim.weights, ~held, low, high, (least, most), rate, bounds, unit,
-        by_tension, search,
-    ), aim  # fmt: skip
+        stepper, entries, weights, ~held, low, high, (low, high), (least, most), rate,
+        _limited_entries(limited, places), unit, by_tension, search,
+    )  # fmt: skip
+
+
+def _limited_entries(
+    limited: list[tuple[str, float, np.ndarray]], places: Mapping[str, slice]
+) -> LimitedEntries:
+    entries = [np.r_[places[quantity]] for quantity, _, _ in limited]
+    factors = [side / np.maximum(np.abs(limit), _MIN_LIMIT) for _, side, limit in limited]
+    limits = [limit for _, _, limit in limited]
+    rows = np.array([np.concatenate([[], *part]) for part in (entries, limits, factors)])
+    entries, limits, factors = rows[:, np.isfinite(rows[1])]
+    return LimitedEntries(entries.astype(int), limits, factors)
 
 
 def _stepper(

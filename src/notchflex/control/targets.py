@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -33,8 +33,6 @@ LARGEST_TARGET = 1e9
 LARGEST_WEIGHT = 1e9
 """Weights beyond this, or below its inverse, are refused: one quantity alone would count."""
 
-# Tolerance of the rows of a rotation matrix.
-_ROTATION_ERROR = 1e-6
 _FORMS = "x, y, z of the tip in mm, or names of quantities with their values"
 
 
@@ -56,53 +54,41 @@ class Targets:
     @property
     def outputs(self) -> tuple[str, ...]:
         """Quantities that a solve must report for these."""
-        names = ("tip_rotation" if name == DIRECTION else name for name in self.values)
-        return tuple(dict.fromkeys(names))
+        return tuple(dict.fromkeys(map(output_of, self.values)))
 
-    def row(self, index: int) -> dict[str, np.ndarray]:
-        """Return one target, counted from 0."""
-        return {name: values[index] for name, values in self.values.items()}
-
-
-class Aim(NamedTuple):
-    """Targets as numbers of a response.
-
-    Attributes:
-        entries: Entries of `Response.values` that have a target, (m,).
-        goals: What they are to become, (k, m); NaN where free.
-        weights: What an error of one unit counts, (m,).
-    """
-
-    entries: Int[np.ndarray, " m"]
-    goals: Float[np.ndarray, "k m"]
-    weights: Float[np.ndarray, " m"]
+    @property
+    def goals(self) -> Float[np.ndarray, "k m"]:
+        """All values of each target, one after the other."""
+        return np.concatenate([v.reshape(len(self), -1) for v in self.values.values()], axis=1)
 
 
-def aim_at(
+def output_of(name: str) -> str:
+    """Return the quantity whose numbers a target is compared with."""
+    return "tip_rotation" if name == DIRECTION else name
+
+
+def weigh(
     targets: Targets, slices: Mapping[str, slice], weights: Mapping[str, float] | None
-) -> Aim:
-    """Return targets as numbers of a response.
+) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+    """Return which numbers of a step have a target, and what an error of one unit counts.
 
     Args:
         targets: The targets.
-        slices: Where each output is in `Response.values`.
+        slices: Where each output is among the numbers of a step.
         weights: By quantity, what an error of one unit (mm, N, rad) counts; 1 where not given.
 
     Raises:
         InputError: A weight of what is not a target, not positive, or beyond `LARGEST_WEIGHT`.
     """
-    weights = _check_weights(weights, targets)
+    checked = _check_weights(weights, targets)
     entries: list[np.ndarray] = []
+    counts: list[np.ndarray] = []
     for name in targets.values:
-        numbers = slices["tip_rotation" if name == DIRECTION else name]
-        places = np.arange(numbers.start, numbers.stop)
-        entries.append(places[2::3] if name == DIRECTION else places)
-    goals = [values.reshape(len(targets), -1) for values in targets.values.values()]
-    each = [
-        np.full(len(places), weights.get(name, 1.0))
-        for name, places in zip(targets.values, entries, strict=True)
-    ]
-    return Aim(np.concatenate(entries), np.concatenate(goals, axis=1), np.concatenate(each))
+        places = np.r_[slices[output_of(name)]]
+        places = places[2::3] if name == DIRECTION else places  # the last column
+        entries.append(places)
+        counts.append(np.full(len(places), checked.get(name, 1.0)))
+    return np.concatenate(entries), np.concatenate(counts)
 
 
 def units_of(targets: Targets) -> tuple[str, ...]:
@@ -184,22 +170,13 @@ def _checked(values: Mapping[str, np.ndarray], robot: Robot) -> Targets:
             "all quantities need the same number of targets; got "
             + ", ".join(f"{len(numbers)} of {name}" for name, numbers in values.items())
         )
-    empty = np.all([np.isnan(v.reshape(len(v), -1)).all(axis=1) for v in values.values()], axis=0)
+    empty = np.isnan(Targets(values).goals).all(axis=1)
     if empty.any():
         raise InputError.NO_DATA(
             f"target {int(np.argmax(empty)) + 1} has no number: all of its entries are free"
         )
     if DIRECTION in values:
         values = {**values, DIRECTION: _unit(values[DIRECTION])}
-    if "tip_rotation" in values:
-        rotations = values["tip_rotation"]
-        whole = rotations[~np.isnan(rotations).any(axis=(1, 2))]
-        error = np.abs(whole @ np.swapaxes(whole, 1, 2) - np.eye(3)).max(initial=0.0)
-        if error > _ROTATION_ERROR or (np.linalg.det(whole) < 0.0).any():
-            raise InputError.OUT_OF_RANGE(
-                "a target of tip_rotation is not a rotation matrix: its rows must be of length 1, "
-                "at right angles and right-handed"
-            )
     return Targets(values)
 
 
@@ -263,10 +240,7 @@ def read_targets(
     values: dict[str, np.ndarray] = {}
     for header in table.header:
         if header not in meant:
-            # Of columns for every notch the first alone.
-            usual = ", ".join(
-                one for one, (_, entry) in meant.items() if not any(entry) or "notch" not in one
-            )
+            usual = "tip_x_mm, total_deg, notch_1_deg and the like"
             raise InputError.TABLE_COLUMNS(
                 f"{table.name}: {short_repr(header)} is not a column of targets"
                 f"{nearest(header, meant, 2) or f'; there are {usual}'}"
@@ -290,29 +264,3 @@ def _columns(robot: Robot) -> dict[str, tuple[str, tuple[int, ...]]]:
                 labels = zip(quantity.per, entry_names(quantity.per, entry), strict=True)
                 columns[quantity.header(**dict(labels))] = name, entry
     return columns
-
-
-# A position is near a robot whose straight length it is a part from the first to the second of.
-_LENGTH_RATIOS = (0.2, 2.0)
-# Sizes of other units, mm.
-_UNITS = {"m": 1000.0, "µm": 0.001}
-
-
-def unit_hint(robot: Robot, position: Float[np.ndarray, " 3"] | None) -> str:
-    """Say in which unit a position that is out of reach would be near the robot.
-
-    Args:
-        robot: The robot.
-        position: Where its tip shall be, mm, NaN where free; None if no position is targeted.
-
-    Returns:
-        Words to add to a reason; empty where no other unit explains the position.
-    """
-    if position is None:
-        return ""
-    size = float(np.sqrt(np.nansum(position**2))) / robot.geometry.length
-    low, high = _LENGTH_RATIOS
-    for unit, scale in _UNITS.items():
-        if low <= size * scale <= high:
-            return f"; positions are in mm, and this one would be near the robot in {unit}"
-    return ""

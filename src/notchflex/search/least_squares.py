@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
-Vector = Float[np.ndarray, " n"]
+Vector = Vector
 
 # What a violated limit counts beside the residuals: in a step as a part of the Hessian, and in the
 # merit of a point.
@@ -58,13 +58,13 @@ def bounded_step(
     each other are violated as little as possible.
     """
     count = len(gradient)
-    # The inverse of the factor maps to variables in which the Hessian is the identity.
-    inverse = 1.0 / np.sqrt(hessian) if count == 1 else np.linalg.inv(np.linalg.cholesky(hessian))
-    free = -inverse.T @ (inverse @ gradient)
+    free = -gradient / hessian[0] if count == 1 else -np.linalg.solve(hessian, gradient)
     bounded = np.minimum(np.maximum(free, low), high)
-    inside = bool((bounded == free).all()) or count == 1
+    inside = count == 1 or bool((bounded == free).all())
     if inside and (not room.size or (limits @ bounded <= room).all()):
         return bounded
+    # The inverse of the factor maps to variables in which the Hessian is the identity.
+    inverse = np.linalg.inv(np.linalg.cholesky(hessian))
     normals = np.concatenate([np.eye(count), -np.eye(count), limits])
     excess = np.concatenate([free - high, low - free, limits @ free - room])
     columns = -inverse @ normals.T
@@ -82,7 +82,7 @@ def bounded_step(
     return np.minimum(np.maximum(free + inverse.T @ nearest, low), high)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class SearchPoint:
     """Residuals and limits at some variables, with their slopes; n variables.
 
@@ -93,7 +93,9 @@ class SearchPoint:
         limits: Slopes of limited quantities, (c, n).
         room: How far each of these is from its limit, negative beyond, (c,).
         solution: What was solved there.
-        across: Factor by which the residuals may grow on the way here, across a plateau.
+        accepted: Size up to which the residuals may grow on the way here, across a plateau.
+        error: Size of the residuals.
+        merit: Squared residuals and a penalty of violated limits.
     """
 
     variables: Vector
@@ -102,28 +104,23 @@ class SearchPoint:
     limits: Float[np.ndarray, "c n"]
     room: Float[np.ndarray, " c"]
     solution: Any
-    across: float = 0.0
+    accepted: float = 0.0
+    error: float = field(init=False)
+    merit: float = field(init=False)
 
-    @property
-    def error(self) -> float:
-        """Size of the residuals."""
-        return math.sqrt(float(self.residuals @ self.residuals))
+    def __post_init__(self) -> None:
+        """Measure the residuals."""
+        self.error = math.sqrt(float(self.residuals @ self.residuals))
+        self.merit = _merit(self.residuals, self.room)
 
     @property
     def excess(self) -> float:
         """Largest violation of a limit; 0 where all are kept."""
         return max(0.0, -float(self.room.min())) if self.room.size else 0.0
 
-    def merit(self, step: Vector | None = None) -> float:
-        """Return squared residuals and a penalty of violated limits, after a step by the slopes."""
-        residuals, room = self.residuals, self.room
-        if step is not None:
-            residuals, room = residuals + self.slopes @ step, room - self.limits @ step
-        merit = float(residuals @ residuals)
-        if room.size:
-            broken = np.minimum(room, 0.0)
-            merit += _PENALTY * float(broken @ broken)
-        return merit
+    def promised(self, step: Vector) -> float:
+        """Return the merit that the slopes promise after a step."""
+        return _merit(self.residuals + self.slopes @ step, self.room - self.limits @ step)
 
     def corrected(self, trial: SearchPoint) -> SearchPoint:
         """Return the point with slopes that agree with another one."""
@@ -136,6 +133,14 @@ class SearchPoint:
             slopes=self.slopes + np.multiply.outer(missing, along),
             limits=self.limits + np.multiply.outer(room, along),
         )
+
+
+def _merit(residuals: Float[np.ndarray, " m"], room: Float[np.ndarray, " c"]) -> float:
+    merit = float(residuals @ residuals)
+    if room.size:
+        broken = np.minimum(room, 0.0)
+        merit += _PENALTY * float(broken @ broken)
+    return merit
 
 
 class SearchEnd(NamedTuple):
@@ -154,7 +159,7 @@ class SearchEnd(NamedTuple):
     settled: bool
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class BoundedLeastSquares:
     """A bounded least-squares problem.
 
@@ -181,7 +186,7 @@ class BoundedLeastSquares:
         """Return the step that the slopes of a point suggest, of no more than a radius."""
         slopes, variables = point.slopes, point.variables
         hessian = slopes.T @ slopes
-        size = float(hessian.trace()) / len(variables)
+        size = float(np.vdot(slopes, slopes)) / len(variables)
         if size == 0.0:
             return np.zeros_like(variables)
         reach = self.size(variables)
@@ -208,12 +213,12 @@ class BoundedLeastSquares:
     def search(self, point: SearchPoint, budget: int) -> SearchEnd:
         """Search from a point, with at most a number of solves."""
         best, radius, solves, settled = point, np.inf, 0, False
-        mark, before = _PATIENCE, point.merit()
+        mark, before = _PATIENCE, point.merit
         while not (settled or self.is_met(point)) and solves < budget:
-            step, merit = self.step(point, radius), point.merit()
-            promised = merit - point.merit(step)
+            step = self.step(point, radius)
+            promised = point.merit - point.promised(step)
             length = float(np.abs(step).max())
-            moves = promised > _FLAT * merit and length > _NO_STEP * self.size(point.variables)
+            moves = promised > _FLAT * point.merit and length > _NO_STEP * self.reach
             trial = self.move(point, step) if moves else point
             if trial is point:
                 settled = True
@@ -221,8 +226,8 @@ class BoundedLeastSquares:
             solves += 1
             gain = -1.0
             if trial is not None:
-                gain = (merit - trial.merit()) / promised
-                if self.is_met(trial) or trial.error <= trial.across * point.error:
+                gain = (point.merit - trial.merit) / promised
+                if self.is_met(trial) or trial.error <= trial.accepted:
                     gain = max(gain, _MIN_GAIN)
             if trial is None or gain < _MIN_GAIN:
                 radius = _SHORTER * length
@@ -231,10 +236,10 @@ class BoundedLeastSquares:
                 radius = max(radius, _LONGER * length) if gain >= _GOOD_GAIN else radius
                 point = trial
                 # On a plateau the farther one is nearer to its end.
-                best = trial if trial.merit() <= best.merit() * (1.0 + 1e-9) else best
+                best = trial if trial.merit <= best.merit * (1.0 + 1e-9) else best
             if solves >= mark:
-                settled = best.merit() > _SLOW * before
-                mark, before = solves + _PATIENCE, best.merit()
+                settled = best.merit > _SLOW * before
+                mark, before = solves + _PATIENCE, best.merit
         if not self.is_met(point):
             return SearchEnd(best, solves, False, settled)
         if self.small:

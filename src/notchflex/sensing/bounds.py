@@ -15,8 +15,10 @@ from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
 from notchflex.sensing.history import History, OwnReading, Progress, state_after, whitening_of
-from notchflex.sensing.model import SolvedState
+from notchflex.sensing.model import Force, SolvedState
 from notchflex.sensing.search import ReadingProblem, best, best_of_all, extreme, fits_badly
+
+Forces = Float[np.ndarray, "s d"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +33,9 @@ class Bounds:
         no_force: How much worse no force fits than the best one, the least of all histories, (s,).
     """
 
-    force: Float[np.ndarray, "s d"]
-    low: Float[np.ndarray, "s d"]
-    high: Float[np.ndarray, "s d"]
+    force: Forces
+    low: Forces
+    high: Forces
     limited: Bool[np.ndarray, "s d"]
     no_force: Float[np.ndarray, " s"]
 
@@ -107,7 +109,7 @@ def _add(
             # What noise does not explain of its distance from the mean is a change of the force.
             ends.force[row] = mean + reading.part * (point.variables - mean)
             forces.append(ends.force[row])
-        least = point.merit()
+        least = point.merit
         for goal in trackers[1:]:
             own = goal is tracker
             if not own and model.size > 1 and tracker.side:
@@ -129,6 +131,6 @@ class _Tracker:
     """A history that is followed: its last state and force, and what it keeps extreme if any."""
 
     state: SolvedState
-    force: Float[np.ndarray, " d"]
+    force: Force
     component: int = 0
     side: float = 0.0

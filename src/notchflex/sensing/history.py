@@ -13,11 +13,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex.search.least_squares import SearchPoint
-from notchflex.sensing.model import SensingModel, SensingStep, SolvedState
+from notchflex.sensing.model import Force, SensingModel, SensingStep, SolvedState
 from notchflex.sensing.readings import Readings
 from notchflex.sensing.search import ReadingProblem, best, best_of_all
 
 Progress = Callable[[int, int], None]
+Covariance = Float[np.ndarray, "m m"]
 
 LINEAR = 0.1
 """A deviation beyond this part of the range of the search is none of first order."""
@@ -41,8 +42,8 @@ class History:
     model: SensingModel
     steps: list[SensingStep]
     best: list[SearchPoint]
-    covariance: list[Float[np.ndarray, "m m"]]
-    alone: list[Float[np.ndarray, "m m"]]
+    covariance: list[Covariance]
+    alone: list[Covariance]
     by_force: list[Float[np.ndarray, "m d"]]
     by_drive: list[Float[np.ndarray, "m t"]]
     gain: list[Float[np.ndarray, "d noises"]]
@@ -76,7 +77,7 @@ def estimate(model: SensingModel, progress: Progress | None = None) -> History:
 
 
 def _estimate_one(
-    model: SensingModel, number: int, state: SolvedState, force: Float[np.ndarray, " d"]
+    model: SensingModel, number: int, state: SolvedState, force: Force
 ) -> tuple[SensingStep, SearchPoint | None]:
     step = model.step(number)
     problem = ReadingProblem(model, step, state, np.diag(step.variance**-0.5))
@@ -92,10 +93,8 @@ def _estimate_one(
     return step, point
 
 
-def whitening_of(covariance: Float[np.ndarray, "m m"]) -> Float[np.ndarray, "m m"]:
+def whitening_of(covariance: Covariance) -> Covariance:
     """Return the matrix that makes deviations of a covariance independent of unit variance."""
-    if not len(covariance):
-        return covariance
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
@@ -185,7 +184,7 @@ class OwnReading:
 
     number: int
     step: SensingStep
-    extra: Float[np.ndarray, "m m"]
+    extra: Covariance
     part: float
     information: Float[np.ndarray, "m d"]
     gain: Float[np.ndarray, "d noises"]
@@ -230,22 +229,18 @@ def _of_mean(
     scale = np.sqrt(step.noise), by_drive * np.sqrt(step.driving * count)
     root = np.sqrt(1.0 - 1.0 / count) * np.concatenate([np.diag(scale[0]), scale[1]], axis=1)
     rest = extra, part, information, history.gain[number], inverse @ root
-    if count == 1:  # it is its mean, to the last digit
-        return [OwnReading(int(rows[0]), step, *rest)]
     return [
         OwnReading(int(row), replace(step, measured=values), *rest)
         for row, values in zip(rows, measured, strict=True)
     ]
 
 
-def _change(apart: Float[np.ndarray, "n m"], noise: Float[np.ndarray, "m m"]) -> float:
+def _change(apart: Float[np.ndarray, "n m"], noise: Covariance) -> float:
     """Return the part of distances from a mean that noise does not explain.
 
     As James and Stein estimate means (Efron and Morris 1973, *Stein's Estimation Rule and Its
     Competitors*): 0 where the distances are those of noise alone, towards 1 where they are larger.
     """
     freedom = (len(apart) - 1) * apart.shape[1]
-    if not freedom:
-        return 0.0
     total = float(((apart @ whitening_of(noise).T) ** 2).sum())
     return 1.0 - freedom / total if total > freedom else 0.0

@@ -27,6 +27,11 @@ from notchflex.support import (
 SolvedState = Any
 """A state to go on from, as the solver has it; None for rest."""
 
+Force = Float[np.ndarray, " d"]
+"""Components of a force, N."""
+Numbers = Float[np.ndarray, " m"]
+"""What is read at once."""
+
 _NO_TURN = (0.0, 0.0, 0.0)
 
 
@@ -48,7 +53,7 @@ class UnknownForce:
     base_rotation: tuple[float, float, float] = _NO_TURN
     body: int | None = None
 
-    def load(self, components: Float[np.ndarray, " d"]) -> ExternalLoad:
+    def load(self, components: Force) -> ExternalLoad:
         """Return the external loads with some components of the force, N."""
         return added_force(self.known, components @ self.directions, self.body)
 
@@ -137,11 +142,11 @@ class SensingStep:
     """
 
     number: int
-    measured: Float[np.ndarray, " m"]
+    measured: Numbers
     entries: np.ndarray
-    variance: Float[np.ndarray, " m"]
-    noise: Float[np.ndarray, " m"]
-    resolution: Float[np.ndarray, " m"]
+    variance: Numbers
+    noise: Numbers
+    resolution: Numbers
     driving: Float[np.ndarray, " t"]
 
 

@@ -27,6 +27,9 @@ _MAX_NOISE = 10.0
 
 _LARGEST = 1e6  # of a deviation; with more a sensor tells nothing
 
+PerTendon = Float[np.ndarray, "s t"]
+Table = Float[np.ndarray, "s m"]
+
 
 @dataclass(frozen=True)
 class SensorNoise:
@@ -76,8 +79,8 @@ class Readings:
         count: How many readings each row is the mean of, (s,).
     """
 
-    tension: Float[np.ndarray, "s t"]
-    stroke: Float[np.ndarray, "s t"]
+    tension: PerTendon
+    stroke: PerTendon
     tip: Float[np.ndarray, "s 3"]
     angles: Float[np.ndarray, "s n"]
     noise: SensorNoise
@@ -88,7 +91,7 @@ class Readings:
         return len(self.tension)
 
     @property
-    def commands(self) -> tuple[Float[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
+    def commands(self) -> tuple[PerTendon, PerTendon]:
         """Tensions and strokes that drive the model: the stroke where no tension was measured.
 
         A negative tension is the offset of a sensor, 0 N in the model.
@@ -97,12 +100,12 @@ class Readings:
         return np.maximum(self.tension, 0.0), np.where(no_tension, self.stroke, np.nan)
 
     @property
-    def driving_deviation(self) -> Float[np.ndarray, "s t"]:
+    def driving_deviation(self) -> PerTendon:
         """Standard deviation of what drives the model, N or mm."""
         return np.where(np.isnan(self.tension), self.noise.stroke, self.noise.tension)
 
     @property
-    def read(self) -> dict[str, Float[np.ndarray, "s m"]]:
+    def read(self) -> dict[str, Table]:
         """Measured values that the model must reproduce, by quantity.
 
         The stroke of a slack tendon says nothing: it is left out where the tension cannot be told
@@ -112,7 +115,7 @@ class Readings:
         return {**self.compared, "stroke": np.where(slack, np.nan, self.stroke)}
 
     @property
-    def compared(self) -> dict[str, Float[np.ndarray, "s m"]]:
+    def compared(self) -> dict[str, Table]:
         """Sensor values that the model computes, by quantity."""
         return {"stroke": self.stroke, "tip_position": self.tip, "notch_angle": self.angles}
 
@@ -238,9 +241,7 @@ def merged(readings: Readings) -> tuple[Readings, Int[np.ndarray, " s"]]:
     return Readings(tension, stroke, tip, angles, noise, count.astype(float)), group
 
 
-def _groups(
-    values: Float[np.ndarray, "s m"], deviations: Float[np.ndarray, " m"]
-) -> Int[np.ndarray, " s"]:
+def _groups(values: Table, deviations: Float[np.ndarray, " m"]) -> Int[np.ndarray, " s"]:
     """Return which group every reading belongs to."""
     group = np.zeros(len(values), int)
     total, size = values[0].copy(), 1

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.search.least_squares import BoundedLeastSquares, SearchPoint
-from notchflex.sensing.model import SensingModel, SensingStep, SolvedState
+from notchflex.sensing.model import Force, Numbers, SensingModel, SensingStep, SolvedState
 
 BAD_FIT = 12.0
 """Largest accepted misfit, in squares of the noise for each number read."""
@@ -65,9 +65,7 @@ class ReadingProblem:
             weak=_WEAK / largest,
         )
 
-    def point(
-        self, force: Float[np.ndarray, " d"], *, with_slopes: bool = True
-    ) -> SearchPoint | None:
+    def point(self, force: Force, *, with_slopes: bool = True) -> SearchPoint | None:
         """Solve a force."""
         path = self.model.solve(self.start, self.step.number, force[None])
         if not path.converged[0]:
@@ -87,10 +85,10 @@ class ReadingProblem:
         squares = [float((self._residuals(row) ** 2).sum()) for row in self.model.values(path)]
         return np.nan_to_num(np.where(path.converged, squares, np.inf), nan=np.inf)
 
-    def _residuals(self, values: Float[np.ndarray, " outputs"]) -> Float[np.ndarray, " m"]:
+    def _residuals(self, values: Float[np.ndarray, " outputs"]) -> Numbers:
         return self.whitening @ (values[self.step.entries] - self.step.measured)
 
-    def _differences(self, force: Float[np.ndarray, " d"]) -> Float[np.ndarray, "m d"]:
+    def _differences(self, force: Force) -> Float[np.ndarray, "m d"]:
         """Slopes by differences."""
         width = _NARROW_STEP * self.model.largest
         moves = width * np.eye(len(force))
@@ -101,7 +99,7 @@ class ReadingProblem:
         return np.nan_to_num((ahead - behind).T / (2.0 * width))
 
 
-def best(problem: ReadingProblem, forces: Iterable[Float[np.ndarray, " d"]]) -> SearchPoint | None:
+def best(problem: ReadingProblem, forces: Iterable[Force]) -> SearchPoint | None:
     """Find the force that fits best, from the best of some; None without an equilibrium.
 
     Where several fit equally well, it stays near the one it began at.
@@ -109,18 +107,16 @@ def best(problem: ReadingProblem, forces: Iterable[Float[np.ndarray, " d"]]) -> 
     points = [point for force in forces if (point := problem.point(force)) is not None]
     if not points:
         return None
-    point = min(points, key=SearchPoint.merit)
+    point = min(points, key=lambda point: point.merit)
     return problem.least_squares.search(point, _MAX_SOLVES).point
 
 
 def fits_badly(point: SearchPoint | None) -> bool:
     """Return whether a force misses the readings by far more than their noise."""
-    return point is None or point.merit() > BAD_FIT * max(len(point.residuals), 1)
+    return point is None or point.merit > BAD_FIT * max(len(point.residuals), 1)
 
 
-def best_of_all(
-    problem: ReadingProblem, forces: list[Float[np.ndarray, " d"]]
-) -> SearchPoint | None:
+def best_of_all(problem: ReadingProblem, forces: list[Force]) -> SearchPoint | None:
     """Find the force that fits best near some, and, if none fits, from all over the range."""
     near = best(problem, forces)
     if not fits_badly(near):
@@ -130,7 +126,7 @@ def best_of_all(
     scan = np.concatenate([np.outer(np.linspace(-largest, largest, _STARTS), row) for row in axes])
     far = best(problem, [scan[int(np.argmin(problem.misfits(scan)))]])
     points = [point for point in (near, far) if point is not None]
-    return min(points, key=SearchPoint.merit, default=None)
+    return min(points, key=lambda point: point.merit, default=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +140,7 @@ class Extreme:
     """
 
     inside: SearchPoint
-    force: Float[np.ndarray, " d"]
+    force: Force
     limited: bool
 
 
@@ -185,11 +181,11 @@ def extreme(
 def _farthest(
     problem: ReadingProblem,
     point: SearchPoint,
-    beyond: Float[np.ndarray, " d"] | None,
+    beyond: Force | None,
     component: int,
     values: Float[np.ndarray, " k"],
     most: float,
-) -> tuple[SearchPoint, Float[np.ndarray, " d"] | None]:
+) -> tuple[SearchPoint, Force | None]:
     """Return the last of some values of a component that fits, and the first that does not."""
     others = np.arange(problem.model.size) != component
     forces = np.tile(point.variables, (len(values), 1))
@@ -213,7 +209,7 @@ def _farthest(
             )
             search = replace(problem.least_squares, low=low, high=high, tolerance=math.sqrt(most))
             trial = search.search(trial, _FEW_SOLVES).point
-            if trial.merit() <= most:
+            if trial.merit <= most:
                 return trial, None
     if count and others.any():
         point = problem.point(forces[count - 1]) or point
@@ -227,5 +223,5 @@ def _predicted(problem: ReadingProblem, point: SearchPoint, component: int, most
     slopes = point.slopes
     normal = slopes.T @ slopes + problem.least_squares.weak**2 * np.eye(slopes.shape[1])
     lean = float(np.linalg.inv(normal)[component, component])
-    move = math.sqrt(max(most - point.merit(), 0.0) * lean)
+    move = math.sqrt(max(most - point.merit, 0.0) * lean)
     return move if move < problem.model.largest else 0.0

@@ -126,7 +126,7 @@ def _best_place(
     for number, body in enumerate(bodies, 1):
         candidates = estimate(replace(model, unknown=replace(model.unknown, body=body))).best
         whole = len(candidates) == len(model.readings)
-        misfits[body] = sum(point.merit() for point in candidates) if whole else np.inf
+        misfits[body] = sum(point.merit for point in candidates) if whole else np.inf
         if report is not None:
             report(number, len(bodies))
     # Of places that fit as well the tip is taken: it is where robots touch.
@@ -144,9 +144,7 @@ def _result(
     group: Int[np.ndarray, " s"],
 ) -> SensedForce:
     means, count, size = len(model.readings), len(group), model.size
-    rest = count - len(left_open)
-    stuck = np.array([one.stuck for one in left_open] + [np.zeros(size, bool)] * rest)
-    hidden = [*(one.hidden for one in left_open), *[np.zeros((0, size))] * rest]
+    hidden = [one.hidden for one in left_open]
     entries = np.array([len(model.step(number).entries) for number in range(means)])
     return SensedForce(
         robot=model.robot,
@@ -156,12 +154,12 @@ def _result(
         covariance=_filled([one.covariance for one in left_open], (count, size, size)),
         low=_filled(ends.low, (count, size)),
         high=_filled(ends.high, (count, size)),
-        limited=np.concatenate([ends.limited, np.zeros((rest, size), bool)]),
-        stuck=stuck,
-        misfit=_filled([point.merit() for point in candidates], (means,))[group],
+        limited=_filled(ends.limited, (count, size), False),
+        stuck=_filled([one.stuck for one in left_open], (count, size), False),
+        misfit=_filled([point.merit for point in candidates], (means,))[group],
         read=entries[group],
         no_force=_filled(ends.no_force, (count,)),
-        hidden=tuple(hidden),
+        hidden=(*hidden, *[np.zeros((0, size))] * (count - len(hidden))),
         group=group,
         place=model.unknown.body,
         places=places,
@@ -174,10 +172,10 @@ def _result(
     )
 
 
-def _filled(rows: object, shape: tuple[int, ...]) -> np.ndarray:
-    """Return rows as an array, NaN beyond their number."""
-    values = np.full(shape, np.nan)
-    given = np.asarray(rows, float)
+def _filled(rows: object, shape: tuple[int, ...], missing: float = np.nan) -> np.ndarray:
+    """Return rows as an array, and what is missing beyond their number."""
+    values = np.full(shape, missing)
+    given = np.asarray(rows, values.dtype)
     values[: len(given)] = given.reshape(len(given), *shape[1:])
     return values
 

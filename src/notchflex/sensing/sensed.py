@@ -11,11 +11,14 @@ from jaxtyping import Bool, Float, Int
 from scipy.stats import chi2
 
 from notchflex import ConvergenceError, EquilibriumPath, Robot
-from notchflex.sensing.bounds import Bounds
+from notchflex.sensing.bounds import Bounds, Forces
 from notchflex.sensing.history import LINEAR, OwnReading
 from notchflex.sensing.model import SensingModel
 from notchflex.sensing.search import BAD_FIT
 from notchflex.support import Displayed, Summary
+
+PerReading = Float[np.ndarray, " s"]
+Said = Bool[np.ndarray, " s"]
 
 # An interval this much wider than that of the noise alone is one that stuck friction leaves.
 _STUCK = 1.5
@@ -144,15 +147,15 @@ class SensedForce(Displayed):
     robot: Robot
     components: tuple[str, ...]
     directions: Float[np.ndarray, "d 3"]
-    force: Float[np.ndarray, "s d"]
+    force: Forces
     covariance: Float[np.ndarray, "s d d"]
-    low: Float[np.ndarray, "s d"]
-    high: Float[np.ndarray, "s d"]
+    low: Forces
+    high: Forces
     limited: Bool[np.ndarray, "s d"]
     stuck: Bool[np.ndarray, "s d"]
-    misfit: Float[np.ndarray, " s"]
-    read: Float[np.ndarray, " s"]
-    no_force: Float[np.ndarray, " s"]
+    misfit: PerReading
+    read: PerReading
+    no_force: PerReading
     hidden: tuple[Float[np.ndarray, "k d"], ...]
     group: Int[np.ndarray, " s"]
     place: int | None
@@ -167,12 +170,12 @@ class SensedForce(Displayed):
         return len(self.force)
 
     @property
-    def converged(self) -> Bool[np.ndarray, " s"]:
+    def converged(self) -> Said:
         """Whether a force was found for each reading, (s,)."""
         return np.asarray(np.isfinite(self.force).all(axis=1))
 
     @property
-    def unexplained(self) -> Bool[np.ndarray, " s"]:
+    def unexplained(self) -> Said:
         """Whether even the best force misses a reading by far more than noise does, (s,)."""
         return np.asarray(self.misfit > BAD_FIT * np.maximum(self.read, 1.0))
 
@@ -182,12 +185,12 @@ class SensedForce(Displayed):
         return self.force @ self.directions
 
     @property
-    def deviation(self) -> Float[np.ndarray, "s d"]:
+    def deviation(self) -> Forces:
         """Standard deviation of each component by the noise of the sensors, N, (s, d)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
     @cached_property
-    def contact_probability(self) -> Float[np.ndarray, " s"]:
+    def contact_probability(self) -> PerReading:
         """Probability of readings that differ as much from those without force by noise, (s,).
 
         The least favourable history decides: while the tendon sticks, small forces are not
@@ -202,7 +205,7 @@ class SensedForce(Displayed):
         )
 
     @property
-    def contact(self) -> Bool[np.ndarray, " s"]:
+    def contact(self) -> Said:
         """Whether no force is refuted at the level of the intervals, (s,)."""
         return self.contact_probability < 1.0 - self.level
 
