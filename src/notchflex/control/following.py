@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 from notchflex import Equilibrium, EquilibriumPath, Failure, Load, LoadPath, Robot, State, simulate
 from notchflex._summary import vector
 from notchflex.control.problem import Attempt, TargetSearch
-from notchflex.control.targets import DIRECTION, Targets, units_of
+from notchflex.control.targets import DIRECTION, Targets, unit_hint, units_of
 from notchflex.search.least_squares import KEPT
 from notchflex.support import (
     DEGREES,
@@ -151,7 +151,10 @@ class Following(Displayed):
             return ""
         if failure is Failure.NO_EQUILIBRIUM:
             return self.path.reason[int(self.step[target])]
-        return f"{failure.text.format(error=self.missed(target))}; {failure.remedy}"
+        hint, positions = "", self.targets.values.get("tip_position")
+        if positions is not None and failure is not Failure.SEARCH_STOPPED:
+            hint = unit_hint(self.robot, positions[target])
+        return f"{failure.text.format(error=self.missed(target))}; {failure.remedy}{hint}"
 
     @cached_property
     def tension(self) -> Float[np.ndarray, "k t"]:

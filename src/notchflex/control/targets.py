@@ -264,3 +264,19 @@ def _columns(robot: Robot) -> dict[str, tuple[str, tuple[int, ...]]]:
                 labels = zip(quantity.per, entry_names(quantity.per, entry), strict=True)
                 columns[quantity.header(**dict(labels))] = name, entry
     return columns
+
+
+# A position is near a robot whose straight length it is a part from the first to the second of.
+_LENGTH_RATIOS = (0.2, 2.0)
+# Sizes of other units, mm.
+_UNITS = {"m": 1000.0, "µm": 0.001}
+
+
+def unit_hint(robot: Robot, position: Float[np.ndarray, " 3"]) -> str:
+    """Say in which unit a position (mm, NaN where free) out of reach would be near the robot."""
+    size = float(np.sqrt(np.nansum(position**2))) / robot.geometry.length
+    low, high = _LENGTH_RATIOS
+    for unit, scale in _UNITS.items():
+        if low <= size * scale <= high:
+            return f"; positions are in mm, and this one would be near the robot in {unit}"
+    return ""
