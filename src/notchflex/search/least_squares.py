@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
-Vector = Vector
+Vector = Float[np.ndarray, " n"]
 
 # What a violated limit counts beside the residuals: in a step as a part of the Hessian, and in the
 # merit of a point.
