@@ -14,7 +14,7 @@ from notchflex.plotting import BLUE, GREEN, ORANGE
 from notchflex.sensing import SensedForce, SensorNoise, sense
 from notchflex.viewer.colours import add_arrows, rgb
 from notchflex.viewer.controls import POINTING, ControlRanges, Controls
-from notchflex.viewer.session import Session, LoopStep
+from notchflex.viewer.session import LoopStep, Session
 from notchflex.workspaces import Workspace, workspace
 
 _POINT = 0.004  # size of a point of the cloud, in lengths of the robot
