@@ -14,7 +14,7 @@ from notchflex.plotting import BLUE, GREEN, ORANGE
 from notchflex.sensing import SensedForce, SensorNoise, sense
 from notchflex.viewer.colours import add_arrows, rgb
 from notchflex.viewer.controls import POINTING, ControlRanges, Controls
-from notchflex.viewer.session import Session, Step
+from notchflex.viewer.session import LoopStep, Session
 from notchflex.workspaces import Workspace, workspace
 
 _POINT = 0.004  # size of a point of the cloud, in lengths of the robot
@@ -205,7 +205,7 @@ def turning_points(rows: Float[np.ndarray, "s k"]) -> Int[np.ndarray, " r"]:
     return np.append(turns, len(rows) - 1)
 
 
-def read(history: Sequence[Step]) -> tuple[Float[np.ndarray, "r t"], Float[np.ndarray, "r t"]]:
+def read(history: Sequence[LoopStep]) -> tuple[Float[np.ndarray, "r t"], Float[np.ndarray, "r t"]]:
     """Return tensions (N) and strokes (mm) of a history, where its loads turn round."""
     tension = np.array([step.tension for step in history])
     stroke = np.array([step.stroke for step in history])

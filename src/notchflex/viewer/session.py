@@ -25,7 +25,7 @@ from notchflex.support import Friction, Material, fields_of, is_list, kinds_of, 
 from notchflex.viewer.controls import STROKE, TENSION, ControlRanges, Controls
 
 
-class Step(NamedTuple):
+class LoopStep(NamedTuple):
     """A solved step: tension [N] and stroke [mm] of every tendon, total angle [rad]."""
 
     controls: Controls
@@ -34,7 +34,7 @@ class Step(NamedTuple):
     total_angle: float
 
 
-def hysteresis(history: Sequence[Step], tendon: int, by: str = TENSION) -> np.ndarray:
+def hysteresis(history: Sequence[LoopStep], tendon: int, by: str = TENSION) -> np.ndarray:
     """Return tension [N] or stroke [mm] of a tendon (from 0) and total angle [rad], (S, 2)."""
     return np.array([(getattr(step, by)[tendon], step.total_angle) for step in history])
 
@@ -66,8 +66,8 @@ class Session:
 
     def reset(self) -> None:
         """Return to the robot at rest and clear all history."""
-        self.before: list[Step] = []  # the loop before the robot was last changed
-        self.history: list[Step] = []
+        self.before: list[LoopStep] = []  # the loop before the robot was last changed
+        self.history: list[LoopStep] = []
         rest = Controls.at_rest(self.robot, self.pointing)
         self._keep(rest, simulate(self.robot, rest.load()))
 
@@ -75,7 +75,7 @@ class Session:
         self.controls, self.solved, state = controls, solved, solved[0]
         self._compiled.add(_form(controls))
         angle = float(state.total_angle)
-        self.history.append(Step(controls, state.tension, state.stroke, angle))
+        self.history.append(LoopStep(controls, state.tension, state.stroke, angle))
 
     @property
     def state(self) -> Equilibrium:
