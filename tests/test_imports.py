@@ -50,7 +50,7 @@ MOST_FILES = 17
 
 SATELLITES = ORDER[ORDER.index("search") :]
 
-INNER_NAMES = 50
+INNER_NAMES = 42
 """Names of the core that satellites import from elsewhere than `notchflex` and
 `notchflex.support`: this number only ever falls."""
 

@@ -413,7 +413,7 @@ def design_picture(design: Design) -> Picture:
     Args:
         design: The design.
     """
-    from notchflex.designing.model.quantities import target_points
+    from notchflex.designing import target_points
 
     shapes: list[Panel] = []
     for label, path, colour in (

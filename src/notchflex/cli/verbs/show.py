@@ -12,7 +12,7 @@ from notchflex import InputError, Robot
 from notchflex.cli import tables, terminal
 from notchflex.cli.options import OUTPUT, File, Outputs
 from notchflex.cli.robots import RobotName, Settings, changed_title, chosen_robot, robot_files
-from notchflex.support import DEGREES, PAPER
+from notchflex.support import DEGREES, PAPER, described_at, to_table
 
 if TYPE_CHECKING:
     from notchflex.analysis.bands import ClosingBands
@@ -89,14 +89,25 @@ def _print(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:
 
     terminal.line(title, "bold")
     _, *parts, _ = repr(robot).splitlines()
-    parts.append(f"length    {robot.geometry.length:g} mm")
-    terminal.show(*(tables.wrapped(part.strip(), " " * 10) for part in parts), "")
+    lines = [part for part in parts if part.split()[0] not in ("material", "friction")]
+    lines.append(f"length    {robot.geometry.length:g} mm")
+    for name in ("material", "friction"):  # with all values, the usual ones as well
+        values = to_table(robot)[name]
+        words = [values.pop("kind")]
+        for key, value in values.items():
+            shown = f"{value:g}" if isinstance(value, float) else value
+            unit = described_at(robot, f"{name}.{key}").unit
+            words.append(f"{key.replace('_', ' ')} {shown} {unit}".strip())
+        lines.append(f"{name:10}{', '.join(words)}")
+    terminal.show(*(tables.wrapped(line.strip(), " " * 10) for line in lines), "")
     values = [named_values(notch) for notch in robot.notches]
     names = dict.fromkeys(name for row in values for name in row)
     if differ := [name for name in names if len({row.get(name) for row in values}) > 1]:
-        numbers = {"notch": [str(row["notch"]) for row in notches]}
-        columns = {name: [row.get(name) for row in values] for name in differ}
-        tables.show(numbers | columns, forms={"notch": ">"})
+        equal: dict[tuple[Any, ...], list[str]] = {}
+        for number, row in enumerate(values, start=1):
+            equal.setdefault(tuple(map(row.get, differ)), []).append(str(number))
+        columns = dict(zip(differ, zip(*equal, strict=True), strict=True))
+        tables.show({"notches": [", ".join(numbers) for numbers in equal.values()]} | columns)
         print()
     rows = [
         {
