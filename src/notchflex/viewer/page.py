@@ -372,12 +372,13 @@ class Page:
         self._charted.put(str(tendon + 1))
         self.update()
 
-    def update(self) -> None:
-        """Update numbers, charts, controls and notice."""
+    def update(self, charts: bool = True) -> None:
+        """Update numbers, controls and notice, and charts: a browser takes long to draw them."""
         session = self.viewer.session
         self._readout.content = readout(session)
-        self._loop.figure = chart_of(loop(session, self.active))
-        self._along.figure = chart_of(along_tendon(session, self.active))
+        if charts:
+            self._loop.figure = chart_of(loop(session, self.active))
+            self._along.figure = chart_of(along_tendon(session, self.active))
         self.follow()
 
     def follow(self) -> None:

@@ -21,8 +21,8 @@ from notchflex.viewer.tasks import TargetQueue, Task, Tasks, WatchedFile
 # A browser does not show more steps a second than this.
 MAX_STEPS = 60.0
 # Intervals in which numbers and charts are updated while the robot moves, and in which the file is
-# checked [s]: a browser takes long to draw charts.
-_SHOW, _LOOK = 0.3, 0.5
+# checked [s].
+_TEXT, _CHARTS, _LOOK = 0.1, 0.5, 0.5
 # Distance of the tip from its target that is worth a note, in outer radii.
 _SEEN = 0.05
 
@@ -64,7 +64,7 @@ class Viewer:
         self._playing = False
         self._read = read
         self._file = WatchedFile(file) if file is not None and read is not None else None
-        self._looked = self._updated = 0.0
+        self._looked = self._updated = self._charted = 0.0
         self.server, self.address = serve(host, port)
         self._make_scene(robot)
         self.page = Page(self)
@@ -127,9 +127,11 @@ class Viewer:
         """Move the robot, and update numbers and charts; while it moves, not at every step."""
         self.scene.update(self.session, still=not moving)
         now = time.monotonic()
-        if not moving or now - self._updated > _SHOW:
+        if not moving or now - self._updated > _TEXT:
             self._updated = now
-            self.page.update()
+            charts = not moving or now - self._charted > _CHARTS
+            self._charted = now if charts else self._charted
+            self.page.update(charts)
 
     def _begin(self) -> None:
         """Begin something else: clear the message, end a cycle."""
