@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -79,7 +80,8 @@ def named(data: Data, keys: str = "", forms: Mapping[str, str] | None = None) ->
         is_text = any(isinstance(value, str) for value in values)
         form = (forms or {}).get(name, "" if is_text else FORMS.get(unit.strip(), ".3g"))
         widest = max(_HEAD, *(len(cell(value, form).partition("\n")[0]) for value in values))
-        words = textwrap.fill(words.replace("_", " "), widest, break_long_words=False)
+        words = re.sub(r"^(interval|inside) (\d+)$", r"\2 % \1", words.replace("_", " "))
+        words = textwrap.fill(words, widest, break_long_words=False)
         columns.append((words + unit, values, form))
     return columns
 
