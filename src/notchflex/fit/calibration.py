@@ -468,10 +468,17 @@ class Calibration:
         for objectives that are not likelihoods. Infinite if nothing measured depends on a constant,
         or the noise is unknown.
         """
+        return self._of_constants(self._covariance_with_drawing)
+
+    @cached_property
+    def _covariance_with_drawing(self) -> Matrix:
         if not self.is_likelihood:
             return self.by_pulls.covariance
-        wider = self.by_pulls.wider
-        return self.covariance_by_rows * np.outer(wider, wider)
+        wider = np.ones(len(self.best.values))
+        if self.tells_no_noise:
+            return np.diag(np.inf * wider)
+        wider[: len(self.names)] = self.by_pulls.wider
+        return self.covariance_of_all * np.outer(wider, wider)
 
     @property
     def covariance_by_rows(self) -> Matrix:
@@ -544,11 +551,16 @@ class Calibration:
     def half_width(self, slopes: Float[np.ndarray, "r k"]) -> Float[np.ndarray, " r"]:
         """Return half the 95 % interval of numbers from their derivatives by the constants.
 
-        With the model linearised; NaN if it has no end.
+        Derivatives by what deviates from the drawing may follow. With the model linearised; NaN if
+        it has no end.
         """
-        is_known = np.isfinite(np.diag(self.covariance))
-        times = quantile(self._freedom_of_intervals)[is_known]
-        covariance = self.covariance[np.ix_(is_known, is_known)] * np.outer(times, times)
+        size = slopes.shape[1]
+        freedom = np.full(size, self._freedom_of_rows)
+        freedom[: len(self.names)] = self._freedom_of_intervals
+        covariance = self._covariance_with_drawing[:size, :size]
+        is_known = np.isfinite(np.diag(covariance))
+        times = quantile(freedom)[is_known]
+        covariance = covariance[np.ix_(is_known, is_known)] * np.outer(times, times)
         variance = np.einsum("ri,ij,rj->r", slopes[:, is_known], covariance, slopes[:, is_known])
         # An unknown constant only matters to numbers that depend on it.
         variance[slopes[:, ~is_known].any(axis=1)] = np.nan
