@@ -102,7 +102,9 @@ def largest_tensions(robot: Robot, tension: ArrayLike | None) -> Float[np.ndarra
         raise InputError.WRONG_SHAPE(
             f"tension must be one number or {tendons}, one per tendon; got {short_repr(tension)}"
         )
-    if not (values >= 0.0).all() or not values.any():
+    if not np.isfinite(values).all():  # NaN is slack in a load, no largest tension
+        raise InputError.NOT_FINITE(f"tension must be finite, N; got {short_repr(tension)}")
+    if (values < 0.0).any() or not values.any():
         raise InputError.OUT_OF_RANGE(
             f"a tendon only pulls: give a largest tension above 0 N; got {short_repr(tension)}"
         )

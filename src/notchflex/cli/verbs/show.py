@@ -101,8 +101,16 @@ def _print(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:
         lines.append(f"{name:10}{', '.join(words)}")
     terminal.show(*(tables.wrapped(line.strip(), " " * 10) for line in lines), "")
     values = [named_values(notch) for notch in robot.notches]
-    names = dict.fromkeys(name for row in values for name in row)
-    if differ := [name for name in names if len({row.get(name) for row in values}) > 1]:
+    kinds = {
+        row["kind"]: [other for other in values if other["kind"] == row["kind"]] for row in values
+    }
+    names = [
+        name
+        for same in kinds.values()
+        for name in same[0]
+        if len({notch[name] for notch in same}) > 1 or (name == "kind" and len(kinds) > 1)
+    ]
+    if differ := list(dict.fromkeys(names)):
         equal: dict[tuple[Any, ...], list[str]] = {}
         for number, row in enumerate(values, start=1):
             equal.setdefault(tuple(map(row.get, differ)), []).append(str(number))

@@ -86,7 +86,7 @@ def simulate(
     Args:
         tension: Tension at the base of a tendon [N], step by step. Values or `start:stop:count`
             ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. For one of several tendons
-            `1=SPEC`, given once for each tendon; tendons that are not named hang slack.
+            `1=SPEC`, given once for each; those without hang slack.
         stroke: Tendon length drawn out at the base [mm], step by step; written as --tension.
         base_rotation: Turn the base by a rotation vector RX,RY,RZ [deg], for example `90,0,0`.
         uncertain: Carry the tolerances of the robot (its [tolerance] table, else assumed ones)
@@ -97,7 +97,7 @@ def simulate(
             Table, picture and JSON have all of them, other files the first.
         columns: Quantities that the table shows, joined by commas, such as
             `tension,notch_angle,gap`. A wrong name lists all names.
-        every_row: Show every step in the table; without it a path of more than 60 steps is thinned.
+        every_row: Show every step in the table, which otherwise has 60 at most.
     """
     from notchflex.cli import path_table
 
