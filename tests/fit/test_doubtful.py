@@ -45,6 +45,18 @@ def untold(seen):
     return Measurements("untold", seen.load, seen.pull, seen.from_rest, seen.observed)
 
 
+def test_what_deviates_from_the_drawing_leaves_no_noise_to_estimate():
+    """Of two numbers, tolerances explain what a constant leaves."""
+    seen = untold(measured())
+    seen.observed["notch_angle"][2:] = seen.observed["notch_angle"][:, 1:] = np.nan
+    seen.observed["total_angle"][:] = np.nan
+    found = calibrate(WRIST, seen, MODULUS, starts=1)
+    assert len(found.residuals) == 2
+    assert found.intervals[MODULUS].lower is found.intervals[MODULUS].upper is None
+    assert found.deviations[MODULUS] == np.inf
+    assert "the noise of the measurement" in said_of(found)
+
+
 def test_a_fit_through_every_number_does_not_tell_how_far_to_trust_it(tmp_path):
     seen = untold(measured())
     seen.observed["notch_angle"][1:] = seen.observed["notch_angle"][:, 1:] = np.nan
@@ -55,7 +67,7 @@ def test_a_fit_through_every_number_does_not_tell_how_far_to_trust_it(tmp_path):
     assert interval.lower is interval.upper is None
     assert found.deviations[MODULUS] == np.inf
     assert said_of(found).count(".") == 2
-    assert "No more numbers were measured than constants fitted" in said_of(found)
+    assert "Fewer numbers were measured than it takes" in said_of(found)
     assert found.allows(MODULUS, 1.01 * found.values[MODULUS])
     (file,) = write_fitted(found, tmp_path / "fitted")
     assert "the noise is unknown" in file.read_text(encoding="utf-8")

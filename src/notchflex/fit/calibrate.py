@@ -197,7 +197,7 @@ def _with_noise(problem: FitProblem, best: Minimum) -> tuple[FitProblem, Minimum
         if noise is None or noise.is_known:
             break
         residuals = reached(best).residuals
-        problem.noise = noise_left(noise, residuals, len(problem.unknowns), robust=robust)
+        problem.noise = noise_left(noise, residuals, problem.fitted(residuals), robust=robust)
         again = problem.minimum(best.values)
         if again.cost is None:
             break

@@ -319,10 +319,13 @@ class Calibration:
         """
         return self.noise.counted if self.is_likelihood else len(self.residuals)
 
-    @property
-    def freedom(self) -> int:
-        """Degrees of freedom: numbers measured less numbers fitted."""
-        return self.noise.counted - len(self.names)
+    @cached_property
+    def freedom(self) -> float:
+        """Degrees of freedom: numbers measured less numbers fitted.
+
+        What deviates from the drawing counts by the part that the data tell of it.
+        """
+        return self.noise.counted - self.problem.fitted(self.residuals)
 
     @property
     def is_likelihood(self) -> bool:
@@ -337,7 +340,7 @@ class Calibration:
     @property
     def tells_no_noise(self) -> bool:
         """Whether the noise is unknown, and no number is left over to estimate it."""
-        return not self.noise.is_known and self.freedom <= 0
+        return not self.noise.is_known and self.freedom < 1.0
 
     @property
     def reduced_chi_squared(self) -> float:

@@ -243,9 +243,9 @@ def _noise(calibration: Calibration) -> Iterator[str]:
         yield f"{kind} is not a likelihood: it gives no intervals. LeastSquares does."
     elif calibration.tells_no_noise:
         yield (
-            "No more numbers were measured than constants fitted, and their noise is unknown: "
-            "the fit passes through any such data, so its accuracy is unknown. "
-            "Measure more, or give standard deviations."
+            "Fewer numbers were measured than it takes to find the constants, what deviates from "
+            "the drawing, and the noise of the measurement: the fit passes through any such data, "
+            "so its accuracy is unknown. Measure more, or give standard deviations."
         )
         return
     elif not calibration.noise.is_known:

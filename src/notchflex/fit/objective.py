@@ -24,8 +24,9 @@ Vector = Float[np.ndarray, " k"]
 
 # Standard deviations to begin with if nothing is known, rad, mm and N by unit.
 _FIRST_NOISE = {"deg": float(np.radians(1.0)), "mm": 0.1, "N": 0.01}
-# Nothing is measured better than this part of that; else an exact fit would have no noise at all.
-_LEAST_NOISE = 1e-9
+# Nothing is measured better than this part of that: else an exact fit would have no noise at all,
+# and rounding would hide what only the tolerances of the drawing tell.
+_LEAST_NOISE = 1e-5
 
 
 class Cost(NamedTuple):
@@ -271,15 +272,15 @@ def first_noise(samples: Samples, residuals: Residuals) -> Noise:
     return noise
 
 
-def noise_left(noise: Noise, residuals: Residuals, constants: int, *, robust: bool) -> Noise:
+def noise_left(noise: Noise, residuals: Residuals, fitted: float, *, robust: bool) -> Noise:
     """Return the noise with the unknown standard deviations estimated from the residuals.
 
-    By quantity: root mean squares over the degrees of freedom that the constants leave; for robust
-    objectives from the median of absolute values, as of Gaussian noise.
+    By quantity: root mean squares over the degrees of freedom that the numbers fitted leave; for
+    robust objectives from the median of absolute values, as of Gaussian noise.
     """
     deviation = noise.deviation.copy()
     counted = max(noise.counted, 1)
-    share = max(1.0 - constants / counted, 1.0 / counted)
+    share = max(1.0 - fitted / counted, 1.0 / counted)
     for quantity in np.unique(residuals.quantity[noise.estimated]):
         mine = noise.estimated & (residuals.quantity == quantity)
         least = _LEAST_NOISE * _FIRST_NOISE[MEASURED[OBSERVED[quantity]].unit]

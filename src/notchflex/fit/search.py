@@ -27,6 +27,8 @@ from notchflex.support import to_table
 if TYPE_CHECKING:
     from polars import DataFrame
 
+    from notchflex.fit.residuals import Residuals
+
 Progress = Callable[[str, int, int], None]
 """Called with the name of the task, how much of it is done, and how much there is."""
 
@@ -216,6 +218,20 @@ class FitProblem:
         whole.drawing = tuple(np.array(self.drawing, object)[is_known])
         whole.samples = self.samples.of_unknowns((*self.unknowns, *whole.drawing))
         return whole
+
+    def fitted(self, residuals: Residuals) -> float:
+        """Return how many of the measured numbers a fit takes to find what is varied.
+
+        One for each constant that has no prior; less where priors tell a part (the trace of what
+        maps numbers measured to numbers fitted; MacKay 1992, *Neural Computation* 4, 415).
+        """
+        if self.noise is None or not any(unknown.prior for unknown in self.varied):
+            return float(len(self.varied))
+        counts = np.isfinite(self.noise.deviation)
+        scaled = residuals.slopes[counts] / self.noise.deviation[counts, None]
+        priors = [1.0 / unknown.prior[1] if unknown.prior else 0.0 for unknown in self.varied]
+        orthogonal = np.linalg.qr(np.concatenate([scaled, np.diag(priors)]))[0]
+        return float(np.sum(orthogonal[: len(scaled)] ** 2))
 
     def minimum(self, start: Vector) -> Minimum:
         """Return the minimum that a search from a start ends at."""
