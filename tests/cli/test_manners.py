@@ -85,7 +85,7 @@ def test_comparison_of_many_notches_fits_80_columns(call, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("columns", "in_one"), [pytest.param("80", False, marks=pytest.mark.nightly), ("130", True)]
+    ("columns", "in_one"), [pytest.param("70", False, marks=pytest.mark.nightly), ("130", True)]
 )
 def test_a_table_is_as_wide_as_the_terminal(columns, in_one):
     loads = ("--tension", "0:2:3", "--gravity", "0,0.5,-9.81")
