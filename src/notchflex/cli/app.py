@@ -266,8 +266,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return code
     except InputError as problem:
         terminal.error(str(problem))
-    except KeyboardInterrupt:
-        terminal.error("interrupted; nothing more is written.")
+    except KeyboardInterrupt as problem:
+        terminal.error(f"interrupted; {str(problem) or 'nothing more is written'}.")
         return INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone
         let_go(sys.stdout)
