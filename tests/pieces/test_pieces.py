@@ -214,5 +214,5 @@ def test_what_is_kept_is_told_when_interrupted(wrist, tmp_path, monkeypatch, cap
     monkeypatch.chdir(tmp_path)
     Path("t.toml").write_text(TOLERANCES, encoding="utf-8")
     monkeypatch.setattr("notchflex.pieces.run.stored_piece", interrupted)
-    assert run("tolerance pacheco2021-a t.toml --draws 800 --folder h".split()) == 130
+    assert run(["tolerance", "pacheco2021-a", "t.toml", "--folder", "h"]) == 130
     assert "interrupted; finished pieces are kept" in capsys.readouterr().err

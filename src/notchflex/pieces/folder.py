@@ -21,7 +21,15 @@ import numpy as np
 from pydantic_core import to_jsonable_python
 
 from notchflex import InputError, __version__
-from notchflex.support import backend, check_folder, read_text, replacing, unwritable, write_text
+from notchflex.support import (
+    backend,
+    check_folder,
+    check_is_path,
+    read_text,
+    replacing,
+    unwritable,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -81,6 +89,7 @@ class Manifest:
         Raises:
             InputError: There is none of this kind and format.
         """
+        check_is_path(folder, f"a folder of a {kind}")
         file = Path(folder) / f"{kind}.json"
         if not file.exists():
             raise InputError.FILE_NOT_FOUND(

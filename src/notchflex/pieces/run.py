@@ -37,7 +37,7 @@ from notchflex.pieces.folder import (
     write_piece,
 )
 from notchflex.specification import whole
-from notchflex.support import need, on_cores, short_repr
+from notchflex.support import check_is_path, need, on_cores
 
 T = TypeVar("T")
 
@@ -85,10 +85,7 @@ class PieceFolder:
 
     def __post_init__(self) -> None:
         """Check workers and scheduler."""
-        if not isinstance(self.directory, str | os.PathLike):  # pyright: ignore
-            raise InputError.WRONG_TYPE(
-                f"folder must be the path of a folder; got {short_repr(self.directory)}"
-            )
+        check_is_path(self.directory, "a folder")
         need("polars", "data", "pieces")
         if self.workers is not None and self.scheduler is not None:
             raise InputError.CONFLICT("workers and a scheduler exclude each other; give one.")
