@@ -124,3 +124,9 @@ def _mode_for(destination: Path) -> int:
     mask = os.umask(0)
     os.umask(mask)
     return 0o666 & ~mask
+
+
+def check_is_path(value: object, what: str) -> None:
+    """Raise InputError unless a value is the path of what it shall be."""
+    if not isinstance(value, str | os.PathLike):
+        raise InputError.WRONG_TYPE(f"the path of {what} is needed; got {value!r:.60}")

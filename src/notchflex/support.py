@@ -32,6 +32,7 @@ _HOME = {
             "axis_sizes",
         ),
         "notchflex._replacing": (
+            "check_is_path",
             "replacing",
             "unwritable",
         ),

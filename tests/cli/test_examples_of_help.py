@@ -1,6 +1,7 @@
 """The examples that `--help` shows run as they are written, in an empty folder."""
 
 import os
+import re
 import subprocess
 import sys
 import textwrap
@@ -25,6 +26,13 @@ def test_help_shows_the_examples(verb, capsys):
     shown = " ".join(capsys.readouterr().out.split())
     for line in textwrap.dedent(f"    {VERBS[verb][1]}").splitlines():
         assert line.split()[-1] in shown
+
+
+def test_columns_that_are_cut_from_a_table_are_those_of_the_tip(capsys):
+    run(["simulate", "pacheco2021-a", "--tension", "1", "--csv", "-"])
+    names = capsys.readouterr().out.splitlines()[0].split(",")
+    (places,) = re.findall(r"cut -d, -f(\S+)", VERBS["follow"][1])
+    assert [names[int(place) - 1] for place in places.split(",")] == ["tip_x_mm", "tip_z_mm"]
 
 
 @pytest.mark.nightly

@@ -18,6 +18,9 @@ def test_files_and_table(call, tmp_path):
     assert document["peak_strain"]["largest"] <= 0.04
     assert document["limits"] == ["peak strain at most 0.04"]
     assert f"{document['convex_hull']['size']:.4g} mm²" in out
+    units, *parts = out.partition("\nstates")[2].splitlines()
+    assert units.split() == ["deg", "strain", "N", "mm"]
+    assert [part.split()[0] for part in parts] == ["5", "50", "95", "largest"]
     assert (tmp_path / "w.png").stat().st_size > 1000
 
 

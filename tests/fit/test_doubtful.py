@@ -296,6 +296,8 @@ def test_whether_a_model_misses_is_judged_by_numbers_of_known_noise_alone():
     [
         (lambda: calibrate(WRIST, measured(), FRICTION, seed=-1), "OUT_OF_RANGE", "seed"),
         (lambda: calibrate(ROBOT, measured(), FRICTION), "WRONG_TYPE", "Robot"),
+        (lambda: calibrate(WRIST, None, FRICTION), "NO_DATA", "got None"),
+        (lambda: read_measurements(5, WRIST), "WRONG_TYPE", "CSV is needed; got 5"),
         (lambda: calibrate(WRIST, [measured(), measured()], FRICTION), "CONFLICT", "synthetic"),
         (lambda: calibrate({"each": WRIST}, {"each": measured()}, FRICTION), "CONFLICT", "each"),
         (

@@ -345,3 +345,12 @@ def test_a_picture_as_long_as_a_wire_is_refused(tmp_path):
     cv2.imwrite(str(tmp_path / "wire.png"), np.zeros((64, 70_000, 3), np.uint8))
     with refused("OUT_OF_RANGE", "70000 x 64", "50 times"):
         nf.measure([tmp_path / "wire.png"], nf.load_robot("pacheco2021-a"))
+
+
+@pytest.mark.parametrize(
+    ("photographs", "robot", "name"),
+    [(ROBOT, "x", "a photograph"), (5, ROBOT, "got 5"), ("x.png", "x", "Robot is needed")],
+)
+def test_what_is_no_path_or_no_robot_is_refused(photographs, robot, name):
+    with refused("WRONG_TYPE", name):
+        nf.measure(photographs, robot)

@@ -199,3 +199,20 @@ def test_the_command_line(tmp_path, monkeypatch, capsys):
     assert Path("a.json").read_text() == Path("b.json").read_text()
     assert digests(Path("drawn")) == before
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_number_that_is_not_given_is_no_difference(wrist, tolerances):
+    """A load holds NaN for what is not given, and the draws differ by their seed alone."""
+    with pytest.raises(nf.InputError, match="`seed` is 0 there and 3 here"):
+        drawn(wrist, tolerances, seed=3)
+
+
+def test_what_is_kept_is_told_when_interrupted(wrist, tmp_path, monkeypatch, capsys):
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    Path("t.toml").write_text(TOLERANCES, encoding="utf-8")
+    monkeypatch.setattr("notchflex.pieces.run.stored_piece", interrupted)
+    assert run(["tolerance", "pacheco2021-a", "t.toml", "--folder", "h"]) == 130
+    assert "interrupted; finished pieces are kept" in capsys.readouterr().err

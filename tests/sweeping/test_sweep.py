@@ -367,3 +367,22 @@ def test_labels_of_a_picture_are_those_of_quantities(whole):
         r"angle of notch 2 $\theta_2$ [deg]",
         "row",
     ]
+
+
+def test_a_folder_that_is_no_path_is_refused():
+    with pytest.raises(nf.InputError, match="a folder of a sweep is needed; got 5") as caught:
+        nf.read_sweep(5)
+    assert caught.value.code is nf.ErrorCode.WRONG_TYPE
+
+
+def test_dots_alone_are_thinned(whole, monkeypatch):
+    found, marks = nf.read_sweep(whole), list[Any]()
+    monkeypatch.setattr("notchflex.plotting.results._BINS", 6)
+    for most in (found.rows, found.rows // 4):
+        monkeypatch.setattr("notchflex.plotting.results.MAX_ROWS", most)
+        picture = sweep_picture(found, "notch.depth", "total_angle_deg")
+        marks.append({mark.name: mark for mark in picture.cells[0].panel.items})
+    assert "drawn" in picture.title
+    alone, thinned = marks
+    np.testing.assert_array_equal(thinned["median"].points, alone["median"].points)
+    assert len(thinned["accepted"].points) < 0.5 * len(alone["accepted"].points)

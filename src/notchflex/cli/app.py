@@ -83,7 +83,7 @@ VERBS = {
     "follow": (
         "Find the tensions or strokes that bring the tip to one target after the other.",
         "notchflex simulate pacheco2021-a --tension 0.5:1:6,1:0.5:6 --csv loop.csv\n"
-        "    cut -d, -f15,17 loop.csv > targets.csv\n"
+        "    cut -d, -f16,18 loop.csv > targets.csv\n"
         "    notchflex follow pacheco2021-a targets.csv --plot follow.png\n"
         "    notchflex follow pacheco2021-a targets.csv --approach least --most-tension 2",
     ),
@@ -266,8 +266,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return code
     except InputError as problem:
         terminal.error(str(problem))
-    except KeyboardInterrupt:
-        terminal.error("interrupted; nothing more is written.")
+    except KeyboardInterrupt as problem:
+        terminal.error(f"interrupted; {str(problem) or 'nothing more is written'}.")
         return INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone
         let_go(sys.stdout)

@@ -426,7 +426,7 @@ class Work:
     """Who works on a long computation.
 
     Attributes:
-        workers: Work in so many processes; by default in one.
+        workers: Work in so many processes; by default in threads of one, one per core.
         scheduler: Work with those of a dask scheduler that see the same folder, such as
             tcp://10.0.0.1:8786 (`cluster`).
     """

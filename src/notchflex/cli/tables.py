@@ -19,7 +19,15 @@ if TYPE_CHECKING:
 
 NO_NUMBER = "–"
 
-FORMS = {"deg": ".2f", "%": ".2f", "mm": ".3f", "mm2": ".4f", "mm4": ".4e", "N": ".3f"}
+FORMS = {
+    "deg": ".2f",
+    "%": ".2f",
+    "mm": ".3f",
+    "mm2": ".4f",
+    "mm4": ".4e",
+    "N": ".3f",
+    "N/mm": ".4g",
+}
 """Rounding by unit."""
 
 _HEAD = 8

@@ -382,9 +382,9 @@ class MovingSolids:
 
 
 def _surface(solid: Manifold) -> tuple[Points, NDArray[np.int64]]:
-    """Return vertices and triangles of a solid."""
+    """Return vertices and triangles of a solid, copied: views would keep its mesh alive."""
     mesh = solid.to_mesh64()
-    return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64)
+    return np.array(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64)
 
 
 def stl_solid(subject: Subject, options: SolidOptions) -> Document:

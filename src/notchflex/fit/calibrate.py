@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from notchflex.fit.objective import FitObjective, LeastSquares, noise_left
 from notchflex.fit.residuals import Samples
 from notchflex.fit.search import FitProblem, Minimum, Progress, search
 from notchflex.pieces import PieceFolder
+from notchflex.support import short_repr
 
 # How often noise and constants are estimated from each other.
 _ROUNDS = 10
@@ -129,9 +130,11 @@ def _of_robots(
     data: dict[str, tuple[Measurements, ...]] = {}
     for label in robots:
         of_robot = measurements[label]
-        tables = (of_robot,) if isinstance(of_robot, Measurements) else tuple(of_robot)
+        tables = tuple(of_robot) if isinstance(of_robot, Iterable) else (of_robot,)
         if not tables or not all(isinstance(table, Measurements) for table in tables):  # pyright: ignore
-            raise InputError.NO_DATA(f"{label} needs one Measurements or more")
+            raise InputError.NO_DATA(
+                f"{label} needs one Measurements or more; got {short_repr(of_robot)}"
+            )
         for number, table in enumerate(tables):
             if table in tables[:number]:
                 raise InputError.CONFLICT(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.photographs.outline import PlanarRobot, axis_points
 from notchflex.photographs.reading import loads_of, read_photograph
-from notchflex.support import check_number
+from notchflex.support import check_is_path, check_is_robot, check_number
 
 Photographs = Sequence[str | os.PathLike[str]] | str | os.PathLike[str]
 Progress = Callable[[str, int, int], None]
@@ -78,7 +78,7 @@ def measure(
         >>> found.write_csv("measured.csv")  # doctest: +SKIP
     """
     names = names_of(photographs)
-    planar, ruler = PlanarRobot(robot), Ruler(scale, board)
+    planar, ruler = PlanarRobot(check_is_robot(robot)), Ruler(scale, board)
     uncertainty = checked_uncertainty(uncertainty_deg)
     columns_of_loads = loads_of(names, robot, loads, pattern, exif, columns)
     measured = tuple(
@@ -94,8 +94,12 @@ def names_of(photographs: Photographs) -> list[str]:
     Raises:
         InputError: There is none.
     """
-    is_single = isinstance(photographs, (str, os.PathLike))
-    names = [os.fspath(name) for name in ([photographs] if is_single else photographs)]
+    if isinstance(photographs, str) or not isinstance(photographs, Iterable):
+        photographs = [photographs]
+    names: list[str] = []
+    for name in photographs:
+        check_is_path(name, "a photograph")
+        names.append(os.fspath(name))
     if not names:
         raise InputError.NO_DATA("there is no photograph to measure; name one or more")
     return names

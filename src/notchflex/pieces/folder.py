@@ -21,7 +21,15 @@ import numpy as np
 from pydantic_core import to_jsonable_python
 
 from notchflex import InputError, __version__
-from notchflex.support import backend, check_folder, read_text, replacing, unwritable, write_text
+from notchflex.support import (
+    backend,
+    check_folder,
+    check_is_path,
+    read_text,
+    replacing,
+    unwritable,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -81,6 +89,7 @@ class Manifest:
         Raises:
             InputError: There is none of this kind and format.
         """
+        check_is_path(folder, f"a folder of a {kind}")
         file = Path(folder) / f"{kind}.json"
         if not file.exists():
             raise InputError.FILE_NOT_FOUND(
@@ -205,21 +214,21 @@ def open_folder(folder: str | os.PathLike[str], manifest: Manifest) -> None:
         there, here = _values(stored.document), _values(manifest.document)
         differing = (name for name in here | there if here.get(name) != there.get(name))
         name = next(differing, "format")
-        words = [json.dumps(of[name]) if name in of else "not given" for of in (there, here)]
+        words = [of.get(name, "not given") for of in (there, here)]
         raise InputError.CONFLICT(
             f"{folder} holds another {manifest.kind}: `{name}` is {words[0]} there and {words[1]} "
             "here; give what it was begun with, or take another folder."
         )
 
 
-def _values(document: Any, path: str = "") -> dict[str, Any]:
-    """Return the values of a document by their paths."""
+def _values(document: Any, path: str = "") -> dict[str, str]:
+    """Return the values of a document by their paths, as JSON: NaN is equal to NaN there."""
     if isinstance(document, list):
         parts = {f"{path}[{place}]": part for place, part in enumerate(document, start=1)}
     elif isinstance(document, Mapping):
         parts = {f"{path}.{key}".lstrip("."): part for key, part in document.items()}
     else:
-        return {path: document}
+        return {path: json.dumps(document)}
     return {
         name: value for key, part in parts.items() for name, value in _values(part, key).items()
     }

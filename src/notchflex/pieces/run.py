@@ -37,7 +37,7 @@ from notchflex.pieces.folder import (
     write_piece,
 )
 from notchflex.specification import whole
-from notchflex.support import need, on_cores, short_repr
+from notchflex.support import check_is_path, need, on_cores
 
 T = TypeVar("T")
 
@@ -46,6 +46,9 @@ Progress = Callable[[int, int, int, int], None]
 
 _Work = Callable[[int], tuple[int, int]]
 """Works out a piece; returns its number, and its rows without a result."""
+
+_KEPT = "finished pieces are kept; the same call goes on"
+"""What an interruption says."""
 
 _AHEAD = 2
 """Pieces that wait for each worker, so that none is idle."""
@@ -82,10 +85,7 @@ class PieceFolder:
 
     def __post_init__(self) -> None:
         """Check workers and scheduler."""
-        if not isinstance(self.directory, str | os.PathLike):  # pyright: ignore
-            raise InputError.WRONG_TYPE(
-                f"folder must be the path of a folder; got {short_repr(self.directory)}"
-            )
+        check_is_path(self.directory, "a folder")
         need("polars", "data", "pieces")
         if self.workers is not None and self.scheduler is not None:
             raise InputError.CONFLICT("workers and a scheduler exclude each other; give one.")
@@ -123,6 +123,7 @@ class PieceFolder:
         Raises:
             InputError: The folder belongs to another task, is being written by another process, or
                 takes no more files.
+            KeyboardInterrupt: It was interrupted; the message says what is kept.
         """
         manifest, folder = task.manifest, os.path.abspath(self.directory)
         check_target(self.directory, manifest.kind, "--folder")
@@ -136,16 +137,18 @@ class PieceFolder:
         total = sum(rows.values())
         # Products of matrices by several threads may have other last digits.
         with threadpool_limits(1), locked(self.directory, pieces):
-            stored = {piece: stored_piece(folder, manifest, piece) for piece in pieces}
-            left = [piece for piece, lost in stored.items() if lost is None]
-            before = done = total - sum(rows[piece] for piece in left)
-            lost = sum(filter(None, stored.values()))
             try:
+                stored = {piece: stored_piece(folder, manifest, piece) for piece in pieces}
+                left = [piece for piece, lost in stored.items() if lost is None]
+                before = done = total - sum(rows[piece] for piece in left)
+                lost = sum(filter(None, stored.values()))
                 with contextlib.closing(self._finished(task, folder, left, cores)) as finished:
                     for piece, lost_here in finished:
                         done, lost = done + rows[piece], lost + lost_here
                         if progress is not None:
                             progress(done, total, lost, before)
+            except KeyboardInterrupt:
+                raise KeyboardInterrupt(_KEPT) from None
             except InputError as problem:
                 if problem.code is not ErrorCode.FILE_UNWRITABLE:
                     raise

@@ -53,6 +53,8 @@ from notchflex.plotting.style import (
 from notchflex.support import AXES, QUANTITIES, REGISTERED, described_at, nearest
 
 if TYPE_CHECKING:
+    from polars import LazyFrame
+
     from notchflex.control import Following
     from notchflex.designing import Design, DesignFront, WishResult
     from notchflex.sensing import SensedForce
@@ -132,7 +134,7 @@ def batch_picture(
 
 
 MAX_ROWS = 2000
-"""Rows of a sweep that are drawn; of more, an even selection."""
+"""Rows of a sweep that are drawn as dots; of more, an even selection."""
 
 _BINS = 24
 _MIN_PER_BIN = 20
@@ -143,7 +145,7 @@ def sweep_picture(sweep: Sweep, x: str, y: str) -> Picture:
     """Describe one column of a sweep over another.
 
     Rows as points, rejected ones in another colour; where there are many, the median and the band
-    that holds 95 % of them, along x. Rows without a result lie on the axis of x.
+    that holds 95 % of all of them, along x. Rows without a result lie on the axis of x.
 
     Args:
         sweep: The sweep.
@@ -163,12 +165,16 @@ def sweep_picture(sweep: Sweep, x: str, y: str) -> Picture:
                 f'the sweep has no column "{name}"{nearest(name, columns)}; there are '
                 f"{', '.join(columns)}."
             )
+    across, upward = (polars.col(name).cast(polars.Float64) for name in (x, y))
+    numbers = across.alias("x"), upward.alias("y")
+    curves, title = _quantiles(frame.select(numbers)), f"{sweep.plan.name}: {sweep.rows} rows"
     if sweep.rows > MAX_ROWS and sweep.plan.output.rows:
         # Every k-th row would be a regular part of a grid or of a Sobol sequence.
         frame = frame.filter(polars.col("row").hash() % -(-sweep.rows // MAX_ROWS) == 0)
-    across, upward = (polars.col(name).cast(polars.Float64) for name in (x, y))
-    table = frame.select(polars.col("code").cast(str), across.alias("x"), upward.alias("y"))
-    code, *both = (column.to_numpy() for column in table.collect())
+    table = frame.select(polars.col("code").cast(str), *numbers).collect()
+    code, *both = (column.to_numpy() for column in table)
+    if len(table) < sweep.rows:
+        title += f", {len(table)} drawn"
     both = np.column_stack(both)
     placed, is_finite = np.isfinite(both[:, 0]), np.isfinite(both).all(axis=1)
     if not placed.any():
@@ -178,30 +184,42 @@ def sweep_picture(sweep: Sweep, x: str, y: str) -> Picture:
         for name, colour in (("accepted", BLUE), ("rejected", ORANGE))
         if len(points := both[is_finite & (code == name)])
     ]
-    items += _quantiles(both[is_finite])
+    items += curves
     if len(lost := both[placed & ~is_finite]):
         lost[:, 1] = both[is_finite, 1].min() if is_finite.any() else 0.0
         items.append(dots(lost, VERMILLION, 4.0, name="no result", marker="X"))
     panel = Panel(items, sweep_label(sweep, x), sweep_label(sweep, y))
-    title = f"{sweep.plan.name}: {sweep.rows} rows"
     return Picture(title, grid([panel], 1), column_width=5.4, row_height=4.2)
 
 
-def _quantiles(both: Array) -> list[Mark]:
+def _quantiles(rows: LazyFrame) -> list[Mark]:
     """Return the median and the band of 95 % in bins along x: one for each value if these are few.
 
     Otherwise as many rows are in each bin.
     """
-    if not len(both):
-        return []
-    edges = np.unique(np.quantile(both[:, 0], np.linspace(0.0, 1.0, _BINS + 1)))
-    place = np.searchsorted(edges, both[:, 0], side="right")
-    bins = [both[place == number] for number in range(1, len(edges) + 1)]
-    bins = [rows for rows in bins if len(rows) >= _MIN_PER_BIN]
+    import polars
+
+    x, y = polars.col("x"), polars.col("y")
+    rows = rows.filter(x.is_finite() & y.is_finite())
+    parts = np.linspace(0.0, 1.0, _BINS + 1).tolist()
+    ends = rows.select(x.quantile(part).alias(f"{part}") for part in parts).collect().row(0)
+    edges = polars.Series(sorted(set(ends) - {None}), dtype=polars.Float64)
+    bins = (
+        rows.group_by(polars.lit(edges).search_sorted(x, side="right").alias("bin"))
+        .agg(
+            x.median(),
+            y.quantile(0.025, "linear").alias("low"),
+            y.median(),
+            y.quantile(0.975, "linear").alias("high"),
+            polars.len().alias("count"),
+        )
+        .filter(polars.col("count") >= _MIN_PER_BIN)
+        .sort("bin")
+        .collect()
+    )
     if len(bins) < 3:
         return []
-    middle = np.array([np.median(rows[:, 0]) for rows in bins])
-    low, half, high = np.transpose([np.quantile(rows[:, 1], (0.025, 0.5, 0.975)) for rows in bins])
+    middle, low, half, high = (bins[name].to_numpy() for name in ("x", "low", "y", "high"))
     return [
         band(middle, low, high, BLUE, 0.15, name="95 % of rows", layer=3),
         line(middle, half, "black", name="median", layer=4),

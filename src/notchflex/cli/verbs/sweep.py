@@ -89,11 +89,7 @@ def sweep(
         def show(done: int, total: int, unsolved: int, _: int) -> None:
             progress(text, done, total, f"{unsolved} unsolved")
 
-        try:
-            swept = sweeping.sweep(plan, output, **vars(work), part=part or (1, 1), progress=show)
-        except KeyboardInterrupt:
-            terminal.note("finished pieces are kept; the same call goes on.")
-            raise
+        swept = sweeping.sweep(plan, output, **vars(work), part=part or (1, 1), progress=show)
     return _report(swept, outputs)
 
 

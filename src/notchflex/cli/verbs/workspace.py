@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -197,8 +198,6 @@ def _print(workspace: Workspace, document: dict[str, Any]) -> None:
         f"{100 * voxels['dexterity_mean']:.2g} % of directions in a voxel of "
         f"{voxels['edge_mm']:.3g} mm, up to {100 * voxels['dexterity_largest']:.2g} %"
     )
-    spreads = [{"": name.replace("_", " "), **document[name]} for name in _SPREADS]
-    tables.show(
-        [row for row in spreads if row["largest"] is not None],
-        forms=dict.fromkeys(spreads[0].keys() - {""}, ".4g"),
-    )
+    parts = [re.sub(r"^p(\d+)$", r"\1 %", part) for part in document[_SPREADS[0]]]
+    spreads = {name.replace("N_mm", "N/mm"): document[name].values() for name in _SPREADS}
+    tables.show({"states": parts, **spreads}, forms=dict.fromkeys(spreads, ".4g"))

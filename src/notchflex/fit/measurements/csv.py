@@ -21,6 +21,7 @@ from notchflex.support import (
     QUANTITIES,
     ExternalLoad,
     Table,
+    check_is_path,
     check_is_robot,
     check_pulls,
     no_tendon_column,
@@ -337,6 +338,7 @@ def read_measurements(
     """
     if measured not in ("ring", "edge"):
         raise InputError.UNKNOWN_NAME(f'measured is "ring" or "edge"; got {measured!r}')
+    check_is_path(source, "a CSV")
     reader = MeasurementReader(read_data_table(source, columns), check_is_robot(robot))
     table = reader.table
     reader.check_numbers()
