@@ -123,7 +123,7 @@ def table(
         result.add_column(
             "\n" * (deepest - head.count("\n")) + head,
             justify="right" if form else "left",
-            no_wrap=bool(form) or not any(" " in str(value) for value in values),
+            no_wrap=bool(form),
             overflow="fold",
             style="" if result.columns else colour,
         )

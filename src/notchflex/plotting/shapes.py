@@ -70,22 +70,32 @@ def shape_from_angles(
 
 
 def smooth(shape: RobotShape, pieces: int) -> RobotShape:
-    """Return a shape whose flexures have at least so many straight pieces."""
-    return replace(shape, flexures=tuple(_finer(part, pieces) for part in shape.flexures))
+    """Return a shape whose flexures have at least so many straight pieces, (n,).
 
-
-def _finer(flexure: FlexureShape, pieces: int) -> FlexureShape:
-    """Return a flexure with more sections; between two it is the arc of a constant twist."""
-    count = len(flexure.area)
-    parts = -(-pieces // (count - 1))
-    place = np.arange((count - 1) * parts + 1) / parts
+    Between two sections a flexure is the arc of a constant twist.
+    """
+    flexures = shape.flexures
+    counts = np.array([len(flexure.area) for flexure in flexures])
+    parts = -(-pieces // (counts - 1))
+    first, total = np.cumsum(counts) - counts, counts.sum()
+    places = [
+        start + np.arange((count - 1) * part + 1) / part
+        for start, count, part in zip(first, counts, parts, strict=True)
+    ]
+    place = np.concatenate(places)
+    rotation, position, *widths = (
+        np.concatenate([getattr(flexure, name) for flexure in flexures])
+        for name in ("rotation", "position", "spine", "near", "area")
+    )
+    poses = RigidTransform.from_components(position, Rotation.from_matrix(rotation))
     before = place.astype(int)
-    poses = RigidTransform.from_components(flexure.position, Rotation.from_matrix(flexure.rotation))
-    twist = (poses[before].inv() * poses[np.minimum(before + 1, count - 1)]).as_exp_coords()
+    twist = (poses[before].inv() * poses[np.minimum(before + 1, total - 1)]).as_exp_coords()
     line = poses[before] * RigidTransform.from_exp_coords((place - before)[:, None] * twist)
-    widths = flexure.spine, flexure.near, flexure.area
-    widths = (np.interp(place, np.arange(count), width) for width in widths)
-    return FlexureShape(line.rotation.as_matrix(), line.translation, *widths)
+    columns = [line.rotation.as_matrix(), line.translation]
+    columns += [np.interp(place, np.arange(total), width) for width in widths]
+    ends = np.cumsum([len(part) for part in places])[:-1]
+    rows = zip(*(np.split(column, ends) for column in columns), strict=True)
+    return replace(shape, flexures=tuple(FlexureShape(*row) for row in rows))
 
 
 def walls(robot: Robot, side_deg: float) -> list[tuple[float, float] | None]:

@@ -133,10 +133,11 @@ def _print(following: Following) -> None:
         ("stroke", "mm", following.stroke),
         ("tip", "mm", following.tip_position),
     ):
-        labels = "xyz" if name == "tip" else map(str, range(1, 1 + vectors.shape[1]))
+        count = vectors.shape[1]
+        labels = "_x _y _z" if name == "tip" else " ".join(f"_{n}" for n in range(1, 1 + count))
         columns |= {
-            f"{name}_{label}_{unit}": vector
-            for label, vector in zip(labels, vectors.T, strict=True)
+            f"{name}{label if count > 1 else ''}_{unit}": vector
+            for label, vector in zip(labels.split(), vectors.T, strict=True)
         }
     columns["angle_deg"] = following.path.total_angle[following.step] * DEGREES
     columns |= {name: getattr(following, name) for name in ("error_mm", "error_deg")}

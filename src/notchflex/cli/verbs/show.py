@@ -85,8 +85,6 @@ def show(
 
 def _print(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:
     """Print the parts of a robot, in what its notches differ, and how they close."""
-    from notchflex.analysis.closing_loads import named_values
-
     terminal.line(title, "bold")
     _, *parts, _ = repr(robot).splitlines()
     lines = [part for part in parts if part.split()[0] not in ("material", "friction")]
@@ -100,23 +98,7 @@ def _print(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:
             words.append(f"{key.replace('_', ' ')} {shown} {unit}".strip())
         lines.append(f"{name:10}{', '.join(words)}")
     terminal.show(*(tables.wrapped(line.strip(), " " * 10) for line in lines), "")
-    values = [named_values(notch) for notch in robot.notches]
-    kinds = {
-        row["kind"]: [other for other in values if other["kind"] == row["kind"]] for row in values
-    }
-    names = [
-        name
-        for same in kinds.values()
-        for name in same[0]
-        if len({notch[name] for notch in same}) > 1 or (name == "kind" and len(kinds) > 1)
-    ]
-    if differ := list(dict.fromkeys(names)):
-        equal: dict[tuple[Any, ...], list[str]] = {}
-        for number, row in enumerate(values, start=1):
-            equal.setdefault(tuple(map(row.get, differ)), []).append(str(number))
-        columns = dict(zip(differ, zip(*equal, strict=True), strict=True))
-        tables.show({"notches": [", ".join(numbers) for numbers in equal.values()]} | columns)
-        print()
+    _print_differences(robot)
     rows = [
         {
             **row,
@@ -147,6 +129,29 @@ def _print(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:
             )
         )
     )
+
+
+def _print_differences(robot: Robot) -> None:
+    """Print in what notches of one kind differ; equal notches share a row."""
+    from notchflex.analysis.closing_loads import named_values
+
+    values = [named_values(notch) for notch in robot.notches]
+    kinds = {
+        row["kind"]: [other for other in values if other["kind"] == row["kind"]] for row in values
+    }
+    names = [
+        name
+        for same in kinds.values()
+        for name in same[0]
+        if len({notch[name] for notch in same}) > 1 or (name == "kind" and len(kinds) > 1)
+    ]
+    if differ := list(dict.fromkeys(names)):
+        equal: dict[tuple[Any, ...], list[str]] = {}
+        for number, row in enumerate(values, start=1):
+            equal.setdefault(tuple(map(row.get, differ)), []).append(str(number))
+        columns = dict(zip(differ, zip(*equal, strict=True), strict=True))
+        tables.show({"notches": [", ".join(numbers) for numbers in equal.values()]} | columns)
+        print()
 
 
 _LEGEND = (

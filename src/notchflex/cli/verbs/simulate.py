@@ -86,7 +86,7 @@ def simulate(
     Args:
         tension: Tension at the base of a tendon [N], step by step. Values or `start:stop:count`
             ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. For one of several tendons
-            `1=SPEC`, given once for each; those without hang slack.
+            `1=SPEC`; those without hang slack.
         stroke: Tendon length drawn out at the base [mm], step by step; written as --tension.
         base_rotation: Turn the base by a rotation vector RX,RY,RZ [deg], for example `90,0,0`.
         uncertain: Carry the tolerances of the robot (its [tolerance] table, else assumed ones)
