@@ -478,21 +478,19 @@ class Calibration:
         if not self.is_likelihood:
             return self.by_pulls.covariance
         wider = np.ones(len(self.best.values))
-        if self.tells_no_noise:
-            return np.diag(np.inf * wider)
         wider[: len(self.names)] = self.by_pulls.wider
         return self.covariance_of_all * np.outer(wider, wider)
 
     @property
     def covariance_by_rows(self) -> Matrix:
         """Covariance of the constants if all rows were independent."""
-        if self.is_likelihood and self.tells_no_noise:
-            return np.diag(np.full(len(self.names), np.inf))
         return self._of_constants(self.covariance_of_all)
 
     @cached_property
     def covariance_of_all(self) -> Matrix:
-        """The same with what deviates from the drawing."""
+        """The same with what deviates from the drawing; infinite if the noise is unknown."""
+        if self.is_likelihood and self.tells_no_noise:
+            return np.diag(np.full(len(self.best.values), np.inf))
         if self.huber:
             contributions = self.reached.contributions
             factor = self.noise.counted / max(self.freedom, 1)

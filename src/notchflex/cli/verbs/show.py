@@ -89,8 +89,9 @@ def _print(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:
     _, *parts, _ = repr(robot).splitlines()
     lines = [part for part in parts if part.split()[0] not in ("material", "friction")]
     lines.append(f"length    {robot.geometry.length:g} mm")
+    parts_of_file = to_table(robot)
     for name in ("material", "friction"):  # with all values, the usual ones as well
-        values = to_table(robot)[name]
+        values = parts_of_file[name]
         words = [values.pop("kind")]
         for key, value in values.items():
             shown = f"{value:g}" if isinstance(value, float) else value
@@ -136,9 +137,9 @@ def _print_differences(robot: Robot) -> None:
     from notchflex.analysis.closing_loads import named_values
 
     values = [named_values(notch) for notch in robot.notches]
-    kinds = {
-        row["kind"]: [other for other in values if other["kind"] == row["kind"]] for row in values
-    }
+    kinds: dict[str, list[dict[str, Any]]] = {}
+    for row in values:
+        kinds.setdefault(row["kind"], []).append(row)
     names = [
         name
         for same in kinds.values()
