@@ -281,6 +281,22 @@ def tendons_in_plane(robot: Robot) -> bool:
 # The rings beside every notch, as notches with elastic ends need them.
 
 
+def _is_turned(direction_deg: float, other_deg: float) -> bool:
+    """Return whether two directions differ by more than the rounding of sums of angles."""
+    return abs((direction_deg - other_deg + 180.0) % 360.0 - 180.0) > 1e-6
+
+
+def tip_anchor(robot: Robot) -> Any:
+    """Return the mean radius of the tendons that end at the last notch, where it bends to; or 0."""
+    side, last = robot.notches[-1].direction_deg, robot.number_of_notches
+    radii = [
+        tendon.radius
+        for tendon in robot.tendon
+        if tendon.end_body in (None, last) and not _is_turned(tendon.direction_deg, side)
+    ]
+    return sum(radii) / max(len(radii), 1)
+
+
 def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     """Return the rings beside every notch; None for notches that do not depend on them."""
     # A rigid plate holds the base at its length before the first notch. The ring after the last
@@ -290,15 +306,16 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     if not any(notch.has_elastic_ends for notch in notches):
         return (None,) * len(notches)
     lengths = [plain_number(length) for length in body_lengths(robot.tube, notches)]
+    anchor = plain_number(tip_anchor(robot))
     # Ring i lies before notch i, and the last one behind all.
     boundaries: list[Any] = ["clamped", *["between"] * (len(notches) - 1), "free"]
     around = [notches[0], *notches, notches[-1]]
     shared: dict[tuple[Any, ...], Site] = {}  # where all around is of the same parts
 
     def side(ring: int, notch: Notch, other: Notch) -> Side:
-        apart = (notch.direction_deg - other.direction_deg + 180.0) % 360.0 - 180.0
-        # 1e-6 deg: rounding of sums of angles
-        return Side(boundaries[ring], lengths[ring], abs(apart) > 1e-6)
+        turned = _is_turned(notch.direction_deg, other.direction_deg)
+        is_last = ring == len(notches)
+        return Side(boundaries[ring], lengths[ring], turned, anchor if is_last else 0.0)
 
     def site(index: int) -> Site | None:
         before, notch, after = around[index : index + 3]

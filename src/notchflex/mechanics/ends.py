@@ -9,8 +9,9 @@ import numpy as np
 
 from notchflex._arrays import cached, plain_number, xp
 from notchflex.mechanics.cuts import SECTION_OF_CUT
+from notchflex.mechanics.flattening import FACTORS, distorted_by_rings, distortion, softening
 from notchflex.mechanics.ring import Side, WallSector, arc_of, end_compliance
-from notchflex.mechanics.section import Section, gauss_on
+from notchflex.mechanics.section import Section
 
 # Torsion of a notch whose ends restrain warping of its section, and its shear.
 #
@@ -38,62 +39,6 @@ def torsion_length(
     spring = 0.004 * diameter * (t / diameter) ** -1.98 * xp.exp(0.16 * (2.0 * a * r / diameter))
     warping = 2.0 / (rate * (1.0 / xp.tanh(0.5 * rate * height) + spring * rate))
     return height + t * (3.11 - 1.60 * a) - warping
-
-
-# Softening of a notch as it closes, by flattening of its curved spine.
-#
-# The moment at an angle θ is $M = K_0\theta/q^2$ with $q = 1 + \alpha\theta/2 + \beta\theta^2/2$.
-# β is Brazier's flattening of an arc with free edges, α the anticlastic one (odd in θ: closing
-# softens, opening stiffens) and what the ring imposes on the arc at the edges of the notch.
-#
-# With $b = \alpha/2$, $e = \beta/2$, $D = 4e - b^2$ the moment is the derivative of the potential
-#
-# $$U = K_0\Big[\frac2D - \frac{2 + b\theta}{Dq} - \frac bD\,(F(\theta) - F(0))\Big],\qquad
-# F = \frac2{\sqrt D}\arctan\frac{2e\theta + b}{\sqrt D},$$
-#
-# and the tangent stiffness $K_0(1 - b\theta - 3e\theta^2)/q^3$ is zero at the limit point, beyond
-# which a constant moment closes the notch at once.
-
-
-def edge_and_brazier(radius: float, sides: Sequence[Side]) -> tuple[float, float]:
-    """Compute the mean k of the two sides, and the factor c_b on Brazier's flattening."""
-    # Fitted between notches: what a ring imposes at the edge, k = k0 (1 - exp(-(c / (c1 r))²)), and
-    # a factor on Brazier. First and last notches of wrists are met by the same numbers (6 % to
-    # closing), one notch alone between two clamped rings, as test specimens are, by others.
-    is_specimen = sides[0].shares[1] * sides[1].shares[1] > 0.5
-    numbers = ((0.465, 0.207), (1.51, 1.69), (0.74, 0.97))
-    factor, decay, brazier = (plain_number(xp.where(is_specimen, *pair)) for pair in numbers)
-    imposed = [-factor * xp.expm1(-((side.length / (decay * radius)) ** 2)) for side in sides]
-    return 0.5 * (imposed[0] + imposed[1]), brazier
-
-
-def flattening_numbers(
-    outer: float,
-    inner: float,
-    cut: str,
-    depth: float,
-    poisson_ratio: float,
-    section: Section,
-) -> tuple[float, float, float]:
-    """Compute the parameters of flattening from the shape of the arc."""
-    radius, wall = 0.5 * (outer + inner), outer - inner
-    outer_angle = xp.arccos((depth - outer) / outer)
-    # An off-axis cut beyond the mean radius leaves no arc at mid-wall; `validity` says so.
-    a = outer_angle
-    if cut == "off-axis":
-        a = xp.arccos(xp.minimum((depth - outer) / radius, 1.0 - 1e-9))
-    angle, weights = gauss_on(0.0, a)
-    slope = xp.sin(a) / a
-    bent = (
-        0.5 * (xp.sin(a) ** 2 + xp.sin(angle) ** 2)
-        + slope * (xp.cos(a) - xp.cos(angle))
-        - slope * angle * xp.sin(angle)
-    )
-    first, second = bent @ weights, bent**2 @ weights
-    weak = section.second_moment_weak
-    phi = 2.0 * wall * radius**3 * xp.abs(first) / weak
-    brazier = 48.0 * (1.0 - poisson_ratio**2) * radius**7 * second / (wall * weak)
-    return outer_angle, phi, brazier
 
 
 # Shear of a notch with its ends: relative displacement of its two rings.
@@ -185,14 +130,30 @@ def notch_stiffness(
     for side in (proximal, distal):  # cut where the effects of the edge have died out
         longest = plain_number(reach_of(arc) * (1.0 + side.shares[0]))
         sides.append(side._replace(length=xp.minimum(side.length, longest)))
-    added = [end_compliance(outer_radius, inner_radius, arc, side, poisson_ratio) for side in sides]
-    weak, strong, axial, coupling = (sum(each) for each in zip(*added, strict=True))
+    distorted = distortion(arc, poisson_ratio)
+    factors = FACTORS[cut]
+    added = [
+        end_compliance(arc, side, poisson_ratio, distorted.loads, factors.relaxation)
+        for side in sides
+    ]
+    weak, strong, axial, coupling, *_ = map(sum, zip(*added, strict=True))
     length = height + weak
-    outer_angle, phi, brazier = flattening_numbers(
-        outer_radius, inner_radius, cut, depth, poisson_ratio, section
+    by_rings = distorted_by_rings(
+        distorted,
+        height,
+        xp.stack([ring.warped for ring in added]),
+        xp.stack([ring.yielding for ring in added]),
     )
-    edge, share = edge_and_brazier(arc.radius, sides)
-    imposed = 3.0 * poisson_ratio * height + edge * outer_angle**3 * arc.radius**2 / arc.wall
+    alpha, beta = softening(
+        arc,
+        distorted,
+        by_rings,
+        section.second_moment_weak,
+        height,
+        length,
+        poisson_ratio,
+        factors,
+    )
     shear, sway = shear_compliances(
         arc,
         outer_radius,
@@ -215,8 +176,8 @@ def notch_stiffness(
         shear_centre=plain_number(section.shear_centre) * moved_out,
         shear=shear,
         sway=sway,
-        alpha=plain_number(arc.radius * phi * imposed / length**2),
-        beta=plain_number(share * brazier * height / length**3),
+        alpha=plain_number(alpha),
+        beta=plain_number(beta),
         closing_factor=closing_factor,
         closed_ratio=plain_number(closed),
     )

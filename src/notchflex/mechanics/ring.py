@@ -26,7 +26,7 @@ from functools import cache
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from notchflex._arrays import cached, decide, is_traced, plain_number, xp
 from notchflex._values import read_only
@@ -48,11 +48,14 @@ class Side(NamedTuple):
         length: Uncut length c from the edge of the notch to the next notch, to the plate or to
             the free end, mm.
         turned: Whether the notch beyond the ring opens to another side of the tube.
+        anchor: Distance from the tube axis of the tendon that ends behind the notch, on the side to
+            which it bends, mm; 0 for none.
     """
 
     boundary: Literal["between", "clamped", "free"] | Array
     length: float
     turned: bool = False
+    anchor: float = 0.0
 
     @property
     def shares(self) -> Any:
@@ -170,8 +173,8 @@ _ROW, _COLUMN = np.indices((_EDGE, _EDGE))
 _SQUARE = np.minimum(_ROW, _COLUMN), np.abs(_ROW - _COLUMN)
 
 
-def _flexibility(by_power: Any, powers: Any, held: Any) -> Any:
-    """Solve for u by tension, u by moment and slope by moment, (3, harmonics)."""
+def _edge_stiffness(by_power: Any, powers: Any, held: Any) -> Any:
+    """Return the stiffness of what moves at the loaded edge, v, w, u and slope, (4, 4, harmonics)."""
     rows = xp.tensordot(by_power, powers, ((0,), (0,))) + _EMPTY
     window, shifted = rows[:_BAND], np.arange(1, _BAND)[:, None] + np.arange(_BAND)
     for following in range(_BAND, len(rows)):  # the first row of the window goes
@@ -184,17 +187,21 @@ def _flexibility(by_power: Any, powers: Any, held: Any) -> Any:
     stiffness = xp.einsum("pia,pibn->abn", edges, half)
     free = (1.0 - held[:, None]) * (1.0 - held[None])
     stiffness = free * stiffness + np.eye(len(held))[..., None] * held[None]
-    for _ in range(2 * _EDGE - 2):
+    for _ in range(_EDGE):
         factor = stiffness[:1, 1:] * (1.0 / stiffness[:1, :1])
         stiffness = stiffness[1:, 1:] - stiffness[1:, :1] * factor
-    (pulled, mixed), (_, turned) = stiffness
-    inverse = 1.0 / (pulled * turned - mixed * mixed)
-    return xp.stack([turned * inverse, -mixed * inverse, pulled * inverse])
+    return stiffness
 
 
 @cached(256)  # rings of one length are equal, however deep the notches beside them
-def edge_compliance(radius: float, wall: float, ring: Side, poisson_ratio: float) -> Array:
-    """Compute the compliance of an edge to its loads, for each harmonic."""
+def edge_compliance(
+    radius: float, wall: float, ring: Side, poisson_ratio: float
+) -> Float[Array, "harmonics 4 4"]:
+    """Compute the compliance of an edge to its loads, for each harmonic.
+
+    Loads are, per length of the edge, those around the tube and outward, the tension, which pulls
+    the edge toward the notch, and the moment of the wall; displacements are in their directions.
+    """
     # Rounding errors grow as a ring gets shorter; one of a micrometre is no part of a tube.
     length = xp.maximum(ring.length, 1e-3 * radius)
     ratio = radius / length
@@ -206,16 +213,16 @@ def edge_compliance(radius: float, wall: float, ring: Side, poisson_ratio: float
     energies, held = _energies(), xp.tensordot(ring.shares, _HELD, 1)
     by_power = (factors @ energies.reshape(len(factors), -1)).reshape(energies.shape[3:])
     if is_traced(by_power):  # compiled as a loop: soon, and small enough for the cache of code
-        flexibility = sys.modules["jax"].lax.map(
-            lambda of: _flexibility(by_power, of[0][:, None], of[1][:, None])[:, 0],
+        stiffness = sys.modules["jax"].lax.map(
+            lambda of: _edge_stiffness(by_power, of[0][:, None], of[1][:, None])[..., 0],
             (_POWERS.T, held.T),
         )
     else:
-        flexibility = _flexibility(by_power, _POWERS, held).T
+        stiffness = xp.moveaxis(_edge_stiffness(by_power, _POWERS, held), -1, 0)
     # Displacements are of order r² per N/mm over E t length; a slope along z has one length less.
     scale = (1.0 - poisson_ratio**2) * radius**2 / (wall * length)
-    units = xp.stack([scale, scale / length, scale / length**2])
-    return read_only((flexibility * units[None])[:, np.array([[0, 1], [1, 2]])])
+    units = xp.stack([1.0, 1.0, -1.0, -1.0 / length])
+    return read_only(xp.linalg.inv(stiffness) * scale * xp.outer(units, units))
 
 
 # End compliance: the compliance that the ring beside a notch adds to the notch.
@@ -251,14 +258,17 @@ def arc_of(outer: float, inner: float, section: Section) -> WallSector:
 class EndCompliance(NamedTuple):
     """Compliance that one ring adds to a notch."""
 
-    weak: float  # Length δ added to that of the bending of the notch, mm
-    strong: float  # Length added to that of the bending sideways, mm
-    axial: float  # Length added to that of the stretch of the centroid, mm
-    coupling: float  # b_c, mm²: I E times the stretch of the centroid per bending moment
+    weak: Array  # Length δ added to that of the bending of the notch, mm
+    strong: Array  # Length added to that of the bending sideways, mm
+    axial: Array  # Length added to that of the stretch of the centroid, mm
+    # b_c, mm²: I E times the stretch of the centroid per bending moment; less that of the tendon
+    coupling: Array
+    warped: Array  # Displacements of its edge by the moment of the notch along given loads
+    yielding: Array  # Its compliance to these loads
 
 
-def arc_harmonics(arc: WallSector) -> tuple[Array, Array, Array]:
-    """Expand the edge loads of the arc's stress in harmonics."""
+def arc_loads(arc: WallSector) -> tuple[Array, Array, Array]:
+    """Expand the edge loads of the arc's stress in harmonics, (harmonics, 4)."""
     r, t, a = arc.radius, arc.wall, arc.half_angle
     n = xp.arange(HARMONICS, dtype=float)
     # Integrals over |φ| < a of cos nφ, cos φ cos nφ, sin φ sin nφ.
@@ -271,7 +281,8 @@ def arc_harmonics(arc: WallSector) -> tuple[Array, Array, Array]:
         """Compute loads of the stress `constant` + (1 + ζ/r) `varying`, in harmonics of φ."""
         force = t * (constant + varying) + third / r**2 * varying
         moment = third / r * (constant + 2.0 * varying)
-        return xp.stack([force, -moment], axis=-1) / _NORM[:, None]
+        nought = xp.zeros_like(force)
+        return xp.stack([nought, nought, force, -moment], axis=-1) / EDGE_NORM[:, None]
 
     section = arc.section
     weak = loads(-plain_number(section.centroid) * even, r * cosine) / section.second_moment_weak
@@ -279,37 +290,62 @@ def arc_harmonics(arc: WallSector) -> tuple[Array, Array, Array]:
     return weak, strong, loads(even, 0.0 * even) / section.area
 
 
-_NORM = np.pi * xp.where(xp.arange(HARMONICS) == 0, 2.0, 1.0)
-_RELAXED = xp.where(xp.arange(HARMONICS) < 2, 1.0, 0.833)
+def anchor_loads(arc: WallSector, radius: Array | float) -> Array:
+    """Expand the pull of a tendon that ends at the edge, opposite the arc, in harmonics."""
+    n = np.arange(HARMONICS)
+    pull = (-1.0) ** n / (arc.radius * EDGE_NORM)
+    nought = 0.0 * pull
+    return xp.stack([nought, nought, pull, -(radius - arc.radius) * pull], axis=-1)
+
+
+EDGE_NORM = np.pi * np.where(np.arange(HARMONICS) == 0, 2.0, 1.0)
+"""Integrals of the squares of the harmonics around the tube."""
 
 
 def end_compliance(
-    outer: float,
-    inner: float,
     arc: WallSector,
     side: Side,
     poisson_ratio: float,
-    relaxation: Array = _RELAXED,
+    distorting: Array,
+    relaxation: float,
 ) -> EndCompliance:
-    """Compute the compliance of a ring beyond that of a tube as stiff as a beam of its length."""
+    """Compute the compliance of a ring, whose beam bends and stretches with it.
+
+    Args:
+        arc: The arc that the notch leaves.
+        side: The ring.
+        poisson_ratio: Poisson's ratio.
+        distorting: Loads by which the arc distorts the edge, (k, harmonics, 4).
+        relaxation: Factor on the energy of the stress in the harmonics from n = 2.
+    """
     ring_length = plain_number((1.0 - 0.5 * side.shares[0]) * side.length)
     if decide(ring_length == 0.0):
-        return EndCompliance(0.0, 0.0, 0.0, 0.0)
-    weak, strong, axial = arc_harmonics(arc)
-    ring = Side(side.boundary, ring_length)
-    flexibility = edge_compliance(arc.radius, arc.wall, ring, poisson_ratio)
-    weights = _NORM * relaxation
+        k = len(distorting)
+        return EndCompliance(0.0, 0.0, 0.0, 0.0, np.zeros(k), np.zeros((k, k)))
+    weak, strong, axial = arc_loads(arc)
+    flexibility = edge_compliance(
+        arc.radius, arc.wall, Side(side.boundary, ring_length), poisson_ratio
+    )
+    section, bound = arc.section, arc.radius * EDGE_NORM
 
-    def energy(first: Array, second: Array) -> float:
-        return arc.radius * xp.einsum("n,ni,nij,nj->", weights, first, flexibility, second)
+    def energy(first: Array, second: Array, weights: Array) -> Array:
+        return xp.einsum("n,...ni,nij,knj->...k", weights, first, flexibility, second)
 
-    # As a beam, the ring has the compliances c/(E I_tube) in bending and c/(E A_tube) in tension.
-    bends = ring_length / (0.25 * np.pi * (outer**4 - inner**4))
-    stretches = ring_length / (np.pi * (outer**2 - inner**2))
-    section, offset = arc.section, arc.section.centroid
+    # A tendon that ends there pulls the edge along: in the bending of the notch its pull counts as
+    # a tension of the arc does.
+    anchored = 1.0 * (side.anchor > 0.0)
+    pull = anchored * anchor_loads(arc, side.anchor)
+    relaxed = bound * np.where(np.arange(HARMONICS) < 2, 1.0, relaxation)
+    by_weak = energy(weak, xp.stack([weak, axial]), relaxed) - energy(
+        weak, xp.stack([0.0 * pull, pull]), bound
+    )
+    arm = section.centroid + side.anchor
+    loads = weak + (pull - anchored * axial) / xp.where(anchored > 0.0, arm, 1.0)
     return EndCompliance(
-        weak=plain_number(section.second_moment_weak * (energy(weak, weak) - bends)),
-        strong=plain_number(section.second_moment_strong * (energy(strong, strong) - bends)),
-        axial=plain_number(section.area * (energy(axial, axial) - stretches - bends * offset**2)),
-        coupling=plain_number(section.second_moment_weak * (energy(weak, axial) - bends * offset)),
+        weak=section.second_moment_weak * by_weak[0],
+        strong=section.second_moment_strong * energy(strong, strong[None], relaxed)[0],
+        axial=section.area * energy(axial, axial[None], relaxed)[0],
+        coupling=section.second_moment_weak * by_weak[1],
+        warped=energy(loads, distorting, bound),
+        yielding=energy(distorting, distorting, bound),
     )

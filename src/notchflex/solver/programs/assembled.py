@@ -19,7 +19,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._arrays import Decisions
 from notchflex._jax import jax, jnp
-from notchflex.mechanics.chain import Chain, assemble, body_lengths, flexure, sites_of
+from notchflex.mechanics.chain import Chain, assemble, body_lengths, flexure, sites_of, tip_anchor
 from notchflex.mechanics.flexure import Site
 from notchflex.mechanics.ring import Side
 from notchflex.robot import Robot
@@ -58,7 +58,7 @@ class _NotchForm(NamedTuple):
 def _flexures(numbers: Float[Array, " numbers"], form: _NotchForm) -> dict[str, Array]:
     """Build the flexures of a notch, one for each site."""
     # The numbers are those of the tube and the notch; then of each site lengths and boundaries of
-    # the rings, and Poisson's ratio.
+    # the rings, Poisson's ratio, and the radius of a tendon that ends there.
     of_parts, of_sites = jnp.split(numbers, [len(form.parts.places)])
     tube, notch = form.parts.with_numbers(of_parts)
 
@@ -68,14 +68,12 @@ def _flexures(numbers: Float[Array, " numbers"], form: _NotchForm) -> dict[str, 
         return form.structure.pack(form.structure.form.pack(tree)), _all(decisions)
 
     def built_at(rings: Any) -> tuple[Array, Array]:
-        proximal, distal = (
-            Side(shares, length)
-            for shares, length in zip(rings[2:8].reshape(2, 3), rings[:2], strict=True)
-        )
+        proximal = Side(rings[2:5], rings[0])
+        distal = Side(rings[5:8], rings[1], anchor=rings[9])
         return built(Site(proximal, distal, rings[8]))
 
     if form.sites:  # compiled as a loop, before which is done what sites share
-        packed, alike = jax.lax.map(built_at, of_sites.reshape(form.sites, 9))
+        packed, alike = jax.lax.map(built_at, of_sites.reshape(form.sites, 10))
     else:
         packed, alike = built(None)
     return {"flexures": packed.ravel(), "alike": alike.all()}
@@ -455,13 +453,15 @@ class AssembledRobots:
     def _numbers_of(self, numbers: np.ndarray, notches: _Notches) -> np.ndarray:
         """Return the numbers of every notch and its rings, robots and notches as leading axes."""
         of_parts = numbers[:, notches.columns]
-        rings = np.zeros((len(numbers), *notches.first.shape, 9), of_parts.dtype)
+        rings = np.zeros((len(numbers), *notches.first.shape, 10), of_parts.dtype)
         if notches.form.sites:
             robot = robot_of(self.form.with_numbers(numbers.T))
             lengths = np.asarray(body_lengths(robot.tube, robot.notches)).T
             rings[..., :2] = lengths[..., notches.first[..., None] + np.arange(2)]
             rings[..., 2:8] = notches.boundaries
             rings[..., 8] = np.reshape(robot.material.poisson_ratio, (-1, 1, 1))
+            is_last = notches.boundaries[:, 5::6]
+            rings[..., 9] = is_last * np.reshape(tip_anchor(robot), (-1, 1, 1))
         return np.concatenate([of_parts, rings.reshape(*of_parts.shape[:2], -1)], axis=-1)
 
 
