@@ -10,70 +10,124 @@ import numpy as np
 from notchflex._arrays import cached, plain_number, xp
 from notchflex.mechanics.cuts import SECTION_OF_CUT
 from notchflex.mechanics.flattening import FACTORS, distorted_by_rings, distortion, softening
-from notchflex.mechanics.ring import Side, WallSector, arc_of, end_compliance
-from notchflex.mechanics.section import Section
+from notchflex.mechanics.ring import (
+    HARMONICS,
+    Side,
+    WallSector,
+    arc_of,
+    edge_compliance,
+    end_compliance,
+)
+from notchflex.mechanics.section import Section, gauss_on
 
-# Torsion of a notch whose ends restrain warping of its section, and its shear.
+# Torsion of a notch whose ends restrain warping of its section.
 #
-# Vlasov's theory of thin-walled bars with an elastic spring for the warping at either end. The
-# twist of a torque T is $T\ell/(GJ)$ with
+# Vlasov's theory of thin-walled bars: of the torque T, $GJ\theta'$ is Saint-Venant's and B' that of
+# the bimoment $B = B_h\sinh kz/\sinh(kh/2)$, with $k^2 = GJ/EC_w$. On the edge of the ring, a
+# cylindrical shell, B acts as a membrane force in proportion to the sectorial area ω and as a
+# moment of the wall; B' as a shear flow and a radial force, whose harmonics follow from those by
+# equilibrium; $GJ\theta'$ as an even shear flow $1/(2ar^2)$ with opposite radial forces
+# $1/(2ar)$ at the corners of the arc. The energy of the arc and of both rings is least for one
+# $B_h$, and the twist is $T\ell/(GJ)$ with
 #
-# $$\ell = h + t\,(3.11 - 1.60\,a) - \frac{2}{k\,(\coth(kh/2) + \lambda_w k)},\qquad
-# k = \sqrt{GJ/EC_w},$$
+# $$\ell = \frac{1}{1 + k_a a^3 r\sqrt{r/t}/h}
+# \Big[h + e_{TT} - \frac{(2 - e_{TB})^2}{2\kappa + e_{BB}}\Big] + k_t t,\qquad
+# \kappa = k\coth(kh/2),$$
 #
-# the second term for what the arc's shear does in the rings, the third for the warping. The two
-# numbers and the spring λ_w were fitted to cells of chains of equal notches.
+# where the e are GJ times the work in the rings by the loads of T = 1 and of $B_h$ = 1. A prescribed
+# stress makes the rings too compliant; it relaxes as in bending, and more so in wide and short
+# arcs: $k_a$ and $k_t$ were fitted to cells of chains of equal notches.
 
 
 def torsion_length(
-    arc: WallSector, outer: float, height: float, poisson_ratio: float, section: Section
+    arc: WallSector,
+    height: float,
+    poisson_ratio: float,
+    section: Section,
+    sides: Sequence[Side],
+    relaxation: float,
 ) -> float:
     """Compute the effective length ℓ in free torsion of the notch with its ends, mm."""
-    r, t, a, diameter = arc.radius, arc.wall, arc.half_angle, 2.0 * outer
+    r, t, a, n = arc.radius, arc.wall, arc.half_angle, np.arange(1.0, HARMONICS)
     sine, cosine = xp.sin(a), xp.cos(a)
-    line = a**3 - 6.0 * (sine - a * cosine) ** 2 / (a - sine * cosine)
+    pole = 2.0 * r * (sine - a * cosine) / (a - sine * cosine)
     # C_w about the shear centre: of the middle line and of the wall, mm⁶.
+    line = a**3 - 6.0 * (sine - a * cosine) ** 2 / (a - sine * cosine)
     warping_constant = 2.0 / 3.0 * t * r**5 * line + (2.0 * a * r * t) ** 3 / 144.0
-    shear_over_young = 0.5 / (1.0 + poisson_ratio)
-    rate = xp.sqrt(shear_over_young * section.torsion_constant / warping_constant)
-    spring = 0.004 * diameter * (t / diameter) ** -1.98 * xp.exp(0.16 * (2.0 * a * r / diameter))
-    warping = 2.0 / (rate * (1.0 / xp.tanh(0.5 * rate * height) + spring * rate))
-    return height + t * (3.11 - 1.60 * a) - warping
+    rigidity = 0.5 / (1.0 + poisson_ratio) * plain_number(section.torsion_constant)
+    rate = xp.sqrt(rigidity / warping_constant)
+    growth = rate / xp.tanh(0.5 * rate * height)
+    # Harmonics of sin φ and φ on the arc.
+    sideways = a * (xp.sinc((n - 1.0) * (a / np.pi)) - xp.sinc((n + 1.0) * (a / np.pi)))
+    turned = 2.0 * (xp.sin(n * a) / n - a * xp.cos(n * a)) / n
+    membrane = r * t * (r * turned - pole * sideways) / (np.pi * warping_constant)
+    bent = t**3 / 12.0 * pole * sideways / (np.pi * warping_constant)
+    corners = -xp.sin(n * a) / (np.pi * a * r**2)
+    through = xp.stack([corners / n, corners, 0.0 * n, 0.0 * n], -1)
+    warped = -xp.stack([growth * r / n * membrane, growth * bent, membrane, bent], -1)
+    loads = xp.stack([through, relaxation**0.5 * warped - growth * through])
+    energy = 0.0
+    for side in sides:
+        ring = Side(side.boundary, side.own_length)
+        flexibility = edge_compliance(r, t, ring, poisson_ratio, passing=True)[1:]
+        energy = energy + xp.einsum("ani,nij,bnj->ab", loads, flexibility, loads)
+    (torque, mixed), (_, warping) = np.pi * r * rigidity * energy
+    length = height + torque - (2.0 - mixed) ** 2 / (2.0 * growth + warping)
+    return length / (1.0 + 0.048 * a**3 * r * xp.sqrt(r / t) / height) + 0.365 * t
 
 
 # Shear of a notch with its ends: relative displacement of its two rings.
 #
 # A force across the tube, through the middle of the notch and its centre of twist, bends the arc to
-# an S and distorts the rings. Its compliance times Young's modulus is
+# an S, shears it, and distorts the rings. Its compliance times Young's modulus is
 #
-# $$E\,C = \frac{\ell^3}{12\,I} +
-# \frac{K}{D}\left(\frac{t}{D}\right)^{p}\left(\frac{b}{D}\right)^{q}
-# \left(\frac{\ell}{D}\right)^{m}\left(\frac{c}{D}\right)^{n}$$
+# $$E\,C = \frac{h^3}{12\,I} + \frac{\delta\,(h + \psi)^2}{4\,I} + s\,(h + \chi)$$
 #
-# with the length ℓ of the bending about the axis that the force bends it about, ends included, the
-# wall t, the width b of the arc, the uncut length c and the outer diameter D. The five numbers of
-# each direction were fitted to cells of chains of equal notches.
+# with the length δ that the ends add to the bending about the axis that the force bends it about,
+# and the compliance s of the arc's shear, by equilibrium with the stress of bending. The ends
+# yield to bending not at the edge but ψ/2 inside the ring, and to shear as χ more of the arc. Both
+# grow with the uncut length c; in radii r, walls t and half angles a of the arc, and the length
+# $r\sqrt{r/t}$ over which an ovalised ring recovers, they were fitted to cells of chains of equal
+# notches.
 
 
 def shear_compliances(
     arc: WallSector,
-    outer: float,
-    lengths: tuple[float, float],
+    height: float,
+    added: tuple[float, float],
     second_moments: tuple[float, float],
+    poisson_ratio: float,
     sides: Sequence[Side],
 ) -> tuple[float, float]:
     """Compute the compliance of the two directions across the tube, times E, 1/mm."""
-    diameter = 2.0 * outer
-    wall, width = arc.wall / diameter, 2.0 * arc.half_angle * arc.radius / diameter
+    r, t, a, section = arc.radius, arc.wall, arc.half_angle, arc.section
+    angle, weights = gauss_on(0.0, a)
+    sine, cosine, centroid = xp.sin(angle), xp.cos(angle), plain_number(section.centroid)
+    # Flow of the shear stress round the tube and across its wall, times second moment over wall.
+    curl, plate = r**2 + t**2 / 12.0, t**2 / 12.0
+    flows = (
+        (curl * sine - r * centroid * angle, plate * (2.0 * cosine - centroid / r)),
+        (curl * (cosine - xp.cos(a)), plate * 2.0 * sine),
+    )
+    uncut, reach = xp.stack([1.0 * side.length for side in sides]), r * xp.sqrt(r / t)
+    part, deep = uncut / reach, 1.032 * xp.sqrt(r * t)
+    recovered = 1.0 - xp.exp(-part / 1.478)
+    more = (1.0 + 0.655 * part) / (1.0 + 0.328 * part**2)
+    ends = (
+        (deep * uncut / xp.hypot(deep, uncut), 0.195 * xp.sqrt(a * r / t) * uncut * more),
+        (0.45 * r * (r / t) ** 0.75 * xp.sqrt(a) * recovered, 0.427 * reach / a * recovered),
+    )
+    moments = section.second_moment_weak, section.second_moment_strong
 
-    def compliance(of: int, factor: float, p: float, q: float, m: float, n: float) -> float:
-        rings = sum((side.length / diameter) ** n for side in sides) / len(sides)
-        distorted = factor * (wall**p * width**q * rings) * (lengths[of] / diameter) ** m
-        bent = lengths[of] ** 3 / (12.0 * second_moments[of])
-        return plain_number(bent + distorted / diameter)
+    def compliance(of: int) -> float:
+        (along, across), (inside, further) = flows[of], map(xp.mean, ends[of])
+        # The shear across a wall is a parabola: 6/5 of the energy of an even one.
+        work = (along**2 + 1.2 * across**2) @ weights / moments[of] ** 2
+        sheared = 4.0 * (1.0 + poisson_ratio) * r * t * work * (height + further)
+        bent = height**3 / 12.0 + 0.25 * added[of] * (height + inside) ** 2
+        return plain_number(bent / second_moments[of] + sheared)
 
-    in_plane = compliance(0, 1.37, -1.80, -2.10, 1.00, 0.30)
-    return in_plane, compliance(1, 2.35, -1.17, -0.84, 1.31, 0.06)
+    return compliance(0), compliance(1)
 
 
 class NotchStiffness(NamedTuple):
@@ -154,11 +208,20 @@ def notch_stiffness(
         poisson_ratio,
         factors,
     )
+    # In shear the tube's own bending is that of its beam, which the chain does without.
+    bends = sum(side.own_length for side in sides) / (
+        0.25 * np.pi * (outer_radius**4 - inner_radius**4)
+    )
+    moments = (
+        plain_number(section.second_moment_weak),
+        plain_number(section.second_moment_strong),
+    )
     shear, sway = shear_compliances(
         arc,
-        outer_radius,
-        (length, height + strong),
-        (plain_number(section.second_moment_weak), plain_number(section.second_moment_strong)),
+        height,
+        (weak - moments[0] * bends, strong - moments[1] * bends),
+        moments,
+        poisson_ratio,
         sides,
     )
     # Finite elements with contact of one tube (OD 1.62, ID 1.40, depth 1.4, height 0.8 mm): angle
@@ -166,13 +229,17 @@ def notch_stiffness(
     closing_factor = {"on-axis": 1.0248, "off-axis": 1.0203}[cut]
     closed = 0.354 * arc.wall * arc.radius**2 * length / section.second_moment_weak
     width = 2.0 * arc.half_angle * arc.radius
-    moved_out = 1.0 + 0.027 * width / (height + 0.72 * width)  # by the ends of short notches
+    # Fitted: the centre of twist moves out, where the notch is short between long rings.
+    between = 0.5 * (sides[0].length + sides[1].length)
+    moved_out = 1.0 + 0.027 * between / (height + 0.33 * width)
     return NotchStiffness(
         weak=plain_number(length),
         strong=plain_number(height + strong),
         axial=plain_number(height + axial),
         coupling=plain_number(coupling),
-        torsion=plain_number(torsion_length(arc, outer_radius, height, poisson_ratio, section)),
+        torsion=plain_number(
+            torsion_length(arc, height, poisson_ratio, section, sides, factors.relaxation)
+        ),
         shear_centre=plain_number(section.shear_centre) * moved_out,
         shear=shear,
         sway=sway,

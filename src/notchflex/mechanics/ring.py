@@ -17,6 +17,9 @@ with the six nearest only: each half is a band. It is eliminated from the highes
 the polynomials that move the edges, four in each half. A dense solution agrees to 1e-7, and in the
 lengths that a ring adds to a notch to 1e-8 (tests/mechanics/ends/test_ring_band.py); thin walls
 and short free rings are the worst.
+
+Between two notches a ring is loaded alike from both sides, in bending and tension, or its loads
+pass through it, in torsion: then the middle of the ring warps, but keeps its place.
 """
 
 from __future__ import annotations
@@ -63,6 +66,11 @@ class Side(NamedTuple):
         if isinstance(self.boundary, str):
             return np.array([self.boundary == name for name in BOUNDARIES], float)
         return self.boundary
+
+    @property
+    def own_length(self) -> float:
+        """Length that belongs to the notch: between two notches a half, mm."""
+        return plain_number((1.0 - 0.5 * self.shares[0]) * self.length)
 
 
 HARMONICS = 41  # n = 0 ... 40
@@ -154,12 +162,14 @@ def _edges() -> np.ndarray:
     return np.linalg.inv(moved).reshape(2, _EDGE, 2 * _EDGE)
 
 
-def _held(boundary: str) -> np.ndarray:
+def _held(boundary: str, passing: bool) -> np.ndarray:
     """Return what is held at the edges, in the order of `_edges`, (2 _EDGE, harmonics)."""
     held = np.zeros((2 * _EDGE, HARMONICS))
     held[[1, 4], 0] = 1.0  # no torsion
     if boundary == "clamped":
         held[:_EDGE] = 1.0
+    elif boundary == "between" and passing:
+        held[[1, 2]] = held[0, :2] = 1.0
     elif boundary == "between":
         held[[0, 3]] = held[1, 1] = 1.0
     else:  # free, but for the motions of a rigid ring
@@ -168,7 +178,7 @@ def _held(boundary: str) -> np.ndarray:
 
 
 _POWERS = np.arange(HARMONICS, dtype=float) ** np.arange(5.0)[:, None]
-_HELD = np.array([_held(boundary) for boundary in BOUNDARIES])
+_HELD = np.array([[_held(boundary, of) for boundary in BOUNDARIES] for of in (False, True)])
 _ROW, _COLUMN = np.indices((_EDGE, _EDGE))
 _SQUARE = np.minimum(_ROW, _COLUMN), np.abs(_ROW - _COLUMN)
 
@@ -195,12 +205,13 @@ def _edge_stiffness(by_power: Any, powers: Any, held: Any) -> Any:
 
 @cached(256)  # rings of one length are equal, however deep the notches beside them
 def edge_compliance(
-    radius: float, wall: float, ring: Side, poisson_ratio: float
+    radius: float, wall: float, ring: Side, poisson_ratio: float, passing: bool = False
 ) -> Float[Array, "harmonics 4 4"]:
     """Compute the compliance of an edge to its loads, for each harmonic.
 
     Loads are, per length of the edge, those around the tube and outward, the tension, which pulls
     the edge toward the notch, and the moment of the wall; displacements are in their directions.
+    Between two notches they pass through the ring, or act alike from both sides.
     """
     # Rounding errors grow as a ring gets shorter; one of a micrometre is no part of a tube.
     length = xp.maximum(ring.length, 1e-3 * radius)
@@ -210,7 +221,7 @@ def edge_compliance(
     material = xp.stack([1.0, 1.0 * poisson_ratio])
     slopes = xp.stack([1.0, ratio, ratio**2, ratio**3, ratio**4])
     factors = xp.einsum("a,b,c->abc", parts, material, slopes).ravel()
-    energies, held = _energies(), xp.tensordot(ring.shares, _HELD, 1)
+    energies, held = _energies(), xp.tensordot(ring.shares, _HELD[int(passing)], 1)
     by_power = (factors @ energies.reshape(len(factors), -1)).reshape(energies.shape[3:])
     if is_traced(by_power):  # compiled as a loop: soon, and small enough for the cache of code
         stiffness = sys.modules["jax"].lax.map(
@@ -318,14 +329,12 @@ def end_compliance(
         distorting: Loads by which the arc distorts the edge, (k, harmonics, 4).
         relaxation: Factor on the energy of the stress in the harmonics from n = 2.
     """
-    ring_length = plain_number((1.0 - 0.5 * side.shares[0]) * side.length)
-    if decide(ring_length == 0.0):
+    if decide(side.own_length == 0.0):
         k = len(distorting)
         return EndCompliance(0.0, 0.0, 0.0, 0.0, np.zeros(k), np.zeros((k, k)))
     weak, strong, axial = arc_loads(arc)
-    flexibility = edge_compliance(
-        arc.radius, arc.wall, Side(side.boundary, ring_length), poisson_ratio
-    )
+    ring = Side(side.boundary, side.own_length)
+    flexibility = edge_compliance(arc.radius, arc.wall, ring, poisson_ratio)
     section, bound = arc.section, arc.radius * EDGE_NORM
 
     def energy(first: Array, second: Array, weights: Array) -> Array:
