@@ -69,7 +69,7 @@ def torsion_length(
     energy = 0.0
     for side in sides:
         ring = Side(side.boundary, side.own_length)
-        flexibility = edge_compliance(r, t, ring, poisson_ratio, passing=True)[1:]
+        flexibility = edge_compliance(r, t, ring, poisson_ratio, True)[1:]
         energy = energy + xp.einsum("ani,nij,bnj->ab", loads, flexibility, loads)
     (torque, mixed), (_, warping) = np.pi * r * rigidity * energy
     length = height + torque - (2.0 - mixed) ** 2 / (2.0 * growth + warping)
