@@ -103,7 +103,7 @@ def _ends(
         torsion=stiffness.torsion / height - 1.0,
         odd=0.5 * stiffness.alpha * height,
         even=0.5 * stiffness.beta * height**2,
-        material_share=0.25,  # of finite elements beyond the elastic limit
+        material_share=0.1,  # of finite elements beyond the elastic limit
         sway=sway,
         push=push,
     )
