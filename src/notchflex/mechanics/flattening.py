@@ -25,8 +25,8 @@ $$\alpha = 3 c_a\frac{c_\nu\nu r\phi h - c_r S\int V_r\,dz}{\ell^2},\quad
 \phi = \frac{2 t r^3 |J_1|}I,\qquad
 \beta = c_b a^p\Bigl(\frac hr\Bigr)^m\frac{48(1-\nu^2) r^7 J_2}{tI}\frac h{\ell^3}$$
 
-with the distortion $V_r$ by the rings per unit of moment: a notch closes softer and opens stiffer. The
-factors stand for what one mode of distortion leaves out; they would be 1, and p and m 0.
+with the distortion $V_r$ by the rings per unit of moment: a notch closes softer and opens stiffer.
+The factors stand for what one mode of distortion leaves out; they would be 1, and p and m 0.
 """
 
 from __future__ import annotations
@@ -53,6 +53,7 @@ FACTORS = {"on-axis": FittedFactors(0.806, 0.788), "off-axis": FittedFactors(0.8
 _POISSON, _RINGS = 0.611, 2.634  # c_nu, c_r
 _BRAZIER, _WIDTH, _HEIGHT = 0.521, -1.056, 0.815  # c_b, p, m
 
+
 class Distortion(NamedTuple):
     """How the section of an arc distorts; over Young's modulus.
 
@@ -77,11 +78,7 @@ def distortion(arc: WallSector, poisson_ratio: float) -> Distortion:
     r, t, a = arc.radius, arc.wall, arc.half_angle
     angle, weights = gauss_on(0.0, a, 24)
     slope, sine, cosine = xp.sin(a) / a, xp.sin(angle), xp.cos(angle)
-    bent = (
-        0.5 * (xp.sin(a) ** 2 + sine**2)
-        + slope * (xp.cos(a) - cosine)
-        - slope * angle * sine
-    )
+    bent = 0.5 * (xp.sin(a) ** 2 + sine**2) + slope * (xp.cos(a) - cosine) - slope * angle * sine
     # The solution u of u'''' + u'' = m, its integral, and what moves the section as a whole.
     even = 0.5 * xp.sin(a) ** 2 + slope * xp.cos(a) + 0.25
     along = (

@@ -14,7 +14,7 @@ The system is solved in few operations, so that it can be traced and differentia
 middle of a ring, u even with v and w odd shares no energy with the reverse. Integrals of Legendre's
 polynomials, u and v once and w twice, are nil at both edges and, in a suitable order, share energy
 with the six nearest only: each half is a band. It is eliminated from the highest degree; left are
-the polynomials that move the edges, four in each half. A dense solution agrees to 1e-7, and in the
+the polynomials that move the edges, four in each half. A dense solution agrees to 3e-7, and in the
 lengths that a ring adds to a notch to 1e-8 (tests/mechanics/ends/test_ring_band.py); thin walls
 and short free rings are the worst.
 
@@ -184,7 +184,7 @@ _SQUARE = np.minimum(_ROW, _COLUMN), np.abs(_ROW - _COLUMN)
 
 
 def _edge_stiffness(by_power: Any, powers: Any, held: Any) -> Any:
-    """Return the stiffness of what moves at the loaded edge, v, w, u and slope, (4, 4, harmonics)."""
+    """Return the stiffness of v, w, u and slope at the loaded edge, (4, 4, harmonics)."""
     rows = xp.tensordot(by_power, powers, ((0,), (0,))) + _EMPTY
     window, shifted = rows[:_BAND], np.arange(1, _BAND)[:, None] + np.arange(_BAND)
     for following in range(_BAND, len(rows)):  # the first row of the window goes

@@ -12,6 +12,7 @@ from notchflex._arrays import Decisions, xp
 from notchflex.mechanics import ring
 from notchflex.mechanics import ring as edge_loads
 from notchflex.mechanics.cuts import annular_sector
+from notchflex.mechanics.flattening import distortion
 from notchflex.mechanics.ring import Side
 
 BOUNDARIES = ("between", "clamped", "free")
@@ -37,7 +38,7 @@ def dense(radius, wall, side, nu):
 
     All is for radius 1; units follow from those of displacement, slope and load.
     """
-    boundary, length, _ = side
+    boundary, length, *_ = side
     t, c = wall / radius, length / radius
     at = np.r_[POINTS, -1.0, 1.0]
     polynomials = np.eye(DEGREE + 1)
@@ -49,8 +50,10 @@ def dense(radius, wall, side, nu):
     plane = np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - nu)]])
     plane = plane / (1.0 - nu**2)
     stiffnesses = np.kron(np.diag([t, t**3 / 12.0]), plane)
-    edge = np.zeros((57, 2))
-    edge[:19, 0], edge[38:, 1] = value[-2], slope[-2]
+    edge = np.zeros((57, 4))
+    edge[19:38, 0], edge[38:, 1], edge[:19, 2], edge[38:, 3] = (
+        value[-2], value[-2], -value[-2], -slope[-2],
+    )  # fmt: skip
     result = []
     for n in range(ring.HARMONICS):
         strains = np.array(
@@ -70,7 +73,7 @@ def dense(radius, wall, side, nu):
             allowed = null_space(rows)
         loads = allowed.T @ edge
         result.append(loads.T @ np.linalg.solve(allowed.T @ energy @ allowed, loads))
-    units = np.array([1.0, 1.0 / radius])
+    units = np.array([1.0, 1.0, 1.0, 1.0 / radius])
     return np.array(result) * np.outer(units, units)
 
 
@@ -98,10 +101,9 @@ def added(values, boundary):
     sector = annular_sector(outer, inner, outer * (1.0 + xp.cos(angle)))
     side = Side(boundary, length * (2.0 if boundary == "between" else 1.0))
     with Decisions((False,) * 9).deciding():  # the ring is there
-        ends = edge_loads.end_compliance(
-            outer, inner, edge_loads.arc_of(outer, inner, sector), side, nu
-        )
-    return xp.stack(ends) / xp.stack([radius, radius, radius, radius**2])
+        arc = edge_loads.arc_of(outer, inner, sector)
+        ends = edge_loads.end_compliance(arc, side, nu, distortion(arc, nu).loads, 0.8)
+    return xp.stack(ends[:4]) / xp.stack([radius, radius, radius, radius**2])
 
 
 @pytest.mark.parametrize("boundary", BOUNDARIES)
@@ -112,14 +114,16 @@ def test_the_band_solves_the_dense_system(boundary, monkeypatch, margin):
     for radius, wall, length, nu in every[:, :4]:
         values = radius, wall, Side(boundary, length), nu
         wanted = dense(*values)
-        scale = np.sqrt(np.einsum("nii->ni", wanted))
+        # Loads around the tube have no harmonic 0.
+        scale = np.sqrt(np.einsum("nii->ni", wanted)) + (wanted == 0.0).all(axis=2)
         error = ring.edge_compliance(*values) - wanted
+        error[0, 0], error[0, :, 0] = 0.0, 0.0
         compliances.append(error / scale[:, :, None] / scale[:, None])
     monkeypatch.setattr(edge_loads, "edge_compliance", dense)
     for values, computed in zip(every, band, strict=True):
         wanted = added(values, boundary)
         lengths.append((computed - wanted) / (1.0 / 3.0 + np.abs(wanted)))
-    margin.within("compliance, relative", compliances, 1e-7)
+    margin.within("compliance, relative", compliances, 5e-7)
     margin.within("lengths, relative", lengths, 1e-8)
 
 

@@ -16,6 +16,7 @@ the ratio in which one force causes both.
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 from notchflex._arrays import plain_number, xp
 from notchflex._jax import constant
@@ -32,7 +33,7 @@ from notchflex.mechanics.flexure.notch_rod import (
 )
 from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres, validity_warnings
 from notchflex.mechanics.material import NotchEnds
-from notchflex.mechanics.section import FibresAt, Section
+from notchflex.mechanics.section import FibresAt, Points, Section, gauss_on
 from notchflex.robot import ArcNotch, Tube
 
 
@@ -102,7 +103,7 @@ def _ends(
         torsion=stiffness.torsion / height - 1.0,
         odd=0.5 * stiffness.alpha * height,
         even=0.5 * stiffness.beta * height**2,
-        material_share=0.25,  # of finite elements beyond the elastic limit
+        material_share=0.1,  # of finite elements beyond the elastic limit
         sway=sway,
         push=push,
     )
@@ -115,10 +116,36 @@ def _ends(
     return ends, (in_plane, sideways)
 
 
+# Strain of the fibre farthest on the cut side at the edge of a ring, over that far from it, less 1;
+# and the part of the mean radius over which it fades: mean of the distortion by the rings
+# (mechanics/flattening.py) of notches 0.8 to 0.9 outer diameters deep.
+_CONCENTRATION, _FADING = 0.27, 0.25
+
+
 @section_fibres.register
 def _(notch: ArcNotch, tube: Tube) -> FibresAt:
     shape = tube.outer_radius, tube.inner_radius, notch.section_depth(tube)
-    return lambda _near, _spine, count: cut_fibres(notch.cut, *shape, count)
+
+    def fibres(_near: Any, _spine: Any, count: int) -> Points:
+        if notch.ends == "rigid":
+            return cut_fibres(notch.cut, *shape, count)
+        # Beside a ring the section does not stay plane: the edges of the arc strain more than the
+        # spine, by a part that neither stretches nor bends it. Half of the fibres stand for each
+        # of two sections, at Gauss's points of half the height.
+        arm, area = cut_fibres(notch.cut, *shape, count // 2)
+        total = xp.sum(area)
+        arm = arm - arm @ area / total
+        second, skew = arm**2 @ area / total, arm**3 @ area / (arm**2 @ area)
+        near = SECTION_OF_CUT[notch.cut](*shape).edge_near
+        warped = (arm**2 - skew * arm - second) / (near**2 + skew * near - second)
+        place, _ = gauss_on(0.0, 0.5 * notch.height, 2)
+        radius = 0.5 * (tube.outer_radius + tube.inner_radius)
+        share = _CONCENTRATION * xp.exp(-place / (_FADING * radius))
+        arms = arm - (share * near)[:, None] * warped
+        arms = arms * xp.sqrt(second / (arms**2 @ area / total))[:, None]
+        return arms.ravel(), xp.concatenate([area, area])
+
+    return fibres
 
 
 @validity_warnings.register
