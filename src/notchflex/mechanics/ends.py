@@ -208,19 +208,18 @@ def notch_stiffness(
         poisson_ratio,
         factors,
     )
-    # In shear the tube's own bending is that of its beam, which the chain does without.
+    # Off what the ends add is the bending of the tube as a beam, which is no part of the shear.
     bends = sum(side.own_length for side in sides) / (
         0.25 * np.pi * (outer_radius**4 - inner_radius**4)
-    )
-    moments = (
-        plain_number(section.second_moment_weak),
-        plain_number(section.second_moment_strong),
     )
     shear, sway = shear_compliances(
         arc,
         height,
-        (weak - moments[0] * bends, strong - moments[1] * bends),
-        moments,
+        (
+            weak - arc.section.second_moment_weak * bends,
+            strong - arc.section.second_moment_strong * bends,
+        ),
+        (plain_number(section.second_moment_weak), plain_number(section.second_moment_strong)),
         poisson_ratio,
         sides,
     )
