@@ -34,9 +34,9 @@ from notchflex.mechanics.section import Section, gauss_on
 # \Big[h + e_{TT} - \frac{(2 - e_{TB})^2}{2\kappa + e_{BB}}\Big] + k_t t,\qquad
 # \kappa = k\coth(kh/2),$$
 #
-# where the e are GJ times the work in the rings by the loads of T = 1 and of $B_h$ = 1. A prescribed
-# stress makes the rings too compliant; it relaxes as in bending, and more so in wide and short
-# arcs: $k_a$ and $k_t$ were fitted to cells of chains of equal notches.
+# where the e are GJ times the work in the rings by the loads of T = 1 and of $B_h$ = 1. A
+# prescribed stress makes the rings too compliant; it relaxes as in bending, and more so in wide and
+# short arcs: $k_a$ and $k_t$ were fitted to cells of chains of equal notches.
 
 
 def torsion_length(
