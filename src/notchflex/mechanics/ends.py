@@ -9,7 +9,7 @@ import numpy as np
 
 from notchflex._arrays import cached, plain_number, xp
 from notchflex.mechanics.cuts import SECTION_OF_CUT
-from notchflex.mechanics.flattening import FACTORS, distorted_by_rings, distortion, softening
+from notchflex.mechanics.flattening import FACTORS, distortion, softening
 from notchflex.mechanics.ring import Side, WallSector, arc_of, end_compliance
 from notchflex.mechanics.section import Section
 
@@ -138,21 +138,9 @@ def notch_stiffness(
     ]
     weak, strong, axial, coupling, *_ = map(sum, zip(*added, strict=True))
     length = height + weak
-    by_rings = distorted_by_rings(
-        distorted,
-        height,
-        xp.stack([ring.warped for ring in added]),
-        xp.stack([ring.yielding for ring in added]),
-    )
+    weak_moment = section.second_moment_weak
     alpha, beta = softening(
-        arc,
-        distorted,
-        by_rings,
-        section.second_moment_weak,
-        height,
-        length,
-        poisson_ratio,
-        factors,
+        arc, distorted, added, weak_moment, height, length, poisson_ratio, factors.odd
     )
     shear, sway = shear_compliances(
         arc,
