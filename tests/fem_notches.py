@@ -41,9 +41,9 @@ def single_notch() -> tuple[list[float], list[float]]:
         found = notch_stiffness(*tube_and_notch(row), row["nu"], side, side).weak
         outer, inner, cut, depth, height = tube_and_notch(row)
         wanted = height + row["delta_weak"]
-        if row["with_tube"] == "yes":
+        if row["with_tube"] != "yes":
             second = SECTION_OF_CUT[cut](outer, inner, depth).second_moment_weak
-            wanted -= 2 * row["ring"] * second / (np.pi / 4 * (outer**4 - inner**4))
+            wanted += 2 * row["ring"] * second / (np.pi / 4 * (outer**4 - inner**4))
         error[not inside(row, side)].append(float(wanted / found - 1))
     return error
 
@@ -103,8 +103,7 @@ def moments(depth: float) -> list[float]:
         side = Side("clamped", row["ring"])
         law = notch_stiffness(0.81, 0.7, "off-axis", depth, row["height"], 0.33, side, side)
         second = SECTION_OF_CUT["off-axis"](0.81, 0.7, depth).second_moment_weak
-        tube = 2 * row["ring"] / (np.pi / 4 * (0.81**4 - 0.7**4))  # the two rings as beams
-        angle = np.radians(row["theta_deg"]) - row["moment"] / YOUNG * tube
+        angle = np.radians(row["theta_deg"])
         flattening = 1.0 + law.alpha * angle / 2 + law.beta * angle**2 / 2
         found = YOUNG * second / law.weak * angle / flattening**2
         error.append(float(found / row["moment"] - 1))

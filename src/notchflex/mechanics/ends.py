@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Array
 
 from notchflex._arrays import cached, plain_number, xp
 from notchflex.mechanics.cuts import SECTION_OF_CUT
-from notchflex.mechanics.flattening import FACTORS, distorted_by_rings, distortion, softening
+from notchflex.mechanics.flattening import FACTORS, distortion, softening
 from notchflex.mechanics.ring import (
     HARMONICS,
     Side,
@@ -94,7 +95,7 @@ def torsion_length(
 def shear_compliances(
     arc: WallSector,
     height: float,
-    added: tuple[float, float],
+    added: tuple[Array, Array],
     second_moments: tuple[float, float],
     poisson_ratio: float,
     sides: Sequence[Side],
@@ -192,21 +193,9 @@ def notch_stiffness(
     ]
     weak, strong, axial, coupling, *_ = map(sum, zip(*added, strict=True))
     length = height + weak
-    by_rings = distorted_by_rings(
-        distorted,
-        height,
-        xp.stack([ring.warped for ring in added]),
-        xp.stack([ring.yielding for ring in added]),
-    )
+    weak_moment = section.second_moment_weak
     alpha, beta = softening(
-        arc,
-        distorted,
-        by_rings,
-        section.second_moment_weak,
-        height,
-        length,
-        poisson_ratio,
-        factors,
+        arc, distorted, added, weak_moment, height, length, poisson_ratio, factors.odd
     )
     # Off what the ends add is the bending of the tube as a beam, which is no part of the shear.
     bends = sum(side.own_length for side in sides) / (

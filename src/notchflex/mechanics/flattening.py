@@ -31,13 +31,14 @@ The factors stand for what one mode of distortion leaves out; they would be 1, a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._arrays import xp
-from notchflex.mechanics.ring import EDGE_NORM, HARMONICS, WallSector
+from notchflex.mechanics.ring import EDGE_NORM, HARMONICS, EndCompliance, WallSector, inverse
 from notchflex.mechanics.section import gauss_on
 
 
@@ -92,11 +93,12 @@ def distortion(arc: WallSector, poisson_ratio: float) -> Distortion:
         + slope * (2.25 * sine - 2.25 * angle * cosine - 0.25 * angle**2 * sine)
     )
     rigid, moved = xp.stack([xp.ones_like(angle), cosine]), xp.stack([angle, sine])
-    shares = xp.linalg.solve((rigid * weights) @ rigid.T, (rigid * weights) @ along)
+    weighed = rigid * weights[None]
+    shares = inverse(weighed @ rigid.T) @ (weighed @ along)
     along, integral = along - shares @ rigid, integral - shares @ moved
-    order = np.arange(HARMONICS)[:, None] * angle
+    order = np.arange(HARMONICS)[:, None] * angle[None]
     tension, shear = (
-        2.0 * (wave(order) * weights) @ values / EDGE_NORM
+        2.0 * (wave(order) * weights[None]) @ values / EDGE_NORM
         for wave, values in ((xp.cos, t * r * along), (xp.sin, -t * r**2 * integral))
     )
     nought = xp.zeros_like(tension)
@@ -116,7 +118,7 @@ _DERIVATIVE = np.array([[-1.0, -1.0], [1.0, -1.0]])
 _DERIVATIVES = np.array([np.linalg.matrix_power(_DERIVATIVE, order) for order in range(4)])
 
 
-def distorted_by_rings(
+def _distorted_by_rings(
     distorted: Distortion,
     height: float,
     warped: Float[Array, "2 2"],
@@ -146,7 +148,7 @@ def distorted_by_rings(
             xp.concatenate([last @ other, last @ own], 1),
         ]
     )
-    amplitudes = xp.linalg.solve(system, warped.ravel())
+    amplitudes = inverse(system) @ warped.ravel()
     total = np.linalg.inv(_DERIVATIVE) @ (there - here) / rate
     return xp.sum(amplitudes.reshape(2, 2) @ total)
 
@@ -154,19 +156,25 @@ def distorted_by_rings(
 def softening(
     arc: WallSector,
     distorted: Distortion,
-    by_rings: Array,
+    rings: Sequence[EndCompliance],
     second_moment: Array,
     height: float,
     length: Array,
     poisson_ratio: float,
-    factors: FittedFactors,
+    odd: float,
 ) -> tuple[Array, Array]:
     """Compute α and β of a notch, from its second moment and its length with its ends."""
     r, t, first, second = arc.radius, arc.wall, distorted.first, distorted.second
     phi = 2.0 * t * r**3 * xp.abs(first) / second_moment
     poisson = _POISSON * poisson_ratio * r * phi * height
-    rings = -2.0 * _RINGS * r**2 * t * second * by_rings
+    by_rings = _distorted_by_rings(
+        distorted,
+        height,
+        xp.stack([ring.warped for ring in rings]),
+        xp.stack([ring.yielding for ring in rings]),
+    )
+    warped = -2.0 * _RINGS * r**2 * t * second * by_rings
     brazier = 48.0 * (1.0 - poisson_ratio**2) * r**7 * second / (t * second_moment)
     fitted = _BRAZIER * arc.half_angle**_WIDTH * (height / r) ** _HEIGHT
-    alpha = 3.0 * factors.odd * (poisson + rings) / length**2
+    alpha = 3.0 * odd * (poisson + warped) / length**2
     return alpha, fitted * brazier * height / length**3

@@ -203,6 +203,26 @@ def _edge_stiffness(by_power: Any, powers: Any, held: Any) -> Any:
     return stiffness
 
 
+def inverse(matrix: Array) -> Array:
+    """Invert matrices of two or four rows, (..., n, n), by their blocks.
+
+    LAPACK's functions are no operations that the programs of assembly can have.
+    """
+    half = matrix.shape[-1] // 2
+    first, right = matrix[..., :half, :half], matrix[..., :half, half:]
+    left, last = matrix[..., half:, :half], matrix[..., half:, half:]
+    if half == 1:
+        scale = 1.0 / (first * last - right * left)
+        rows = [[last, -right], [-left, first]]
+        return scale * xp.concatenate([xp.concatenate(row, axis=-1) for row in rows], axis=-2)
+    before = inverse(first)
+    below = left @ before
+    rest = inverse(last - below @ right)
+    beside = -before @ right @ rest
+    rows = [[before - beside @ below, beside], [-rest @ below, rest]]
+    return xp.concatenate([xp.concatenate(row, axis=-1) for row in rows], axis=-2)
+
+
 @cached(256)  # rings of one length are equal, however deep the notches beside them
 def edge_compliance(
     radius: float, wall: float, ring: Side, poisson_ratio: float, passing: bool = False
@@ -233,7 +253,7 @@ def edge_compliance(
     # Displacements are of order r² per N/mm over E t length; a slope along z has one length less.
     scale = (1.0 - poisson_ratio**2) * radius**2 / (wall * length)
     units = xp.stack([1.0, 1.0, -1.0, -1.0 / length])
-    return read_only(xp.linalg.inv(stiffness) * scale * xp.outer(units, units))
+    return read_only(inverse(stiffness) * (scale * xp.outer(units, units))[None])
 
 
 # End compliance: the compliance that the ring beside a notch adds to the notch.

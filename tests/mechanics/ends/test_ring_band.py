@@ -122,12 +122,13 @@ def test_the_band_solves_the_dense_system(boundary, monkeypatch, margin):
         scale = np.sqrt(np.einsum("nii->ni", wanted)) + (wanted == 0.0).all(axis=2)
         error = ring.edge_compliance(*values) - wanted
         error[0, 0], error[0, :, 0] = 0.0, 0.0
-        compliances.append(error / scale[:, :, None] / scale[:, None])
+        # Loads that pass have no harmonic 0.
+        compliances.append((error / scale[:, :, None] / scale[:, None])[int(passing) :])
     monkeypatch.setattr(edge_loads, "edge_compliance", dense)
     for values, computed in zip(every, band, strict=True):
         wanted = added(values, boundary)
         lengths.append((computed - wanted) / (1.0 / 3.0 + np.abs(wanted)))
-    margin.within("compliance, relative", compliances, 5e-7)
+    margin.within("compliance, relative", np.concatenate(compliances), 5e-7)
     margin.within("lengths, relative", lengths, 1e-8)
 
 

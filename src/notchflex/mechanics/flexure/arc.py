@@ -141,7 +141,7 @@ def _(notch: ArcNotch, tube: Tube) -> FibresAt:
         place, _ = gauss_on(0.0, 0.5 * notch.height, 2)
         radius = 0.5 * (tube.outer_radius + tube.inner_radius)
         share = _CONCENTRATION * xp.exp(-place / (_FADING * radius))
-        arms = arm - (share * near)[:, None] * warped
+        arms = arm[None] - (share * near)[:, None] * warped[None]
         arms = arms * xp.sqrt(second / (arms**2 @ area / total))[:, None]
         return arms.ravel(), xp.concatenate([area, area])
 

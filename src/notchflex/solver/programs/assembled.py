@@ -460,8 +460,8 @@ class AssembledRobots:
             rings[..., :2] = lengths[..., notches.first[..., None] + np.arange(2)]
             rings[..., 2:8] = notches.boundaries
             rings[..., 8] = np.reshape(robot.material.poisson_ratio, (-1, 1, 1))
-            is_last = notches.boundaries[:, 5::6]
-            rings[..., 9] = is_last * np.reshape(tip_anchor(robot), (-1, 1, 1))
+            is_free = notches.boundaries[..., 5]
+            rings[..., 9] = is_free * np.reshape(tip_anchor(robot), (-1, 1, 1))
         return np.concatenate([of_parts, rings.reshape(*of_parts.shape[:2], -1)], axis=-1)
 
 
