@@ -14,7 +14,7 @@ The system is solved in few operations, so that it can be traced and differentia
 middle of a ring, u even with v and w odd shares no energy with the reverse. Integrals of Legendre's
 polynomials, u and v once and w twice, are nil at both edges and, in a suitable order, share energy
 with the six nearest only: each half is a band. It is eliminated from the highest degree; left are
-the polynomials that move the edges, four in each half. A dense solution agrees to 3e-7, and in the
+the polynomials that move the edges, four in each half. A dense solution agrees to 4e-7, and in the
 lengths that a ring adds to a notch to 1e-8 (tests/mechanics/ends/test_ring_band.py); thin walls
 and short free rings are the worst.
 
