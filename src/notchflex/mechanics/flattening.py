@@ -77,22 +77,21 @@ class Distortion(NamedTuple):
 def distortion(arc: WallSector, poisson_ratio: float) -> Distortion:
     """Compute the distortion of an arc of wall."""
     r, t, a = arc.radius, arc.wall, arc.half_angle
-    angle, weights = gauss_on(0.0, a, 24)
-    slope, sine, cosine = xp.sin(a) / a, xp.sin(angle), xp.cos(angle)
-    bent = 0.5 * (xp.sin(a) ** 2 + sine**2) + slope * (xp.cos(a) - cosine) - slope * angle * sine
-    # The solution u of u'''' + u'' = m, its integral, and what moves the section as a whole.
-    even = 0.5 * xp.sin(a) ** 2 + slope * xp.cos(a) + 0.25
-    along = (
-        0.5 * even * angle**2
-        - xp.cos(2.0 * angle) / 48.0
-        + slope * angle * (1.75 * sine - 0.25 * angle * cosine)
-    )
-    integral = (
-        even * angle**3 / 6.0
-        - xp.sin(2.0 * angle) / 96.0
-        + slope * (2.25 * sine - 2.25 * angle * cosine - 0.25 * angle**2 * sine)
-    )
-    rigid, moved = xp.stack([xp.ones_like(angle), cosine]), xp.stack([angle, sine])
+    part, weights = gauss_on(0.0, 1.0, 24)
+    angle, weights = a * part, a * weights
+    slope, sine, cosine = xp.sin(a) / a, xp.sin(a), xp.cos(a)
+
+    def bent(at: Array) -> Array:
+        return 0.5 * (sine**2 + xp.sin(at) ** 2) + slope * (cosine - xp.cos(at) - at * xp.sin(at))
+
+    # The solution u of u'''' + u'' = m is the integral of (x - sin x) m at the distance x. What
+    # moves the section as a whole is taken off.
+    before = angle[:, None] * part[None]
+    apart, given = angle[:, None] - before, bent(before) * part[:, None] * weights[None]
+    along = xp.sum(given * (apart - xp.sin(apart)), axis=1)
+    integral = xp.sum(given * (0.5 * apart**2 - 2.0 * xp.sin(0.5 * apart) ** 2), axis=1)
+    rigid = xp.stack([xp.ones_like(angle), 2.0 * xp.sin(0.5 * angle) ** 2])
+    moved = xp.stack([angle, angle - xp.sin(angle)])
     weighed = rigid * weights[None]
     shares = inverse(weighed @ rigid.T) @ (weighed @ along)
     along, integral = along - shares @ rigid, integral - shares @ moved
@@ -103,7 +102,8 @@ def distortion(arc: WallSector, poisson_ratio: float) -> Distortion:
     )
     nought = xp.zeros_like(tension)
     loads = [[nought, nought, tension, nought], [shear, nought, nought, nought]]
-    first, second = bent @ weights, bent**2 @ weights
+    amplitude = bent(angle)
+    first, second = amplitude @ weights, amplitude**2 @ weights
     return Distortion(
         xp.moveaxis(xp.stack([xp.stack(load) for load in loads]), 1, 2),
         2.0 * t * r**3 * (along**2 @ weights),
