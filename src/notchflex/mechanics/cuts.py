@@ -396,7 +396,7 @@ def annular_segment(outer_radius: ArrayLike, inner_radius: ArrayLike, depth: Arr
 @cached(1024)  # the same for all sites and heights
 def cut_fibres(cut: str, outer: float, inner: float, depth: float, count: int) -> Points:
     """Few fibres of what a cut leaves of a tube."""
-    return gauss_rule(*_FIBRES_OF_CUT[cut](outer, inner, depth, count), count)
+    return gauss_rule(*STRIPS_OF_CUT[cut](outer, inner, depth, count), count)
 
 
 def sector_fibres(outer: float, inner: float, depth: float, count: int = FIBRES) -> Points:
@@ -435,7 +435,7 @@ def segment_fibres(outer: float, inner: float, depth: float, count: int = FIBRES
     return xp.append(outer * xp.cos(solid), height), xp.concatenate(area)
 
 
-_FIBRES_OF_CUT = {"on-axis": sector_fibres, "off-axis": segment_fibres}
+STRIPS_OF_CUT = {"on-axis": sector_fibres, "off-axis": segment_fibres}
 
 
 SECTION_OF_CUT = {"on-axis": annular_sector, "off-axis": annular_segment}

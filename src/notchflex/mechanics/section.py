@@ -185,7 +185,7 @@ def clamped_torsion_constant(
 # centroid and second moment equal those of the section to rounding: the arms are shifted and scaled
 # by the error of the strips, about 1e-7.
 
-FIBRES = 20
+FIBRES = 30
 Points = tuple[Float[Array, "*nodes fibres"], Float[Array, "*nodes fibres"]]
 """Arms (mm) and areas (mm^2)."""
 

@@ -20,7 +20,7 @@ from typing import Any
 
 from notchflex._arrays import plain_number, xp
 from notchflex._jax import constant
-from notchflex.mechanics.cuts import SECTION_OF_CUT, cut_fibres
+from notchflex.mechanics.cuts import SECTION_OF_CUT, STRIPS_OF_CUT, cut_fibres
 from notchflex.mechanics.ends import NotchStiffness, notch_stiffness, validity
 from notchflex.mechanics.flexure.notch_rod import (
     STRAIGHT,
@@ -33,7 +33,7 @@ from notchflex.mechanics.flexure.notch_rod import (
 )
 from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres, validity_warnings
 from notchflex.mechanics.material import NotchEnds
-from notchflex.mechanics.section import FibresAt, Points, Section, gauss_on
+from notchflex.mechanics.section import FibresAt, Points, Section, gauss_on, gauss_rule
 from notchflex.robot import ArcNotch, Tube
 
 
@@ -130,20 +130,20 @@ def _(notch: ArcNotch, tube: Tube) -> FibresAt:
         if notch.ends == "rigid":
             return cut_fibres(notch.cut, *shape, count)
         # Beside a ring the section does not stay plane: the edges of the arc strain more than the
-        # spine, by a part that neither stretches nor bends it. Half of the fibres stand for each
-        # of two sections, at Gauss's points of half the height.
-        arm, area = cut_fibres(notch.cut, *shape, count // 2)
+        # spine, by a part that neither stretches nor bends it. The fibres stand for sections at
+        # Gauss's points of half the height.
+        arm, area = STRIPS_OF_CUT[notch.cut](*shape, count)
         total = xp.sum(area)
         arm = arm - arm @ area / total
         second, skew = arm**2 @ area / total, arm**3 @ area / (arm**2 @ area)
         near = SECTION_OF_CUT[notch.cut](*shape).edge_near
         warped = (arm**2 - skew * arm - second) / (near**2 + skew * near - second)
-        place, _ = gauss_on(0.0, 0.5 * notch.height, 2)
+        place, weights = gauss_on(0.0, 0.5 * notch.height, 4)
         radius = 0.5 * (tube.outer_radius + tube.inner_radius)
         share = _CONCENTRATION * xp.exp(-place / (_FADING * radius))
         arms = arm[None] - (share * near)[:, None] * warped[None]
         arms = arms * xp.sqrt(second / (arms**2 @ area / total))[:, None]
-        return arms.ravel(), xp.concatenate([area, area])
+        return gauss_rule(arms.ravel(), xp.outer(weights, area).ravel(), count)
 
     return fibres
 
