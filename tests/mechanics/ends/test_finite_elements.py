@@ -18,8 +18,9 @@ def judge(margin, what, error, rms, largest):
 
 
 def test_small_loads(margin):
+    # None of the law's constants was fitted to notches between rigid plates.
     error, outside = single_notch()
-    judge(margin, "K₀ of one notch", error, 1.0, 3.0)
+    judge(margin, "K₀ of one notch", error, 1.2, 4.3)
     assert len(error) > 90
     margin.note(f"K₀ outside the range: max {100 * np.max(np.abs(outside)):.1f} %")
 
@@ -42,7 +43,7 @@ def test_weak_bending_in_chains(use, margin):
     judge(margin, f"K₀ in chains, outside the ranges, {use}", shallow, 3.1, 6.3)
 
 
-@pytest.mark.parametrize(("depth", "allowed"), [(1.4, 3.4), (1.458, 3.4), (0.972, 3.4)])
+@pytest.mark.parametrize(("depth", "allowed"), [(1.4, 4.6), (1.458, 3.0), (0.972, 2.1)])
 def test_moment_to_closing(depth, allowed, margin):
     error = 100 * np.array(moments(depth))
     assert error.size > 5

@@ -91,9 +91,15 @@ def test_work_is_stored_with_elastic_ends_and_stops(margin):
 
 
 def test_sideways_force(margin):
+    # Where the two rings of a notch differ, its torsion and its bending sideways are coupled: the
+    # law leaves that out. The first notch, beside the plate, shows it.
     twist, bend, *solid = sideways(wrist())
-    margin.within("twist", twist / solid[0] - 1.0, 0.03)
-    margin.within("sideways bend", bend / solid[1] - 1.0, 0.07)
+    for name, error, allowed in (
+        ("twist", twist / solid[0] - 1.0, (0.08, 0.03, 0.01)),
+        ("sideways bend", bend / solid[1] - 1.0, (0.095, 0.045, 0.01)),
+    ):
+        for ring, part, most in zip(("first", "others", "tip"), np.split(error, [1, 4]), allowed):
+            margin.within(f"{name}, {ring}", part, most)
 
 
 @pytest.mark.parametrize("across", [0, 1])
