@@ -10,11 +10,11 @@ from fem_wrists import Solid, rigid, solid
 
 # Largest error of an angle of any notch at any level; of the tip, as part of its path.
 ANGLES = {
-    "A_lin_mu0_medium": 0.065,
-    "A_lin_mu013_medium": 0.065,
+    "A_lin_mu0_medium": 0.035,
+    "A_lin_mu013_medium": 0.035,
     "B_lin_mu0_medium": 0.03,
-    "A_lin_mu0_tipFy+_medium": 0.065,
-    "A_lin_mu0_tipFy-_medium": 0.065,
+    "A_lin_mu0_tipFy+_medium": 0.035,
+    "A_lin_mu0_tipFy-_medium": 0.035,
 }
 TIP = 0.02
 
@@ -39,12 +39,13 @@ def test_angles_and_tips(case, allowed, margin):
     margin.within("tip, part of its path", fem.tip_errors(path), TIP)
 
 
-@pytest.mark.parametrize("case", ["A_se_mu0_medium", "A_se_mu013_coarse"])
-def test_yielding_fibres(case, margin):
+@pytest.mark.parametrize(
+    ("case", "allowed"), [("A_se_mu0_medium", 0.03), ("A_se_mu013_coarse", 0.04)]
+)
+def test_yielding_fibres(case, allowed, margin):
     path, fem = solved(case)
     error = np.degrees(path.notch_angle) / fem.angles - 1.0
-    margin.within("middle notches, relative", error[:, :4], 0.03)
-    margin.within("last notch, relative", error[:, 4], 0.06)
+    margin.within("notch angle, relative", error, allowed)
 
 
 def test_the_papers_law_is_far_off():

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Array
 
 from notchflex._arrays import cached, plain_number, xp
 from notchflex.mechanics.cuts import SECTION_OF_CUT
@@ -94,16 +93,16 @@ def torsion_length(
 
 def shear_compliances(
     arc: WallSector,
+    section: Section,
     height: float,
-    added: tuple[Array, Array],
-    second_moments: tuple[float, float],
+    added: tuple[Any, Any],
     poisson_ratio: float,
     sides: Sequence[Side],
 ) -> tuple[float, float]:
     """Compute the compliance of the two directions across the tube, times E, 1/mm."""
-    r, t, a, section = arc.radius, arc.wall, arc.half_angle, arc.section
+    r, t, a = arc.radius, arc.wall, arc.half_angle
     angle, weights = gauss_on(0.0, a)
-    sine, cosine, centroid = xp.sin(angle), xp.cos(angle), plain_number(section.centroid)
+    sine, cosine, centroid = xp.sin(angle), xp.cos(angle), plain_number(arc.section.centroid)
     # Flow of the shear stress round the tube and across its wall, times second moment over wall.
     curl, plate = r**2 + t**2 / 12.0, t**2 / 12.0
     flows = (
@@ -118,15 +117,20 @@ def shear_compliances(
         (deep * uncut / xp.hypot(deep, uncut), 0.195 * xp.sqrt(a * r / t) * uncut * more),
         (0.45 * r * (r / t) ** 0.75 * xp.sqrt(a) * recovered, 0.427 * reach / a * recovered),
     )
-    moments = section.second_moment_weak, section.second_moment_strong
+    moments, true = (
+        (of.second_moment_weak, of.second_moment_strong) for of in (arc.section, section)
+    )
+    # The bending of the rings as beams is no part of the shear.
+    bends = sum(side.own_length for side in sides) / (np.pi * r * t * (r**2 + 0.25 * t**2))
 
     def compliance(of: int) -> float:
         (along, across), (inside, further) = flows[of], map(xp.mean, ends[of])
         # The shear across a wall is a parabola: 6/5 of the energy of an even one.
         work = (along**2 + 1.2 * across**2) @ weights / moments[of] ** 2
         sheared = 4.0 * (1.0 + poisson_ratio) * r * t * work * (height + further)
-        bent = height**3 / 12.0 + 0.25 * added[of] * (height + inside) ** 2
-        return plain_number(bent / second_moments[of] + sheared)
+        turned = added[of] - moments[of] * bends
+        bent = height**3 / 12.0 + 0.25 * turned * (height + inside) ** 2
+        return plain_number(bent / true[of] + sheared)
 
     return compliance(0), compliance(1)
 
@@ -192,30 +196,15 @@ def notch_stiffness(
         for side in sides
     ]
     weak, strong, axial, coupling, *_ = map(sum, zip(*added, strict=True))
-    length = height + weak
-    weak_moment = section.second_moment_weak
+    length, second = height + weak, plain_number(section.second_moment_weak)
     alpha, beta = softening(
-        arc, distorted, added, weak_moment, height, length, poisson_ratio, factors.odd
+        arc, distorted, added, second, height, length, poisson_ratio, factors.odd
     )
-    # Off what the ends add is the bending of the tube as a beam, which is no part of the shear.
-    bends = sum(side.own_length for side in sides) / (
-        0.25 * np.pi * (outer_radius**4 - inner_radius**4)
-    )
-    shear, sway = shear_compliances(
-        arc,
-        height,
-        (
-            weak - arc.section.second_moment_weak * bends,
-            strong - arc.section.second_moment_strong * bends,
-        ),
-        (plain_number(section.second_moment_weak), plain_number(section.second_moment_strong)),
-        poisson_ratio,
-        sides,
-    )
+    shear, sway = shear_compliances(arc, section, height, (weak, strong), poisson_ratio, sides)
     # Finite elements with contact of one tube (OD 1.62, ID 1.40, depth 1.4, height 0.8 mm): angle
     # at first contact over h/(r_o + ȳ), and stiffness 1 to 3° beyond over E t r².
     closing_factor = {"on-axis": 1.0248, "off-axis": 1.0203}[cut]
-    closed = 0.354 * arc.wall * arc.radius**2 * length / section.second_moment_weak
+    closed = 0.354 * arc.wall * arc.radius**2 * length / second
     width = 2.0 * arc.half_angle * arc.radius
     # Fitted: the centre of twist moves out, where the notch is short between long rings.
     between = 0.5 * (sides[0].length + sides[1].length)

@@ -32,7 +32,7 @@ The factors stand for what one mode of distortion leaves out; they would be 1, a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -157,9 +157,9 @@ def softening(
     arc: WallSector,
     distorted: Distortion,
     rings: Sequence[EndCompliance],
-    second_moment: Array,
+    second_moment: Any,
     height: float,
-    length: Array,
+    length: Any,
     poisson_ratio: float,
     odd: float,
 ) -> tuple[Array, Array]:

@@ -289,13 +289,13 @@ def arc_of(outer: float, inner: float, section: Section) -> WallSector:
 class EndCompliance(NamedTuple):
     """Compliance that one ring adds to a notch."""
 
-    weak: Array  # Length δ added to that of the bending of the notch, mm
-    strong: Array  # Length added to that of the bending sideways, mm
-    axial: Array  # Length added to that of the stretch of the centroid, mm
+    weak: Any  # Length δ added to that of the bending of the notch, mm
+    strong: Any  # Length added to that of the bending sideways, mm
+    axial: Any  # Length added to that of the stretch of the centroid, mm
     # b_c, mm²: I E times the stretch of the centroid per bending moment; less that of the tendon
-    coupling: Array
-    warped: Array  # Displacements of its edge by the moment of the notch along given loads
-    yielding: Array  # Its compliance to these loads
+    coupling: Any
+    warped: Any  # Displacements of its edge by the moment of the notch along given loads
+    yielding: Any  # Its compliance to these loads
 
 
 def arc_loads(arc: WallSector) -> tuple[Array, Array, Array]:
@@ -357,7 +357,7 @@ def end_compliance(
     flexibility = edge_compliance(arc.radius, arc.wall, ring, poisson_ratio)
     section, bound = arc.section, arc.radius * EDGE_NORM
 
-    def energy(first: Array, second: Array, weights: Array) -> Array:
+    def energy(first: Array, second: Array, weights: Any) -> Array:
         return xp.einsum("n,...ni,nij,knj->...k", weights, first, flexibility, second)
 
     # A tendon that ends there pulls the edge along: in the bending of the notch its pull counts as

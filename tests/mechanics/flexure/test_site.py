@@ -98,7 +98,8 @@ def test_sideways_force(margin):
         ("twist", twist / solid[0] - 1.0, (0.08, 0.03, 0.01)),
         ("sideways bend", bend / solid[1] - 1.0, (0.095, 0.045, 0.01)),
     ):
-        for ring, part, most in zip(("first", "others", "tip"), np.split(error, [1, 4]), allowed):
+        parts = zip(("first", "others", "tip"), np.split(error, [1, 4]), allowed, strict=True)
+        for ring, part, most in parts:
             margin.within(f"{name}, {ring}", part, most)
 
 
