@@ -154,6 +154,7 @@ class NotchStiffness(NamedTuple):
     sway: float  # The same sideways, under a force through the centre of twist
     # α, 1/rad: the stiffness K₀ = E I/ℓ falls to K₀/q², q = 1 + αθ/2 + βθ²/2, θ > 0 closing
     alpha: float
+    alpha_rings: float  # The part of α by the rings, which goes with the moment
     beta: float  # β, 1/rad²
     closing_factor: float  # Angle between the rings at which the edges touch, over h/(r_o + ȳ)
     closed_ratio: float  # Stiffness of the closed notch, its edges in contact, over K₀
@@ -194,7 +195,7 @@ def notch_stiffness(
     weak, strong, axial, coupling, *_ = map(sum, zip(*added, strict=True))
     length = height + weak
     weak_moment = section.second_moment_weak
-    alpha, beta = softening(
+    alpha, alpha_rings, beta = softening(
         arc, distorted, added, weak_moment, height, length, poisson_ratio, factors.odd
     )
     # Off what the ends add is the bending of the tube as a beam, which is no part of the shear.
@@ -232,6 +233,7 @@ def notch_stiffness(
         shear=shear,
         sway=sway,
         alpha=plain_number(alpha),
+        alpha_rings=plain_number(alpha_rings),
         beta=plain_number(beta),
         closing_factor=closing_factor,
         closed_ratio=plain_number(closed),
