@@ -194,11 +194,11 @@ class FibreSection(Pytree):
 
 # Energy of the flattening of a notch at constant transformation.
 #
-# The moment M = Phi(s) / q with s = kappa / q does more work than fibres and ends absorb: the rest,
-# Phi (g dX - a x de) with x = kappa / p and dX = kappa p' / p^2 dkappa, flattens the notch; p is q of
-# elastic fibres, q = p / g, g = 1 + a e. At constant transformed strains of the fibres the section is elastic, Phi = K (s - e),
-# with one number e for the transformation of all fibres. The energy of flattening is then, with Y
-# the integral of x dX,
+# The moment M = Phi(s) / q with s = kappa / q does more work than fibres and ends absorb. With
+# p = 1 + odd kappa + even kappa^2, g = 1 + a e = p / q, x = kappa / p, dX = kappa p' / p^2 dkappa,
+# the rest, Phi (g dX - a x de), flattens the notch. At constant transformed strains of the fibres
+# the section is elastic, Phi = K (s - e), with one number e for the transformation of all fibres.
+# The energy of flattening is then, with Y the integral of x dX,
 #
 #     psi(kappa, e) = K g (g Y(kappa) - e X(kappa)) + H(e),    d psi / d kappa = Phi g X'.
 #
