@@ -13,9 +13,7 @@ from notchflex.mechanics.flexure import rod
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw
 
 TUBE = nf.Tube(1.62, 1.40)
-ENDS = NotchEnds(
-    weak=0.6, strong=0.0, axial=0.0, torsion=0.0, odd=0.2, even=0.1, material_share=0.25
-)
+ENDS = NotchEnds(weak=0.6, odd=0.2, even=0.1, warped=0.15, material_share=0.25)
 
 PLAIN = FibreSection(
     area=0.125,

@@ -158,6 +158,7 @@ class NotchStiffness(NamedTuple):
     sway: float  # The same sideways, under a force through the centre of twist
     # α, 1/rad: the stiffness K₀ = E I/ℓ falls to K₀/q², q = 1 + αθ/2 + βθ²/2, θ > 0 closing
     alpha: float
+    alpha_rings: float  # The part of α by the rings, which goes with the moment
     beta: float  # β, 1/rad²
     closing_factor: float  # Angle between the rings at which the edges touch, over h/(r_o + ȳ)
     closed_ratio: float  # Stiffness of the closed notch, its edges in contact, over K₀
@@ -197,7 +198,7 @@ def notch_stiffness(
     ]
     weak, strong, axial, coupling, *_ = map(sum, zip(*added, strict=True))
     length, second = height + weak, plain_number(section.second_moment_weak)
-    alpha, beta = softening(
+    alpha, alpha_rings, beta = softening(
         arc, distorted, added, second, height, length, poisson_ratio, factors.odd
     )
     shear, sway = shear_compliances(arc, section, height, (weak, strong), poisson_ratio, sides)
@@ -221,6 +222,7 @@ def notch_stiffness(
         shear=shear,
         sway=sway,
         alpha=plain_number(alpha),
+        alpha_rings=plain_number(alpha_rings),
         beta=plain_number(beta),
         closing_factor=closing_factor,
         closed_ratio=plain_number(closed),

@@ -26,6 +26,8 @@ $$\alpha = 3 c_a\frac{c_\nu\nu r\phi h - c_r S\int V_r\,dz}{\ell^2},\quad
 \beta = c_b a^p\Bigl(\frac hr\Bigr)^m\frac{48(1-\nu^2) r^7 J_2}{tI}\frac h{\ell^3}$$
 
 with the distortion $V_r$ by the rings per unit of moment: a notch closes softer and opens stiffer.
+Beyond the elastic limit the part of $V_r$ goes with the moment, which makes it, the others with the
+angle: the wall then resists its distortion by as much less as the moment that drives it is less.
 The factors stand for what one mode of distortion leaves out; they would be 1, and p and m 0.
 """
 
@@ -162,8 +164,8 @@ def softening(
     length: Any,
     poisson_ratio: float,
     odd: float,
-) -> tuple[Array, Array]:
-    """Compute α and β of a notch, from its second moment and its length with its ends."""
+) -> tuple[Array, Array, Array]:
+    """Compute α, its part by the rings, and β of a notch from its length with its ends."""
     r, t, first, second = arc.radius, arc.wall, distorted.first, distorted.second
     phi = 2.0 * t * r**3 * xp.abs(first) / second_moment
     poisson = _POISSON * poisson_ratio * r * phi * height
@@ -176,5 +178,5 @@ def softening(
     warped = -2.0 * _RINGS * r**2 * t * second * by_rings
     brazier = 48.0 * (1.0 - poisson_ratio**2) * r**7 * second / (t * second_moment)
     fitted = _BRAZIER * arc.half_angle**_WIDTH * (height / r) ** _HEIGHT
-    alpha = 3.0 * odd * (poisson + warped) / length**2
-    return alpha, fitted * brazier * height / length**3
+    own, by_rings = (3.0 * odd * part / length**2 for part in (poisson, warped))
+    return own + by_rings, by_rings, fitted * brazier * height / length**3

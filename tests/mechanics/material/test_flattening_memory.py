@@ -99,7 +99,7 @@ def test_moment_is_the_derivative_of_the_energy_behind_a_corner(
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("name", ["odd", "even", "weak"])
+@pytest.mark.parametrize("name", ["odd", "even", "warped", "weak"])
 def test_energy_has_the_derivatives_by_the_ends(name: str, margin: Margin) -> None:
     memory = history()[1][STEPS]
 

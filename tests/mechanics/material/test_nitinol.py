@@ -14,7 +14,7 @@ from fibre_sections import ENDS, bending, energy, fine_fibres, moment, respond, 
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
 from refusals import refused
 
-STRAIGHT = dataclasses.replace(ENDS, odd=0.0, even=0.0)
+STRAIGHT = dataclasses.replace(ENDS, odd=0.0, even=0.0, warped=0.0)
 BILINEAR = nf.Nitinol(42000.0, 350.0, 6000.0, compression_ratio=1.3)
 HYSTERETIC = dataclasses.replace(BILINEAR, unloading_stress=150.0)
 
@@ -40,13 +40,20 @@ def test_between_ends_the_law_of_the_notch_is_solved() -> None:
     plain = dataclasses.replace(own, ends=None)
     rigidity = 42000.0 * float(own.second_moment_weak)
     for curvature in (-1.0, 0.2, 0.9):
-        q = 1.0 + 0.2 * curvature + 0.1 * curvature**2
+        elastic = 1.0 + 0.2 * curvature + 0.1 * curvature**2
 
-        def missing(k: float, q: float = q, at: float = curvature) -> float:
-            return 1.15 * k + 0.45 * moment(law, k, plain) / rigidity - at / q
+        def parts(k: float, elastic: float = elastic) -> tuple[float, float]:
+            """Bend of section and ends, and flattening by the angle and by the moment."""
+            part = moment(law, k, plain) / rigidity
+            bent = 1.15 * k + 0.45 * part
+            return bent, elastic / (1.0 + 0.15 * (bent - 1.6 * part))
+
+        def missing(k: float, at: float = curvature) -> float:
+            bent, q = parts(k)
+            return bent - at / q
 
         own_curvature = brentq(missing, -2.0, 2.0, xtol=1e-15)
-        expected = moment(law, own_curvature, plain) / q
+        expected = moment(law, own_curvature, plain) / parts(own_curvature)[1]
         assert moment(law, curvature, own) == pytest.approx(expected, rel=1e-11)
 
 

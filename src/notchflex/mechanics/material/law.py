@@ -10,7 +10,12 @@ of the notch are added here, for all laws:
     s = kappa / q,   (1 + c w) k + (1 - c) w Phi(k) / (E I) = s,   M = Phi(k) / q
 
 with the curvature k of the section itself, its moment Phi(k), the end compliance w of which a
-share c follows the material, and the flattening q.
+share c follows the material, and the flattening q. Bending flattens the section, and so does the
+rings' yielding to the stress of the arc, which goes with Phi instead of kappa: q falls by 1 + a e,
+
+    q = (1 + odd kappa + even kappa^2) / (1 + a e),   e = s - (1 + w) Phi(k) / (E I)
+
+with the curvature e by transformation, and that part a of `odd`.
 """
 
 from __future__ import annotations
@@ -89,6 +94,7 @@ class NotchEnds(Pytree):
             q = 1 + odd * kappa + even * kappa^2, at the elastic curvature kappa about the weak
             axis (positive closes), mm.
         even: Its even part, mm^2.
+        warped: Part of `odd` by the rings, which goes with the moment of the section, mm.
         material_share: Share of `weak` that follows the material; the rest stays elastic.
         sway: In shear sideways.
         push: In shear in the plane of bending.
@@ -106,13 +112,14 @@ class NotchEnds(Pytree):
     torsion: Each | float = 0.0
     odd: Each | float = 0.0
     even: Each | float = 0.0
+    warped: Each | float = 0.0
     material_share: Each | float = 0.0
     sway: Each | float = 0.0
     push: Each | float = 0.0
     oblique: Each | float = 0.0
 
     def flattening(self, curvature: Scalar) -> Scalar:
-        """Compute the factor q by which the distances of the fibres shrink at a curvature."""
+        """Compute the factor q by which the distances of elastic fibres shrink at a curvature."""
         return 1.0 + curvature * (self.odd + curvature * self.even)
 
     def slope_factor(self, curvature: Scalar) -> Scalar:
@@ -187,19 +194,21 @@ class FibreSection(Pytree):
 
 # Energy of the flattening of a notch at constant transformation.
 #
-# The moment M = Phi(s) / q with s = kappa / q does more work than fibres and ends absorb: the rest,
-# Phi dX with dX = kappa q' / q^2 dkappa, flattens the notch. At constant transformed strains of the
-# fibres the section is elastic, Phi = K (s - e), with one number e for the transformation of all
-# fibres. The energy of flattening is then, with Y the integral of s dX,
+# The moment M = Phi(s) / q with s = kappa / q does more work than fibres and ends absorb. With
+# p = 1 + odd kappa + even kappa^2, g = 1 + a e = p / q, x = kappa / p, dX = kappa p' / p^2 dkappa,
+# the rest, Phi (g dX - a x de), flattens the notch. At constant transformed strains of the fibres
+# the section is elastic, Phi = K (s - e), with one number e for the transformation of all fibres.
+# The energy of flattening is then, with Y the integral of x dX,
 #
-#     psi(kappa, e) = K (Y(kappa) - e X(kappa)) + H(e),    d psi / d kappa = Phi X'.
+#     psi(kappa, e) = K g (g Y(kappa) - e X(kappa)) + H(e),    d psi / d kappa = Phi g X'.
 #
 # H belongs to the transformation. It makes the force on e vanish in the middle of the hysteresis,
-# H'(e) = K X(kappa_m) where loading has transformed as much by halfway stresses, at kappa_m:
+# where loading by halfway stresses transforms as much, at kappa_m: all work is stored on this way,
 #
-#     H(e) = K * integral of (e - e_m) dX over 0 ... kappa_m.
+#     H(e) = K * integral of (s_m - e_m) (g_m dX - a x de_m) - g (g x - e) dX over 0 ... kappa_m,
 #
-# A change of e thus dissipates (K X(kappa) - H'(e)) de, which is zero without hysteresis.
+# in which de_m is integrated by parts, as it jumps where a fibre yields. A change of e thus
+# dissipates (K R - H'(e)) de, R = (g + a e) X - 2 a g Y - a x (g x - e), zero without hysteresis.
 
 NODES, WEIGHTS = gauss_on(0.0, 1.0, 64)
 """Gauss's rule on 0 ... 1."""
@@ -208,7 +217,7 @@ NODES, WEIGHTS = gauss_on(0.0, 1.0, 64)
 class Flattening(NamedTuple):
     """Flattening of a section, per length."""
 
-    path: Array  # X
+    path: Array  # R
     transformed: Array  # K e, N mm
     by_transformation: Array  # H, N mm/mm
     energy: Array  # psi, N mm/mm
@@ -219,62 +228,65 @@ def flattening(law: SectionLaw, curvature: Array, section: FibreSection, memory:
     ends = section.compliance
     stiffness = law.elastic_modulus * section.second_moment_weak / (1.0 + ends.weak)
 
-    def transformed(reduced: Array, past: Any) -> Array:
-        return reduced - law.bent(reduced, section, past).moment / stiffness
+    def transformed(reduced: Array, past: Any) -> Transformed:
+        return law.transformed(reduced, law.bent(reduced, section, past), section)
 
     reduced = curvature / ends.flattening(curvature)
-    present, middle = transformed(reduced, memory), curvature
+    (present, gain, *_), middle = transformed(reduced, memory), curvature
     if not isinstance(memory, tuple):
-        middle = _middle(law, section, reduced, present, stiffness)
+        middle = _middle(law, section, reduced, present)
 
     def add(total: tuple[Array, ...], node: Array) -> tuple[tuple[Array, ...], None]:
         path, elastic, transformation = total
-        reduced, change = _along(ends, curvature, node)
-        until, by = _along(ends, middle, node)
-        return (
-            path + change,
-            elastic + reduced * change,
-            transformation + (present - transformed(until, ())) * by,
-        ), None
+        at, change, _ = _along(ends, curvature, node)
+        until, flat, bent = _along(ends, middle, node)
+        on_way, its_gain, *_ = transformed(until, ())
+        more = its_gain * (its_gain * until - on_way) - gain * (gain * until - present)
+        by_parts = on_way * (2.0 * until - on_way * (0.5 - ends.warped * until))
+        stored = more * flat + ends.warped * by_parts * bent
+        return (path + change, elastic + at * change, transformation + stored), None
 
-    none = jnp.zeros_like(curvature)
+    none, last = jnp.zeros_like(curvature), middle / ends.flattening(middle)
     path, elastic, transformation = jax.lax.scan(
         add, (none, none, none), constant(xp.stack([NODES, WEIGHTS], axis=-1))
     )[0]
-    by_transformation = stiffness * transformation
-    energy = stiffness * (elastic - present * path) + by_transformation
+    at_last = present * last * (last - 0.5 * present * (1.0 - ends.warped * last))
+    by_transformation = stiffness * (transformation - ends.warped * at_last)
+    energy = stiffness * gain * (gain * elastic - present * path) + by_transformation
+    path = (2.0 * gain - 1.0) * path - 2.0 * ends.warped * gain * elastic
+    path -= ends.warped * reduced * (gain * reduced - present)
     return Flattening(path, stiffness * present, by_transformation, energy)
 
 
-def _along(ends: NotchEnds, curvature: Array, node: Array) -> tuple[Array, Array]:
-    """Return s at a node of the rule on 0 ... curvature, and its weight of dX."""
+def _along(ends: NotchEnds, curvature: Array, node: Array) -> tuple[Array, Array, Array]:
+    """Return x at a node of the rule on 0 ... curvature, and its weights of dX and of dx."""
     part = node[0] * curvature
     q, slope = ends.flattening(part), ends.odd + 2.0 * ends.even * part
-    return part / q, node[1] * curvature * part * slope / q**2
+    flat, all_of = part * slope / q**2, node[1] * curvature
+    return part / q, all_of * flat, all_of * (1.0 / q - flat)
 
 
-def _middle(
-    law: SectionLaw, section: FibreSection, start: Array, present: Array, stiffness: Array
-) -> Array:
+def _middle(law: SectionLaw, section: FibreSection, start: Array, present: Array) -> Array:
     """Find the curvature where loading by halfway stresses has transformed a section as much."""
     ends = section.compliance
 
     def beyond(
-        law: SectionLaw, section: FibreSection, present: Array, stiffness: Array, reduced: Array
+        law: SectionLaw, section: FibreSection, present: Array, reduced: Array
     ) -> tuple[Array, Array]:
-        bent = law.bent(reduced, section, ())
-        return reduced - bent.moment / stiffness - present, 1.0 - bent.slope / stiffness
+        found = law.transformed(reduced, law.bent(reduced, section, ()), section)
+        return found.curvature - present, found.by
 
-    # s is largest at kappa^2 = 1 / even; the transformation is a fraction of it. Where a section
+    # x is largest at kappa^2 = 1 / even; the transformation is a fraction of it. Where a section
     # does not flatten, `even` is negligible, but above 0.
     root = jnp.sqrt(jnp.maximum(ends.even, 1e-12))
     side = jnp.where(present < 0.0, -1.0, 1.0)
     extreme = side / (2.0 * root + side * ends.odd)
-    low, high = jnp.minimum(present, extreme), jnp.maximum(present, extreme)
+    least = present / (1.0 + ends.warped * present)
+    low, high = jnp.minimum(least, extreme), jnp.maximum(least, extreme)
     bounds = jax.lax.stop_gradient((low, high))
-    varied = law, section, present, stiffness
+    varied = law, section, present
     reduced = jnp.clip(bracketed_root(beyond, varied, jnp.clip(start, *bounds), *bounds), *bounds)
-    # The solution of s = kappa / q before that largest one.
+    # The solution of x = kappa / p before that largest one.
     linear = 1.0 - ends.odd * reduced
     square = jnp.maximum(linear**2 - 4.0 * ends.even * reduced**2, 0.0)
     return 2.0 * reduced / (linear + jnp.sqrt(square))
@@ -295,8 +307,17 @@ class Bending(NamedTuple):
     curvature: Scalar
     moment: Scalar  # Its moment, N mm
     memory: Any  # The memory after it
-    slope: Array  # Change of the moment with s
+    slope: Array  # Change of the moment with s, at constant 1 + a e
     strain: Array | float = 0.0  # Strain of the neutral axis, for laws of fibres
+
+
+class Transformed(NamedTuple):
+    """What the transformation adds to the elastic bending of a section between its ends."""
+
+    curvature: Array  # e, 1/mm
+    gain: Array  # 1 + a e
+    slope: Array  # Change of the moment with x
+    by: Array  # Change of e with x
 
 
 # Mask of weak-axis bending among strains and resultants.
@@ -340,14 +361,26 @@ class SectionLaw(Pytree, ABC):
         """Return the energy per length of a section without ends at a curvature, N mm/mm."""
 
     def joint(self, reduced: Each, section: FibreSection) -> SectionEnds:
-        """Join sections to their ends."""
+        """Join sections to their ends, as they flatten at x (`reduced`)."""
         ends, rigid = section.compliance, jnp.ones_like(reduced)
         rigidity = self.elastic_modulus * section.second_moment_weak
         direct = rigid + ends.material_share * ends.weak
-        return SectionEnds(direct, (rigid - ends.material_share) * ends.weak / rigidity, reduced)
+        soft = (rigid - ends.material_share) * ends.weak
+        follows = ends.warped * reduced * direct
+        return SectionEnds(direct - follows, (soft + follows) / rigidity, reduced)
+
+    def transformed(self, reduced: Each, bending: Bending, section: FibreSection) -> Transformed:
+        """Compute what the transformation of bent sections adds to their elastic bending."""
+        ends, rigidity = section.compliance, self.elastic_modulus * section.second_moment_weak
+        direct = 1.0 + ends.material_share * ends.weak
+        curvature = direct * (bending.curvature - bending.moment / rigidity)
+        gain = 1.0 + ends.warped * curvature
+        slope = gain * bending.slope
+        by = (gain - slope * (1.0 + ends.weak) / rigidity) / (1.0 - ends.warped * reduced)
+        return Transformed(curvature, gain, slope, by)
 
     def bent(self, reduced: Each, section: FibreSection, memory: Any) -> Bending:
-        """Bend sections between their ends by s = kappa / q; for laws without memory."""
+        """Bend sections between their ends by x, kappa / p; for laws without memory."""
 
         def moment(law: SectionLaw, section: FibreSection, curvature: Array) -> tuple[Array, Array]:
             moment_at = partial(law.moment, section=section)
@@ -375,9 +408,11 @@ class SectionLaw(Pytree, ABC):
         ends, curvature = section.compliance, strain[..., 1]
         q = ends.flattening(curvature)
         bending = self.bent(curvature / q, section, memory)
-        by_q = (ends.odd + 2.0 * ends.even * curvature) / q
-        slope = (bending.slope * (1.0 - curvature * by_q) / q - bending.moment * by_q) / q
-        resultants = jnp.where(_WEAK, (bending.moment / q)[..., None], elastic)
+        _, gain, slope, by = self.transformed(curvature / q, bending, section)
+        by_q, moment = (ends.odd + 2.0 * ends.even * curvature) / q, gain * bending.moment
+        slope = gain * slope + ends.warped * by * bending.moment
+        slope = (slope * (1.0 - curvature * by_q) / q - moment * by_q) / q
+        resultants = jnp.where(_WEAK, (moment / q)[..., None], elastic)
         return SectionResponse(resultants, bending.memory, slope)
 
     def stored_energy_density(
@@ -390,7 +425,7 @@ class SectionLaw(Pytree, ABC):
         others = 0.5 * jnp.where(_WEAK, 0.0, self.elastic(strain, section)) @ strain
         ends, curvature = section.compliance, strain[1]
         bending = self.bent(curvature / ends.flattening(curvature), section, memory)
-        joint = self.joint(bending.curvature, section)
+        joint = self.joint(jnp.zeros_like(curvature), section)
         stored = joint.direct * self.bending_energy(bending.curvature, section, memory)
         if section.ends is None:
             return others + stored, Flattening(*[jnp.zeros_like(curvature)] * 4)
