@@ -6,6 +6,7 @@ the inner wall. Levels with less than 0.05 mm of gap are left out, as the solid 
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -64,6 +65,37 @@ def wrist(wrist: str = "A", friction: float = 0.0, **keys: Any) -> nf.Robot:
         material=LINEAR,
         friction=nf.Capstan(friction) if friction else nf.Frictionless(),
     )
+
+
+def drawn(row: dict[str, Any]) -> nf.Robot:
+    """Build a wrist of fem_wrists_drawn.csv, with elastic ends."""
+    young, *plateau = map(float, str(row["material"]).split())
+    notch = nf.ArcNotch(
+        row["cut"],
+        depth=row["depth"],
+        height=row["height"],
+        uncut_length=row["uncut"],
+        repeat=int(row["notches"]) - 1,
+        ends="shell",
+    )
+    return nf.Robot(
+        name="wrist",
+        tube=nf.Tube(row["outer"], row["inner"], base_length=row["base"]),
+        notch=(notch, replace(notch, uncut_length=row["last"], repeat=1)),
+        tendon=(nf.Tendon(row["inner"] / 2, path="straight"),),
+        material=nf.Nitinol(
+            elastic_modulus=young, plateau_stress=plateau[0], plateau_modulus=plateau[1]
+        )
+        if plateau
+        else nf.Linear(young),
+        friction=nf.Frictionless(),
+    )
+
+
+def drawn_wrists() -> list[list[dict[str, Any]]]:
+    """Read the wrists of fem_wrists_drawn.csv: the rows of each, one for a level of tension."""
+    rows = named_rows("fem_wrists_drawn.csv")
+    return [list(same) for _, same in itertools.groupby(rows, lambda row: list(row.values())[:11])]
 
 
 def rigid(robot: nf.Robot) -> nf.Robot:
