@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import notchflex as nf
+from notchflex.mechanics.law_errors import Place
 from reference_data import named_rows
 
 LEAST_GAP = 0.05  # mm
@@ -96,6 +97,45 @@ def drawn_wrists() -> list[list[dict[str, Any]]]:
     """Read the wrists of fem_wrists_drawn.csv: the rows of each, one for a level of tension."""
     rows = named_rows("fem_wrists_drawn.csv")
     return [list(same) for _, same in itertools.groupby(rows, lambda row: list(row.values())[:11])]
+
+
+def stiffness_errors(rows: list[dict[str, Any]]) -> np.ndarray:
+    """Return the factor on the stiffness that gives the angles of a drawn wrist, less 1.
+
+    Shape (levels, notches), or one column where the total is given; NaN where the law has snapped.
+    """
+    robot = drawn(rows[0])
+    loads = [nf.Load(tension=tension) for tension in (0.0, *(row["tension_N"] for row in rows))]
+    wanted = np.array([str(row["angles_deg"]).split() for row in rows], float)
+
+    def logarithms(factor: float) -> np.ndarray:
+        path = nf.simulate(robot.with_value("notch.stiffness_factor", factor), loads)
+        bent = np.degrees(path.notch_angle)[1:]
+        bent = bent if wanted.shape[1] > 1 else bent.sum(axis=1, keepdims=True)
+        return np.where(path.converged[1:, None], np.log(bent), np.nan)
+
+    softer, stiffer = logarithms(0.98), logarithms(1.02)
+    return 0.04 * (logarithms(1.0) - np.log(wanted)) / (softer - stiffer)
+
+
+def errors_by_place(rows: list[dict[str, Any]]) -> list[tuple[Place, float, float]]:
+    """Return places of the first, the middle and the last notch; rms and largest of residuals."""
+    row, found = rows[0], stiffness_errors(rows)
+    outer, uncut = row["outer"], row["uncut"]
+    parts = {0: (uncut, found)}
+    if found.shape[1] > 1:
+        rings = [min(row["base"], uncut), uncut, min(uncut, row["last"])]
+        parts = dict(enumerate(zip(rings, np.split(found, [1, -1], axis=1), strict=True)))
+    ratios = 0.5 * (1.0 - row["inner"] / outer), row["depth"] / outer, row["height"] / outer
+    kind = row["cut"] == "on-axis", isinstance(row["material"], str)
+    return [
+        (
+            Place(*ratios, ring / outer, *kind, last=number == 2),
+            float(np.sqrt(np.nanmean(part**2))),
+            float(np.nanmax(np.abs(part))),
+        )
+        for number, (ring, part) in parts.items()
+    ]
 
 
 def rigid(robot: nf.Robot) -> nf.Robot:
