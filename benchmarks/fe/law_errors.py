@@ -14,7 +14,6 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 from fem_wrists import drawn_wrists, errors_by_place
-
 from notchflex.mechanics.law_errors import Place
 
 if __name__ == "__main__":

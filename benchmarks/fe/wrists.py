@@ -125,7 +125,10 @@ def solved(robot: nf.Robot, tension: float) -> list[tuple[float, np.ndarray]]:
     parts = re.split(r" displacements .*? time\s+(\S+)", printed)
     mesh = mesh_of(robot, MESH)
     return [
-        (tension * float(time), np.degrees(read_rings(mesh, f" displacements x\n{body}").notch_angle))
+        (
+            tension * float(time),
+            np.degrees(read_rings(mesh, f" displacements x\n{body}").notch_angle),
+        )
         for time, body in zip(parts[1::2], parts[2::2], strict=True)
     ]
 

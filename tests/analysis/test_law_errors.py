@@ -18,12 +18,13 @@ from notchflex.mechanics.ring import Side
 from notchflex.support import law_errors
 
 DRAWN = drawn_wrists()
-OTHER_TUBES = [rows for rows in DRAWN if rows[0]["notches"] != 4 or rows[0]["outer"] == 4.0][:5]
+TOTAL, USUAL, LAST = 2.2, 4.4, 1.7
+"""Largest errors in % of the first five: of the total, of all notches but the last, of the last."""
 
 
-@pytest.mark.parametrize("rows", OTHER_TUBES, ids=lambda rows: "{outer:g} mm".format(**rows[0]))
+@pytest.mark.parametrize("rows", DRAWN[:5], ids=lambda rows: "{outer:g} mm".format(**rows[0]))
 def test_other_tubes(rows, margin):
-    """Tubes of 2 to 4 mm with off-axis cuts (fitted), and wrist A with on-axis cuts to 93 degrees."""
+    """Tubes of 2 to 4 mm with off-axis cuts (fitted), wrist A with on-axis cuts to 93 degrees."""
     loads = [nf.Load(tension=row["tension_N"]) for row in rows]
     bent = np.degrees(nf.simulate(drawn(rows[0]), loads).notch_angle)
     wanted = np.array([str(row["angles_deg"]).split() for row in rows], float)
@@ -72,10 +73,10 @@ def test_outside_the_table_the_border_counts():
     notch = 0.81, 0.7, "on-axis", 1.0, 0.8
     ring = Side("between", 1.2)
     (sentence,) = validity(*notch, ring, ring)
-    assert sentence.startswith("depth / outer diameter is 0.617, below 0.68: the stiffness was found")
+    assert sentence.startswith("depth / outer diameter is 0.617, below 0.68: the stiffness")
     robot = nf.load_robot("pacheco2021-a-true")
     at = [law_errors(robot.with_value("notch.depth", depth))[0] for depth in (0.9, 1.0, 1.4)]
-    assert at[0] == pytest.approx(at[1]) > at[2]
+    assert at[0] == at[1] > at[2]
 
 
 def test_the_law_is_a_part_of_the_band(wrist: nf.Robot):
@@ -84,7 +85,7 @@ def test_the_law_is_a_part_of_the_band(wrist: nf.Robot):
     assert sizes["notch.stiffness_factor"] == "1.5 %"
     assert sizes["notch[5].stiffness_factor"] == "1.9 %"
     linear = {one.value: one.sd for one in tolerances_of(true.replace(material=LINEAR))[0]}
-    assert linear["notch.stiffness_factor"] == "1.4 %"
+    assert linear["notch.stiffness_factor"] == "1.5 %"
     assert not any("stiffness_factor" in one.value for one in tolerances_of(wrist)[0])
     bands = nf.uncertain(true, nf.Load(tension=1.0), draws=40, outputs=("total_angle",))
     assert 0.0 < bands.variance_shares("total_angle", 0)["law"] < 0.2

@@ -25,11 +25,11 @@ from notchflex.mechanics.flexure import (
     fibre_stretch,
     flattened,
     flexure_state,
+    law_error,
     relative_pose,
     rod_at,
     section_fibres,
     stack,
-    law_error,
     validity_warnings,
     with_level,
 )
