@@ -2,8 +2,8 @@
 
     python benchmarks/fe/law_errors.py
 
-To be run again when the law of a notch changes. A wrist of which a notch is more than 10 % off (root
-mean square over the loads) lies outside what the law covers: it is printed and left out.
+To be run again when the law of a notch changes. A wrist of which a notch is more than 10 % off
+(root mean square over the loads) lies outside what the law covers: it is printed and left out.
 """
 
 from __future__ import annotations
@@ -11,10 +11,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tests"))
-from fem_wrists import drawn_wrists, errors_by_place
 from notchflex.mechanics.law_errors import Place
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from fem_wrists import drawn_wrists, errors_by_place
+
+TABLE = Path(__file__).parents[2] / "src/notchflex/mechanics/law_errors.csv"
 
 if __name__ == "__main__":
     lines = [",".join([*Place._fields, "error", "largest"])]
@@ -27,5 +29,4 @@ if __name__ == "__main__":
             ",".join([*(f"{value:.5g}" for value in place), f"{error:.4f}", f"{largest:.4f}"])
             for place, error, largest in places
         ]
-    table = ROOT / "src/notchflex/mechanics/law_errors.csv"
-    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    TABLE.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -19,7 +19,7 @@ def judge(margin, what, error, rms, largest):
 
 def test_small_loads(margin):
     error, outside = single_notch()
-    judge(margin, "K₀ of one notch", error, 1.4, 4.0)
+    judge(margin, "K₀ of one notch", error, 1.4, 4.3)
     assert len(error) > 60
     margin.note(f"K₀ outside the range: max {100 * np.max(np.abs(outside)):.1f} %")
 
@@ -38,11 +38,11 @@ def test_other_directions(use, margin):
 @pytest.mark.parametrize("use", CELLS)
 def test_weak_bending_in_chains(use, margin):
     error, shallow = chain_bending(use)
-    judge(margin, f"K₀ in chains, {use}", error, 1.8, 5.0)
+    judge(margin, f"K₀ in chains, {use}", error, 1.8, 5.2)
     judge(margin, f"K₀ in chains, outside the ranges, {use}", shallow, 3.1, 6.3)
 
 
-@pytest.mark.parametrize(("depth", "allowed"), [(1.4, 4.6), (1.458, 3.4), (0.972, 3.4)])
+@pytest.mark.parametrize(("depth", "allowed"), [(1.4, 3.4), (1.458, 3.4), (0.972, 3.4)])
 def test_moment_to_closing(depth, allowed, margin):
     error = 100 * np.array(moments(depth))
     assert error.size > 5
