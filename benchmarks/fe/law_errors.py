@@ -1,4 +1,4 @@
-"""Make law_errors.csv of notchflex.mechanics from tests/reference/fem_wrists_drawn.csv (a minute).
+"""Make law_errors.csv of notchflex.mechanics from tests/reference/fem_wrists_drawn.csv (seconds).
 
     python benchmarks/fe/law_errors.py
 

@@ -6,11 +6,14 @@ solid. Where they differ from 1, the law is wrong, whatever the softening makes 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import notchflex as nf
 from fem_wrists import LINEAR, drawn, drawn_wrists, errors_by_place, stiffness_errors
+from margins import Margin
 from notchflex.analysis.draws import tolerances_of
 from notchflex.mechanics.ends import validity
 from notchflex.mechanics.law_errors import error_at, table
@@ -23,7 +26,7 @@ TOTAL, USUAL, LAST = 2.2, 4.4, 1.7
 
 
 @pytest.mark.parametrize("rows", DRAWN[:5], ids=lambda rows: "{outer:g} mm".format(**rows[0]))
-def test_other_tubes(rows, margin):
+def test_other_tubes(rows: list[dict[str, Any]], margin: Margin):
     """Tubes of 2 to 4 mm with off-axis cuts (fitted), wrist A with on-axis cuts to 93 degrees."""
     loads = [nf.Load(tension=row["tension_N"]) for row in rows]
     bent = np.degrees(nf.simulate(drawn(rows[0]), loads).notch_angle)
@@ -46,7 +49,7 @@ def test_the_table_is_that_of_the_law():
 
 
 @pytest.mark.nightly
-def test_residuals_lie_in_the_band(margin):
+def test_residuals_lie_in_the_band(margin: Margin):
     """Of the wrists that were not fitted; also where the table lacks the wrist that is judged."""
     inside: list[np.ndarray] = []
     for rows in DRAWN:

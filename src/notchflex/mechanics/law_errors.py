@@ -66,4 +66,5 @@ def covered(dimension: int) -> tuple[float, float, float, float]:
     low, high = float(values.min()), float(values.max())
     margin = 0.1 * (high - low)
     ends = (values < low + margin, values > high - margin)
-    return low, high, *(float(table()[end, 8].max()) for end in ends)
+    near_low, near_high = (float(table()[end, 8].max()) for end in ends)
+    return low, high, near_low, near_high
