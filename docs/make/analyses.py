@@ -6,6 +6,7 @@ picture needs.
 
 from __future__ import annotations
 
+import csv
 import sys
 import tempfile
 from pathlib import Path
@@ -89,14 +90,16 @@ def accuracy(*axes: Axes, measured: Path) -> None:
         beside(off_last, (last[1], 100.0 * (last[0] / last[1] - 1.0)), BLUE)
     for letter in "abc":
         robot = nf.load_robot(f"pacheco2021-{letter}-true")
-        table = np.genfromtxt(
-            measured / f"pacheco2021_wrist_{letter.upper()}_measured.csv", delimiter=",", names=True
-        )
-        order = np.argsort(table["tendon_force_N"])
-        force = np.maximum(table["tendon_force_N"][order], 0.0)
+        file = measured / f"pacheco2021_wrist_{letter.upper()}_measured.csv"
+        with file.open(encoding="utf-8") as lines:
+            table = [
+                (float(row["tendon_force_N"]), float(row["total_deg"]))
+                for row in csv.DictReader(lines)
+            ]
+        force, seen = np.array(sorted(table)).T.clip(0.0)
         path = nf.simulate(robot, [nf.Load(tension=one) for one in force])
         total.plot(
-            table["total_deg"][order], np.degrees(path.edge_angle).sum(axis=1), "x", color="k", ms=3
+            seen, np.degrees(path.edge_angle).sum(axis=1), "x", color="k", ms=3
         )
     total.plot([0, 160], [0, 160], color="0.6", lw=0.8, zorder=0)
     for one, size in zip((off, off_last), 100.0 * np.median(sizes, axis=0), strict=True):
