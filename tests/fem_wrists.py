@@ -6,12 +6,14 @@ the inner wall. Levels with less than 0.05 mm of gap are left out, as the solid 
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import notchflex as nf
+from notchflex.mechanics.law_errors import Place
 from reference_data import named_rows
 
 LEAST_GAP = 0.05  # mm
@@ -64,6 +66,76 @@ def wrist(wrist: str = "A", friction: float = 0.0, **keys: Any) -> nf.Robot:
         material=LINEAR,
         friction=nf.Capstan(friction) if friction else nf.Frictionless(),
     )
+
+
+def drawn(row: dict[str, Any]) -> nf.Robot:
+    """Build a wrist of fem_wrists_drawn.csv, with elastic ends."""
+    young, *plateau = map(float, str(row["material"]).split())
+    notch = nf.ArcNotch(
+        row["cut"],
+        depth=row["depth"],
+        height=row["height"],
+        uncut_length=row["uncut"],
+        repeat=int(row["notches"]) - 1,
+        ends="shell",
+    )
+    return nf.Robot(
+        name="wrist",
+        tube=nf.Tube(row["outer"], row["inner"], base_length=row["base"]),
+        notch=(notch, replace(notch, uncut_length=row["last"], repeat=1)),
+        tendon=(nf.Tendon(row["inner"] / 2, path="straight"),),
+        material=nf.Nitinol(
+            elastic_modulus=young, plateau_stress=plateau[0], plateau_modulus=plateau[1]
+        )
+        if plateau
+        else nf.Linear(young),
+        friction=nf.Frictionless(),
+    )
+
+
+def drawn_wrists() -> list[list[dict[str, Any]]]:
+    """Read the wrists of fem_wrists_drawn.csv: the rows of each, one for a level of tension."""
+    rows = named_rows("fem_wrists_drawn.csv")
+    return [list(same) for _, same in itertools.groupby(rows, lambda row: list(row.values())[:11])]
+
+
+def stiffness_errors(rows: list[dict[str, Any]]) -> np.ndarray:
+    """Return the factor on the stiffness that gives the angles of a drawn wrist, less 1.
+
+    Shape (levels, notches), or one column where the total is given; NaN where the law has snapped.
+    """
+    robot = drawn(rows[0])
+    loads = [nf.Load(tension=tension) for tension in (0.0, *(row["tension_N"] for row in rows))]
+    wanted = np.array([str(row["angles_deg"]).split() for row in rows], float)
+
+    def logarithms(factor: float) -> np.ndarray:
+        path = nf.simulate(robot.with_value("notch.stiffness_factor", factor), loads)
+        bent = np.degrees(path.notch_angle)[1:]
+        bent = bent if wanted.shape[1] > 1 else bent.sum(axis=1, keepdims=True)
+        return np.where(path.converged[1:, None], np.log(bent), np.nan)
+
+    softer, stiffer = logarithms(0.98), logarithms(1.02)
+    return 0.04 * (logarithms(1.0) - np.log(wanted)) / (softer - stiffer)
+
+
+def errors_by_place(rows: list[dict[str, Any]]) -> list[tuple[Place, float, float]]:
+    """Return places of the first, the middle and the last notch; rms and largest of residuals."""
+    row, found = rows[0], stiffness_errors(rows)
+    outer, uncut = row["outer"], row["uncut"]
+    parts = {0: (uncut, found)}
+    if found.shape[1] > 1:
+        rings = [min(row["base"], uncut), uncut, min(uncut, row["last"])]
+        parts = dict(enumerate(zip(rings, np.split(found, [1, -1], axis=1), strict=True)))
+    ratios = 0.5 * (1.0 - row["inner"] / outer), row["depth"] / outer, row["height"] / outer
+    kind = row["cut"] == "on-axis", isinstance(row["material"], str)
+    return [
+        (
+            Place(*ratios, ring / outer, *kind, last=number == 2),
+            float(np.sqrt(np.nanmean(part**2))),
+            float(np.nanmax(np.abs(part))),
+        )
+        for number, (ring, part) in parts.items()
+    ]
 
 
 def rigid(robot: nf.Robot) -> nf.Robot:

@@ -99,12 +99,9 @@ def _sideways() -> str:
 
 def _notches() -> str:
     single, single_outside = single_notch()
-    chain, shallow = chain_bending()
     errors = {
         "bending, one notch between plates": single,
         "the same, outside the checked ranges": single_outside,
-        "bending, in a chain of notches": chain,
-        "the same, depth / outer diameter 0.60": shallow,
     }
     for depth in (0.972, 1.4, 1.458):
         errors[f"moment to closing, {depth:.2f} mm deep"] = moments(depth)
@@ -117,7 +114,11 @@ def _notches() -> str:
         "shear": "shift by a force across, in the plane",
         "sway": "shift by a force across, sideways",
     }
-    errors |= {names[name]: values for name, values in other_directions().items()}
+    for use, kind in (("fit", "fitted"), ("judge", "kept back")):
+        inside, outside = chain_bending(use)
+        errors[f"bending, in a chain of notches, {kind}"] = inside
+        errors[f"the same, outside the checked ranges, {kind}"] = outside
+        errors |= {f"{names[name]}, {kind}": all_ for name, all_ in other_directions(use).items()}
     rows = []
     for name, values in errors.items():
         both = np.sqrt(np.mean(np.square(values))), np.abs(values).max()

@@ -1,18 +1,27 @@
 """Draws the pictures of the pages on sweeps, tolerances, sensing and workspaces into docs/images.
 
-`python docs/make/analyses.py`.
+`python docs/make/analyses.py [FOLDER]`; FOLDER has the measured angles of Pacheco 2021, which one
+picture needs.
 """
 
 from __future__ import annotations
 
+import csv
+import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
-from pictures import IMAGES, shown_file
+from matplotlib.axes import Axes
+from pictures import HOLLOW, IMAGES, beside, label_all, picture, shown_file
 
 import notchflex as nf
 from notchflex.plotting import sensed_picture, sweep_picture
+from notchflex.plotting.style import BLUE, GREEN, VERMILLION
+from notchflex.support import law_errors
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from fem_wrists import drawn, drawn_wrists, solid
 
 
 def sweep(images: Path = IMAGES) -> None:
@@ -53,6 +62,60 @@ def workspace(images: Path = IMAGES) -> None:
     nf.plot(nf.workspace(robot, states=20_000, stiffness=300)).save(images / "workspace.png")
 
 
+@picture("accuracy.svg", 7.2, 2.9, columns=3)
+def accuracy(*axes: Axes, measured: Path) -> None:
+    """Every wrist of finite elements and every measured one, against the law from the drawing."""
+    total, off, off_last = axes
+    sizes: list[tuple[float, float]] = []
+    for rows in drawn_wrists():
+        robot = drawn(rows[0])
+        found = np.array([str(row["angles_deg"]).split() for row in rows], float)
+        path = nf.simulate(robot, [nf.Load(tension=row["tension_N"]) for row in rows])
+        bent = np.where(path.converged[:, None], np.degrees(path.notch_angle), np.nan)
+        sizes.append(law_errors(robot))
+        nitinol = isinstance(rows[0]["material"], str)
+        colour = GREEN if nitinol else BLUE if rows[0]["use"] == "fit" else VERMILLION
+        sums, last = (bent.sum(axis=1), found.sum(axis=1)), (bent[:, -1], found[:, -1])
+        beside(total, sums[::-1], colour)
+        beside(off, (sums[1], 100.0 * (sums[0] / sums[1] - 1.0)), colour)
+        if found.shape[1] > 1:
+            beside(off_last, (last[1], 100.0 * (last[0] / last[1] - 1.0)), colour)
+    for case in ("A_lin_mu0", "B_lin_mu0", "A_lin_mu013"):
+        wrist = solid(f"{case}_medium")
+        bent = np.degrees(nf.simulate(wrist.robot, wrist.loads).notch_angle)
+        sums = bent.sum(axis=1), wrist.angles.sum(axis=1)
+        beside(total, sums[::-1], BLUE)
+        beside(off, (sums[1], 100.0 * (sums[0] / sums[1] - 1.0)), BLUE)
+        last = bent[:, -1], wrist.angles[:, -1]
+        beside(off_last, (last[1], 100.0 * (last[0] / last[1] - 1.0)), BLUE)
+    for letter in "abc":
+        robot = nf.load_robot(f"pacheco2021-{letter}-true")
+        file = measured / f"pacheco2021_wrist_{letter.upper()}_measured.csv"
+        with file.open(encoding="utf-8") as lines:
+            table = [
+                (float(row["tendon_force_N"]), float(row["total_deg"]))
+                for row in csv.DictReader(lines)
+            ]
+        force, seen = np.array(sorted(table)).T.clip(0.0)
+        path = nf.simulate(robot, [nf.Load(tension=one) for one in force])
+        total.plot(
+            seen, np.degrees(path.edge_angle).sum(axis=1), "x", color="k", ms=3
+        )
+    total.plot([0, 160], [0, 160], color="0.6", lw=0.8, zorder=0)
+    for one, size in zip((off, off_last), 100.0 * np.median(sizes, axis=0), strict=True):
+        for part, shade in ((2.0, "0.92"), (1.0, "0.83")):
+            one.axhspan(-part * size, part * size, color=shade, lw=0.0, zorder=0)
+        one.set_ylim(-15.0, 15.0)
+    for colour, label in ((BLUE, "fitted"), (VERMILLION, "kept back"), (GREEN, "nitinol")):
+        total.plot([], [], "o", color=colour, label=label, **HOLLOW)
+    total.plot([], [], "x", color="k", ms=3, label="measured")
+    total.legend()
+    label_all(axes, "total, found [deg]", "total, predicted [deg]", "error of the total [%]")
+    off_last.set(xlabel="last notch, found [deg]", ylabel="error of the last notch [%]")
+
+
 if __name__ == "__main__":
     for draw in (sweep, tolerances, sensing, workspace):
         draw()
+    if len(sys.argv) > 1:
+        accuracy(measured=Path(sys.argv[1]))

@@ -62,7 +62,7 @@ _HOME = {
             "short_repr",
         ),
         "notchflex.loads.load_path": ("load_path",),
-        "notchflex.mechanics.chain": ("unchecked_dimensions",),
+        "notchflex.mechanics.chain": ("law_errors", "unchecked_dimensions"),
         "notchflex.results.io": (
             "frame",
             "whole_document",

@@ -38,6 +38,7 @@ from notchflex.loads.load import check_number as check_number
 from notchflex.loads.load import check_pulls as check_pulls
 from notchflex.loads.load import short_repr as short_repr
 from notchflex.loads.load_path import load_path as load_path
+from notchflex.mechanics.chain import law_errors as law_errors
 from notchflex.mechanics.chain import unchecked_dimensions as unchecked_dimensions
 from notchflex.results.io import frame as frame
 from notchflex.results.io import whole_document as whole_document

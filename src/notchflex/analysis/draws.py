@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from notchflex.analysis.varied import VariedRobots
 from notchflex.errors import InputError
+from notchflex.mechanics.chain import law_errors
 from notchflex.robot import Nitinol, Robot
 from notchflex.robot.part import fields_of, unit_of
 from notchflex.robot.problems import Tolerance, amount
@@ -171,9 +172,6 @@ _FRICTION = Tolerance("friction.coefficient", sd="60 %", plus="300 %", minus="75
 # Where in the lumen a tendon runs is seldom known: York's is read as 0.43 or 0.38 mm.
 _RADIUS = Tolerance("tendon.radius", sd="6 %", plus="12 %", minus="12 %")
 
-# Error of the law of fibres: moments of yielding notches with hardening by finite elements.
-_LAW_OF_FIBRES = 0.034
-
 # Of no effect before a notch is destroyed.
 _LEFT_OUT = ("plastic_modulus",)
 
@@ -223,16 +221,12 @@ def _tendon_radius(robot: Robot) -> Iterator[Tolerance]:
 
 
 def _law(robot: Robot) -> Iterator[Tolerance]:
-    """Yield the error of the law of notches with elastic ends, larger for the last notch."""
-    # Papers' laws of rigid ends come with constants that were fitted by them, error included.
-    notches = robot.notches
-    all_of_them = max(notch.law_errors[0] for notch in notches)
-    last = notches[-1].law_errors[1]
-    names = ("notch", all_of_them), (f"notch[{len(notches)}]", last)
-    for name, error in names if all_of_them != last else names[:1]:
-        if error:
-            total = math.hypot(error, _LAW_OF_FIBRES * robot.material.by_fibres)
-            yield Tolerance(f"{name}.stiffness_factor", sd=f"{100 * total:.2g} %")
+    """Yield the error of the law of notches with elastic ends, and that of the last notch."""
+    sizes = [f"{100.0 * error:.2g} %" for error in law_errors(robot)]
+    names = "notch", f"notch[{len(robot.notches)}]"
+    for name, size in zip(names[: len(set(sizes))], sizes, strict=False):
+        if size != "0 %":
+            yield Tolerance(f"{name}.stiffness_factor", sd=size)
 
 
 def _rounded(size: float) -> float:

@@ -25,6 +25,7 @@ from notchflex.mechanics.flexure import (
     fibre_stretch,
     flattened,
     flexure_state,
+    law_error,
     relative_pose,
     rod_at,
     section_fibres,
@@ -326,6 +327,16 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
         return shared.setdefault(key, Site(*sides, robot.material.poisson_ratio))
 
     return tuple(map(site, range(len(notches))))
+
+
+def law_errors(robot: Robot) -> tuple[float, float]:
+    """Return relative errors (SD) of the stiffness by finite elements: of notches, of the last."""
+    yields = robot.material.by_fibres
+    each = [
+        0.0 if site is None else law_error(notch, robot.tube, site, yields)
+        for notch, site in zip(robot.notches, sites_of(robot), strict=True)
+    ]
+    return float(np.sqrt(np.mean(np.square(each[:-1] or each)))), each[-1]
 
 
 def unchecked_dimensions(robot: Robot) -> list[str]:

@@ -196,14 +196,6 @@ class Notch:
         """Whether its stiffness depends on the rings or walls beside it."""
         return getattr(self, "ends", "rigid") != "rigid"
 
-    @property
-    def law_errors(self) -> tuple[float, float]:
-        """Relative errors (SD) of its stiffness by finite elements: of any notch, of the last.
-
-        Those of strips and links: root mean square over cells that were not fitted.
-        """
-        return (0.047, 0.047) if self.has_elastic_ends else (0.0, 0.0)
-
     def problems(self, tube: Tube) -> Problems:
         """Find what does not fit the tube: pairs of a key and the rest of the sentence."""
         return ()

@@ -20,8 +20,8 @@ def judge(margin, what, error, rms, largest):
 def test_small_loads(margin):
     # None of the law's constants was fitted to notches between rigid plates.
     error, outside = single_notch()
-    judge(margin, "K₀ of one notch", error, 1.2, 4.3)
-    assert len(error) > 90
+    judge(margin, "K₀ of one notch", error, 1.4, 4.3)
+    assert len(error) > 60
     margin.note(f"K₀ outside the range: max {100 * np.max(np.abs(outside)):.1f} %")
 
 
@@ -39,7 +39,7 @@ def test_other_directions(use, margin):
 @pytest.mark.parametrize("use", CELLS)
 def test_weak_bending_in_chains(use, margin):
     error, shallow = chain_bending(use)
-    judge(margin, f"K₀ in chains, {use}", error, 1.6, 3.6)
+    judge(margin, f"K₀ in chains, {use}", error, 1.8, 5.2)
     judge(margin, f"K₀ in chains, outside the ranges, {use}", shallow, 3.1, 6.3)
 
 
@@ -70,13 +70,13 @@ def test_validity_names_what_is_left():
     assert validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, ring) == []
     said = {
         "solid strip": (0.58, 0.43, "off-axis", 1.044, 0.5),
-        "between notches": (0.81, 0.7, "on-axis", 1.05, 0.8),
-        "moment": (0.81, 0.75, "on-axis", 1.4, 0.8),
-        "0.159": (0.81, 0.7, "on-axis", 1.4, 0.12),
+        "depth": (0.81, 0.7, "on-axis", 1.05, 0.8),
+        "85 %": (0.81, 0.78, "on-axis", 1.4, 0.8),
+        "height": (0.81, 0.7, "on-axis", 1.4, 0.12),
     }
     for word, notch in said.items():
         assert any(word in text for text in validity(*notch, ring, ring)), word
     for far in (Side("free", 3.0), Side("clamped", 300.0), Side("clamped", 0.0)):
         assert validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, far) == []
-    (near,) = validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, Side("free", 0.4))
-    assert near.startswith("ring / outer diameter is 0.247, below 0.37")
+    (near,) = validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, Side("free", 0.15))
+    assert near.startswith("ring / outer diameter is 0.0926, below 0.13")

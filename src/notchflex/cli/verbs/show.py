@@ -165,6 +165,8 @@ _LEGEND = (
 
 def _print_accuracy(robot: Robot, bands: ClosingBands, document: dict[str, Any]) -> None:
     """Print the effect of tolerances on closing and a typical load, and what was assumed."""
+    from notchflex.support import law_errors
+
     columns: dict[str, Any] = {"notch": map(str, document["notches"])}
     for name in ("closing_tension_N", "closing_angle_deg"):
         ends = document[name]
@@ -183,5 +185,8 @@ def _print_accuracy(robot: Robot, bands: ClosingBands, document: dict[str, Any])
     if math.isfinite(bands.by_depth):
         change = abs(bands.by_depth) * DEGREES
         text += f" 10 µm of depth in all notches change that angle by {change:.2g} deg."
+    usual, last = (100.0 * error for error in law_errors(robot))
+    if usual:
+        text += f" Law's error (1 SD): {usual:.2g} % of the stiffness, last notch {last:.2g} %."
     tolerances = tables.tolerance_words(robot, bands.bands.tolerances, bands.bands.assumed)
     terminal.show("", tables.wrapped(text), *tolerances)

@@ -21,7 +21,7 @@ from typing import Any
 from notchflex._arrays import plain_number, xp
 from notchflex._jax import constant
 from notchflex.mechanics.cuts import SECTION_OF_CUT, STRIPS_OF_CUT, cut_fibres
-from notchflex.mechanics.ends import NotchStiffness, notch_stiffness, validity
+from notchflex.mechanics.ends import NotchStiffness, notch_stiffness, place_of, validity
 from notchflex.mechanics.flexure.notch_rod import (
     STRAIGHT,
     NeutralAxis,
@@ -31,7 +31,15 @@ from notchflex.mechanics.flexure.notch_rod import (
     rod_quadrature,
     shifted,
 )
-from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres, validity_warnings
+from notchflex.mechanics.flexure.rod import (
+    Rod,
+    Site,
+    law_error,
+    rod,
+    section_fibres,
+    validity_warnings,
+)
+from notchflex.mechanics.law_errors import law_error_at
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.section import FibresAt, Points, Section, gauss_on, gauss_rule
 from notchflex.robot import ArcNotch, Tube
@@ -156,3 +164,13 @@ def _(notch: ArcNotch, tube: Tube, site: Site) -> list[str]:
     depth = notch.section_depth(tube)
     shape = tube.outer_radius, tube.inner_radius, notch.cut, depth, notch.height
     return validity(*shape, site.proximal, site.distal)
+
+
+@law_error.register
+def _(notch: ArcNotch, tube: Tube, site: Site, yields: bool) -> float:
+    # Papers' laws of rigid ends come with constants that were fitted by them, error included.
+    if notch.ends == "rigid":
+        return 0.0
+    depth = notch.section_depth(tube)
+    shape = tube.outer_radius, tube.inner_radius, notch.cut, depth, notch.height
+    return law_error_at(place_of(*shape, site.proximal, site.distal, yields))

@@ -98,11 +98,6 @@ class ArcNotch(Notch):
         """Whether its stiffness depends on the rings beside it."""
         return super().has_elastic_ends or self.closing == "elastic"
 
-    @property
-    def law_errors(self) -> tuple[float, float]:
-        """Relative errors of its stiffness: root mean square over wrists that were not fitted."""
-        return (0.014, 0.054) if self.ends == "shell" else (0.0, 0.0)
-
     def section_depth(self, tube: Tube) -> float:
         """Return the depth at the outer surface that gives the same section [mm]."""
         if self.cut == "off-axis" or self.depth_at == "outer":
