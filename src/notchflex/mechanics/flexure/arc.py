@@ -129,7 +129,7 @@ def _ends(
 # and the part of the mean radius over which it fades, which is that of the distortion by the rings
 # (mechanics/flattening.py) in notches 0.8 to 0.9 outer diameters deep. By that distortion the first
 # is 0.27; it was fitted, as the share of the ends that follows the material, to finite elements of
-# six wrists of nitinol on its plateau, with plateaus of 3 to 8.5 GPa.
+# six wrists of nitinol, plateaus of 3 to 8.5 GPa; six more, of the same shapes, were kept back.
 _CONCENTRATION, _FADING, _MATERIAL_SHARE = 0.36, 0.25, 0.18
 
 
