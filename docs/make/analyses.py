@@ -98,9 +98,7 @@ def accuracy(*axes: Axes, measured: Path) -> None:
             ]
         force, seen = np.array(sorted(table)).T.clip(0.0)
         path = nf.simulate(robot, [nf.Load(tension=one) for one in force])
-        total.plot(
-            seen, np.degrees(path.edge_angle).sum(axis=1), "x", color="k", ms=3
-        )
+        total.plot(seen, np.degrees(path.edge_angle).sum(axis=1), "x", color="k", ms=3)
     total.plot([0, 160], [0, 160], color="0.6", lw=0.8, zorder=0)
     for one, size in zip((off, off_last), 100.0 * np.median(sizes, axis=0), strict=True):
         for part, shade in ((2.0, "0.92"), (1.0, "0.83")):
