@@ -8,7 +8,8 @@ Pacheco 2021. Five constants are fitted (material, friction, a factor of the for
 a search without derivatives, once for every variant of the law. `--left-out` also predicts each
 wrist from a fit to the two others; `--profile` fits a factor for every wrist and prints the errors
 of the total by load and pull.
-Lengths of the ends and flattening are the library's; tests compare them with a reference.
+Lengths of the ends and flattening are the library's; tests compare them with a reference. All
+flattening goes with the angle here, and sections stay plane beside the rings.
 """
 
 from __future__ import annotations
