@@ -41,6 +41,6 @@ def test_refinement_takes_more_fibres(margin):
     # Of the angle at a given moment.
     tangent = np.gradient(fine, curvatures)
     errors = [(one - fine) / (tangent * curvatures) for one in coarse]
-    for name, error, most in zip("013", errors, (1e-3, 3e-4, 1e-4), strict=True):
+    for name, error, most in zip("013", errors, (1e-3, 4e-4, 1e-4), strict=True):
         margin.within(f"rms at refinement {name}", np.sqrt(np.mean(error**2)), most)
     margin.within("largest at refinement 0", errors[0], 3e-3)
