@@ -143,7 +143,7 @@ def _(notch: ArcNotch, tube: Tube) -> FibresAt:
         # Beside a ring the section does not stay plane: the edges of the arc strain more than the
         # spine, by a part that neither stretches nor bends it. The fibres stand for sections at
         # Gauss's points of half the height.
-        arm, area = STRIPS_OF_CUT[notch.cut](*shape, count // 2)
+        arm, area = STRIPS_OF_CUT[notch.cut](*shape, count)
         total = xp.sum(area)
         arm = arm - arm @ area / total
         second, skew = arm**2 @ area / total, arm**3 @ area / (arm**2 @ area)
