@@ -179,7 +179,12 @@ _LEFT_OUT = ("plastic_modulus",)
 def tolerances_of(robot: Robot) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]:
     """Return the tolerances of a robot, and the names of those that its file lacks: assumed."""
     specified = {tolerance.value for tolerance in robot.tolerance}
-    assumed = [tolerance for tolerance in _assumed(robot) if tolerance.value not in specified]
+    # What the file says of all notches holds for the last one too.
+    assumed = [
+        tolerance
+        for tolerance in _assumed(robot)
+        if not specified & {tolerance.value, f"notch.{tolerance.value.rpartition('.')[2]}"}
+    ]
     return (*robot.tolerance, *assumed), tuple(tolerance.value for tolerance in assumed)
 
 

@@ -261,7 +261,8 @@ def place_of(
     """Return where a notch stands among the wrists of finite elements."""
     diameter = 2.0 * outer_radius
     # Between a notch and a plate right at its edge there is no ring.
-    ring = min(filter(None, (proximal.length, distal.length)), default=diameter)
+    sides = [side for side in (proximal, distal) if side.length or side.boundary != "clamped"]
+    ring = min((side.length for side in sides), default=diameter)
     return Place(
         (outer_radius - inner_radius) / diameter,
         depth / diameter,
