@@ -294,7 +294,7 @@ def validity(
     place = place_of(outer_radius, inner_radius, cut, depth, height, proximal, distal)
     names = "wall", "depth", "height", "ring"
     for number, (name, value) in enumerate(zip(names, place, strict=False)):
-        low, high, *found = covered(number)
+        low, high, *found = covered(number, place.last)
         known = [
             f"the stiffness was found up to {100.0 * most:.0f} % off inside, near that bound"
             for most in found

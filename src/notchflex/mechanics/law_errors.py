@@ -60,10 +60,13 @@ def law_error_at(place: Place) -> float:
     return error_at(np.clip(place, rows[:, :7].min(axis=0), rows[:, :7].max(axis=0)), rows)
 
 
-def covered(dimension: int) -> tuple[float, float, float, float]:
-    """Return the range of a dimension of the table, and the largest residual near either end."""
-    values = table()[:, dimension]
-    low, high = float(values.min()), float(values.max())
+def covered(dimension: int, last: bool) -> tuple[float, float, float, float]:
+    """Return the range of a dimension of last or of other notches; the largest residual near it.
+
+    The residuals are those of all notches, near the lower and near the upper bound.
+    """
+    values, of_last = table()[:, dimension], table()[:, 6] == last
+    low, high = float(values[of_last].min()), float(values[of_last].max())
     margin = 0.1 * (high - low)
     ends = (values < low + margin, values > high - margin)
     near_low, near_high = (float(table()[end, 8].max()) for end in ends)

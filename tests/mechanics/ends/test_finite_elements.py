@@ -79,4 +79,4 @@ def test_validity_names_what_is_left():
     for far in (Side("free", 3.0), Side("clamped", 300.0), Side("clamped", 0.0)):
         assert validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, far) == []
     (near,) = validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, Side("free", 0.15))
-    assert near.startswith("ring / outer diameter is 0.0926, below 0.13")
+    assert near.startswith("ring / outer diameter is 0.0926, below 0.2")
