@@ -24,7 +24,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 import notchflex as nf
 
 from .forces import State, about_z
-from .rings import Ends, ends_of, rings
+from .rings import Ends, ends_of
 from .sections import Curve, Left, Memory, fibres, left_by, memory_of, remembered, stress
 
 # Seven Gauss nodes all along, those of the solver: where the law of the material has a kink within
@@ -45,7 +45,7 @@ _NIL = 1e-7  # rad, of a mode
 POSE = 1e-6
 # Relative to what acts, and of the moment that bends the notch by a tenth of a degree.
 BALANCE, _SMALL = 1e-6, 2e-3
-_SHARE = 0.25  # of the end compliance that follows the material
+_SHARE = 0.18  # of the end compliance that follows the material
 _CLOSING, _CLOSED = {"on-axis": 1.0248, "off-axis": 1.0203}, 0.354
 _EDGE = 0.086
 # Tries for a curvature or a strain: to 1e-15 of where they begin.
@@ -293,7 +293,7 @@ def arc_law(state: State, i: int) -> ArcLaw:
         # Of the lips alone, beside the open notch.
         lips = closure**2 / (_CLOSED * modulus * wall * (tube.outer_radius - 0.5 * wall) ** 2)
     if notch.ends == "shell":
-        ends = ends_of(notch, tube, material.poisson_ratio, rings(robot, state.length, i))
+        ends = ends_of(robot, i)
 
     def slides(compliance: float, moment: float, length: float) -> tuple[float, float]:
         force = 2.0 * moment / (height * length)
@@ -321,7 +321,10 @@ def bending(
     material, rigidity = robot.material, robot.material.elastic_modulus * second
     if isinstance(material, nf.Linear):
         return rigidity * reduced / ((1.0 + added) * q), []
-    soft, own = (1.0 - _SHARE) * added / rigidity, 1.0 + _SHARE * added
+    soft, whole = (1.0 - _SHARE) * added / rigidity, 1.0 + _SHARE * added
+    # The rings' part of the flattening follows the moment.
+    warped = whole * law.ends.warped * law.height
+    own, soft = whole - warped * reduced, soft + warped * reduced / rigidity
     if isinstance(material, nf.Superelastic):
         problems: list[str] = []
 
@@ -347,9 +350,11 @@ def bending(
         strain = (now @ area / area.sum())[..., None] + curvature[..., None] * arm
         near = _ON_CURVE * np.abs(arm).max() / law.closure
         problems += remembered(i, material, strain, past, now, near)
-        return rigidity * (curvature - moved) / q, problems
-    curvature = _bisected(lambda k: own * k + soft * moment(k) - reduced, np.abs(reduced))
-    return moment(curvature) / q, problems
+        return (1.0 + warped * moved) * rigidity * (curvature - moved) / q, problems
+    most = np.abs(reduced) / np.minimum(own, 1.0)
+    curvature = _bisected(lambda k: own * k + soft * moment(k) - reduced, most)
+    bends = moment(curvature)
+    return (1.0 + warped * (curvature - bends / rigidity)) * bends / q, problems
 
 
 def _bisected(rising, most: np.ndarray) -> np.ndarray:

@@ -91,7 +91,8 @@ def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any):
     for part in ("finite_elements", "drawing"):
         make(f"against_{part}").pictures(tmp_path)
     drawn = {file.name for file in tmp_path.iterdir()}
-    plain = {file.name for file in (DOCS / "images").glob("*.svg")}
+    # The picture of every wrist needs measured angles that are not in the repository.
+    plain = {file.name for file in (DOCS / "images").glob("*.svg")} - {"accuracy.svg"}
     compared = {"finite_elements.svg", "drawing_wrists.svg", "drawing_depth.svg"}
     assert drawn == plain | compared
     assert len(plain) == 17

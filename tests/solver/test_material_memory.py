@@ -181,7 +181,7 @@ def test_work_is_stored_or_lost_where_notches_flatten(friction: nf.Capstan, marg
 @pytest.mark.nightly
 def test_work_is_stored_or_lost_where_a_notch_closes(margin: Margin) -> None:
     """Rigid lips do no work, but their force jumps as they meet: the trapezoid rule counts some."""
-    corners = [0.0, 2.0, 0.7, 1.3, 0.3, 1.9, 0.4]
+    corners = [0.0, 2.4, 0.7, 1.3, 0.3, 2.3, 0.4]
     missing, without_lips = {}, {}
     for count in (40, 160):
         path, missing[count] = balance(nf.Capstan(0.13), corners, count)
@@ -193,7 +193,7 @@ def test_work_is_stored_or_lost_where_a_notch_closes(margin: Margin) -> None:
         closes = int(np.flatnonzero(path.closed[:, 0])[0])
         jump = path.tension[closes, 0] - path.tension[closes - 1, 0]
         turned = np.abs(np.diff(path.notch_angle, axis=0)).max(axis=1)
-        assert jump > 0.15
+        assert jump > 0.05
         assert turned[closes - 1] < turned[closes - 2]
     margin.within("balance without the lips, part of the work", without_lips[160], 5e-5)
     assert without_lips[40] > 12.0 * without_lips[160]  # 16 by the trapezoid rule
