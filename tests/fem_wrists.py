@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import notchflex as nf
+from notchflex.mechanics.chain import sites_of
+from notchflex.mechanics.ends import place_of
 from notchflex.mechanics.law_errors import Place
 from reference_data import named_rows
 
@@ -120,21 +122,23 @@ def stiffness_errors(rows: list[dict[str, Any]]) -> np.ndarray:
 
 def errors_by_place(rows: list[dict[str, Any]]) -> list[tuple[Place, float, float]]:
     """Return places of the first, the middle and the last notch; rms and largest of residuals."""
-    row, found = rows[0], stiffness_errors(rows)
-    outer, uncut = row["outer"], row["uncut"]
-    parts = {0: (uncut, found)}
+    found, robot = stiffness_errors(rows), drawn(rows[0])
+    parts = {1: found}
     if found.shape[1] > 1:
-        rings = [min(row["base"], uncut), uncut, min(uncut, row["last"])]
-        parts = dict(enumerate(zip(rings, np.split(found, [1, -1], axis=1), strict=True)))
-    ratios = 0.5 * (1.0 - row["inner"] / outer), row["depth"] / outer, row["height"] / outer
-    kind = row["cut"] == "on-axis", isinstance(row["material"], str)
+        parts = dict(zip((0, 1, -1), np.split(found, [1, -1], axis=1), strict=True))
+    tube, sites = robot.tube, sites_of(robot)
+    shape = (
+        tube.outer_radius,
+        tube.inner_radius,
+        *(rows[0][key] for key in ("cut", "depth", "height")),
+    )
     return [
         (
-            Place(*ratios, ring / outer, *kind, last=number == 2),
+            place_of(*shape, sites[i].proximal, sites[i].distal, robot.material.by_fibres),
             float(np.sqrt(np.nanmean(part**2))),
             float(np.nanmax(np.abs(part))),
         )
-        for number, (ring, part) in parts.items()
+        for i, part in parts.items()
     ]
 
 

@@ -67,6 +67,15 @@ def accuracy(*axes: Axes, measured: Path) -> None:
     """Every wrist of finite elements and every measured one, against the law from the drawing."""
     total, off, off_last = axes
     sizes: list[tuple[float, float]] = []
+
+    def compare(bent: np.ndarray, found: np.ndarray, colour: str) -> None:
+        """Add the levels of a wrist: angles of its notches, or the total where one angle stands."""
+        sums, last = (bent.sum(axis=1), found.sum(axis=1)), (bent[:, -1], found[:, -1])
+        beside(total, sums[::-1], colour)
+        beside(off, (sums[1], 100.0 * (sums[0] / sums[1] - 1.0)), colour)
+        if found.shape[1] > 1:
+            beside(off_last, (last[1], 100.0 * (last[0] / last[1] - 1.0)), colour)
+
     for rows in drawn_wrists():
         robot = drawn(rows[0])
         found = np.array([str(row["angles_deg"]).split() for row in rows], float)
@@ -75,19 +84,11 @@ def accuracy(*axes: Axes, measured: Path) -> None:
         sizes.append(law_errors(robot))
         nitinol = isinstance(rows[0]["material"], str)
         colour = GREEN if nitinol else BLUE if rows[0]["use"] == "fit" else VERMILLION
-        sums, last = (bent.sum(axis=1), found.sum(axis=1)), (bent[:, -1], found[:, -1])
-        beside(total, sums[::-1], colour)
-        beside(off, (sums[1], 100.0 * (sums[0] / sums[1] - 1.0)), colour)
-        if found.shape[1] > 1:
-            beside(off_last, (last[1], 100.0 * (last[0] / last[1] - 1.0)), colour)
+        compare(bent, found, colour)
     for case in ("A_lin_mu0", "B_lin_mu0", "A_lin_mu013"):
         wrist = solid(f"{case}_medium")
         bent = np.degrees(nf.simulate(wrist.robot, wrist.loads).notch_angle)
-        sums = bent.sum(axis=1), wrist.angles.sum(axis=1)
-        beside(total, sums[::-1], BLUE)
-        beside(off, (sums[1], 100.0 * (sums[0] / sums[1] - 1.0)), BLUE)
-        last = bent[:, -1], wrist.angles[:, -1]
-        beside(off_last, (last[1], 100.0 * (last[0] / last[1] - 1.0)), BLUE)
+        compare(bent, wrist.angles, BLUE)
     for letter in "abc":
         robot = nf.load_robot(f"pacheco2021-{letter}-true")
         file = measured / f"pacheco2021_wrist_{letter.upper()}_measured.csv"

@@ -39,13 +39,12 @@ def test_angles_and_tips(case, allowed, margin):
     margin.within("tip, part of its path", fem.tip_errors(path), TIP)
 
 
-@pytest.mark.parametrize(
-    ("case", "allowed"), [("A_se_mu0_medium", 0.03), ("A_se_mu013_coarse", 0.04)]
-)
-def test_yielding_fibres(case, allowed, margin):
+@pytest.mark.parametrize("case", ["A_se_mu0_medium", "A_se_mu013_coarse"])
+def test_yielding_fibres(case, margin):
     path, fem = solved(case)
     error = np.degrees(path.notch_angle) / fem.angles - 1.0
-    margin.within("notch angle, relative", error, allowed)
+    margin.within("middle notches, relative", error[:, :4], 0.03)
+    margin.within("last notch, relative", error[:, 4], 0.035)
 
 
 def test_the_papers_law_is_far_off():

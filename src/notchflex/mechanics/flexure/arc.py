@@ -41,6 +41,7 @@ from notchflex.mechanics.flexure.rod import (
 )
 from notchflex.mechanics.law_errors import law_error_at
 from notchflex.mechanics.material import NotchEnds
+from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FibresAt, Points, Section, gauss_on, gauss_rule
 from notchflex.robot import ArcNotch, Tube
 
@@ -159,11 +160,18 @@ def _(notch: ArcNotch, tube: Tube) -> FibresAt:
     return fibres
 
 
-@validity_warnings.register
-def _(notch: ArcNotch, tube: Tube, site: Site) -> list[str]:
+def _dimensions(
+    notch: ArcNotch, tube: Tube, site: Site
+) -> tuple[float, float, str, float, float, Side, Side]:
+    """Return what `validity` and `place_of` take of a notch."""
     depth = notch.section_depth(tube)
     shape = tube.outer_radius, tube.inner_radius, notch.cut, depth, notch.height
-    return validity(*shape, site.proximal, site.distal)
+    return *shape, site.proximal, site.distal
+
+
+@validity_warnings.register
+def _(notch: ArcNotch, tube: Tube, site: Site) -> list[str]:
+    return validity(*_dimensions(notch, tube, site))
 
 
 @law_error.register
@@ -171,6 +179,4 @@ def _(notch: ArcNotch, tube: Tube, site: Site, yields: bool) -> float:
     # Papers' laws of rigid ends come with constants that were fitted by them, error included.
     if notch.ends == "rigid":
         return 0.0
-    depth = notch.section_depth(tube)
-    shape = tube.outer_radius, tube.inner_radius, notch.cut, depth, notch.height
-    return law_error_at(place_of(*shape, site.proximal, site.distal, yields))
+    return law_error_at(place_of(*_dimensions(notch, tube, site), yields))

@@ -295,8 +295,7 @@ class FibreLaw(SectionLaw):
         for side, kinks in (xp.minimum, self.low), (xp.maximum, self.high):
             change = xp.abs(side(after, 0.0) - side(before, 0.0))
             loss = loss + 0.5 * self.elastic_modulus * xp.abs(kinks[1, 0] - kinks[0, 0]) * change
-        follows = 1.0 + section.compliance.material_share * section.compliance.weak
-        return follows * xp.sum(loss * section.fibres.area, axis=-1)
+        return section.compliance.direct * xp.sum(loss * section.fibres.area, axis=-1)
 
 
 def _in_parts(array: Array) -> Array:

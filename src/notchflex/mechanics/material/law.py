@@ -67,18 +67,18 @@ def bracketed_root(
 
 
 class SectionEnds(NamedTuple):
-    """The section between its ends: direct * k + soft * moment = s."""
+    """The section between its ends: direct * k + soft * moment = x, which is `reduced`."""
 
     direct: Array
     soft: Array
     reduced: Array
 
     def beyond(self, curvature: Array, moment: Array) -> Array:
-        """Return by how much section and ends bend beyond s."""
+        """Return by how much section and ends bend beyond x."""
         return self.direct * curvature + self.soft * moment - self.reduced
 
     def slope(self, free: Array) -> Array:
-        """Return the change of the moment with s, from that with the section's own curvature."""
+        """Return the change of the moment with x, from that with the section's own curvature."""
         return free / (self.direct + self.soft * free)
 
 
@@ -117,6 +117,11 @@ class NotchEnds(Pytree):
     sway: Each | float = 0.0
     push: Each | float = 0.0
     oblique: Each | float = 0.0
+
+    @property
+    def direct(self) -> Any:
+        """Bend of a section with the part of the ends that follows its material, over its own."""
+        return 1.0 + self.material_share * self.weak
 
     def flattening(self, curvature: Scalar) -> Scalar:
         """Compute the factor q by which the distances of elastic fibres shrink at a curvature."""
@@ -362,18 +367,15 @@ class SectionLaw(Pytree, ABC):
 
     def joint(self, reduced: Each, section: FibreSection) -> SectionEnds:
         """Join sections to their ends, as they flatten at x (`reduced`)."""
-        ends, rigid = section.compliance, jnp.ones_like(reduced)
-        rigidity = self.elastic_modulus * section.second_moment_weak
-        direct = rigid + ends.material_share * ends.weak
-        soft = (rigid - ends.material_share) * ends.weak
-        follows = ends.warped * reduced * direct
-        return SectionEnds(direct - follows, (soft + follows) / rigidity, reduced)
+        ends, rigidity = section.compliance, self.elastic_modulus * section.second_moment_weak
+        soft = (1.0 - ends.material_share) * ends.weak
+        follows = ends.warped * reduced * ends.direct
+        return SectionEnds(ends.direct - follows, (soft + follows) / rigidity, reduced)
 
     def transformed(self, reduced: Each, bending: Bending, section: FibreSection) -> Transformed:
         """Compute what the transformation of bent sections adds to their elastic bending."""
         ends, rigidity = section.compliance, self.elastic_modulus * section.second_moment_weak
-        direct = 1.0 + ends.material_share * ends.weak
-        curvature = direct * (bending.curvature - bending.moment / rigidity)
+        curvature = ends.direct * (bending.curvature - bending.moment / rigidity)
         gain = 1.0 + ends.warped * curvature
         slope = gain * bending.slope
         by = (gain - slope * (1.0 + ends.weak) / rigidity) / (1.0 - ends.warped * reduced)
