@@ -81,7 +81,7 @@ def accuracy(*axes: Axes, measured: Path) -> None:
         found = np.array([str(row["angles_deg"]).split() for row in rows], float)
         path = nf.simulate(robot, [nf.Load(tension=row["tension_N"]) for row in rows])
         bent = np.where(path.converged[:, None], np.degrees(path.notch_angle), np.nan)
-        sizes.append(law_errors(robot))
+        sizes.append(tuple(law_errors(robot).values()))
         nitinol = isinstance(rows[0]["material"], str)
         colour = GREEN if nitinol else BLUE if rows[0]["use"] == "fit" else VERMILLION
         compare(bent, found, colour)

@@ -77,7 +77,7 @@ def test_outside_the_table_the_border_counts():
     (sentence,) = validity(*notch, ring, ring)
     assert sentence.startswith("depth / outer diameter is 0.617, below 0.68: the stiffness")
     robot = nf.load_robot("pacheco2021-a-true")
-    at = [law_errors(robot.with_value("notch.depth", depth))[0] for depth in (0.9, 1.0, 1.4)]
+    at = [law_errors(robot.with_value("notch.depth", depth))["notch"] for depth in (0.9, 1.0, 1.4)]
     assert at[0] == at[1] > at[2]
 
 
@@ -91,6 +91,17 @@ def test_the_law_is_a_part_of_the_band(wrist: nf.Robot):
     assert not any("stiffness_factor" in one.value for one in tolerances_of(wrist)[0])
     bands = nf.uncertain(true, nf.Load(tension=1.0), draws=40, outputs=("total_angle",))
     assert 0.0 < bands.variance_shares("total_angle", 0)["law"] < 0.2
+
+
+def test_rigid_notches_have_no_error(wrist: nf.Robot):
+    """Beside rigid notches, every notch with elastic ends has its own error."""
+    true = nf.load_robot("pacheco2021-a-true")
+    mixed = true.replace(notch=(*wrist.notches[:2], *true.notches[2:]))
+    sizes = {one.value: one.sd for one in tolerances_of(mixed)[0]}
+    names = [f"notch[{number}].stiffness_factor" for number in (3, 4, 5)]
+    assert [name for name in sizes if "stiffness_factor" in name] == names
+    assert sizes[names[-1]] == "1.7 %"
+    assert law_errors(wrist) == {}
 
 
 def test_notches_that_deviate_together_count_once():

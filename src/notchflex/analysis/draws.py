@@ -226,11 +226,10 @@ def _tendon_radius(robot: Robot) -> Iterator[Tolerance]:
 
 
 def _law(robot: Robot) -> Iterator[Tolerance]:
-    """Yield the error of the law of notches with elastic ends, and that of the last notch."""
-    sizes = [f"{100.0 * error:.2g} %" for error in law_errors(robot)]
-    names = "notch", f"notch[{len(robot.notches)}]"
-    for name, size in zip(names[: len(set(sizes))], sizes, strict=False):
-        if size != "0 %":
+    """Yield the errors of the law of notches with elastic ends, the last one's if it differs."""
+    sizes = {name: f"{100.0 * error:.2g} %" for name, error in law_errors(robot).items()}
+    for name, size in sizes.items():
+        if name == "notch" or size != sizes.get("notch"):
             yield Tolerance(f"{name}.stiffness_factor", sd=size)
 
 

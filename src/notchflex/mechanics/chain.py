@@ -329,14 +329,22 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     return tuple(map(site, range(len(notches))))
 
 
-def law_errors(robot: Robot) -> tuple[float, float]:
-    """Return relative errors (SD) of the stiffness by finite elements: of notches, of the last."""
-    yields = robot.material.by_fibres
-    each = [
-        0.0 if site is None else law_error(notch, robot.tube, site, yields)
-        for notch, site in zip(robot.notches, sites_of(robot), strict=True)
-    ]
-    return float(np.sqrt(np.mean(np.square(each[:-1] or each)))), each[-1]
+def law_errors(robot: Robot) -> dict[str, float]:
+    """Return relative errors (SD) of the stiffness by finite elements, under the names of notches.
+
+    Where all notches have elastic ends, `notch` has the mean square of all but the last. Else every
+    notch with such ends has its own.
+    """
+    yields, count = robot.material.by_fibres, robot.number_of_notches
+    each = {
+        f"notch[{number}]": law_error(notch, robot.tube, site, yields)
+        for number, (notch, site) in enumerate(zip(robot.notches, sites_of(robot), strict=True), 1)
+        if site is not None
+    }
+    if len(each) < count:
+        return each
+    *others, last = each.values()
+    return {"notch": float(np.sqrt(np.mean(np.square(others or [last])))), f"notch[{count}]": last}
 
 
 def unchecked_dimensions(robot: Robot) -> list[str]:

@@ -185,8 +185,8 @@ def _print_accuracy(robot: Robot, bands: ClosingBands, document: dict[str, Any])
     if math.isfinite(bands.by_depth):
         change = abs(bands.by_depth) * DEGREES
         text += f" 10 µm of depth in all notches change that angle by {change:.2g} deg."
-    usual, last = (100.0 * error for error in law_errors(robot))
-    if usual:
-        text += f" Law's error (1 SD): {usual:.2g} % of the stiffness, last notch {last:.2g} %."
+    if errors := law_errors(robot):
+        sizes = ", ".join(f"{name} {100.0 * error:.2g} %" for name, error in errors.items())
+        text += f" Law's error (1 SD) of the stiffness: {sizes}."
     tolerances = tables.tolerance_words(robot, bands.bands.tolerances, bands.bands.assumed)
     terminal.show("", tables.wrapped(text), *tolerances)
