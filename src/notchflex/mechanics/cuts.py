@@ -409,7 +409,7 @@ def cut_fibres(cut: str, outer: float, inner: float, depth: float, count: int) -
 def _arcs(radii: Any, angles: Any, count: int) -> Points:
     """Divide segments of the outer circle and of the inner one, by their half angles."""
     # The upper half of an even rule: arms are even in the angle.
-    part, width = (values[2 * count :] for values in leggauss(4 * count))
+    part, width = (values[None, 2 * count :] for values in leggauss(4 * count))
     radius, end = (xp.stack(pair)[:, None] for pair in (radii, angles))
     angle = end * part
     area = np.array([[2.0], [-2.0]]) * (radius * xp.sin(angle)) ** 2 * end * width
