@@ -38,10 +38,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.polynomial import legendre
 
 from notchflex._arrays import xp
+from notchflex._jax import scan
 from notchflex.mechanics.ring import EDGE_NORM, HARMONICS, EndCompliance, WallSector, inverse
-from notchflex.mechanics.section import gauss_on
+from notchflex.mechanics.section import gauss_on, leggauss
 
 
 class FittedFactors(NamedTuple):
@@ -55,6 +57,15 @@ class FittedFactors(NamedTuple):
 FACTORS = {"on-axis": FittedFactors(0.806, 0.788), "off-axis": FittedFactors(0.835, 1.0)}
 _POISSON, _RINGS = 0.611, 2.634  # c_nu, c_r
 _BRAZIER, _WIDTH, _HEIGHT = 0.521, -1.056, 0.815  # c_b, p, m
+
+
+# Integrals of a function from 0 to Gauss's nodes on 0 ... 1, from its values there.
+_NODES = leggauss(24)[0]
+_UP_TO = (
+    0.5
+    * legendre.legval(_NODES, legendre.legint(np.eye(24), lbnd=-1.0)).T
+    @ np.linalg.inv(legendre.legvander(_NODES, 23))
+)
 
 
 class Distortion(NamedTuple):
@@ -79,32 +90,29 @@ class Distortion(NamedTuple):
 def distortion(arc: WallSector, poisson_ratio: float) -> Distortion:
     """Compute the distortion of an arc of wall."""
     r, t, a = arc.radius, arc.wall, arc.half_angle
-    part, weights = gauss_on(0.0, 1.0, 24)
-    angle, weights = a * part, a * weights
-    slope, sine, cosine = xp.sin(a) / a, xp.sin(a), xp.cos(a)
-
-    def bent(at: Array) -> Array:
-        return 0.5 * (sine**2 + xp.sin(at) ** 2) + slope * (cosine - xp.cos(at) - at * xp.sin(at))
-
-    # The solution u of u'''' + u'' = m is the integral of (x - sin x) m at the distance x. What
-    # moves the section as a whole is taken off.
-    before = angle[:, None] * part[None]
-    apart, given = angle[:, None] - before, bent(before) * part[:, None] * weights[None]
-    along = xp.sum(given * (apart - xp.sin(apart)), axis=1)
-    integral = xp.sum(given * (0.5 * apart**2 - 2.0 * xp.sin(0.5 * apart) ** 2), axis=1)
+    angle, weights = gauss_on(0.0, a, len(_UP_TO))
+    sine, cosine, end, up_to = xp.sin(angle), xp.cos(angle), xp.sin(a), a * _UP_TO
+    turned = xp.cos(a) - cosine - angle * sine
+    amplitude = 0.5 * (end**2 + sine**2) + end / a * turned
+    # The solution u'' of u'''' + u'' = m is the integral of m sin x at the distance x. What moves
+    # the section as a whole is taken off.
+    bent = sine * (up_to @ (cosine * amplitude)) - cosine * (up_to @ (sine * amplitude))
+    along = up_to @ (up_to @ bent)
     rigid = xp.stack([xp.ones_like(angle), 2.0 * xp.sin(0.5 * angle) ** 2])
-    moved = xp.stack([angle, angle - xp.sin(angle)])
     weighed = rigid * weights[None]
-    shares = inverse(weighed @ rigid.T) @ (weighed @ along)
-    along, integral = along - shares @ rigid, integral - shares @ moved
-    order = np.arange(HARMONICS)[:, None] * angle[None]
-    tension, shear = (
-        2.0 * (wave(order) * weights[None]) @ values / EDGE_NORM
-        for wave, values in ((xp.cos, t * r * along), (xp.sin, -t * r**2 * integral))
-    )
+    along = along - inverse(weighed @ rigid.T) @ (weighed @ along) @ rigid
+    pull, slide = 2.0 * t * r * weights * along, -2.0 * t * r**2 * weights * (up_to @ along)
+
+    def harmonic(wave: Any, _: Any) -> Any:
+        even, odd = wave
+        following = even * cosine - odd * sine, odd * cosine + even * sine
+        return following, (even @ pull, odd @ slide)
+
+    start = xp.ones_like(angle), xp.zeros_like(angle)
+    sums = scan(harmonic, start, (np.zeros(HARMONICS),))[1]
+    tension, shear = (values / EDGE_NORM for values in sums)
     nought = xp.zeros_like(tension)
     loads = [[nought, nought, tension, nought], [shear, nought, nought, nought]]
-    amplitude = bent(angle)
     first, second = amplitude @ weights, amplitude**2 @ weights
     return Distortion(
         xp.moveaxis(xp.stack([xp.stack(load) for load in loads]), 1, 2),

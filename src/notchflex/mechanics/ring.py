@@ -244,16 +244,16 @@ def edge_compliance(
     energies, held = _energies(), xp.tensordot(ring.shares, _HELD[int(passing)], 1)
     by_power = (factors @ energies.reshape(len(factors), -1)).reshape(energies.shape[3:])
     if is_traced(by_power):  # compiled as a loop: soon, and small enough for the cache of code
-        stiffness = sys.modules["jax"].lax.map(
-            lambda of: _edge_stiffness(by_power, of[0][:, None], of[1][:, None])[..., 0],
+        compliance = sys.modules["jax"].lax.map(
+            lambda of: inverse(_edge_stiffness(by_power, of[0][:, None], of[1][:, None])[..., 0]),
             (_POWERS.T, held.T),
         )
     else:
-        stiffness = xp.moveaxis(_edge_stiffness(by_power, _POWERS, held), -1, 0)
+        compliance = inverse(xp.moveaxis(_edge_stiffness(by_power, _POWERS, held), -1, 0))
     # Displacements are of order r² per N/mm over E t length; a slope along z has one length less.
     scale = (1.0 - poisson_ratio**2) * radius**2 / (wall * length)
     units = xp.stack([1.0, 1.0, -1.0, -1.0 / length])
-    return read_only(inverse(stiffness) * (scale * xp.outer(units, units))[None])
+    return read_only(compliance * (scale * xp.outer(units, units))[None])
 
 
 # End compliance: the compliance that the ring beside a notch adds to the notch.

@@ -66,7 +66,7 @@ _BATCH_SIZES = (64, 256, 1024)
 _MAX_PROGRAMS = 96
 # Lines of a program for rows beyond which it is not optimised: that of a link would be a tenth
 # faster, after five seconds more.
-_OPTIMISED = 50_000
+_OPTIMISED = 100_000
 # JAX's tracing caches are cleared after this number of programs.
 _TRACES_KEPT = 4
 _lock = threading.RLock()
