@@ -183,7 +183,7 @@ def clamped_torsion_constant(
 #
 # The rule is that of the section's width over its height, computed from many fine strips. Area,
 # centroid and second moment equal those of the section to rounding: the arms are shifted and scaled
-# by the error of the strips, about 1e-7.
+# by the error of the strips, below 1e-7.
 
 FIBRES = 30
 Points = tuple[Float[Array, "*nodes fibres"], Float[Array, "*nodes fibres"]]
