@@ -57,7 +57,6 @@ from notchflex.mechanics.flexure.rod import Rod, section_fibres
 from notchflex.mechanics.material import FibreSection, NotchEnds
 from notchflex.mechanics.section import (
     FibresAt,
-    clamped_torsion_constant,
     gauss_on,
     rectangle_torsion_constant,
     two_walls,
@@ -76,8 +75,8 @@ class Ends(NamedTuple):
     arc: float  # τ, of the torsion of the arc beside a slot
 
 
-ROUND = Ends(0.200, 1.0 / 3.0, 0.437, 3.878, 0.537)
-SHARP = Ends(0.383, 0.524, 0.664, 2.988, 0.0)
+ROUND = Ends(0.192, 1.0 / 3.0, 0.435, 3.85, 0.529)
+SHARP = Ends(0.385, 0.512, 0.663, 2.96, 0.0)
 
 
 class RootedStrip(NamedTuple):
@@ -95,14 +94,14 @@ class RootedStrip(NamedTuple):
     middle: float  # height of its middle above the proximal face
     hand: float  # 1 where the proximal wall is on the bend's side, -1 on the opposite one
     wall: float  # width of its walls
-    width_factor: float = 1.0  # the same over that of the tube's walls
+
+
+_PART, _WEIGHT = gauss_on(0.0, 1.0, 8)  # up a slot
 
 
 def sharp_strip(notch: StripNotch, tube: Tube) -> RootedStrip:
     """Describe the strip between triangular notches."""
-    factor = notch.wall_width_in(tube) / (tube.outer_diameter - tube.inner_diameter)
     tip, thickness = notch.depth - tube.outer_radius, notch.strip_thickness
-    part, weight = gauss_on(0.0, 1.0, 8)
     height = notch.height
     return RootedStrip(
         thickness=thickness,
@@ -111,30 +110,28 @@ def sharp_strip(notch: StripNotch, tube: Tube) -> RootedStrip:
         half=tip,
         slot_end=tip,
         opening=height,
-        arc=(0.5 * thickness + height * part, tip - notch.depth * part, height * weight),
+        arc=(0.5 * thickness + height * _PART, tip - notch.depth * _PART, height * _WEIGHT),
         turn=SHARP.turn,
         ends=SHARP,
         middle=height + notch.rise,
         hand=-1.0,
-        wall=factor * (tube.outer_radius - tube.inner_radius),
-        width_factor=factor,
+        wall=0.5 * notch.wall_width_in(tube),
     )
 
 
 def round_strip(notch: ULink, tube: Tube) -> RootedStrip:
     """Describe the strip between slots with round ends."""
     tip, radius, thickness = 0.5 * notch.strip_length, notch.slot_radius, notch.strip_thickness
-    part, weight = gauss_on(0.0, 1.0, 8)
-    bulge = radius * np.sqrt(part * (2.0 - part))
+    bulge = radius * np.sqrt(_PART * (2.0 - _PART))
     return RootedStrip(
         thickness=thickness,
         tip=tip,
         radius=radius,
-        half=tip + 0.521 * radius,
+        half=tip + 0.539 * radius,
         slot_end=tip + radius,
         opening=2.0 * radius,
-        arc=(0.5 * thickness + radius * part, tip + bulge, radius * weight),  # half of the slot
-        turn=ROUND.turn + 0.364 * radius / thickness,
+        arc=(0.5 * thickness + radius * _PART, tip + bulge, radius * _WEIGHT),  # half of the slot
+        turn=ROUND.turn + 0.357 * radius / thickness,
         ends=ROUND,
         middle=notch.height + 0.5 * thickness,
         hand=1.0 if notch.proximal_slot == "away" else -1.0,
@@ -149,6 +146,7 @@ class Hinge(NamedTuple):
     out: Any  # distance from the middle of the strip, mm
     up: Any  # length of the run, mm
     pulled: Any  # E times the compliance along the strip besides, of both ends, 1/mm
+    radius: float  # of the middle of the tube's wall, mm
     twisted: Any  # E times that of the arc's torsion by a force sideways, of both ends, 1/mm
 
 
@@ -156,12 +154,10 @@ def hinge_of(strip: RootedStrip, tube: Tube, poisson_ratio: float) -> Hinge:
     """Compute what an end of a strip adds."""
     t, wall, ratio = strip.thickness, strip.wall, 2.0 * (1.0 + poisson_ratio)
     radius = 0.5 * (tube.outer_radius + tube.inner_radius)
-    square = xp.minimum((strip.half / radius) ** 2, 0.95)
-    oblique = t / wall * (0.267 + 0.859 * square)
-    root = 6.0 / (wall * t**2) * (strip.turn + 0.229 * t / radius + oblique)
-    out, up = strip.half + 0.236 * t, 0.914 * t
+    oblique = t / wall * (0.266 + 0.858 * (strip.half / radius) ** 2)
+    root = 6.0 / (wall * t**2) * (strip.turn + 0.244 * t / radius + oblique)
+    out, up = strip.half + 0.228 * t, 0.924 * t
     height, end, weight = strip.arc
-    end = xp.minimum(end, 0.98 * tube.inner_radius)
     arc = annular_segment(tube.outer_radius, tube.inner_radius, tube.outer_radius + end)
     bend, place = weight / arc.second_moment_weak, xp.asarray(arc.centroid)
     turn = root + bend.sum()
@@ -170,58 +166,52 @@ def hinge_of(strip: RootedStrip, tube: Tube, poisson_ratio: float) -> Hinge:
     risen = strip.ends.spread * root * up**2 + (bend * height**2).sum() - turn * high**2 / 3.0
     # Pulled, both walls straighten as arches.
     reach = xp.minimum(strip.slot_end / radius, 0.98)
-    angle = xp.arcsin(reach) + 0.118 * wall / radius
+    angle = xp.arcsin(reach) + 0.11 * wall / radius
     spread = 0.5 + 0.25 * xp.sin(2.0 * angle) / angle - (xp.sin(angle) / angle) ** 2
-    arch = 2.404 * 12.0 * radius**3 / (t * wall**3) * angle * spread
-    # E/G over that of Poisson's ratio 0.33
-    beside = 3.944 * ratio / 2.66 * strip.opening * reach / wall**2
+    arch = 2.43 * 12.0 * radius**3 / (t * wall**3) * angle * spread
+    beside = 1.47 * ratio * strip.opening * reach / wall**2
     twisted = 2.0 * ratio * (weight / arc.torsion_constant * arc.shear_centre**2).sum()
-    return Hinge(turn, far, high, 2.0 * risen + arch + beside, twisted)
+    return Hinge(turn, far, high, 2.0 * risen + arch + beside, radius, twisted)
 
 
-def turned_compliance(
+def sideways(
     strip: RootedStrip,
     tube: Tube,
     hinge: Hinge,
     plane: Float[Array, "2 2"],
     poisson_ratio: float,
-) -> tuple[Any, Any, Any]:
-    """Compute E times the compliance to moments about strip and tube, and of both, 1/mm³."""
-    rule, outer, inner, t = strip.ends, tube.outer_radius, tube.inner_radius, strip.thickness
-    middle = 0.5 * (outer + inner)
-    torsion = 2.0 * plain_number(rectangle_torsion_constant(strip.wall, t))
-    twisted = rule.twist * t / strip.wall * torsion / (2.0 * (1.0 + poisson_ratio)) / hinge.out
-    about_strip = 1.0 / (middle**2 / plane[1, 1] + twisted)
-    bent = rule.bent * strip.tip / (t * middle)
-    against = 1.578 * inner / outer * plane[0, 0] + bent + rule.arc * hinge.twisted
-    about_tube = against / middle**2
+) -> tuple[Any, Any, Any, Any]:
+    """Compute E times the compliance to moments about strip and tube, and of both, 1/mm³.
+
+    The last one is that to a force sideways, without what those give, 1/mm.
+    """
+    rule, t, wall, out, up = strip.ends, strip.thickness, strip.wall, hinge.out, hinge.up
+    square = hinge.radius**2
+    torsion = 2.0 * plain_number(rectangle_torsion_constant(wall, t))
+    twisted = rule.twist * t / wall * torsion / (2.0 * (1.0 + poisson_ratio)) / out
+    about_strip = 1.0 / (square / plane[1, 1] + twisted)
+    against = 1.59 * tube.inner_radius / tube.outer_radius * plane[0, 0]
+    bent = rule.bent * strip.tip / (t * hinge.radius)
+    about_tube = (against + bent + rule.arc * hinge.twisted) / square
     # Positive definite while it is below half of the root of the product; the cells have 0.29.
     limit = 0.49 * plain_number(xp.sqrt(about_strip * about_tube))
-    coupling = plain_number(xp.clip(-0.674 * plane[0, 1] / middle**2, -limit, limit))
-    return about_strip, about_tube, coupling
-
-
-def sway_of(strip: RootedStrip, tube: Tube, hinge: Hinge, turned: tuple[Any, Any, Any]) -> Any:
-    """Compute E times the compliance sideways, 1/mm, without what `turned` gives."""
-    (about_strip, about_tube, both), middle = turned, 0.5 * (tube.outer_radius + tube.inner_radius)
-    out, up = hinge.out, hinge.up
-    frame = 1.677 * 4.0 * out**3 / (strip.thickness * strip.wall**3)
-    push = 2.863 * about_tube * (middle**2 - out**2)
+    both = plain_number(xp.clip(-0.66 * plane[0, 1] / square, -limit, limit))
+    sway = 6.72 * out**3 / (t * wall**3) + 2.85 * about_tube * (square - out**2)
     turning = 2.0 / 3.0 * about_tube * out**2 + about_strip * up**2 / 6.0 - both * out * up
-    return frame + push - turning
+    return about_strip, about_tube, both, sway - turning
 
 
 def with_sideways(
     section: FibreSection,
     length: Float[Array, " nodes"],
     on_wall: Float[Array, " nodes"],
-    turned: tuple[Any, Any, Any],
-    sway: Any,
+    compliance: tuple[Any, Any, Any, Any],
     poisson_ratio: float,
 ) -> FibreSection:
     """Put the compliance to moments and forces out of the plane into the sections of a rod."""
     # Half of each into the strip and half, with what couples the two, into the runs along the wall.
-    strip, tube, both = 0.5 * turned[0], 0.5 * turned[1], turned[2]
+    about_strip, about_tube, both, sway = compliance
+    strip, tube = 0.5 * about_strip, 0.5 * about_tube
     wall = xp.where(on_wall, length, 0.0).sum()
     rest = xp.where(on_wall, 0.0, length).sum()
     block = xp.linalg.inv(xp.array([[strip, both], [both, tube]]) / wall)
@@ -252,13 +242,13 @@ def strip_sections(
     inside = xp.minimum(xp.abs(along), strip.half)
     outer = xp.sqrt(tube.outer_radius**2 - inside**2)
     inner = xp.sqrt(xp.maximum(tube.inner_radius**2 - inside**2, 0.0))
-    middle, width = 0.5 * (outer + inner), strip.width_factor * (outer - inner)
+    middle = 0.5 * (outer + inner)
+    width = strip.wall / (tube.outer_radius - tube.inner_radius) * (outer - inner)
     rounded = xp.maximum(inside - strip.tip, 0.0)
     thickness = strip.thickness + strip.radius - xp.sqrt(strip.radius**2 - rounded**2)
     walls = two_walls(width, thickness, middle)
     ratio = 2.0 * (1.0 + poisson_ratio)  # E / G
-    radius = 0.5 * (tube.outer_radius + tube.inner_radius)
-    square = xp.minimum((inside / radius) ** 2, 0.95)  # sin² of the angle to a wall
+    square = xp.minimum((inside / hinge.radius) ** 2, 0.95)  # sin² of the angle to a wall
     bar = two_walls(strip.wall, thickness, 0.0)
     twisting = ratio * xp.asarray(bar.second_moment_weak) / bar.torsion_constant
     area, bent = xp.asarray(walls.area), xp.abs(along) < strip.half
@@ -271,10 +261,10 @@ def strip_sections(
         axial=xp.where(on_wall, 0.0, shear_area * pulled - 1.0),
         material_share=1.0,  # the root yields where the strip does
     )
-    clamped = clamped_torsion_constant(walls, middle, 2.0 * hinge.out, poisson_ratio)
-    section = about_neutral_axis(walls, clamped)
     return dataclasses.replace(
-        section, area=area * xp.where(on_wall, 1.0 / _STIFF, shear_area), ends=ends
+        about_neutral_axis(walls),
+        area=area * xp.where(on_wall, 1.0 / _STIFF, shear_area),
+        ends=ends,
     )
 
 
@@ -311,9 +301,8 @@ def rooted_strip_rod(
     resultants = unit_forces(poses.pick(slice(-2)), middle)
     strain = strains_of(section, poisson_ratio, resultants)
     plane = xp.einsum("k,kic,kjc->ij", points.weight, resultants, strain)
-    turned = turned_compliance(strip, tube, hinge, plane, poisson_ratio)
-    sway = sway_of(strip, tube, hinge, turned)
-    section = with_sideways(section, points.weight, on_wall, turned, sway, poisson_ratio)
+    others = sideways(strip, tube, hinge, plane, poisson_ratio)
+    section = with_sideways(section, points.weight, on_wall, others, poisson_ratio)
     modes = 3 + 3 * refinement, 1 + 2 * refinement
     return course_rod(points, poses, section, middle, modes, distal, poisson_ratio, **options)
 
