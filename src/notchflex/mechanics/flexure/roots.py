@@ -196,9 +196,10 @@ def sideways(
     # Positive definite while it is below half of the root of the product; the cells have 0.29.
     limit = 0.49 * plain_number(xp.sqrt(about_strip * about_tube))
     both = plain_number(xp.clip(-0.66 * plane[0, 1] / square, -limit, limit))
-    sway = 6.72 * out**3 / (t * wall**3) + 2.85 * about_tube * (square - out**2)
+    frame, push = 6.72 * out**3 / (t * wall**3), 2.85 * about_tube * (square - out**2)
     turning = 2.0 / 3.0 * about_tube * out**2 + about_strip * up**2 / 6.0 - both * out * up
-    return about_strip, about_tube, both, sway - turning
+    # The difference is positive in the cells; beyond them compliances have to stay so.
+    return about_strip, about_tube, both, frame + plain_number(xp.maximum(push - turning, 0.0))
 
 
 def with_sideways(
@@ -319,8 +320,8 @@ STRIP_UNCHECKED = "the stiffness of the strip was not checked"
 def wall_ranges(thickness: float, tube: Tube) -> list[Dimension]:
     """Return the checked ranges of a strip (mm) and the wall that it turns into."""
     inner, outer = tube.inner_radius, tube.outer_radius
-    thin = "bending was found up to 5 % off, shear across the strip up to 18 %"
+    thin = "bending was found up to 3 % off, other compliances up to 18 %"
     return [
-        ("inner / outer diameter", inner / outer, [(0.4, 0.77, thin)]),
-        ("strip thickness / wall", thickness / (outer - inner), [(0.35, 1.0, STRIP_UNCHECKED)]),
+        ("inner / outer diameter", inner / outer, [(0.4, 0.8, thin)]),
+        ("strip thickness / wall", thickness / (outer - inner), [(0.33, 1.2, STRIP_UNCHECKED)]),
     ]
