@@ -193,7 +193,7 @@ def sideways(
     against = 1.59 * tube.inner_radius / tube.outer_radius * plane[0, 0]
     bent = rule.bent * strip.tip / (t * hinge.radius)
     about_tube = (against + bent + rule.arc * hinge.twisted) / square
-    # Positive definite while it is below half of the root of the product; the cells have 0.29.
+    # Positive definite while it is below half of the root of the product; the cells have 0.32.
     limit = 0.49 * plain_number(xp.sqrt(about_strip * about_tube))
     both = plain_number(xp.clip(-0.66 * plane[0, 1] / square, -limit, limit))
     frame, push = 6.72 * out**3 / (t * wall**3), 2.85 * about_tube * (square - out**2)
