@@ -73,10 +73,11 @@ class Ends(NamedTuple):
     twist: float  # α, of the torsion of the strip's walls
     bent: float  # β₁, of the walls moved against each other along the strip
     arc: float  # τ, of the torsion of the arc beside a slot
+    coupling: float  # η
 
 
-ROUND = Ends(0.192, 1.0 / 3.0, 0.435, 3.85, 0.529)
-SHARP = Ends(0.385, 0.512, 0.663, 2.96, 0.0)
+ROUND = Ends(0.192, 1.0 / 3.0, 0.435, 3.85, 0.529, 0.695)
+SHARP = Ends(0.385, 0.512, 0.663, 2.96, 0.0, 0.648)
 
 
 class RootedStrip(NamedTuple):
@@ -195,7 +196,7 @@ def sideways(
     about_tube = (against + bent + rule.arc * hinge.twisted) / square
     # Positive definite while it is below half of the root of the product; the cells have 0.32.
     limit = 0.49 * plain_number(xp.sqrt(about_strip * about_tube))
-    both = plain_number(xp.clip(-0.66 * plane[0, 1] / square, -limit, limit))
+    both = plain_number(xp.clip(-rule.coupling * plane[0, 1] / square, -limit, limit))
     frame, push = 6.72 * out**3 / (t * wall**3), 2.85 * about_tube * (square - out**2)
     turning = 2.0 / 3.0 * about_tube * out**2 + about_strip * up**2 / 6.0 - both * out * up
     # The difference is positive in the cells; beyond them compliances have to stay so.
