@@ -178,7 +178,7 @@ def mesh(part: Strip | Link, fine: float, coarse: float) -> tuple[np.ndarray, np
     t = part.thickness
     for name, value in (
         ("InField", distance), ("SizeMin", fine), ("SizeMax", coarse),
-        ("DistMin", 0.3 * t), ("DistMax", 3.0 * t),
+        ("DistMin", 0.05 * t), ("DistMax", 4.0 * t),
     ):  # fmt: skip
         field.setNumber(size, name, value)
     field.setAsBackgroundMesh(size)
@@ -316,8 +316,8 @@ ENTRIES = [(i, j) for i in range(6) for j in range(i, 6) if (i in (1, 2, 3)) == 
 def sizes(part: Strip | Link) -> tuple[float, float]:
     """Sizes of the elements of a part, fine and coarse, mm."""
     if isinstance(part, Strip):
-        return part.thickness / 5.5, 0.3 * part.outer
-    return min(part.thickness / 5.0, part.slot_radius / 1.8), 0.2 * part.outer
+        return part.thickness / 16.0, 0.25 * part.outer
+    return min(part.thickness / 7.0, part.slot_radius / 2.5), 0.12 * part.outer
 
 
 def main(kind: type[Strip] | type[Link], parts: Path, out: Path) -> None:

@@ -135,19 +135,19 @@ def test_liu_pulled_to_12_degrees(margin: Margin) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("use", ["fit", "judge"])
+@pytest.mark.parametrize("use", ["fit", "judge", "kept"])
 def test_cells_inside_validity(use: str, margin: Margin) -> None:
-    """The rule against the cells it was fitted to, and against those that only judge it."""
+    """Against the cells fitted, those seen when terms were chosen, and those computed after."""
     found = np.concatenate(
         [errors([row for row in rows if row["use"] == use], True) for rows in (STRIPS, LINKS)]
     )
     rms, largest = np.sqrt(np.mean(found**2, axis=0)), np.abs(found).max(axis=0)
-    allowed = {"rx": (3.2, 6), "uy": (5.5, 10), "uz": (5.5, 9.5), "coupling": (3.5, 7.5)}
-    allowed |= {"ux": (11, 25), "ry": (5.5, 11), "rz": (9, 17), "coupling sideways": (2.5, 5.5)}
+    allowed = {"rx": (2.6, 5.3), "uy": (3.7, 9.0), "uz": (2.8, 8.0), "coupling": (3.4, 7.7)}
+    allowed |= {"ux": (5.8, 14), "ry": (3.2, 8), "rz": (5.2, 15), "coupling sideways": (4, 11.5)}
     for (name, (most_rms, most)), one, worst in zip(allowed.items(), rms, largest, strict=True):
         margin.within(f"{use}: {name}, rms of {len(found)}", one, most_rms, "%")
         margin.within(f"{use}: {name}, max", worst, most, "%")
-    if use == "judge":
+    if use == "kept":
         error = law_error(liu(), nf.Tube(10.0, 8.0), site(), yields=False)
         margin.within("law", np.sqrt(np.mean(rms[:3] ** 2)) - 100.0 * error, 0.1, "%")
 
@@ -155,13 +155,13 @@ def test_cells_inside_validity(use: str, margin: Margin) -> None:
 @pytest.mark.nightly
 def test_cells_outside_validity(margin: Margin) -> None:
     """What the sentence on thin walls says."""
-    rows = [row for row in STRIPS + LINKS if row["inner"] / row["outer"] > 0.77]
-    assert len(rows) == 4
+    rows = [row for row in STRIPS + LINKS if row["inner"] / row["outer"] > 0.8]
+    assert len(rows) == 7
     assert all("inner / outer diameter" in left_ranges(*part(row))[0] for row in rows)
     found = np.abs(np.concatenate([errors([row], False) for row in rows])).max(axis=0)
-    margin.within("bending", found[0], 5.1, "%")
-    margin.within("shear across", found[1:3], 18.0, "%")
-    assert found[2] > 10.0
+    margin.within("bending", found[0], 3.1, "%")
+    margin.within("the others", found[1:], 18.0, "%")
+    assert found[6] > 10.0
 
 
 def test_validity_names_each_range() -> None:

@@ -237,9 +237,11 @@ def _(notch: ULink, tube: Tube, site: Site) -> list[str]:
         return []
     thickness, length = notch.strip_thickness, notch.strip_length
     outer, radius = tube.outer_diameter, notch.slot_radius
+    wide = "stretch and shear were found up to 10 % off"
     ranges: list[Dimension] = [
         ("strip length / strip thickness", length / thickness, [(1.7, 5.8, STRIP_UNCHECKED)]),
         ("strip length / outer diameter", length / outer, [(0.2, 0.5, STRIP_UNCHECKED)]),
         ("slot radius / strip thickness", radius / thickness, [(0.2, 0.8, STRIP_UNCHECKED)]),
+        ("slot width / outer diameter", notch.height / outer, [(0.05, 0.16, wide)]),
     ]
     return left_ranges(wall_ranges(thickness, tube) + ranges)
