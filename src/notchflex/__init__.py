@@ -37,6 +37,7 @@ _HOME = {
             "Frictionless",
             "Linear",
             "Nitinol",
+            "TensileTest",
             "Robot",
             "StressStrain",
             "StripNotch",

@@ -115,6 +115,7 @@ from notchflex.robot import StressStrain as StressStrain
 from notchflex.robot import StripNotch as StripNotch
 from notchflex.robot import Superelastic as Superelastic
 from notchflex.robot import Tendon as Tendon
+from notchflex.robot import TensileTest as TensileTest
 from notchflex.robot import Tube as Tube
 from notchflex.robot import ULink as ULink
 from notchflex.robot import json_schema as json_schema

@@ -19,6 +19,7 @@ _HOME = {
             "TendonCommand",
             "Vector",
             "load_columns",
+            "parse_spec",
             "parse_number",
             "parse_vector",
             "parse_whole",

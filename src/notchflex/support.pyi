@@ -5,6 +5,7 @@ from notchflex._load_words import TendonCommand as TendonCommand
 from notchflex._load_words import Vector as Vector
 from notchflex._load_words import load_columns as load_columns
 from notchflex._load_words import parse_number as parse_number
+from notchflex._load_words import parse_spec as parse_spec
 from notchflex._load_words import parse_vector as parse_vector
 from notchflex._load_words import parse_whole as parse_whole
 from notchflex._load_words import read_body_force as read_body_force

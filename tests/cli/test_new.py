@@ -155,7 +155,7 @@ def test_a_person_goes_back(monkeypatch, tmp_path, capsys, word):
 def test_prompts_are_broken_at_words(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "50")
     asked = person(
-        monkeypatch, "", "1.62", "1.4", "", "", "on-axis", "3", "1.3", "1", "1", *[""] * 11
+        monkeypatch, "", "1.62", "1.4", "", "", "on-axis", "3", "1.3", "1", "1", *[""] * 12
     )
     assert run(["new", "w"]) == 0
     shown = [*capsys.readouterr().out.splitlines()[:-1], *asked]
@@ -346,3 +346,24 @@ def test_a_decimal_comma_in_a_list_gets_a_hint(capsys):
     assert run(command("w", "--yes", height="1,9")) == 2
     assert "got 2 numbers" in (err := capsys.readouterr().err)
     assert "For decimal commas, separate numbers by semicolons, or write a point: 1.9." in err
+
+
+def test_what_a_data_sheet_prints_makes_the_constants(monkeypatch, tmp_path):
+    pipe(monkeypatch)
+    sheet = {"upper_plateau": "520", "lower_plateau": "230", "test_temperature": "22"}
+    assert run(command("w", "--yes", **sheet, elastic_modulus="48000", plateau_modulus="800")) == 0
+    material = load_robot(tmp_path / "w.toml").material
+    share = 1.0 - 800.0 / 48_000.0
+    assert material.plateau_stress == pytest.approx((520.0 - 24.0) / share, rel=1e-9)
+    assert material.unloading_stress == pytest.approx((230.0 - 20.0) / share, rel=1e-9)
+    assert material.reference_temperature == 22.0
+    text = (tmp_path / "w.toml").read_text(encoding="utf-8")
+    assert "estimate" not in next(x for x in text.splitlines() if x.startswith("plateau_stress"))
+    assert (
+        run(command("v", "--yes", upper_plateau="520", material="linear", elastic_modulus="9")) == 2
+    )
+    assert run(command("v", "--yes", upper_plateau="100")) == 2
+    asked = person(monkeypatch, *[""] * 5, "500", "", "none", *[""] * 4)
+    assert run(command("p", friction="0.1", title="x")) == 0
+    assert any("Upper plateau" in words for words in asked)
+    assert load_robot(tmp_path / "p.toml").material.unloading_stress is None

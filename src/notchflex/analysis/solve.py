@@ -130,7 +130,7 @@ def _follow(
         check_robot(from_state, robot)
     load = load_path(loads, check_is_robot(robot).number_of_tendons)
     path = follow_path(robot, load, from_state, settings, refinement, each_from_rest)
-    for warning in unlikely_loads(load, path.prepared.usual_loads):
+    for warning in unlikely_loads(load, robot, path.prepared.usual_loads):
         warnings.warn(warning, stacklevel=3)
     return path
 

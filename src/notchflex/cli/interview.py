@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from pydantic import Field as Limits
 from pydantic import FiniteFloat, TypeAdapter, ValidationError, create_model
 
-from notchflex import InputError, Robot, Tendon, Tube
+from notchflex import InputError, Nitinol, Robot, Tendon, TensileTest, Tube
 from notchflex.robot.problems import MOST_NOTCHES
 from notchflex.support import Friction, Material, Notch, kind_of, kinds_of
 
@@ -87,6 +87,10 @@ NOTES = {
         hint="30000 to 57000 are usual for superelastic tubes.",
     ),
     "nitinol.plateau_stress": KeyNote(comment=f"{_NITINOL}, 250 to 520 MPa"),
+    "material.upper_plateau": KeyNote(
+        hint="Data sheets print it by ASTM F2516; without one the stress where the plateau begins "
+        "is asked for."
+    ),
     "nitinol.plateau_modulus": KeyNote(comment=f"{_NITINOL}, 2 to 9 GPa"),
     "nitinol.compression_ratio": KeyNote(comment="estimate: nitinol has 1 to 1.5"),
     "nitinol.density": _DENSITY,
@@ -195,10 +199,24 @@ class Interview:
         tendons = self._tendons(tube, notches)
         material = self._kind(Material)
         plastic = {"lt": 0.1}  # where the plastic branch begins
-        values = self._keys("material", material, transition_strain=plastic)
+        test = self._tensile_test(material)
+        given = [] if test is None else ["plateau_stress"]
+        values = self._keys("material", material, but=given, transition_strain=plastic)
+        make = material if test is None else test.nitinol
         friction = self._kind(Friction, asks=self.person)
         of_friction = self._keys("friction", friction)
-        return Robot(title, tube, notches, tendons, material(**values), friction(**of_friction))
+        return Robot(title, tube, notches, tendons, make(**values), friction(**of_friction))
+
+    def _tensile_test(self, material: type) -> TensileTest | None:
+        """Ask for what a data sheet of nitinol prints; None where there is none."""
+        if material is not Nitinol or self._options["--plateau-stress"] is not None:
+            return None
+        (first, *more) = keys_of(TensileTest)
+        values = self._keys("material", TensileTest, first)
+        if values[first] is None:
+            return None
+        self.answered |= {f"material.{key}" for key in ("plateau_stress", "unloading_stress")}
+        return TensileTest(**values, **self._keys("material", TensileTest, *more))
 
     def _notches(self, tube: Tube) -> tuple[Notch, ...]:
         """Ask for the number of notches, and for their keys: one value, or each its own."""

@@ -31,6 +31,7 @@ from notchflex.support import (
     check_picture,
     need,
     parse_number,
+    parse_spec,
     parse_vector,
     parse_whole,
     read_body_force,
@@ -371,6 +372,8 @@ class ExternalLoads:
         tip_mass: Mass that hangs at the tip [g]; along 0,0,-9.81 without --gravity.
         gravity: Gravity X,Y,Z in the world [m/s2]; the robot's own weight counts where
             material.density is known.
+        temperature: Temperature of the robot [deg C]: one for all steps, or start:stop:count and
+            values joined by commas for each; needs material.reference_temperature.
         following: Forces and moments turn with the body they act on, and are given in its frame.
     """
 
@@ -385,6 +388,7 @@ class ExternalLoads:
         float | None, number("a finite number of grams, 0 or more", "G", least=0.0)
     ] = None
     gravity: Annotated[Vector | None, vector("accelerations in m/s2")] = None
+    temperature: Annotated[list[float] | None, converted(parse_spec, "SPEC")] = None
     following: bool = False
 
     def __post_init__(self) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from enum import IntFlag
 from math import hypot, pi
 from typing import Any, NamedTuple, cast
@@ -18,14 +19,15 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._arrays import xp
-from notchflex._jax import constant, jnp
+from notchflex._jax import constant, jax, jnp
 from notchflex.errors import InputError, InputWarning
 from notchflex.loads.load import HANGING, NO_VECTOR, NOTHING, ExternalLoad
 from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.chain import Chain, bending_normal
 from notchflex.mechanics.motion import IN_PLANE, turned, unskew
 from notchflex.robot import Robot
-from notchflex.robot.problems import unlikely
+from notchflex.robot.kinds import Transforming
+from notchflex.robot.problems import too_cold, unlikely
 
 # Tolerance of a vector's component out of a plane.
 _ROUNDING = 1e-12
@@ -40,46 +42,54 @@ class BodyLoads(NamedTuple):
         dead_arm: Sum of the products p f^T of the points where those forces act (in the body's
             frame) and the forces (in the base frame).
         following: Moment and force of loads that turn with a body, about its origin, in its frame.
+        rise: Temperature above that of the robot, K, the same for all bodies; None where the
+            material does not depend on it.
     """
 
     dead_force: Float[Array, "*s bodies d"]
     dead_moment: Float[Array, "*s bodies a"]
     dead_arm: Float[Array, "*s bodies d d"]
     following: Float[Array, "*s bodies w"]
+    rise: Float[Array, "*s bodies"] | None = None
 
 
 def applied(
     load: LoadPath,
     chain: Chain,
     steps: Int[np.ndarray, "*k s"],
-    bodies: tuple[np.ndarray, ...] | None = None,
+    bodies: tuple[Any, ...] | None = None,
     tip: Float[np.ndarray, "all 6"] | None = None,
 ) -> BodyLoads:
     """Sum the external loads on each body; the axes of `steps` are the leading ones of the sums."""
-    # Masses, their moments and the distance of the tip (`body_numbers`) may have the rows of
-    # `steps` as leading axis; the sums are linear in them. `tip` acts besides the loads of the
-    # path. Of a flat chain they are the sums in the plane that x and z of its frame span.
+    # Masses, their moments, the distance of the tip and the temperature (`body_numbers`) may have
+    # the rows of `steps` as leading axis; the sums are linear in them. `tip` acts besides the loads
+    # of the path. Of a flat chain they are the sums in the plane that x and z of its frame span.
     along, about = (np.eye(3),) * 2 if chain.frame is None else _of_plane(chain.frame)
-    turn, bodies = load.base_to_world, bodies or body_numbers(chain)
+    turn, (*masses, warm) = load.base_to_world, bodies or body_numbers(chain)
     world_along, world_about = (along, about) if turn is None else (turn @ along, turn @ about)
     axes = along, about, world_along, world_about
-    by_row = bodies[2].ndim
+    by_row = masses[2].ndim
     fields: list[np.ndarray] = []
+    rise = np.zeros(steps.size)
     for external, places, at_tip in _each(load, steps, tip):
-        masses = [each[places // steps.shape[-1]] for each in bodies] if by_row else bodies
-        sums = _sums(external, axes, *masses, at_tip=at_tip)
+        rows = places // steps.shape[-1] if by_row else np.s_[...]
+        if warm is not None and external.temperature is not None:
+            rise[places] = external.temperature - warm[rows]
+        sums = _sums(external, axes, *(each[rows] for each in masses), at_tip=at_tip)
         shapes = [values.shape[by_row if tip is None else 1 :] for values in sums]
         fields = fields or [np.empty((steps.size, *shape)) for shape in shapes]
         for field, values in zip(fields, sums, strict=True):
             field[places] = values
+    if warm is not None:
+        fields.append(np.repeat(rise[:, None], fields[0].shape[1], axis=1))
     return BodyLoads(*(constant(field.reshape(*steps.shape, *field.shape[1:])) for field in fields))
 
 
-def body_numbers(chain: Chain) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what loads take of bodies: masses, their moments, and the distance of the tip."""
+def body_numbers(chain: Chain) -> tuple[Any, ...]:
+    """Return what loads take of a robot: masses, their moments, place of the tip, temperature."""
     mass = np.asarray(chain.body_mass)
     moment = mass[..., None] * np.asarray(chain.body_centre)
-    return mass, moment, np.asarray(chain.body_length)[..., -1]
+    return mass, moment, np.asarray(chain.body_length)[..., -1], chain.law.temperature
 
 
 def load_slopes(load: LoadPath, chain: Chain, change: Chain) -> BodyLoads:
@@ -89,9 +99,10 @@ def load_slopes(load: LoadPath, chain: Chain, change: Chain) -> BodyLoads:
     by_moment = by_mass[..., None] * centre + mass[:, None] * np.asarray(change.body_centre)
     by_tip = np.asarray(change.body_length)[..., -1]
     steps = np.broadcast_to(np.arange(len(load)), (len(by_tip), len(load)))
-    changed = applied(load, chain, steps, (by_mass, by_moment, by_tip))
-    still = applied(load, chain, steps, (0.0 * by_mass, 0.0 * by_moment, 0.0 * by_tip))
-    return BodyLoads(*map(operator.sub, changed, still))
+    by = by_mass, by_moment, by_tip, change.law.temperature
+    none = jax.tree.map(np.zeros_like, by)
+    changed, still = (applied(load, chain, steps, bodies) for bodies in (by, none))
+    return jax.tree.map(operator.sub, changed, still)
 
 
 def in_space(loads: BodyLoads, frame: Float[Array, "3 3"], *, reduce: bool = False) -> BodyLoads:
@@ -99,7 +110,7 @@ def in_space(loads: BodyLoads, frame: Float[Array, "3 3"], *, reduce: bool = Fal
     along, about = _of_plane(frame)
     if not reduce:
         along, about = along.T, about.T
-    force, moment, arm, following = map(np.asarray, loads)
+    force, moment, arm, following = map(np.asarray, loads[:4])
     axes = about.shape[0]
     turning = [following[..., :axes] @ about, following[..., axes:] @ along]
     return BodyLoads(
@@ -107,6 +118,7 @@ def in_space(loads: BodyLoads, frame: Float[Array, "3 3"], *, reduce: bool = Fal
         constant(moment @ about),
         constant(along.T @ arm @ along),
         constant(np.concatenate(turning, axis=-1)),
+        loads.rise,
     )
 
 
@@ -266,7 +278,15 @@ def _of_plane(frame: Float[Array, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check(external: ExternalLoad, robot: Robot) -> None:
-    last = robot.number_of_notches
+    last, material = robot.number_of_notches, robot.material
+    if external.temperature is not None:
+        if not isinstance(material, Transforming) or material.reference_temperature is None:
+            raise InputError.UNSUPPORTED(
+                f"temperature has no effect on {robot.name}: it is not known at which temperature "
+                "its material was measured; give material.reference_temperature (deg C), which "
+                "nitinol and superelastic have"
+            )
+        replace(cast("Any", material), temperature=external.temperature)  # raises if it is too cold
     for force in external.body_forces:
         if force.body > last:
             raise InputError.OUT_OF_RANGE(
@@ -410,7 +430,9 @@ def usual_loads(chain: Chain) -> dict[str, tuple[float, str]]:
     }
 
 
-def unlikely_loads(load: LoadPath, usual: Mapping[str, tuple[float, str]]) -> list[InputWarning]:
+def unlikely_loads(
+    load: LoadPath, robot: Robot, usual: Mapping[str, tuple[float, str]]
+) -> list[InputWarning]:
     """Return a warning for each kind of load that is far beyond a robot (`usual_loads`)."""
     # Every solve comes by: lists are faster than arrays of one number; NaN is never above a limit.
     largest = {
@@ -432,8 +454,9 @@ def unlikely_loads(load: LoadPath, usual: Mapping[str, tuple[float, str]]) -> li
             }
             for name, size in sizes.items():
                 largest[name] = max(largest.get(name, 0.0), size)
+    given = [each.temperature for each in load.different if each.temperature is not None]
     return [
         unlikely(name, float(size), (0.0, float(f"{usual[name][0]:.2g}")), usual[name][1])
         for name, size in largest.items()
         if size > usual[name][0]
-    ]
+    ] + [*too_cold(robot.material, "temperature", min(given, default=None))]

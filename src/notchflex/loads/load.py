@@ -197,6 +197,7 @@ class ExternalLoad:
         body_forces: Forces and moments on single bodies.
         tip_mass: Mass that hangs at the tip point, g.
         gravity: Acceleration of gravity in the world, m/s^2.
+        temperature: Temperature of the robot, deg C.
 
     Raises:
         InputError: An invalid value, one that is not finite, or a negative mass.
@@ -213,6 +214,7 @@ class ExternalLoad:
     body_forces: Sequence[BodyForce] = ()
     tip_mass: float = 0.0
     gravity: Sequence[float] | None = None
+    temperature: float | None = None
 
     def __post_init__(self) -> None:
         """Check the numbers and keep them as tuples, so that equal loads are found equal."""
@@ -242,6 +244,7 @@ class ExternalLoad:
     def is_nothing(self) -> bool:
         """Whether no load acts, whatever the robot weighs."""
         acting = any(self.tip_force) or any(self.tip_moment) or self.pulls_down
+        acting = acting or self.temperature is not None
         return not acting and not any(
             any(load.force) or any(load.moment) for load in self.body_forces
         )
@@ -288,6 +291,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "following": partial(check_bool, what="following"),
     "body_forces": _body_forces,
     "tip_mass": _mass,
+    "temperature": lambda value: _finite(value, "temperature", "a number of deg C"),
 }
 EXTERNAL = tuple(field.name for field in fields(ExternalLoad))
 _DEFAULTS = tuple((field.name, field.default) for field in fields(ExternalLoad))
@@ -344,6 +348,8 @@ class Load(ExternalLoad):
         tip_mass: Mass that hangs at the tip point, g.
         gravity: Acceleration of gravity in the world, m/s^2. Given, the robot's own weight counts
             where its material has a density. Not given, a tip mass hangs along (0, 0, -9.81).
+        temperature: Temperature of the robot, deg C, which moves the plateaus of a material with a
+            `reference_temperature`; not given, that of its material.
 
     A tendon of which neither tension nor stroke is commanded hangs slack (0 N).
 
@@ -409,8 +415,8 @@ def _commanded(value: Any, what: str) -> float | tuple[float | None, ...]:
     return _finite(value, what)
 
 
-def _finite(value: Any, what: str) -> float:
-    number = check_number(value, what, _PER_TENDON)
+def _finite(value: Any, what: str, form: str = _PER_TENDON) -> float:
+    number = check_number(value, what, form)
     if not isfinite(number):
         raise InputError.NOT_FINITE(f"{what} must be finite; got {short_repr(value)}")
     return number

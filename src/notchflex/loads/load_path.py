@@ -269,6 +269,7 @@ class LoadPath(ByValue, Displayed):
         body_forces: Sequence[BodyForce] | None = None,
         tip_mass: float | None = None,
         gravity: Sequence[float] | None = None,
+        temperature: float | Sequence[float] | None = None,
     ) -> LoadPath:
         """Return the path with external loads on all its steps.
 
@@ -280,12 +281,14 @@ class LoadPath(ByValue, Displayed):
             body_forces: Forces and moments on single bodies.
             tip_mass: Mass that hangs at the tip point, g.
             gravity: Acceleration of gravity in the world, m/s^2.
+            temperature: Temperature of the robot, deg C, or one for each step; a path of a single
+                step is repeated for several.
 
         Returns:
             The path; what is not given stays as it is.
 
         Raises:
-            InputError: Invalid value.
+            InputError: Invalid value, or other numbers of temperatures and of steps.
 
         Example:
             >>> from notchflex import pull
@@ -294,9 +297,25 @@ class LoadPath(ByValue, Displayed):
             [(0.0, 0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0)]
         """
         changes = {n: v for n, v in locals().items() if n in EXTERNAL and v is not None}
+        if isinstance(temperature, Sequence | np.ndarray):
+            return self._at_temperatures(changes.pop("temperature")).loaded(**changes)
         # Each distinct load is made and checked once.
         changed = [replace(load, **changes) for load in self.different]
         return replace(self, external=tuple(changed[number] for number in self.which.tolist()))
+
+    def _at_temperatures(self, temperatures: Any) -> LoadPath:
+        """Return the path with a temperature for each step; one step is repeated for several."""
+        try:
+            steps, values = np.broadcast_arrays(np.arange(len(self)), temperatures)
+        except ValueError:
+            raise InputError.WRONG_SHAPE(
+                f"there are {len(temperatures)} temperatures for {len(self)} steps; give one, or "
+                "one for each step"
+            ) from None
+        path, values = self[steps], values.tolist()
+        pairs = zip(path.external, values, strict=True)
+        external = tuple(replace(load, temperature=value) for load, value in pairs)
+        return replace(path, external=external)
 
     def for_tendons(self, count: int) -> LoadPath:
         """Return the path for a number of tendons; those added are slack."""
@@ -416,6 +435,7 @@ def external_words(load: ExternalLoad) -> list[str]:
         (any(load.tip_moment), f"tip moment {vector(load.tip_moment)} N mm{turning}"),
         (load.tip_mass, f"tip mass {short(load.tip_mass)} g{where_of_mass}"),
         (any(load.gravity or ()), f"gravity {vector(load.gravity or ())} m/s²"),
+        (load.temperature is not None, f"temperature {short(load.temperature or 0.0)} °C"),
     ]
     for force in load.body_forces:
         point = f" at {vector(force.point)} mm" if any(force.point) else ""

@@ -158,6 +158,7 @@ _LOAD_KEYS = {
     "tip_point": ("tip_point_mm", "mm"),
     "tip_mass": ("tip_mass_g", "g"),
     "gravity": ("gravity_m_s2", "m/s^2"),
+    "temperature": ("temperature_C", "deg C"),
     "force": ("body_forces.force_N", "N"),
     "moment": ("body_forces.moment_Nmm", "N mm"),
     "point": ("body_forces.point_mm", "mm"),

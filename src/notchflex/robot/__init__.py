@@ -12,7 +12,7 @@ from notchflex.robot.friction.corner import Corner
 from notchflex.robot.friction.frictionless import Frictionless
 from notchflex.robot.kinds import Friction, Material, Notch, Tendon, Tube, kinds_of, openings_along
 from notchflex.robot.materials.linear import Linear
-from notchflex.robot.materials.nitinol import Nitinol
+from notchflex.robot.materials.nitinol import Nitinol, TensileTest
 from notchflex.robot.materials.stress_strain import StressStrain
 from notchflex.robot.materials.superelastic import Superelastic
 from notchflex.robot.notches.arc import ArcNotch
@@ -42,6 +42,7 @@ __all__ = [
     "StripNotch",
     "Superelastic",
     "Tendon",
+    "TensileTest",
     "Tube",
     "ULink",
     "from_table",

@@ -275,6 +275,68 @@ class Material:
     ] = None
 
 
+celsius = functools.partial(quantity, "deg C", at_least=-273.15, at_most=200.0)
+"""Describes a temperature; one in kelvin is refused."""
+
+
+@part(kw_only=True)
+class Transforming:
+    """What a material has whose plateaus move with the temperature.
+
+    Args:
+        temperature: Temperature of use [deg C]; None is `reference_temperature`.
+        reference_temperature: Temperature at which the stresses of the plateaus were measured
+            [deg C]; None where it is not known, and the temperature does not count.
+        plateau_slope: Change of their stresses in tension with the temperature [MPa/K]; None is
+            6.5 (Confluent), the literature has 3.4 to 7.8.
+        austenite_finish: Temperature above which the free material is all austenite [deg C]; below
+            it the material is not superelastic, of which a warning tells.
+    """
+
+    temperature: Annotated[Float | None, celsius("temperature of use")] = None
+    reference_temperature: Annotated[
+        Float | None, celsius("temperature at which the plateaus were measured")
+    ] = None
+    plateau_slope: Annotated[
+        Float | None,
+        quantity("MPa/K", "change of the plateaus with temperature", at_least=0, at_most=100.0),
+    ] = None
+    austenite_finish: Annotated[Float | None, celsius("austenite finish temperature")] = None
+
+    @property
+    def stress_per_kelvin(self) -> float:
+        """Change of the stresses of the plateaus with the temperature [MPa/K]."""
+        return 6.5 if self.plateau_slope is None else self.plateau_slope
+
+    @property
+    def plateau_shift(self) -> float:
+        """By how much the stresses of the plateaus in tension are above those measured [MPa]."""
+        if self.temperature is None or self.reference_temperature is None:
+            return 0.0
+        return self.stress_per_kelvin * (self.temperature - self.reference_temperature)
+
+    @property
+    def plateaus(self) -> tuple[float, ...]:
+        """Stresses in tension where the plateaus of loading and of unloading begin [MPa]."""
+        raise NotImplementedError
+
+    def conflicts(self) -> Problems:
+        """Find a temperature without a reference, or one too cold for the lower plateau."""
+        if self.temperature is not None and self.reference_temperature is None:
+            yield (
+                "reference_temperature",
+                "is missing beside `temperature`; give the temperature at which the plateaus were "
+                "measured.",
+            )
+        if (lowest := min(self.plateaus)) <= 0.0:
+            yield (
+                "temperature",
+                f"is {self.temperature} deg C, where the lower plateau would be at "
+                f"{lowest:.4g} MPa: the material does not spring back there. "
+                "It must be warmer; is it in deg C?",
+            )
+
+
 @part(kw_only=True)
 class Friction:
     """What every kind of friction has: a name.

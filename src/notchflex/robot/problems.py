@@ -307,9 +307,24 @@ def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
                 by_unit.setdefault((unit_of(field), other), []).append(unusual)
     for (unit, other), values in by_unit.items():
         yield _outside(values, unit, other)
+    reference = getattr(robot.material, "reference_temperature", None)
+    used = getattr(robot.material, "temperature", reference)
+    yield from too_cold(robot.material, "material.temperature", reference if used is None else used)
     if not by_unit:
         yield from _narrow_channels(robot)
         yield from _remaining_depths(robot)
+
+
+def too_cold(material: Any, name: str, temperature: float | None) -> Iterator[InputWarning]:
+    """Warn of a temperature below the austenite finish, where both are known."""
+    finish = getattr(material, "austenite_finish", None)
+    if finish is not None and temperature is not None and temperature < finish:
+        text = (
+            f"`{name}` is {_shown(temperature, 'deg C')}, below the austenite finish, "
+            f"{_shown(finish, 'deg C')}: the material is not superelastic there, and no number of "
+            "this robot is right."
+        )
+        yield InputWarning(text, name, temperature, None)
 
 
 def unlikely(name: str, value: float, usual: tuple[float, float], unit: str) -> InputWarning:

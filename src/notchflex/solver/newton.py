@@ -28,6 +28,7 @@ from notchflex.solver.residual import (
     slip_mask,
     stroke,
     tension_is_bounded,
+    warmed,
     without_slack,
 )
 
@@ -231,7 +232,7 @@ def newton(
     if not chain.law.remembers:
         return best
     # The loop does not carry the memory: it is long, and only that of the last point counts.
-    modes = best.point.unknowns.modes
+    modes, chain = best.point.unknowns.modes, warmed(chain, command.applied)
     return best._replace(
         material=flexure_states(chain, modes, memory.material, with_pose=False).memory
     )

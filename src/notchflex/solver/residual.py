@@ -8,6 +8,7 @@ external loads from the tip.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -288,7 +289,7 @@ def unloaded(chain: Chain) -> BodyLoads | None:
         return None
     bodies = chain.flexures + 1
     d, a = (3, 3) if chain.frame is None else (2, 1)
-    shapes = ((d,), (a,), (d, d), (a + d,))
+    shapes = ((d,), (a,), (d, d), (a + d,), *[()] * (chain.law.temperature is not None))
     return BodyLoads(*(constant(np.zeros((bodies, *shape))) for shape in shapes))
 
 
@@ -353,6 +354,13 @@ class Evaluation(NamedTuple):
     residual: Unknowns
 
 
+def warmed(chain: Chain, applied: BodyLoads | None) -> Chain:
+    """Return a chain at the temperature of its loads."""
+    if applied is None or applied.rise is None:
+        return chain
+    return replace(chain, law=chain.law.warmed(applied.rise[0]))
+
+
 def evaluate(
     chain: Chain,
     point: Iterate,
@@ -362,7 +370,7 @@ def evaluate(
     """Evaluate the residual of the chain, with its terms."""
     # Equilibrium is stated as virtual work with the true work of the tendon, -T times the change of
     # its span lengths: normal and friction forces need not be summed.
-    unknowns = point.unknowns
+    unknowns, chain = point.unknowns, warmed(chain, applied)
     on_bodies = chain.forces_on_bodies
     flexure = flexure_states(chain, unknowns.modes, memory.material, with_pose=on_bodies)
     anchors = anchor_poses(chain, flexure.pose)

@@ -34,6 +34,7 @@ from notchflex.solver.residual import (
     evaluate,
     in_tendon_order,
     is_active,
+    warmed,
 )
 
 
@@ -47,6 +48,7 @@ class SolvedState:
         """Take a state of a chain."""
         self.chain, self.solved = chain, solved
         self._evaluated: dict[str, Array] = {}
+        self.law = warmed(chain, solved.applied).law
 
     def quantity(self, name: str) -> Array:
         """Evaluate the formula of a quantity, once."""
@@ -81,14 +83,14 @@ class SolvedState:
     def section_strain(self) -> SectionStrain:
         """Strains of the section at every node of every notch."""
         strain, memory = in_space(self.evaluation.flexure.strain), self.solved.memory.material
-        of_section = partial(section_strain, self.chain.law)
+        of_section = partial(section_strain, self.law)
         return jax.vmap(jax.vmap(of_section))(strain, self.chain.rods.section, memory)
 
     @cached_property
     def stored_energy_density(self) -> tuple[Float[Array, "n nodes"], Flattening]:
         """Energy stored per length, and flattening, at every node of every notch."""
         strain, memory = in_space(self.evaluation.flexure.strain), self.solved.memory.material
-        return jax.vmap(jax.vmap(self.chain.law.stored_energy_density))(
+        return jax.vmap(jax.vmap(self.law.stored_energy_density))(
             strain, self.chain.rods.section, memory
         )
 

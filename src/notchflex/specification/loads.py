@@ -16,6 +16,7 @@ from notchflex.support import (
     TendonCommand,
     Vector,
     load_columns,
+    parse_spec,
     parse_vector,
     read_body_force,
     read_command,
@@ -24,7 +25,8 @@ from notchflex.support import (
 
 _DRIVES = ("tension", "stroke")
 _VECTORS = ("tip_force", "tip_moment", "tip_point", "gravity")
-LOAD_KEYS = (*_DRIVES, "base_rotation", *_VECTORS, "tip_mass", "body_force", "following")
+_OTHERS = ("tip_mass", "temperature", "body_force", "following")
+LOAD_KEYS = (*_DRIVES, "base_rotation", *_VECTORS, *_OTHERS)
 """Keys of a load in a file."""
 
 LoadTables = Annotated[dict[str, dict[str, Any]], Field(min_length=1, max_length=100)]
@@ -83,6 +85,7 @@ def _with_external(path: LoadPath, table: Mapping[str, Any]) -> LoadPath:
     return path.loaded(
         **{key: _vector(key, table[key]) for key in _VECTORS if key in table},
         tip_mass=table.get("tip_mass"),
+        temperature=parse_spec(str(table["temperature"])) if "temperature" in table else None,
         body_forces=forces or None,
         following=following if {"tip_force", "tip_moment"} & {*table} else None,
     )

@@ -92,7 +92,10 @@ class Answers:
         tendon_direction: Side on which each tendon runs [deg]; 0 is x.
         material: `nitinol`, `superelastic`, `linear`, or another kind.
         elastic_modulus: Elastic modulus [MPa].
-        plateau_stress: Stress where the plateau of nitinol begins [MPa].
+        upper_plateau: Upper plateau of a data sheet of nitinol, at 3 % strain [MPa].
+        lower_plateau: Lower plateau, at 2.5 % strain unloading from 6 % [MPa].
+        test_temperature: Temperature at which they were measured [deg C].
+        plateau_stress: Stress where the plateau of nitinol begins [MPa], instead.
         plateau_modulus: Slope of that plateau [MPa].
         superelastic_modulus: Modulus of the superelastic branch [MPa].
         transition_strain: Strain where the superelastic branch begins.
@@ -117,6 +120,9 @@ class Answers:
     tendon_direction: OfTendons = None
     material: OfMaterial = None
     elastic_modulus: OfMaterial = None
+    upper_plateau: OfMaterial = None
+    lower_plateau: OfMaterial = None
+    test_temperature: OfMaterial = None
     plateau_stress: OfMaterial = None
     plateau_modulus: OfMaterial = None
     superelastic_modulus: OfMaterial = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -59,10 +60,15 @@ def show(
         table = closing(chosen)
         document: dict[str, Any] = document_head(chosen)
         document["notches"] = notch_table(chosen, table)
+        if warm := list(_at_temperatures(chosen)):
+            document["temperatures"] = warm
     for sentence in unchecked_dimensions(chosen):
         terminal.warn(sentence)
     if outputs.prints_tables:
         _print(chosen, changed_title(chosen, settings), document["notches"])
+        if warm:
+            print()
+            tables.show(warm, forms={"temperature_C": "g"})
     bands = None
     if outputs.prints_tables or outputs.json is not None:
         with terminal.progress("drawing robots within the tolerances"):
@@ -81,6 +87,25 @@ def show(
     outputs.write(chosen, lambda _: document, plot=draw)
     if bands is not None and outputs.prints_tables:
         _print_accuracy(chosen, bands, document["tolerances"])
+
+
+def _at_temperatures(robot: Robot) -> Iterator[dict[str, Any]]:
+    """Yield plateaus and closing tensions in the workshop and in the body, where they are known."""
+    if getattr(robot.material, "reference_temperature", None) is None:
+        return
+    from notchflex import closing
+
+    for temperature in (22.0, 37.0):
+        try:
+            warm = robot.with_value("material.temperature", temperature)
+        except InputError as problem:
+            terminal.warn(f"{problem}")
+            continue
+        plateaus: Any = vars(warm)["material"].plateaus
+        row = zip(("plateau_MPa", "lower_plateau_MPa"), plateaus, strict=False)
+        tension = closing(warm).tension.tolist()
+        ends = [min(tension), max(tension)]
+        yield {"temperature_C": temperature, **dict(row), "closing_tension_N": ends}
 
 
 def _print(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:

@@ -38,7 +38,10 @@ _LOADS = {
     "following": "following",
     "tip_mass": "tip_mass_g",
     "gravity": "gravity_{axis}_m_s2",
+    "temperature": "temperature_C",
 }
+# A gravity of 0 differs from none given, with which a mass hangs; a temperature of 0 likewise.
+_OPTIONAL = ("gravity", "temperature")
 _ON_BODIES = {
     "force": "body_{body}_force_{axis}_N",
     "moment": "body_{body}_moment_{axis}_Nmm",
@@ -429,17 +432,17 @@ def write_measurements(measurements: Measurements, target: str | Path) -> None:
         raise InputError.UNSUPPORTED(
             f"tendon {tendon + 1} is commanded in some rows only; give 0 N where it is slack"
         )
-    if len({load.gravity is None for load in loads}) > 1:
-        raise InputError.UNSUPPORTED(
-            "gravity is given in some rows only; give it in all or in none"
-        )
+    for name in _OPTIONAL:
+        if len({getattr(load, name) is None for load in loads}) > 1:
+            raise InputError.UNSUPPORTED(
+                f"{name} is given in some rows only; give it in all or in none"
+            )
     table: dict[str, Any] = {"pull": measurements.pull}
     table |= _filled(_COMMANDS["tension"], measurements.measured_tension)
     table |= _filled(_COMMANDS["stroke"], load.stroke)
     for name, pattern in _LOADS.items():
         values = np.array([getattr(load, name) for load in loads], float)
-        # Gravity of 0 differs from no gravity given, with which a mass hangs.
-        table |= _filled(pattern, values if name == "gravity" else _nan_for_zeros(values))
+        table |= _filled(pattern, values if name in _OPTIONAL else _nan_for_zeros(values))
     for name, values in _on_bodies(loads).items():
         table |= _filled(_ON_BODIES[name], _nan_for_zeros(values))
     table |= _filled(_BASE_ROTATION, _nan_for_zeros(np.tile(load.base_rotation, (len(loads), 1))))

@@ -111,6 +111,7 @@ def _commands(measurements: Measurements) -> Numbers:
             *external_load.tip_point,
             *external_load.weight(external_load.tip_mass),
             *gravity,
+            external_load.temperature or 0.0,
         ]
         for force in external_load.body_forces:
             row += [float(force.body), *force.force, *force.moment, *force.point]

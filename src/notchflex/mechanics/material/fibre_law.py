@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -30,6 +30,7 @@ from notchflex.mechanics.material.law import (
     SectionLaw,
     moduli,
     section_law,
+    temperature_of,
 )
 from notchflex.robot import Nitinol, StressStrain
 
@@ -179,6 +180,12 @@ class FibreLaw(SectionLaw):
         """Whether loading and unloading differ."""
         return self.low.shape[0] == 2
 
+    def warmed(self, rise: Scalar) -> Self:
+        """Return the law at a higher temperature, K: all kinks move, transformed strains stay."""
+        assert self.moves is not None
+        low, high = self.low + self.moves[0] * rise, self.high + self.moves[1] * rise
+        return dataclasses.replace(self, low=low, high=high)
+
     def rest(self, section: FibreSection) -> Any:
         """Return untransformed fibres."""
         assert section.fibres is not None
@@ -314,20 +321,20 @@ def _along(strain: Array, curvature: Array, arm: Array) -> Array:
 
 @section_law.register
 def _(material: Nitinol) -> FibreLaw:
-    modulus = material.elastic_modulus
-    loading, ratio = material.plateau_stress / modulus, material.compression_ratio
+    modulus, ratio = material.elastic_modulus, material.compression_ratio
+    loading, *lower = (stress / modulus for stress in material.plateaus)
     # A fibre does not fall below loading in tension, nor below unloading in compression.
     tension, compression = [loading], [-ratio * loading]
-    if material.unloading_stress is not None:
-        unloading = material.unloading_stress / modulus
+    for unloading in lower:
         tension, compression = [loading, unloading], [-ratio * unloading, -ratio * loading]
     low, high = xp.array(compression)[:, None], xp.array(tension)[:, None]
     change = xp.array([1.0 - xp.maximum(material.plateau_modulus / modulus, FLATTEST)])
     if material.transformation_strain is not None:
-        length = material.transformation_strain - loading
+        length = material.transformation_strain - material.plateau_stress / modulus
         low, high = xp.hstack([low, low - length]), xp.hstack([high, high + length])
         change = xp.append(change, -change)
-    return FibreLaw(*moduli(material), *map(constant, (low, high, change)))
+    by_kelvin = temperature_of(material, -ratio, 1.0)
+    return FibreLaw(*moduli(material), *map(constant, (low, high, change)), **by_kelvin)
 
 
 # A curve of stress over strain: each of its points is a kink.

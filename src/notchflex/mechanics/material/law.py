@@ -24,7 +24,7 @@ import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial, singledispatch
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 from jaxtyping import Array, Float
 
@@ -341,6 +341,9 @@ class SectionLaw(Pytree, ABC):
     is_linear: ClassVar[bool] = False
     elastic_modulus: Scalar
     shear_modulus: Scalar
+    # Temperature, deg C, and how far the strains of the law move with it, 1/K; None where they stay
+    temperature: Scalar | None = dataclasses.field(default=None, kw_only=True)
+    moves: Each | None = dataclasses.field(default=None, kw_only=True)
 
     @property
     def remembers(self) -> bool:
@@ -356,6 +359,10 @@ class SectionLaw(Pytree, ABC):
         """Return the energy per length lost between two memories, N mm/mm; for plain arrays."""
         del before, after
         return xp.zeros(xp.shape(section.area))
+
+    def warmed(self, rise: Scalar) -> Self:
+        """Return the law at a higher temperature, K; only laws with `moves` have one."""
+        raise NotImplementedError
 
     @abstractmethod
     def moment(self, curvature: Scalar, section: FibreSection) -> Scalar:
@@ -468,6 +475,17 @@ def moduli(material: Any) -> tuple[Array, Array]:
     """Return Young's modulus and the shear modulus of a material description, MPa."""
     modulus = constant(material.elastic_modulus)
     return modulus, modulus / (2.0 * (1.0 + material.poisson_ratio))
+
+
+def temperature_of(material: Any, *sides: Any) -> dict[str, Array]:
+    """Return temperature and moves of a law whose strains move by shares (`sides`) of a stress."""
+    # Clausius and Clapeyron: the stress of a transformation changes in proportion to temperature.
+    reference, given = material.reference_temperature, material.temperature
+    if reference is None:
+        return {}
+    moves = material.stress_per_kelvin / material.elastic_modulus * xp.stack(sides)
+    temperature = reference if given is None else given
+    return {"temperature": constant(temperature), "moves": constant(moves)}
 
 
 @singledispatch

@@ -8,7 +8,8 @@ moment = I stress(strain) / (r_o - ybar): a law of the cross-section, no iterati
 
 from __future__ import annotations
 
-from typing import Any
+import dataclasses
+from typing import Any, Self
 
 from jaxtyping import Array
 
@@ -21,6 +22,7 @@ from notchflex.mechanics.material.law import (
     SectionLaw,
     moduli,
     section_law,
+    temperature_of,
 )
 from notchflex.robot import Superelastic
 
@@ -37,6 +39,13 @@ class SuperelasticLaw(SectionLaw):
     plastic_strain: Scalar
     plastic_modulus: Scalar
     plastic_exponent: Scalar
+
+    def warmed(self, rise: Scalar) -> Self:
+        """Return the law at a higher temperature, K: the branches beyond the elastic one move."""
+        assert self.moves is not None
+        shift = self.moves[0] * rise
+        strains = self.transition_strain + shift, self.plastic_strain + shift
+        return dataclasses.replace(self, transition_strain=strains[0], plastic_strain=strains[1])
 
     def _branches(self, strain: Scalar) -> tuple[Array, Array, Array]:
         """Split a strain into its parts on the three branches, each with the strain's sign."""
@@ -86,6 +95,8 @@ class SuperelasticLaw(SectionLaw):
 
 @section_law.register
 def _(material: Superelastic) -> SuperelasticLaw:
-    names = ("superelastic_modulus", "transition_strain", "plastic_strain")
-    names += ("plastic_modulus", "plastic_exponent")
-    return SuperelasticLaw(*moduli(material), *(constant(getattr(material, k)) for k in names))
+    shift = material.plateau_shift / material.elastic_modulus
+    strains = material.transition_strain + shift, material.plastic_strain + shift
+    others = material.plastic_modulus, material.plastic_exponent
+    numbers = map(constant, (material.superelastic_modulus, *strains, *others))
+    return SuperelasticLaw(*moduli(material), *numbers, **temperature_of(material, 1.0))

@@ -1,14 +1,16 @@
 """Nitinol with a plateau, and an unloading plateau where it is known."""
 
-from dataclasses import KW_ONLY
-from typing import Annotated, ClassVar, Literal
+import math
+from dataclasses import KW_ONLY, replace
+from typing import Annotated, Any, ClassVar, Literal
 
-from notchflex.robot.kinds import Material
+from notchflex.errors import InputError
+from notchflex.robot.kinds import Material, Transforming, celsius
 from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, quantity
 
 
 @part
-class Nitinol(Material):
+class Nitinol(Transforming, Material):
     """Elastic, then a plateau with hardening, in every fibre of the section.
 
     The defaults are usual values for superelastic tubes; they spread from 30 to 65 GPa, 250 to 520
@@ -22,7 +24,14 @@ class Nitinol(Material):
         unloading_stress: Stress in tension where the plateau of unloading meets the elastic line
             from zero [MPa], less than `plateau_stress`; None unloads along the way it loaded.
         transformation_strain: Strain in tension where the plateau of loading ends and the slope is
-            Young's modulus again; None has no end.
+            Young's modulus again, at the temperature of the test; None has no end.
+        temperature: Temperature of use [deg C]; None is `reference_temperature`.
+        reference_temperature: Temperature at which the plateaus were measured [deg C]; None where
+            it is not known, and the temperature does not count.
+        plateau_slope: Change of both plateaus in tension with the temperature [MPa/K];
+            None is 6.5 (Confluent), the literature has 3.4 to 7.8.
+        austenite_finish: Austenite finish temperature [deg C], below which a warning tells that
+            the material is not superelastic.
         poisson_ratio: Poisson's ratio, for shear and torsion.
         density: Density [kg/m3].
         allowed_strain: Strain beyond which a simulation warns.
@@ -59,6 +68,12 @@ class Nitinol(Material):
     kind: Literal["nitinol"] = "nitinol"
     by_fibres: ClassVar = True
 
+    @property
+    def plateaus(self) -> tuple[float, ...]:
+        """Stresses of the plateaus of loading and unloading [MPa], at the temperature of use."""
+        measured = self.plateau_stress, self.unloading_stress
+        return tuple(each + self.plateau_shift for each in measured if each is not None)
+
     def conflicts(self) -> Problems:
         """Find a plateau that is too steep, ends before it begins, or lies below unloading."""
         if self.plateau_modulus >= self.elastic_modulus:
@@ -73,6 +88,7 @@ class Nitinol(Material):
                 f"is {self.unloading_stress} MPa; it must be less than the plateau stress, "
                 f"{self.plateau_stress} MPa.",
             )
+        yield from super().conflicts()
         begin = self.plateau_stress / self.elastic_modulus
         if self.transformation_strain is not None and self.transformation_strain <= begin:
             yield (
@@ -80,3 +96,72 @@ class Nitinol(Material):
                 f"is {self.transformation_strain}; it must be greater than the strain where the "
                 f"plateau begins, {begin:.4g}.",
             )
+
+
+_LOADED, _UNLOADED, _REVERSED = 0.03, 0.025, 0.06  # strains of ASTM F2516
+
+
+@part
+class TensileTest:
+    """What data sheets of nitinol print of a tensile test by ASTM F2516.
+
+    Args:
+        upper_plateau: Stress at 3 % strain while loading [MPa].
+        lower_plateau: Stress at 2.5 % strain while unloading from 6 % [MPa]; None if not known.
+        test_temperature: Temperature of the test [deg C]; None if not known.
+
+    Raises:
+        InputError: A value is not allowed.
+
+    Example:
+        >>> test = TensileTest(upper_plateau=500.0, lower_plateau=220.0, test_temperature=22.0)
+        >>> material = test.nitinol(elastic_modulus=50_000.0, plateau_modulus=2_000.0)
+        >>> round(material.plateau_stress, 3), round(material.unloading_stress, 3)
+        (458.333, 177.083)
+    """
+
+    upper_plateau: Annotated[
+        Float | None,
+        quantity("MPa", "upper plateau of a data sheet: stress at 3 % strain", above=0),
+    ] = None
+    lower_plateau: Annotated[
+        Float | None,
+        quantity("MPa", "lower plateau: stress at 2.5 % strain, unloading from 6 %", above=0),
+    ] = None
+    test_temperature: Annotated[Float | None, celsius("temperature of the test")] = None
+
+    def nitinol(self, **keys: Any) -> Nitinol:
+        """Make the material whose tensile test gives these stresses.
+
+        Args:
+            **keys: Other keys of `Nitinol`, of which the moduli count.
+
+        Raises:
+            InputError: No material with these moduli gives these stresses.
+        """
+        form = Nitinol(**keys)
+        hardening = form.plateau_modulus
+        share = 1.0 - hardening / form.elastic_modulus
+        plateaus = [
+            None if stress is None else (stress - hardening * strain) / share
+            for stress, strain in (
+                (self.upper_plateau, _LOADED),
+                (self.lower_plateau, _UNLOADED),
+            )
+        ]
+        loading, unloading = plateaus[0] or form.plateau_stress, plateaus[1]
+        # Both stresses lie on plateaus: behind the elastic lines from zero and from 6 %.
+        last = min(_REVERSED, form.transformation_strain or math.inf)
+        reached = last - (loading - (unloading or loading)) / form.elastic_modulus
+        begins = 0.0 < loading < _LOADED * form.elastic_modulus and (unloading or loading) > 0.0
+        if not (begins and _LOADED < last and reached > _UNLOADED):
+            raise InputError.INVALID_ROBOT(
+                f"TensileTest: with the moduli {form.elastic_modulus:g} and {hardening:g} MPa the "
+                "stress at 3 % or at 2.5 % strain lies on no plateau; are all in MPa?"
+            )
+        return replace(
+            form,
+            plateau_stress=loading,
+            unloading_stress=unloading,
+            reference_temperature=self.test_temperature,
+        )

@@ -3,12 +3,12 @@
 from dataclasses import KW_ONLY
 from typing import Annotated, ClassVar, Literal
 
-from notchflex.robot.kinds import PACHECO, Material
+from notchflex.robot.kinds import PACHECO, Material, Transforming
 from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, quantity
 
 
 @part
-class Superelastic(Material):
+class Superelastic(Transforming, Material):
     """Three branches without memory: elastic, superelastic, plastic (Pacheco 2021, eq. 13).
 
     The law is odd in strain: a notch bent the other way carries the opposite moment.
@@ -21,6 +21,13 @@ class Superelastic(Material):
         plastic_modulus: Modulus E_p of the third branch, sigma_p + E_p exp(beta / (eps - eps_p))
             [MPa].
         plastic_exponent: beta of the third branch, negative.
+        temperature: Temperature of use [deg C]; None is `reference_temperature`.
+        reference_temperature: Temperature at which the branches were measured [deg C]; None where
+            it is not known, and the temperature does not count.
+        plateau_slope: Change of the stress at the transition with the temperature [MPa/K];
+            None is 6.5 (Confluent), the literature has 3.4 to 7.8.
+        austenite_finish: Austenite finish temperature [deg C], below which a warning tells that
+            the material is not superelastic.
         poisson_ratio: Poisson's ratio, for shear and torsion.
         density: Density [kg/m3].
         allowed_strain: Strain beyond which a simulation warns.
@@ -58,8 +65,14 @@ class Superelastic(Material):
     kind: Literal["superelastic"] = "superelastic"
     papers: ClassVar = (PACHECO,)
 
+    @property
+    def plateaus(self) -> tuple[float, ...]:
+        """Stress where the superelastic branch begins [MPa], at the temperature of use."""
+        return (self.elastic_modulus * self.transition_strain + self.plateau_shift,)
+
     def conflicts(self) -> Problems:
-        """Find a third branch that begins before the second."""
+        """Find a third branch that begins before the second, or too low a temperature."""
+        yield from super().conflicts()
         if self.plastic_strain <= self.transition_strain:
             yield (
                 "plastic_strain",
