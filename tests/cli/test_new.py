@@ -363,7 +363,7 @@ def test_what_a_data_sheet_prints_makes_the_constants(monkeypatch, tmp_path):
         run(command("v", "--yes", upper_plateau="520", material="linear", elastic_modulus="9")) == 2
     )
     assert run(command("v", "--yes", upper_plateau="100")) == 2
-    asked = person(monkeypatch, *[""] * 5, "500", "", "none", *[""] * 4)
+    asked = person(monkeypatch, *[""] * 5, "500", "", "none", *[""] * 5)
     assert run(command("p", friction="0.1", title="x")) == 0
     assert any("Upper plateau" in words for words in asked)
     assert load_robot(tmp_path / "p.toml").material.unloading_stress is None

@@ -154,7 +154,7 @@ class TensileTest:
         last = min(_REVERSED, form.transformation_strain or math.inf)
         reached = last - (loading - (unloading or loading)) / form.elastic_modulus
         begins = 0.0 < loading < _LOADED * form.elastic_modulus and (unloading or loading) > 0.0
-        if not (begins and _LOADED < last and reached > _UNLOADED):
+        if not (begins and last > _LOADED and reached > _UNLOADED):
             raise InputError.INVALID_ROBOT(
                 f"TensileTest: with the moduli {form.elastic_modulus:g} and {hardening:g} MPa the "
                 "stress at 3 % or at 2.5 % strain lies on no plateau; are all in MPa?"
