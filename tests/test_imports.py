@@ -36,6 +36,7 @@ ORDER = (
     "control",
     "sensing",
     "workspaces",
+    "fatigue",
     "photographs",
     "plotting",
     "export",

@@ -34,6 +34,7 @@ _HOME = {
             "Capstan",
             "Corner",
             "Drawing",
+            "Fatigue",
             "Frictionless",
             "Linear",
             "Nitinol",
@@ -149,6 +150,10 @@ _HOME = {
             "MeasuredPhotographs",
             "measure",
             "measure_cut",
+        ),
+        "notchflex.fatigue": (
+            "StrainCycle",
+            "strain_cycle",
         ),
         "notchflex.workspaces": (
             "Workspace",

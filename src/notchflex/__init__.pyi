@@ -57,6 +57,8 @@ from notchflex.export import PatternOptions as PatternOptions
 from notchflex.export import SimulatorOptions as SimulatorOptions
 from notchflex.export import SolidOptions as SolidOptions
 from notchflex.export import export_robot as export_robot
+from notchflex.fatigue import StrainCycle as StrainCycle
+from notchflex.fatigue import strain_cycle as strain_cycle
 from notchflex.fit import Calibration as Calibration
 from notchflex.fit import Constant as Constant
 from notchflex.fit import FrictionReadings as FrictionReadings
@@ -107,6 +109,7 @@ from notchflex.robot import ArcNotch as ArcNotch
 from notchflex.robot import Capstan as Capstan
 from notchflex.robot import Corner as Corner
 from notchflex.robot import Drawing as Drawing
+from notchflex.robot import Fatigue as Fatigue
 from notchflex.robot import Frictionless as Frictionless
 from notchflex.robot import Linear as Linear
 from notchflex.robot import Nitinol as Nitinol

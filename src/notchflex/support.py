@@ -64,6 +64,7 @@ _HOME = {
         ),
         "notchflex.loads.load_path": ("load_path",),
         "notchflex.mechanics.chain": ("law_errors", "unchecked_dimensions"),
+        "notchflex.mechanics.material": ("CORNERS", "SectionStrain", "edge_strain", "limit_line"),
         "notchflex.results.io": (
             "frame",
             "whole_document",

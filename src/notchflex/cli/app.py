@@ -152,6 +152,11 @@ VERBS = {
         "    notchflex workspace pacheco2021-a --limit strain=0.04 --states 4000 --json -\n"
         "    notchflex workspace pacheco2021-a --states 4000 --beside pacheco2021-b",
     ),
+    "fatigue": (
+        "Find the strain cycle of every notch, and its margin below a limit line.",
+        "notchflex fatigue pacheco2021-a-true --tension 0:0.5:6,0.5:0:6 \\\n"
+        "        --set fatigue.line=cao2020 --plot cycle.png",
+    ),
     "export": (
         "Write files for the laser, for CAD and for simulators.",
         "notchflex export pacheco2021-a --dxf wrist.dxf --two-axis\n"

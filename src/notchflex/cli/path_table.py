@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from notchflex import Bands, EquilibriumPath
 
 CLOSED = "*"
-PERCENT = ("outer_strain", "peak_strain")
+PERCENT = ("outer_strain", "peak_strain", "fatigue_margin")
 """Strains, which files hold as numbers, are shown in percent."""
 
 USUAL = (

@@ -34,7 +34,7 @@ from notchflex.mechanics.flexure import (
     with_level,
 )
 from notchflex.mechanics.friction import FrictionLaw, friction_law
-from notchflex.mechanics.material import Fibres, SectionLaw, section_law
+from notchflex.mechanics.material import Fibres, LimitLine, SectionLaw, limit_line, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
@@ -82,6 +82,7 @@ class Chain(Pytree):
     # For every tendon, the edges of gaps that it touches: indices into (flexure, edge) flattened,
     # -1 as padding
     contacts: Int[Array, "t edges"]
+    limit: LimitLine | None  # The limit line of fatigue; None where the robot has none
     level: str = static()  # Loads for which the flexures have enough modes
     loaded: bool = static()  # Whether loads other than the tendons' act
     follows: bool = static()  # Whether any of them may turn with a body
@@ -443,6 +444,7 @@ def assemble(
         notch_frame=template.notch_frame,
         tendon_entry=template.tendon_entry,
         contacts=_contacts(groups, len(tendons)),
+        limit=limit_line(robot.fatigue),
         level=level,
         loaded=loaded,
         follows=loaded and follows,  # unloaded chains are of one form

@@ -50,6 +50,7 @@ from notchflex.plotting.marks import (
 from notchflex.plotting.output import Picture
 from notchflex.plotting.results import (
     batch_picture,
+    cycle_picture,
     design_picture,
     following_picture,
     front_picture,
@@ -332,6 +333,7 @@ _KINDS: dict[str, Any] = {
     "ToleranceAnalysis": tolerance_picture,
     "Following": following_picture,
     "SensedForce": sensed_picture,
+    "StrainCycle": cycle_picture,
     "Workspace": workspace_picture,
 }
 

@@ -50,13 +50,14 @@ from notchflex.plotting.style import (
     VERMILLION,
     sequence_colours,
 )
-from notchflex.support import AXES, QUANTITIES, REGISTERED, described_at, nearest
+from notchflex.support import AXES, CORNERS, QUANTITIES, REGISTERED, described_at, nearest
 
 if TYPE_CHECKING:
     from polars import LazyFrame
 
     from notchflex.control import Following
     from notchflex.designing import Design, DesignFront, WishResult
+    from notchflex.fatigue import StrainCycle
     from notchflex.sensing import SensedForce
     from notchflex.sweeping import Sweep
     from notchflex.tolerancing import ToleranceAnalysis
@@ -358,6 +359,29 @@ def workspace_picture(found: Workspace) -> Picture:
             items = list(_classes(voxels.centre[finite][:, [across, 2]], shown[finite], name))
             panels.append(Panel(items, _LABELS[across], _LABELS[2], title=name, equal=True))
     return Picture(f"Workspace of {found.robot.name}", grid(panels, 3))
+
+
+def cycle_picture(cycle: StrainCycle) -> Picture:
+    """Describe mean and amplitude of the strain at all points of all notches, and the limit line.
+
+    Args:
+        cycle: The strain cycle.
+    """
+    facts, factor = cycle.limit.facts, cycle.limit.corner_factor or 1.0
+    scale = 100.0 * np.where(CORNERS, factor, 1.0)
+    items: list[Mark] = []
+    for number, colour in enumerate(sequence_colours(len(cycle.mean))):
+        points = np.stack([scale * cycle.mean[number], scale * cycle.amplitude[number]], axis=-1)
+        items.append(dots(points.reshape(-1, 2), colour, 3.0, name=f"notch {number + 1}"))
+    if facts:
+        ends = (100.0 * np.array(facts[key]) for key in ("mean", "amplitude"))
+        mean, amplitude = ends
+        name = f"limit line {cycle.limit.line or ''}".rstrip()
+        items.append(line(mean, amplitude, VERMILLION, width=2.0, name=name))
+        # A mean in compression counts by its size.
+        items.append(line(-mean, amplitude, VERMILLION, DASHED, group=name))
+    panel = Panel(items, "mean strain [%]", "strain amplitude [%]", from_zero=True)
+    return Picture(f"Strain cycle of {cycle.robot.name}", grid([panel], 1))
 
 
 def workspaces_picture(found: Mapping[str, Workspace]) -> Picture:

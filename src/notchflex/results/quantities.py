@@ -313,6 +313,8 @@ class _Quantities:
     """Outer strain, shape (n)."""
     peak_strain = Array()
     """Peak strain, shape (n)."""
+    fatigue_margin = Array()
+    """Margin of fatigue, shape (n)."""
     gap = Array()
     """Notch gap, mm, shape (n)."""
     closed = Array()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from notchflex._ready import list_robots
 from notchflex.robot.cuts import Opening
+from notchflex.robot.fatigue import Fatigue
 from notchflex.robot.friction.capstan import Capstan
 from notchflex.robot.friction.corner import Corner
 from notchflex.robot.friction.frictionless import Frictionless
@@ -30,6 +31,7 @@ __all__ = [
     "Capstan",
     "Corner",
     "Drawing",
+    "Fatigue",
     "Friction",
     "Frictionless",
     "Linear",

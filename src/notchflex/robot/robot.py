@@ -12,6 +12,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from notchflex import __version__
 from notchflex._summary import MOST, Summary, short
 from notchflex.errors import InputError, InputWarning
+from notchflex.robot.fatigue import Fatigue
 from notchflex.robot.kinds import (
     PRINTABLE,
     Drawing,
@@ -56,6 +57,7 @@ class Robot:
         friction: The friction between tendon and tube.
         tolerance: How far values may lie from these, by name, such as `{"notch.depth": 0.01}`;
             see `notchflex.uncertain`.
+        fatigue: The limit line that its strain cycles are compared with.
         drawing: What the title block of its drawing says.
 
     Raises:
@@ -86,6 +88,7 @@ class Robot:
     tolerance: Annotated[
         Tolerances, Field(description="how far values may lie from these, by name")
     ] = ()
+    fatigue: Annotated[Fatigue, Field(description="limit line of its strain cycles")] = Fatigue()
     drawing: Annotated[Drawing, Field(description="what the title block of a drawing says")] = (
         Drawing()
     )
@@ -178,7 +181,7 @@ class Robot:
 
         Args:
             parts: New values for any of `name`, `tube`, `notch`, `tendon`, `material`, `friction`,
-                `tolerance` and `drawing`.
+                `tolerance`, `fatigue` and `drawing`.
 
         Raises:
             InputError: A value is not allowed, or there is no such part.

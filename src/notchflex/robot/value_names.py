@@ -10,6 +10,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from notchflex.errors import InputError
+from notchflex.robot.fatigue import Fatigue
 from notchflex.robot.kinds import Drawing, Friction, Material, Notch, Tendon, Tube, kinds_of
 from notchflex.robot.part import fields_of, nearest, unit_of, unknown_key
 
@@ -24,6 +25,7 @@ SECTIONS: dict[str, type] = {
     "tendon": Tendon,
     "material": Material,
     "friction": Friction,
+    "fatigue": Fatigue,
     "drawing": Drawing,
 }
 EXAMPLES = "write it like material.elastic_modulus, notch[2].depth or notch[*].depth"

@@ -14,6 +14,7 @@ from notchflex._jax import constant, jax, jnp
 from notchflex._quantity import REGISTERED, Quantity, axis_sizes
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import in_space, rotation_error_estimate
+from notchflex.mechanics.material import edge_strain
 from notchflex.mechanics.material import peak_strain as peak_strain_of_section
 from notchflex.mechanics.motion import IN_PLANE
 from notchflex.solver.programs.static_structure import PytreeLayout
@@ -192,6 +193,29 @@ def outer_strain(state: SolvedState) -> Array:
 def peak_strain(state: SolvedState) -> Array:
     """Largest strain of any fibre of a notch: bending both ways and stretch, no shear."""
     return jnp.max(peak_strain_of_section(state.section_strain, state.chain.rods.section), axis=-1)
+
+
+@Quantity("state", per=("notch", "node", "row"))
+def notch_strain(state: SolvedState) -> Array:
+    """Stretch, curvature and sideways curvature (1/mm) of the section at every node of a notch."""
+    return jnp.stack(state.section_strain, axis=-1)
+
+
+@Quantity("state", "margin of fatigue", r"\Delta\varepsilon_\mathrm{a}", key="fatigue_margin",
+          column="notch_{notch}_fatigue_margin", per=("notch",), optional=True,
+          note="NaN without a limit line, and where it is not known at a mean strain.")  # fmt: skip
+def fatigue_margin(state: SolvedState) -> Array:
+    """Strain amplitude that the limit line allows less that between this state and rest.
+
+    It is the smallest of all points on the boundary of the notch's section.
+    """
+    limit, section = state.chain.limit, state.chain.rods.section
+    if limit is None:
+        return jnp.full(state.chain.flexures, jnp.nan)
+    half = 0.5 * edge_strain(state.section_strain, section)
+    margin = limit.margin(half, jnp.abs(half)).reshape(state.chain.flexures, -1)
+    known = jnp.all(margin == margin, axis=-1)
+    return jnp.where(known, jnp.min(margin, axis=-1), jnp.nan)
 
 
 @Quantity("state", "notch gap", "g_j", "mm", key="gap_mm", column="notch_{notch}_gap_mm",

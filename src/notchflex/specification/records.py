@@ -29,7 +29,7 @@ LIMITED = {
 }
 """Quantities that may have limits: numbers that a batch returns."""
 
-_FRACTIONS = ("peak_strain", "outer_strain")
+_FRACTIONS = ("peak_strain", "outer_strain", "fatigue_margin")
 
 
 def as_list(given: Any) -> Any:

@@ -2,13 +2,17 @@
 
 from notchflex._imports import import_all
 from notchflex.mechanics.material.law import (
+    CORNERS,
     Fibres,
     FibreSection,
     Flattening,
+    LimitLine,
     NotchEnds,
     SectionLaw,
     SectionResponse,
     SectionStrain,
+    edge_strain,
+    limit_line,
     peak_strain,
     section_law,
     section_strain,
@@ -17,13 +21,17 @@ from notchflex.mechanics.material.law import (
 import_all(__name__, __path__)
 
 __all__ = [
+    "CORNERS",
     "FibreSection",
     "Fibres",
     "Flattening",
+    "LimitLine",
     "NotchEnds",
     "SectionLaw",
     "SectionResponse",
     "SectionStrain",
+    "edge_strain",
+    "limit_line",
     "peak_strain",
     "section_law",
     "section_strain",

@@ -24,8 +24,10 @@ import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial, singledispatch
+from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple, Self
 
+import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._arrays import decide, xp
@@ -506,7 +508,7 @@ class SectionStrain(NamedTuple):
     stretch: Array  # Strain of the neutral axis
     # Curvature about the weak axis, 1/mm; positive closes and stretches the spine
     curvature: Array
-    sideways: Array  # Magnitude of the curvature about the strong axis, 1/mm
+    sideways: Array  # Curvature about the strong axis, 1/mm
 
 
 def section_strain(
@@ -516,12 +518,12 @@ def section_strain(
     ends, curvature = section.compliance, strain[1]
     bending = law.bent(curvature / ends.flattening(curvature), section, memory)
     stretch = strain[5] / (1.0 + ends.axial) + bending.strain
-    return SectionStrain(stretch, bending.curvature, jnp.abs(strain[0]) / (1.0 + ends.strong))
+    return SectionStrain(stretch, bending.curvature, strain[0] / (1.0 + ends.strong))
 
 
 def peak_strain(strain: SectionStrain, section: FibreSection) -> Each:
     """Compute the largest magnitude of the strain of any fibre, without the shear of torsion."""
-    stretch, curvature, sideways = strain
+    stretch, curvature, sideways = strain._replace(sideways=jnp.abs(strain.sideways))
     radius, angle = section.outer_radius, section.half_angle
     centre = stretch + curvature * (section.edge_spine - radius)
     # Along the arc the strain is a cosine; beyond its ends it has no maximum or no minimum.
@@ -538,3 +540,65 @@ def peak_strain(strain: SectionStrain, section: FibreSection) -> Each:
     near = stretch - curvature * section.edge_near
     places = (top + at_line, bottom - at_line, near + by_width, near - by_width)
     return jnp.max(jnp.abs(jnp.stack(places)), axis=0)
+
+
+# Strains all along the boundary of a section, and the limit line of their cycles.
+
+_ARC = xp.linspace(-1.0, 1.0, 33)  # Points of the arc of the spine, in parts of its half angle
+_FACE = xp.linspace(0.0, 1.0, 9)[1:]  # Points from its end to the corner on the side of the cut
+
+
+def edge_strain(strain: SectionStrain, section: FibreSection) -> Each:
+    """Compute the strains of points on the boundary: the arc, then both faces from its ends."""
+    # They are plane over the section; the last point of each face is the corner of the cut.
+    part = xp.broadcast_to(_ARC, (*xp.shape(section.half_angle), len(_ARC)))
+    face = xp.broadcast_to(_FACE, (*part.shape[:-1], len(_FACE)))
+    radius, spine, across, near, angle, stretch, curvature, sideways = (
+        value[..., None]
+        for value in (
+            section.outer_radius,
+            section.edge_spine,
+            section.edge_across,
+            section.edge_near,
+            section.half_angle,
+            *strain,
+        )
+    )
+    x = spine - radius * (1.0 - xp.cos(angle * part))
+    y = radius * xp.sin(angle * part) + xp.where(radius == 0.0, across * part, 0.0)
+    x_face = x[..., -1:] - face * (x[..., -1:] + near)
+    y_face = y[..., -1:] + face * (across - y[..., -1:])
+    x = xp.concatenate([x, x_face, x_face], axis=-1)
+    y = xp.concatenate([y, y_face, -y_face], axis=-1)
+    return stretch + curvature * x + sideways * y
+
+
+CORNERS = xp.isin(np.arange(len(_ARC) + 2 * len(_FACE)), (len(_ARC) + 7, len(_ARC) + 15))
+"""Which of the points of `edge_strain` are corners of the cut."""
+
+
+class LimitLine(Pytree):
+    """A limit line of fatigue: straight between points of mean strain and allowed amplitude."""
+
+    mean: Float[Array, " k"]
+    amplitude: Float[Array, " k"]
+    corner_factor: Scalar  # Strain at a corner of the cut over that of the section
+
+    def margin(self, mean: Array, amplitude: Array) -> Array:
+        """Compute by how much cycles at the points of `edge_strain` are below; NaN if not known."""
+        # A mean in compression counts as one in tension of its size: cracks open in tension.
+        corners = xp.broadcast_to(CORNERS, mean.shape)
+        factor = xp.where(corners, self.corner_factor, 1.0)
+        mean, amplitude = factor * xp.abs(mean), factor * amplitude
+        allowed, points = self.amplitude[0], [*zip(self.mean, self.amplitude, strict=True)]
+        for (low, first), (high, last) in pairwise(points):
+            allowed = allowed + (last - first) * (xp.clip(mean, low, high) - low) / (high - low)
+        known = (mean >= self.mean[0]) & (mean <= self.mean[-1])
+        return xp.where(known, allowed - amplitude, xp.nan)
+
+
+def limit_line(fatigue: Any) -> LimitLine | None:
+    """Return the limit line of a robot; None where it has none."""
+    facts, factor = fatigue.facts, fatigue.corner_factor
+    numbers = facts.get("mean"), facts.get("amplitude"), 1.0 if factor is None else factor
+    return LimitLine(*map(constant, numbers)) if facts else None
