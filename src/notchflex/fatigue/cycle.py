@@ -187,7 +187,7 @@ def strain_cycle(
 
 
 def _settled(path: EquilibriumPath) -> tuple[EquilibriumPath, int, str]:
-    """Follow a path again until its strains repeat; return the last loop, their number, a reason."""
+    """Follow a path until its strains repeat; return the last loop, their number, a reason."""
     settings = {"settings": path.settings, "refinement": path.chain.refinement}
     for loops in range(1, _MOST_LOOPS + 1):
         if path.each_from_rest or not path.converged.all():
