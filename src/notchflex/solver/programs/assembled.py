@@ -323,12 +323,15 @@ class AssembledRobots:
         first = dict[tuple[int, int], int]()  # of each distinct pair of a notch and its rings
         for number, (notch, site) in enumerate(zip(example.notches, sites, strict=True)):
             first.setdefault((id(notch), id(site)), number)
-        group_of = np.repeat(np.arange(len(robot.notch)), [group.repeat for group in robot.notch])
+        # The parts of notches come behind the single ones.
+        behind = len(form.parts) - len(robot.notch) - len(robot.tendon)
+        repeats = [group.repeat for group in robot.notch]
+        part_of = behind + np.repeat(np.arange(len(repeats)), repeats)
         options = chain.level, chain.refinement, robot.material.by_fibres
         made, trees = dict[tuple[int, _NotchForm], list[int]](), dict[int, Any]()
         for number in first.values():
             notch, site = example.notches[number], sites[number]
-            places = {0: 0, 3 + int(group_of[number]): 1}
+            places = {0: 0, int(part_of[number]): 1}
             zeros = [(places[part], key) for part, key in varied if part in places]
             with Decisions().deciding() as decisions:
                 trees[number] = flexure(notch, site, example.tube, *options)
@@ -352,7 +355,7 @@ class AssembledRobots:
         packed = dict(zip(first.values(), map(np.arange, ends, ends[1:]), strict=True))
         groups = dict[_NotchForm, list[Any]]()
         for (_, alike), numbers in made.items():
-            part = 3 + int(group_of[numbers[0]])
+            part = int(part_of[numbers[0]])
             columns = [k for k, (place, _) in enumerate(form.places) if place in (0, part)]
             shares = [
                 [side.shares for side in site[:2]] if site else np.zeros((2, 3))
