@@ -16,7 +16,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "papers"))
 from page import rewrite, table
 
 PAGE = "../robot_file.md"  # from the folder of page.py
-SINGLE = ("Tube", "Tendon", "Drawing")
+SINGLE = ("Tube", "Tendon", "Fatigue", "Drawing")
 KINDS = ("notch", "material", "friction")
 
 
@@ -53,6 +53,7 @@ MEANING = {
     "material": "the material of the tube",
     "friction": "the friction between tendon and tube",
     "tolerance": "how far values may lie from these, by name: see below",
+    "fatigue": "the limit line that its [strain cycles](fatigue.md) are compared with",
     "drawing": "what the title block of a drawing says",
 }
 
