@@ -18,7 +18,8 @@ FOLDER = Path(nf.__file__).parent
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
     "Drawing", "Geometry", "RobotShape",
-    "Linear", "Superelastic", "Nitinol", "StressStrain", "Frictionless", "Capstan", "Load",
+    "Linear", "Superelastic", "Nitinol", "TensileTest", "StressStrain", "Frictionless", "Capstan",
+    "Load",
     "LoadPath", "pull", "solve",
     "simulate", "Equilibrium", "EquilibriumPath", "State", "tip_from_angles", "equal_stroke",
     "closing", "annular_sector", "annular_segment", "Section", "InputError",
@@ -44,6 +45,7 @@ NAMES = [
     "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
     "MeasuredPhotograph", "MeasuredPhotographs", "measure", "measure_cut", "MeasuredCut",
     "SensedForce", "SensorNoise", "sense", "Workspace", "workspace",
+    "Fatigue", "StrainCycle", "strain_cycle",
     "AcceptanceLimit", "ToleranceSpec", "ToleranceAnalysis", "tolerance_analysis",
     "read_tolerance_spec",
     "Sweep", "SweepPlan", "read_plan", "read_sweep", "sweep",

@@ -328,3 +328,19 @@ def test_angles_from_photographs():
         np.testing.assert_allclose(one.notch_angle, angles, atol=np.radians(0.3))
     interval = names["interval"]
     assert 0.17 < interval.lower < 0.18 < interval.upper < 0.19
+
+
+def test_in_the_body():
+    """At 37 deg C the wrist is one whose plateau lies 15 K times 6.5 MPa/K higher."""
+    names, _ = ran(22)
+    wrist = nf.load_robot("pacheco2021-a-true")
+    higher = wrist.with_value("material.plateau_stress", wrist.material.plateau_stress + 97.5)
+    for tension, angle in zip(names["tensions"], names["angles"][37.0], strict=True):
+        state = nf.solve(higher, nf.Load(tension=tension))
+        assert np.degrees(state.total_angle) == pytest.approx(angle, abs=1e-9)
+
+
+def test_strain_cycle():
+    """Mean and amplitude from rest to the strain e are e / 2: 0.55 % - 0.13 e / 2 = e / 2."""
+    names, _ = ran(23)
+    assert names["bent"].peak_strain.max() == pytest.approx(2.0 * 0.0055 / 1.13, abs=1e-7)

@@ -182,6 +182,7 @@ _MODULES = {
     "schema": "robot_files",
     "new": "robot_files",
     "board": "measure",
+    "fatigue": "simulate",
     "bench": "installation",
     "doctor": "installation",
     "completion": "installation",

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex import Equilibrium, EquilibriumPath, Fatigue, InputError, Robot, plot, simulate
+from notchflex import Equilibrium, EquilibriumPath, Fatigue, InputError, Robot, simulate
 from notchflex.support import (
     CORNERS,
     Displayed,
@@ -22,9 +22,6 @@ from notchflex.support import (
     short,
     short_repr,
 )
-
-if TYPE_CHECKING:
-    from notchflex.plotting import Picture
 
 _REPEATS = 1e-9  # strains repeat to this
 _MOST_LOOPS = 50
@@ -102,10 +99,6 @@ class StrainCycle(Displayed):
             warnings.append(f"the robot is at {used:g} deg C, and the limit line is for {at:g}.")
         return warnings
 
-    def plot(self) -> Picture:
-        """Draw mean and amplitude of all points against the limit line; see `notchflex.plot`."""
-        return plot(self)
-
     def _summary(self) -> Summary:
         table = self.to_table()
         rows = [("limit line", ", ".join(line_words(self.limit)) or "none")]
@@ -114,7 +107,7 @@ class StrainCycle(Displayed):
             text = f"mean {mean} %, amplitude {amplitude} %, margin {margin} % at the {at}"
             rows.append((f"notch {number}", text))
         rows += [("", sentence) for sentence in self.warnings()]
-        return Summary(f"Strain cycle of {self.robot.name}", rows, ".plot() draws all points")
+        return Summary(f"Strain cycle of {self.robot.name}", rows, "nf.plot(...) draws all points")
 
 
 def _place(point: int) -> str:
