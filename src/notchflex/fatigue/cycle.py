@@ -160,7 +160,7 @@ def strain_cycle(
         path, loops, reason = _settled(states)
         paths = [path]
     else:
-        several = list(states)
+        several: list[Any] = list(states)
         if len(several) < 2 or not all(isinstance(state, Equilibrium) for state in several):
             raise InputError.WRONG_TYPE(
                 f"a strain cycle needs a path, or two solved states; got {short_repr(states)}"
@@ -172,25 +172,26 @@ def strain_cycle(
     strains = np.concatenate([_strains(path) for path in paths])
     low, high = strains.min(axis=0), strains.max(axis=0)
     mean, amplitude = 0.5 * (low + high), 0.5 * (high - low)
-    limit = robot.fatigue if limit is None else limit
-    line = limit_line(limit)
-    margin = np.full_like(mean, np.nan) if line is None else line.margin(mean, amplitude)
+    chosen = robot.fatigue if limit is None else limit
+    line = limit_line(chosen)
+    margin: Any = np.full_like(mean, np.nan) if line is None else line.margin(mean, amplitude)
     failed = [reason for path in paths for reason in path.reason if reason]
-    return StrainCycle(robot, limit, mean, amplitude, margin, loops, (*failed, reason)[0])
+    return StrainCycle(robot, chosen, mean, amplitude, margin, loops, (*failed, reason)[0])
 
 
 def _settled(path: EquilibriumPath) -> tuple[EquilibriumPath, int, str]:
     """Follow a path until its strains repeat; return the last loop, their number, a reason."""
-    settings = {"settings": path.settings, "refinement": path.chain.refinement}
-    for loops in range(1, _MOST_LOOPS + 1):
+    loops, change = 1, np.inf
+    while change > _REPEATS and loops < _MOST_LOOPS:
         if path.each_from_rest or not path.converged.all():
             return path, loops, ""
-        again = simulate(path.robot, path.load, from_state=path.state, **settings)
-        change = np.abs(_strains(again) - _strains(path)).max()
-        if change <= _REPEATS:
-            return again, loops + 1, ""
-        path = again
-    return path, _MOST_LOOPS, f"they still change by {change:.2g} after {_MOST_LOOPS} loops"
+        before, start, refinement = _strains(path), path.state, path.chain.refinement
+        path = simulate(
+            path.robot, path.load, from_state=start, settings=path.settings, refinement=refinement
+        )
+        loops, change = loops + 1, np.abs(_strains(path) - before).max()
+    still = f"they still change by {change:.2g} after {loops} loops" if change > _REPEATS else ""
+    return path, loops, still
 
 
 def _strains(path: EquilibriumPath) -> Float[np.ndarray, "s n nodes points"]:

@@ -441,8 +441,10 @@ def unlikely_loads(
     }
     if load.draws:
         largest["stroke"] = max([0.0, *map(abs, load.stroke.ravel().tolist())])
+    cold: list[InputWarning] = []
     for external in load.different:
         if external is not NOTHING:
+            cold = cold or [*too_cold(robot.material, "temperature", external.temperature)]
             sizes = {
                 "tip_force": hypot(*external.tip_force),
                 "tip_moment": hypot(*external.tip_moment),
@@ -454,9 +456,8 @@ def unlikely_loads(
             }
             for name, size in sizes.items():
                 largest[name] = max(largest.get(name, 0.0), size)
-    given = [each.temperature for each in load.different if each.temperature is not None]
     return [
         unlikely(name, float(size), (0.0, float(f"{usual[name][0]:.2g}")), usual[name][1])
         for name, size in largest.items()
         if size > usual[name][0]
-    ] + [*too_cold(robot.material, "temperature", min(given, default=None))]
+    ] + cold

@@ -554,7 +554,7 @@ def edge_strain(strain: SectionStrain, section: FibreSection) -> Each:
     part = xp.broadcast_to(_ARC, (*xp.shape(section.half_angle), len(_ARC)))
     face = xp.broadcast_to(_FACE, (*part.shape[:-1], len(_FACE)))
     radius, spine, across, near, angle, stretch, curvature, sideways = (
-        value[..., None]
+        xp.asarray(value)[..., None]
         for value in (
             section.outer_radius,
             section.edge_spine,
