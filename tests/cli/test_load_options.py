@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import notchflex as nf
+from notchflex.cli import run
 from notchflex.support import parse_whole, read_command
 
 NUMBERS = st.floats(-100.0, 100.0, allow_nan=False)
@@ -99,3 +100,21 @@ def test_following_alone_with_body_forces_leaves_the_tip_as_it_is(call):
     load = json.loads(call(*WRIST, *options)[1])["steps"][0]["load"]
     assert load["following"] is False
     assert load["body_forces"][0]["following"] is True
+
+
+def test_a_temperature_for_all_steps_or_for_each(capsys):
+    known = ["--set", "material.reference_temperature=22", "--json", "-"]
+    loads = ["--tension", "1", "--temperature", "22:37:2"]
+    assert run(["simulate", "pacheco2021-a-true", *loads, *known]) == 0
+    found = json.loads(capsys.readouterr().out)["steps"]
+    assert [step["load"]["temperature_C"] for step in found] == [22.0, 37.0]
+    robot = nf.load_robot("pacheco2021-a-true").with_value("material.reference_temperature", 22.0)
+    path = nf.simulate(robot, [nf.Load(1.0, temperature=one) for one in (22.0, 37.0)])
+    angles = [step["total_angle_deg"] for step in found]
+    assert angles == pytest.approx(np.degrees(path.total_angle).tolist(), abs=1e-12)
+    options = ["--tension", "0:1:3", "--temperature"]
+    assert run(["simulate", "pacheco2021-a-true", *options, "37", *known]) == 0
+    assert run(["simulate", "pacheco2021-a-true", *options, "20,37", *known]) == 2
+    assert "2 temperatures for 3 steps" in capsys.readouterr().err
+    assert run(["simulate", "pacheco2021-a-true", *options, "37"]) == 2
+    assert "reference_temperature" in capsys.readouterr().err

@@ -82,3 +82,17 @@ def test_a_failed_search_is_not_called_never(call, monkeypatch):
     assert out.count("not found") == 2  # in the table and in its legend
     assert "the notch may close" in out
     assert "never" not in out
+
+
+def test_plateaus_and_closing_at_both_temperatures(capsys):
+    setting = ["--set", "material.reference_temperature=37"]
+    assert run(["show", "pacheco2021-a-true", *setting, "--json", "-"]) == 0
+    bench, body = json.loads(capsys.readouterr().out)["temperatures"]
+    wrist = nf.load_robot("pacheco2021-a-true")
+    assert (bench["temperature_C"], body["temperature_C"]) == (22.0, 37.0)
+    assert body["plateau_MPa"] - bench["plateau_MPa"] == pytest.approx(97.5, abs=1e-9)
+    tension = nf.closing(wrist).tension
+    assert body["closing_tension_N"] == pytest.approx([tension.min(), tension.max()], rel=1e-12)
+    stress = wrist.material.plateau_stress - 97.5
+    tension = nf.closing(wrist.with_value("material.plateau_stress", stress)).tension
+    assert bench["closing_tension_N"] == pytest.approx([tension.min(), tension.max()], rel=1e-12)
