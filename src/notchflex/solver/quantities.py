@@ -201,7 +201,7 @@ def notch_strain(state: SolvedState) -> Array:
     return jnp.stack(state.section_strain, axis=-1)
 
 
-@Quantity("state", "margin of fatigue", r"\Delta\varepsilon_\mathrm{a}", key="fatigue_margin",
+@Quantity("state", "margin of fatigue", r"\varepsilon_\mathrm{m}", key="fatigue_margin",
           column="notch_{notch}_fatigue_margin", per=("notch",), optional=True,
           note="NaN without a limit line, and where it is not known at a mean strain.")  # fmt: skip
 def fatigue_margin(state: SolvedState) -> Array:
