@@ -38,6 +38,7 @@ _HOME = {
             "Linear",
             "Nitinol",
             "Robot",
+            "RodGap",
             "StressStrain",
             "StripNotch",
             "Superelastic",

@@ -116,6 +116,7 @@ from notchflex.robot import StripNotch as StripNotch
 from notchflex.robot import Superelastic as Superelastic
 from notchflex.robot import Tendon as Tendon
 from notchflex.robot import Tube as Tube
+from notchflex.robot import RodGap as RodGap
 from notchflex.robot import ULink as ULink
 from notchflex.robot import json_schema as json_schema
 from notchflex.robot import load_robot as load_robot

@@ -16,6 +16,7 @@ from notchflex.robot.materials.nitinol import Nitinol
 from notchflex.robot.materials.stress_strain import StressStrain
 from notchflex.robot.materials.superelastic import Superelastic
 from notchflex.robot.notches.arc import ArcNotch
+from notchflex.robot.notches.rod import RodGap
 from notchflex.robot.notches.strip import StripNotch
 from notchflex.robot.notches.u_link import ULink
 from notchflex.robot.reading import load_robot, robot_from_text
@@ -38,6 +39,7 @@ __all__ = [
     "Notch",
     "Opening",
     "Robot",
+    "RodGap",
     "StressStrain",
     "StripNotch",
     "Superelastic",
