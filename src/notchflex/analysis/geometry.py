@@ -96,7 +96,8 @@ class Geometry:
     @property
     def has_spine(self) -> NDArray[np.bool_]:
         """Whether every notch leaves a spine along the tube, not strips across it."""
-        return read_only(self._chain.rods.has_closure > 0.0)
+        is_round = [notch.is_round for notch in self.robot.notches]
+        return read_only((self._chain.rods.has_closure > 0.0) | np.array(is_round))
 
     @property
     def notch_stiffness(self) -> Array:

@@ -25,7 +25,7 @@ from notchflex import EquilibriumPath, InputError, Robot, RobotShape, __version_
 from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject
 from notchflex.plotting import fair_growth, prism, shape_at, shape_from_angles, tube_wall
-from notchflex.support import FlexureShape, NotchCut, outline, robot_digest
+from notchflex.support import FlexureShape, NotchCut, outline, robot_digest, unchecked
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -160,7 +160,18 @@ def _wall(
         if placed.start < high and placed.end > low
     ]
     wall = tube_wall(cuts.tube, (low, high), sides, fair=True)
-    return wall - Manifold.batch_boolean([*removed, *drills], OpType.Add)
+    left = wall - Manifold.batch_boolean([*removed, *drills], OpType.Add)
+    rings = [
+        tube_wall(
+            unchecked(cuts.tube, outer_diameter=2.0 * ring.outer, inner_diameter=2.0 * ring.inner),
+            (max(low, ring.low), min(high, ring.high)),
+            sides,
+            fair=True,
+        )
+        for ring in cuts.rings
+        if max(low, ring.low) < min(high, ring.high)
+    ]
+    return Manifold.batch_boolean([left, *rings], OpType.Add)
 
 
 def _removed(cut: NotchCut, outer: float, sides: int, chord: float) -> Manifold:

@@ -181,14 +181,25 @@ def outline(shape: RobotShape, view: float) -> ShapeOutline:
             for sign, wall in zip((1.0, -1.0), _sides(shape, body, view), strict=True)
             if wall is not None
         ],
-        flexures=[project(strip(flexure), view) for flexure in shape.flexures],
+        flexures=[
+            project(strip(flexure, across_of(view) if notch.is_round else None), view)
+            for flexure, notch in zip(shape.flexures, shape.robot.notches, strict=True)
+        ],
         tendons=[project(tendon_line(shape, i), view) for i in range(len(shape.robot.tendon))],
         held=place(0, box(-side, below, side, 0.0)),
     )
 
 
-def strip(flexure: FlexureShape) -> Array:
-    """Return the outline of a flexure: along its spine and back along its other edge, (k, 3)."""
+def strip(flexure: FlexureShape, across: Array | None = None) -> Array:
+    """Return the outline of a flexure: along its spine and back along its other edge, (k, 3).
+
+    A round one is seen from all sides alike, by the direction that a view has across.
+    """
+    if across is not None:
+        along = flexure.rotation[..., 2] @ np.stack([across, UP], axis=1)
+        size = np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+        aside = flexure.spine[:, None] * (along[:, 1:] * across - along[:, :1] * UP) / size
+        return np.concatenate([flexure.position - aside, (flexure.position + aside)[::-1]])
     return np.concatenate([flexure.fibre(-flexure.spine), flexure.fibre(flexure.near)[::-1]])
 
 
@@ -240,8 +251,13 @@ def body_faces(shape: RobotShape) -> Iterator[Array]:
 def flexure_faces(shape: RobotShape) -> Iterator[Array]:
     """Yield every flexure: the wall at its spine, or a band with its thickness and area."""
     outer = shape.robot.tube.outer_radius
-    for flexure, spine in zip(shape.flexures, shape.robot.geometry.has_spine, strict=True):
-        if spine:
+    robot = shape.robot
+    kinds = zip(shape.flexures, robot.geometry.has_spine, robot.notches, strict=True)
+    for flexure, spine, notch in kinds:
+        if notch.is_round:
+            angles = np.linspace(0.0, 2.0 * np.pi, 13)
+            edges = [*zip(*flexure.spine[0] * np.array([np.cos(angles), np.sin(angles)]))]
+        elif spine:
             axis = outer - flexure.spine  # from the neutral axis to the axis of the tube
             half = float(np.arccos(np.clip((axis[0] - flexure.near[0]) / outer, -1.0, 1.0)))
             angles = np.pi + np.linspace(-half, half, 9)
