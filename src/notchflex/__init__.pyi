@@ -111,12 +111,12 @@ from notchflex.robot import Frictionless as Frictionless
 from notchflex.robot import Linear as Linear
 from notchflex.robot import Nitinol as Nitinol
 from notchflex.robot import Robot as Robot
+from notchflex.robot import RodGap as RodGap
 from notchflex.robot import StressStrain as StressStrain
 from notchflex.robot import StripNotch as StripNotch
 from notchflex.robot import Superelastic as Superelastic
 from notchflex.robot import Tendon as Tendon
 from notchflex.robot import Tube as Tube
-from notchflex.robot import RodGap as RodGap
 from notchflex.robot import ULink as ULink
 from notchflex.robot import json_schema as json_schema
 from notchflex.robot import load_robot as load_robot

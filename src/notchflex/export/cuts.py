@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex import InputError, RodGap, Robot, Tube
+from notchflex import InputError, Robot, RodGap, Tube
 from notchflex.support import NotchCut, shrunk
 
 
@@ -187,8 +187,8 @@ def tendon_holes(robot: Robot, number: int) -> list[Hole]:
         # Nothing leads it through a base without length; it ends at the first edge of its body.
         passes = end > 0.0 if body == 0 else body < last
         for edge, along in enumerate((start, end) if passes else (start,)):
-            place = np.array([tendon.radius * np.cos(side), tendon.radius * np.sin(side), 0.0])
+            place = tendon.radius * np.array([np.cos(side), np.sin(side)])
             if placed is not None:
-                place = (placed.enters, placed.leaves)[edge][body, number]
-            holes.append(Hole(body, place + [0.0, 0.0, along]))
+                place = (placed.enters, placed.leaves)[edge][body, number, :2]
+            holes.append(Hole(body, np.array([*place, along])))
     return holes

@@ -24,8 +24,8 @@ from scipy.interpolate import make_interp_spline
 from notchflex import EquilibriumPath, InputError, Robot, RobotShape, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject
-from notchflex.plotting import fair_growth, prism, shape_at, shape_from_angles, tube_wall
-from notchflex.support import FlexureShape, NotchCut, outline, robot_digest, unchecked
+from notchflex.plotting import fair_growth, prism, ring_solid, shape_at, shape_from_angles
+from notchflex.support import FlexureShape, NotchCut, outline, robot_digest
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -159,17 +159,13 @@ def _wall(
         for placed in cuts.cuts
         if placed.start < high and placed.end > low
     ]
-    wall = tube_wall(cuts.tube, (low, high), sides, fair=True)
+    radii = cuts.tube.outer_radius, cuts.tube.inner_radius
+    wall = ring_solid(radii, (low, high), sides)
     left = wall - Manifold.batch_boolean([*removed, *drills], OpType.Add)
     rings = [
-        tube_wall(
-            unchecked(cuts.tube, outer_diameter=2.0 * ring.outer, inner_diameter=2.0 * ring.inner),
-            (max(low, ring.low), min(high, ring.high)),
-            sides,
-            fair=True,
-        )
+        ring_solid((ring.outer, ring.inner), ends, sides)
         for ring in cuts.rings
-        if max(low, ring.low) < min(high, ring.high)
+        if (ends := (max(low, ring.low), min(high, ring.high)))[0] < ends[1]
     ]
     return Manifold.batch_boolean([left, *rings], OpType.Add)
 

@@ -395,7 +395,9 @@ class Holes(NamedTuple):
     along: Float[Array, "bodies t 3"]  # Their unit directions
 
 
-def holes_of(tendons: Sequence[Tendon], place: Array, rods: Rod, body_length: Array) -> Holes | None:
+def holes_of(
+    tendons: Sequence[Tendon], place: Array, rods: Rod, body_length: Array
+) -> Holes | None:
     """Lay holes where tendons say for each disk; None where all are parallel to the tube."""
     if all(tendon.holes is None for tendon in tendons):
         return None

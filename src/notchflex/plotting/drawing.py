@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from notchflex import ArcNotch, RodGap, Robot, StripNotch, ULink
+from notchflex import ArcNotch, Robot, RodGap, StripNotch, ULink
 from notchflex.plotting.marks import Area, Array, Arrow, Colour, Curve, Mark, Note, box
 from notchflex.plotting.style import BLUE, VERMILLION, house_style
 from notchflex.plotting.with_matplotlib import draw_marks
@@ -403,13 +403,16 @@ def _side_view(row: NotchRow) -> Iterator[Mark]:
         yield _stroke([(0.0, inner), (length, inner)], width=0.6, dash=_HIDDEN)
     for cut in row.cuts:
         edge = scale * cut
+        edge[:, 1] = np.clip(edge[:, 1], -outer, outer)  # a gap goes through all
         out = np.array([0.0, np.sign(cut[0, 1]) * 0.02])  # over the line of the surface
         yield Area([np.concatenate([edge[:1] + out, edge, edge[-1:] + out])], "white", 1.0)
-        yield _ink(edge)
         if isinstance(row.notch, RodGap):
             half = 0.5 * scale * row.notch.diameter
             rod = box(edge[0, 0], -half, edge[-1, 0], half)
             yield Area([rod], INK, 1.0, 0.8, face=BLUE)
+            yield from map(_ink, (edge[:2], edge[2:]))
+        else:
+            yield _ink(edge)
     yield from (_ink(scale * face, 0.7) for face in row.faces)
     for tendon in row.robot.tendon:
         turn = math.radians(tendon.direction_deg - row.notch.direction_deg)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from notchflex import EquilibriumPath, Load, Robot, RobotShape, Tube, solve
+from notchflex import EquilibriumPath, Load, Robot, RobotShape, solve
 from notchflex.plotting.curves import evenly, prescribed
 from notchflex.plotting.marks import (
     BESIDE,
@@ -156,7 +156,10 @@ def project(points: Any, view: float) -> Array:
 
 def bending_plane(robot: Robot, offset: float = 1e-9) -> float | None:
     """Return the direction [rad] of the plane in which all notches bend, up to an offset [rad]."""
-    directions = np.radians([notch.direction_deg for notch in robot.notches])
+    sides = [notch.direction_deg for notch in robot.notches]
+    for tendon in robot.tendon if any(notch.is_round for notch in robot.notches) else ():
+        sides += tendon.holes[1] if tendon.holes else [tendon.direction_deg]
+    directions = np.radians(sides)
     first = float(directions[0])
     return first if np.all(np.abs(np.sin(directions - first)) < offset) else None
 
@@ -256,7 +259,7 @@ def flexure_faces(shape: RobotShape) -> Iterator[Array]:
     for flexure, spine, notch in kinds:
         if notch.is_round:
             angles = np.linspace(0.0, 2.0 * np.pi, 13)
-            edges = [*zip(*flexure.spine[0] * np.array([np.cos(angles), np.sin(angles)]))]
+            edges = [*(flexure.spine[0] * np.column_stack([np.cos(angles), np.sin(angles)]))]
         elif spine:
             axis = outer - flexure.spine  # from the neutral axis to the axis of the tube
             half = float(np.arccos(np.clip((axis[0] - flexure.near[0]) / outer, -1.0, 1.0)))
@@ -271,22 +274,21 @@ def flexure_faces(shape: RobotShape) -> Iterator[Array]:
         yield np.stack(corners, axis=2).reshape(-1, 4, 3)
 
 
-def tube_wall(tube: Tube, ends: tuple[float, float], sides: int, *, fair: bool = False) -> Manifold:
-    """Return the wall of a tube along z.
+def ring_solid(radii: tuple[float, float], ends: tuple[float, float], sides: int) -> Manifold:
+    """Return a tube along z, as large in volume as the round one.
 
     Args:
-        tube: The tube.
+        radii: Its outer and inner radius [mm]; an inner one of 0 is a solid.
         ends: Its lower and its upper end [mm].
-        sides: Flat sides of each surface.
-        fair: Whether the sides lie half inside and half outside the round surface, so that the
-            volume is that of the round tube; otherwise their corners lie on it.
+        sides: Flat sides of each surface, which lie half inside and half outside the round one.
     """
     from manifold3d import Manifold
 
-    grown = fair_growth(sides) if fair else 1.0
     outer, inner = (
-        Manifold.cylinder(ends[1] - ends[0], grown * radius, circular_segments=sides)
-        for radius in (tube.outer_radius, tube.inner_radius)
+        Manifold.cylinder(ends[1] - ends[0], fair_growth(sides) * radius, circular_segments=sides)
+        if radius
+        else Manifold()
+        for radius in radii
     )
     return (outer - inner).translate((0.0, 0.0, ends[0]))
 

@@ -12,8 +12,6 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipkinc
 
 import notchflex as nf
-from notchflex.errors import InputError
-from notchflex.robot import robot_text
 
 YOUNG, RATIO = 54_000.0, 0.3
 Z = np.array([0.0, 0.0, 1.0])
@@ -94,7 +92,7 @@ def shot(
 
 @pytest.mark.parametrize("load", [1.0, 5.0])
 def test_elastica_under_a_dead_force(load: float) -> None:
-    """A thin cantilever under F L^2/EI across it, by elliptic integrals (Bisshopp, Drucker 1945)."""
+    """A thin cantilever under F L^2/EI across it, by elliptic integrals."""
     length, diameter = 2000.0, 0.05  # so thin that it neither stretches nor shears
 
     def beyond(k: float) -> float:  # sqrt(load) = K(k) - F(k, phi), sin phi = 1/(k sqrt 2)
@@ -130,10 +128,15 @@ def test_helix_under_a_moment() -> None:
     rate, axis = np.linalg.norm(moment) / bending[0], moment / np.linalg.norm(moment)
     along, across = (axis @ Z) * axis, Z - (axis @ Z) * axis
     angle = rate * length
-    tip = along * length + (across * np.sin(angle) + np.cross(axis, across) * (1 - np.cos(angle))) / rate
+    tip = (
+        along * length
+        + (across * np.sin(angle) + np.cross(axis, across) * (1 - np.cos(angle))) / rate
+    )
     load = nf.Load(tip_moment=tuple(moment))
     errors = [
-        np.linalg.norm(nf.solve(backbone(7, length, diameter), load, refinement=r).tip_position - tip)
+        np.linalg.norm(
+            nf.solve(backbone(7, length, diameter), load, refinement=r).tip_position - tip
+        )
         for r in (0, 1)
     ]
     assert errors[0] < 1e-5 * length

@@ -1,4 +1,4 @@
-"""The backbone between two disks: a round rod that bends to all sides, twists, stretches and shears.
+"""The backbone between two disks: a round rod that bends to all sides, twists, stretches, shears.
 
 Curvature and twist are Legendre polynomials of arc length. Stretch and shear have modes of their
 own: a force on the end is nearly constant along a gap. The shear area is the whole area, as

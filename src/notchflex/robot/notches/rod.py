@@ -51,7 +51,9 @@ class RodGap(Notch):
     ]
     disk_mass: Annotated[
         Float | None,
-        quantity("g", "mass of the disk; left out: a ring of the tube, of the material", at_least=0),
+        quantity(
+            "g", "mass of the disk; left out: a ring of the tube, of the material", at_least=0
+        ),
     ] = None
 
     @property
