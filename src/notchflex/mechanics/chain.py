@@ -254,8 +254,11 @@ def body_masses(
     # Every body has a volume: where no tube is left between two notches, half of each flexure.
     volume = piece + before + behind
     on_axis = (0.5 * length * piece)[:, None] * np.eye(3)[2]
-    at_starts = before[:, None] * xp.pad(rods.start_offset, ((0, 1), (0, 0)))
-    at_ends = behind[:, None] * xp.pad(end, ((1, 0), (0, 0)))
+    # The weight of a backbone turns its ends as a beam's does (w L^2/12): a sixth of L inside them.
+    is_round = xp.array([float(notch.is_round) for notch in robot.notches])
+    inside = (is_round * xp.sum(rods.length, axis=-1) / 6.0)[:, None] * TUBE_AXIS
+    at_starts = before[:, None] * xp.pad(rods.start_offset + inside, ((0, 1), (0, 0)))
+    at_ends = behind[:, None] * xp.pad(end - inside, ((1, 0), (0, 0)))
     return 1e-6 * density * volume, (on_axis + at_starts + at_ends) / volume[:, None]
 
 
