@@ -257,6 +257,8 @@ class Interview:
             name = f"tendon-{name}"
         elif (section, key) == ("friction", "coefficient"):
             name = "friction"
+        elif section == "notch" and key in keys_of(Tube):  # a backbone has diameters too
+            name = ""
         return f"--{name}" if f"--{name}" in self._options else f"--set {section}.{key}"
 
     def _rows(
