@@ -112,14 +112,14 @@ def dimensions(folder: Path) -> None:
         save(dimensioned_figure(robot), folder / f"dimensions_{name}.svg")
 
 
-@picture("backbones.svg", 8.6, 4.6, 3, sharey=True)
+@picture("backbones.png", 9.0, 4.4, 3, subplot_kw={"projection": "3d"})
 def backbones(*axes: Axes) -> None:
     """Robots of disks with parallel, converging and winding tendons."""
     part = np.arange(1, 21) / 20
     gap = nf.RodGap(18.5, 1.4, uncut_length=1.5, repeat=20)
     tendons = {
-        "parallel": nf.Tendon(10.0, path="straight"),
-        "converging": nf.Tendon(10.0, path="straight", disk_radius=tuple(10.0 - 6.0 * part)),
+        "parallel": nf.Tendon(10.0, 30.0, path="straight"),
+        "converging": nf.Tendon(10.0, 30.0, path="straight", disk_radius=tuple(10.0 - 6.0 * part)),
         "winding": nf.Tendon(10.0, path="straight", disk_direction_deg=tuple(360.0 * part)),
     }
     for one, (name, tendon) in zip(axes, tendons.items(), strict=True):

@@ -146,6 +146,8 @@ class Tendon:
     disk_radius: Annotated[
         tuple[Annotated[Float, quantity("mm", "distance from the axis", above=0)], ...] | None,
         Field(
+            min_length=1,
+            max_length=10_000,
             description="distance from the axis in each disk, from body 1 to the end",
             json_schema_extra={"unit": "mm"},
         ),
@@ -153,6 +155,8 @@ class Tendon:
     disk_direction_deg: Annotated[
         tuple[Annotated[Float, quantity("deg", "side of the disk")], ...] | None,
         Field(
+            min_length=1,
+            max_length=10_000,
             description="side in each disk, from body 1 to the end",
             json_schema_extra={"unit": "deg"},
         ),
