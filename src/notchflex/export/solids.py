@@ -167,7 +167,10 @@ def _wall(
         for ring in cuts.rings
         if (ends := (max(low, ring.low), min(high, ring.high)))[0] < ends[1]
     ]
-    return Manifold.batch_boolean([left, *rings], OpType.Add)
+    if not rings:
+        return left
+    # Rings in one another leave edges of 1e-6 mm, which single precision would open.
+    return Manifold.batch_boolean([left, *rings], OpType.Add).as_original().simplify(1e-6)
 
 
 def _removed(cut: NotchCut, outer: float, sides: int, chord: float) -> Manifold:
