@@ -81,7 +81,8 @@ class Geometry:
         """Holes of the tendons in all bodies; None where all are parallel to the tube."""
         tendons = self.robot.tendon
         radii, sides = zip(*((each.radius, each.direction_deg) for each in tendons), strict=True)
-        return holes_of(tendons, on_tube(radii, sides), self._chain.rods, self.body_length)
+        lengths = constant(self.body_length)
+        return holes_of(tendons, on_tube(radii, sides), self._chain.rods, lengths)
 
     @property
     def free_angle(self) -> Array:

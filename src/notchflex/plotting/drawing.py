@@ -443,7 +443,7 @@ def _section_view(row: NotchRow) -> Iterator[Mark]:
     """Yield the cross-section as seen from the tip, with the bend upward."""
     radius, outer, inner = row.robot.tube.outer_radius, row.outer, row.inner
     if isinstance(row.notch, RodGap):
-        yield from _backbone_section(row)
+        yield from _backbone_section(row, row.notch)
         return
     half = math.acos(-row.section[1] / radius)
     level = math.cos(half) * outer / inner  # of a straight edge, in radii of the bore
@@ -470,14 +470,14 @@ def _section_view(row: NotchRow) -> Iterator[Mark]:
     yield from _around(row, [words])
 
 
-def _backbone_section(row: NotchRow) -> Iterator[Mark]:
+def _backbone_section(row: NotchRow, gap: RodGap) -> Iterator[Mark]:
     """Yield the disk behind a backbone, and the backbone."""
     turns = np.linspace(0.0, 2.0 * math.pi, 121)
     circle = np.column_stack([np.cos(turns), np.sin(turns)])
     yield Area([row.outer * circle], _FINE, 1.0, 0.6, face=_BEYOND)
     yield Area([row.inner * circle], _FINE, 1.0, 0.6, face="white")
     half = 0.5 * row.scale
-    for size, face in ((row.notch.diameter, BLUE), (row.notch.inner_diameter, "white")):
+    for size, face in ((gap.diameter, BLUE), (gap.inner_diameter, "white")):
         if size:
             yield Area([half * size * circle], INK, 1.0, 0.8, face=face)
     yield from _around(row, [])

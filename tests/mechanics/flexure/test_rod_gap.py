@@ -23,7 +23,7 @@ def backbone(
     **gap: Any,
 ) -> nf.Robot:
     """A backbone that is free over its whole length; its disks have no thickness."""
-    options = {"uncut_length": 0.0, "repeat": gaps} | gap
+    options: dict[str, Any] = {"uncut_length": 0.0, "repeat": gaps} | gap
     return nf.Robot(
         "backbone",
         nf.Tube(30.0, 2.0),
@@ -43,7 +43,7 @@ def test_elastica_under_a_dead_force(load: float) -> None:
         low = np.arcsin(min(1.0, 1.0 / (k * np.sqrt(2.0))))
         return ellipkinc(np.pi / 2, k**2) - ellipkinc(low, k**2) - np.sqrt(load)
 
-    k = brentq(beyond, np.sqrt(0.5) * (1 + 1e-15), 1 - 1e-12, xtol=1e-16)
+    k: Any = brentq(beyond, np.sqrt(0.5) * (1 + 1e-15), 1 - 1e-12, xtol=1e-16)
     # The height along the tube is sqrt(2 EI/F sin(theta)) at the slope theta of the tip.
     height = length * np.sqrt(2.0 * (2 * k**2 - 1.0) / load)
     force = load * stiffness(diameter)[0][0] / length**2
@@ -207,7 +207,8 @@ def test_constant_moment_of_every_material(material: Any) -> None:
     ],
 )
 def test_refused_tendons(change: dict[str, Any], words: str) -> None:
-    tendon = nf.Tendon(**({"radius": 10.0, "path": "straight"} | change))
+    values: dict[str, Any] = {"radius": 10.0, "path": "straight"} | change
+    tendon = nf.Tendon(**values)
     with pytest.raises(InputError, match=words):
         backbone(4, 80.0, 1.4, tendon)
 
