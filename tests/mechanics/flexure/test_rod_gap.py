@@ -231,3 +231,32 @@ def test_robot_files_and_forms() -> None:
     robot = nf.load_robot("disks-two-segments")
     assert robot_from_text(robot_text(robot, "")) == robot
     assert robot.geometry.length == 400.0
+
+
+def test_slopes_and_batches_know_every_number() -> None:
+    """Slopes by numbers of a gap are differences of solves; rows of a batch are solves."""
+    part = np.arange(1, 5) / 4
+    converging = nf.Tendon(10.0, path="straight", disk_radius=tuple(10.0 - 4.0 * part))
+    gap = {"inner_diameter": 0.4, "precurvature_deg": 3.0, "disk_mass": 0.5, "uncut_length": 2.0}
+    robot = backbone(4, 72.0, 1.4, converging, **gap).with_value("material.density", 6450.0)
+    load = nf.Load(tension=6.0, gravity=(9.81, 0.0, 0.0))
+    numbers = {
+        "notch.diameter": 1.4,
+        "notch.length": 18.0,
+        "notch.inner_diameter": 0.4,
+        "notch.precurvature_deg": 3.0,
+        "notch.disk_mass": 0.5,
+        "tendon[1].radius": 10.0,
+    }
+    slopes = nf.simulate(robot, load).jacobian([*numbers], ["tip_position"])[0]
+    for (name, value), slope in zip(numbers.items(), slopes.T, strict=True):
+        low, high = (
+            nf.solve(robot.with_value(name, value * (1.0 + more)), load).tip_position
+            for more in (-1e-4, 1e-4)
+        )
+        np.testing.assert_allclose((high - low) / (2e-4 * value), slope, rtol=1e-6, atol=1e-8)
+    diameters = np.array([1.2, 1.4, 1.6])
+    rows = nf.batch(robot, {"notch.diameter": diameters}, load)["tip_position"]
+    for diameter, row in zip(diameters, rows, strict=True):
+        single = nf.solve(robot.with_value("notch.diameter", diameter), load)
+        np.testing.assert_allclose(np.squeeze(row), single.tip_position, atol=1e-11)
