@@ -248,8 +248,8 @@ def test_slopes_and_batches_know_every_number() -> None:
         "notch.disk_mass": 0.5,
         "tendon[1].radius": 10.0,
     }
-    slopes = nf.simulate(robot, load).jacobian([*numbers], ["tip_position"])[0]
-    for (name, value), slope in zip(numbers.items(), slopes.T, strict=True):
+    slopes = nf.simulate(robot, load).jacobian([*numbers], ["tip_position"])
+    for (name, value), slope in zip(numbers.items(), slopes["tip_position"][0].T, strict=True):
         low, high = (
             nf.solve(robot.with_value(name, value * (1.0 + more)), load).tip_position
             for more in (-1e-4, 1e-4)
