@@ -17,6 +17,7 @@ FOLDER = Path(nf.__file__).parent
 # fmt: off
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
+    "RodGap",
     "Drawing", "Geometry", "RobotShape",
     "Linear", "Superelastic", "Nitinol", "TensileTest", "StressStrain", "Frictionless", "Capstan",
     "Load",

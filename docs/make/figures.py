@@ -102,11 +102,34 @@ def dimensions(folder: Path) -> None:
     robots = {
         "arc_on_axis": nf.load_robot("pacheco2021-a").with_value("tube.base_length", 1.0),
         "arc_off_axis": nf.load_robot("york2015").with_value("tube.base_length", 0.5),
+        "rod": nf.load_robot("disks-two-segments").with_values(
+            {"notch.length": 18.0, "notch.uncut_length": 2.0, "tube.base_length": 3.0}
+        ),
         "strip": nf.load_robot("liu2022"),
         "u_link": nf.load_robot("gao2017"),
     }
     for name, robot in robots.items():
         save(dimensioned_figure(robot), folder / f"dimensions_{name}.svg")
+
+
+@picture("backbones.png", 9.0, 4.4, 3, subplot_kw={"projection": "3d"})
+def backbones(*axes: Axes) -> None:
+    """Robots of disks with parallel, converging and winding tendons."""
+    part = np.arange(1, 21) / 20
+    gap = nf.RodGap(18.5, 1.4, uncut_length=1.5, repeat=20)
+    tendons = {
+        "parallel": nf.Tendon(10.0, 30.0, path="straight"),
+        "converging": nf.Tendon(10.0, 30.0, path="straight", disk_radius=tuple(10.0 - 6.0 * part)),
+        "winding": nf.Tendon(10.0, path="straight", disk_direction_deg=tuple(360.0 * part)),
+    }
+    for one, (name, tendon) in zip(axes, tendons.items(), strict=True):
+        robot = nf.load_robot("disks-two-segments").replace(
+            tube=nf.Tube(24.0, 1.4, base_length=5.0), notch=(gap,), tendon=(tendon,)
+        )
+        nf.plot(nf.solve(robot, nf.Load(tension=3.0)), ax=one)
+        one.set_title(name, loc="left")
+        if (legend := one.get_legend()) is not None:
+            legend.remove()
 
 
 @picture("bands.svg", 8.6, 3.4, 2, sharey=True)

@@ -40,6 +40,7 @@ _HOME = {
             "Nitinol",
             "TensileTest",
             "Robot",
+            "RodGap",
             "StressStrain",
             "StripNotch",
             "Superelastic",

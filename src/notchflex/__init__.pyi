@@ -114,6 +114,7 @@ from notchflex.robot import Frictionless as Frictionless
 from notchflex.robot import Linear as Linear
 from notchflex.robot import Nitinol as Nitinol
 from notchflex.robot import Robot as Robot
+from notchflex.robot import RodGap as RodGap
 from notchflex.robot import StressStrain as StressStrain
 from notchflex.robot import StripNotch as StripNotch
 from notchflex.robot import Superelastic as Superelastic

@@ -262,6 +262,21 @@ def test_a_row_of_links_by_options(monkeypatch):
     assert (robot.friction.kind, robot.friction.coefficient) == ("corner", 0.3)
 
 
+def test_disks_on_a_backbone_by_options(monkeypatch):
+    """The hole of the disks and the bore of the backbone are both inner diameters."""
+    pipe(monkeypatch)
+    gap = ["--kind", "rod", "--notches", "6", "--set", "notch.length=9", "--set"]
+    gap += ["notch.diameter=1.2", "--uncut-length", "1", "--material", "linear"]
+    tube = ["--outer-diameter", "12", "--inner-diameter", "1.2", "--elastic-modulus", "54000"]
+    tendons = ["--tendon-radius", "5,5", "--tendon-direction", "0,180"]
+    assert run(["new", "w", "--yes", *tube, *gap]) == 2  # the backbone fills the hole
+    assert run(["new", "w", "--yes", *tube, *gap, *tendons]) == 0
+    robot = load_robot("w.toml")
+    (row,) = robot.notch
+    assert (row.kind, row.repeat, row.diameter, row.inner_diameter) == ("rod", 6, 1.2, 0.0)
+    assert {tendon.path for tendon in robot.tendon} == {"straight"}
+
+
 def test_links_that_differ_keep_their_slots_in_turn(monkeypatch):
     pipe(monkeypatch)
     unlike = [

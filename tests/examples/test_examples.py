@@ -19,6 +19,7 @@ import pytest
 from scipy.optimize import brentq
 
 import notchflex as nf
+from backbones import continuous
 from balance import left_over
 from oracles import frames
 from oracles.wrist import A, Wrist
@@ -318,6 +319,30 @@ def test_sweep_of_designs():
     assert rows["total_angle_deg"].is_between(55.0, 65.0).all()
     assert len(rows) == names["found"].counts["accepted"]
     assert f"{len(rows)} of 4096" in printed
+
+
+def test_disks_on_a_backbone():
+    """Twenty disks are near the continuous tendon, whose backbone is integrated."""
+    _, printed = ran(20)
+    found = [
+        list(map(float, re.findall(r"-?[0-9.]+(?=[, ])", line))) for line in printed.splitlines()
+    ]
+    outward = np.eye(3)[0]
+
+    def parallel(at: float) -> tuple[np.ndarray, np.ndarray]:
+        return 10.0 * outward, 0.0 * outward
+
+    def converging(at: float) -> tuple[np.ndarray, np.ndarray]:
+        return (10.0 - 6.0 * at / 400.0) * outward, -6.0 / 400.0 * outward
+
+    def winding(at: float) -> tuple[np.ndarray, np.ndarray]:
+        angle = np.pi * at / 400.0
+        cosine, sine = np.cos(angle), np.sin(angle)
+        place = 10.0 * np.array([cosine, sine, 0.0])
+        return place, 10.0 * np.pi / 400.0 * np.array([-sine, cosine, 0.0])
+
+    for path, (*tip, _) in zip((parallel, converging, winding), found, strict=True):
+        np.testing.assert_allclose(tip, continuous(path, 3.0, 400.0), atol=0.01 * 400.0)
 
 
 @pytest.mark.nightly

@@ -9,6 +9,7 @@ from notchflex.robot.reading import READY
 from shared_data import measured, numbers
 
 NAMES = [
+    "disks-two-segments",
     "gao2017",
     "liu2022",
     "pacheco2021-a",
@@ -124,6 +125,18 @@ def test_gao():
     assert robot.notches[0].proximal_slot == robot.notches[26].proximal_slot == "away"
     assert (robot.material.elastic_modulus, robot.friction) == (22e3, nf.Corner(0.66))
     assert robot.tube.base_length == robot.notch[0].uncut_length
+
+
+def test_disks():
+    """The numbers of main.cpp of tdcr-modeling."""
+    robot = nf.load_robot("disks-two-segments")
+    (gap,) = robot.notch
+    assert (gap.kind, gap.diameter, gap.inner_diameter, gap.repeat) == ("rod", 1.4, 0.0, 20)
+    assert robot.geometry.length == 400.0
+    assert [tendon.end_body for tendon in robot.tendon] == [10] * 3 + [20] * 3
+    assert [tendon.direction_deg % 360.0 for tendon in robot.tendon] == [90.0, 330.0, 210.0] * 2
+    assert {tendon.radius for tendon in robot.tendon} == {10.0}
+    assert (robot.material.elastic_modulus, robot.material.poisson_ratio) == (54e3, 0.3)
 
 
 def test_two_axis_wrist():

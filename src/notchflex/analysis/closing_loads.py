@@ -284,7 +284,10 @@ def closing(robot: Robot) -> Closing:
         tension, status = _tensions(prepare(robot), tendon, longest, closing_angle)
         contact_angle = closing_angle
     else:
-        tension, contact_angle, status = _edge_closing(prepare(robot), tendon, longest)
+        # A backbone has no edges that meet.
+        meets = sum((pair.has_contact.sum(axis=-1) for pair in chain.contact_pairs), 0.0 * longest)
+        arms = longest * (meets > 0.0)
+        tension, contact_angle, status = _edge_closing(prepare(robot), tendon, arms)
     elastic = np.where(has_spine, closing_angle / height, np.nan)
     first = jax.tree.map(lambda leaf: leaf[:, 0], section)
     outer, peak = _strains(chain.law, first, elastic, chain.law.rest(first))

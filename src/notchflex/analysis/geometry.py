@@ -17,7 +17,7 @@ from notchflex.errors import InputError
 from notchflex.mechanics.chain import Chain, assemble, body_lengths
 from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.mechanics.flexure.rod_kinematics import node_poses
-from notchflex.mechanics.tendon import passage
+from notchflex.mechanics.tendon import TUBE_AXIS, Holes, holes_of, on_tube, passage
 from notchflex.results.state import Equilibrium
 from notchflex.robot import Robot
 from notchflex.robot.cuts import CutLayout
@@ -76,6 +76,14 @@ class Geometry:
         """Centre of mass of every body, in its frame."""
         return read_only(self._chain.body_centre)
 
+    @cached_property
+    def holes(self) -> Holes | None:
+        """Holes of the tendons in all bodies; None where all are parallel to the tube."""
+        tendons = self.robot.tendon
+        radii, sides = zip(*((each.radius, each.direction_deg) for each in tendons), strict=True)
+        lengths = constant(self.body_length)
+        return holes_of(tendons, on_tube(radii, sides), self._chain.rods, lengths)
+
     @property
     def free_angle(self) -> Array:
         """Angle of every notch without loads: its precurvature."""
@@ -89,7 +97,8 @@ class Geometry:
     @property
     def has_spine(self) -> NDArray[np.bool_]:
         """Whether every notch leaves a spine along the tube, not strips across it."""
-        return read_only(self._chain.rods.has_closure > 0.0)
+        is_round = [notch.is_round for notch in self.robot.notches]
+        return read_only((self._chain.rods.has_closure > 0.0) | np.array(is_round))
 
     @property
     def notch_stiffness(self) -> Array:
@@ -248,10 +257,15 @@ class RobotShape:
     def _along(self, number: int, radius: float | None = None) -> Iterator[tuple[Any, bool]]:
         """Yield the pieces of a tendon, and whether each lies on a body or crosses a notch."""
         tendon, walls = self.robot.tendon[number], self.robot.geometry.walls
-        angle, last = np.radians(tendon.direction_deg), tendon.end_body or len(self.flexures)
+        last, holes = tendon.end_body or len(self.flexures), self.robot.geometry.holes
+        angle = np.radians(tendon.direction_deg)
         across = np.array([np.cos(angle), np.sin(angle)])
         across *= tendon.radius if radius is None else radius
         for body, wall in enumerate(walls(tendon.direction_deg)[: last + 1]):
+            if holes is not None and wall is not None:
+                points = np.stack([holes.enters[body, number], holes.leaves[body, number]])
+                yield self.on_body(body, points + np.array(wall)[:, None] * TUBE_AXIS), True
+                continue
             if body and tendon.path == "wall-arc":  # the fibre that meets the body here
                 flexure, point = self.flexures[body - 1], self.on_body(body, [*across, 0.0])
                 place = (point - flexure.position[-1]) @ flexure.rotation[-1]

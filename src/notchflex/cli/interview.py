@@ -62,6 +62,9 @@ _DENSITY = KeyNote("6450", "estimate: usual for nitinol; only gravity needs it")
 
 NOTES = {
     "tube.inner_diameter": KeyNote(hint="With a pin gauge, or the outer diameter less two walls."),
+    "rod.diameter": KeyNote(hint="The inner diameter of the tube is the hole that holds it."),
+    "rod.inner_diameter": KeyNote(comment="assumed: a solid wire"),
+    "rod.disk_mass": KeyNote(comment="assumed: of the material of the backbone"),
     "tube.base_length": KeyNote(comment="assumed: held at the first notch"),
     "notch.cut": KeyNote(hint="It changes the stiffness by a third to a half."),
     "notch.depth": KeyNote(
@@ -230,7 +233,9 @@ class Interview:
         return tuple(kind(**kind.further_on(run[0][1], run[0][0]), repeat=len(run)) for run in runs)
 
     def _tendons(self, tube: Tube, notches: tuple[Notch, ...]) -> tuple[Tendon, ...]:
-        on_wall = {"default": f"{tube.inner_radius:g}", "le": tube.outer_radius}
+        on_wall: Field = {"default": f"{tube.inner_radius:g}", "le": tube.outer_radius}
+        if notches[0].is_round:  # the backbone fills the hole of its disks
+            on_wall["default"] = ""
         radii = self._rows("tendon", Tendon, 0, "radius", radius=on_wall)
         side: Field = {"default": "0" if len(radii) == 1 else ""}
         more = self._rows("tendon", Tendon, len(radii), direction_deg=side, but=("radius",))
@@ -270,6 +275,8 @@ class Interview:
             name = f"tendon-{name}"
         elif (section, key) == ("friction", "coefficient"):
             name = "friction"
+        elif section == "notch" and key in keys_of(Tube):  # a backbone has diameters too
+            name = ""
         return f"--{name}" if f"--{name}" in self._options else f"--set {section}.{key}"
 
     def _rows(

@@ -8,7 +8,7 @@ the cuts narrower and less deep.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from string import ascii_lowercase
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex import InputError, Robot, Tube
+from notchflex import InputError, Robot, RodGap, Tube
 from notchflex.support import NotchCut, shrunk
 
 
@@ -44,6 +44,15 @@ class PlacedCut(NamedTuple):
         return max(self.cut.corners)[0]
 
 
+class Ring(NamedTuple):
+    """A ring about the tube axis: a backbone, or what joins it to a disk [mm]."""
+
+    low: float
+    high: float
+    outer: float
+    inner: float
+
+
 class RobotCuts(NamedTuple):
     """A tube and what is cut out of it.
 
@@ -53,6 +62,7 @@ class RobotCuts(NamedTuple):
         start: Where the tube is cut off on the base side, from the base [mm]; negative.
         end: Where it ends [mm].
         warnings: A sentence where that is not the tip of the robot file.
+        rings: What is added to the tube without its cuts: backbones, which the disks hold.
     """
 
     tube: Tube
@@ -60,6 +70,7 @@ class RobotCuts(NamedTuple):
     start: float
     end: float
     warnings: tuple[str, ...]
+    rings: tuple[Ring, ...] = ()
 
 
 def cuts_of(robot: Robot, shank: float = 0.0, polishing: float = 0.0) -> RobotCuts:
@@ -89,16 +100,37 @@ def cuts_of(robot: Robot, shank: float = 0.0, polishing: float = 0.0) -> RobotCu
     ]
     end = sum((layout.length for layout in layouts), tube.base_length)
     last, wall = max(cut.end for cut in cuts), tube.outer_radius - tube.inner_radius
-    if end <= last:
+    on_backbone = robot.notches[-1].is_round  # the last disk may have no thickness
+    if end <= last and not on_backbone:
         warnings = (
             f"the last cut ends at {last:.6g} mm and the robot file at {end:.6g} mm, which leaves "
             f"no ring at the tip; a ring of the thickness of the wall, {wall:.6g} mm, was added "
             "beyond the cut. Give the last notch an `uncut_length` to set it.",
         )
         end = last + wall
+    rings = tuple(_rings(robot, cuts, -shank, end))
+    if polishing and rings:
+        raise InputError.UNSUPPORTED(
+            "polishing: a robot of disks on a backbone is not cut from a tube; leave polishing out."
+        )
     if polishing:
         cuts = [_unpolished(cut, tube, stock, polishing) for cut in cuts]
-    return RobotCuts(stock, tuple(cuts), -shank - polishing, end + polishing, warnings)
+    return RobotCuts(stock, tuple(cuts), -shank - polishing, end + polishing, warnings, rings)
+
+
+def _rings(robot: Robot, cuts: list[PlacedCut], low: float, high: float) -> Iterator[Ring]:
+    """Yield every backbone through its gap and the bodies beside it, and what fills their holes."""
+    reach = 0.5 * (robot.tube.outer_radius + robot.tube.inner_radius)
+    for notch, placed in zip(robot.notches, cuts, strict=False):
+        if isinstance(notch, RodGap):
+            start, end = placed.start, placed.end
+            begin = max((cut.end for cut in cuts if cut.end <= start), default=low)
+            stop = min((cut.start for cut in cuts if cut.start >= end), default=high)
+            outer, inner = 0.5 * notch.diameter, 0.5 * notch.inner_diameter
+            rings = Ring(begin, stop, outer, inner), Ring(begin, start, reach, inner)
+            yield from (
+                ring for ring in (*rings, Ring(end, stop, reach, inner)) if ring.low < ring.high
+            )
 
 
 @contextmanager
@@ -147,14 +179,16 @@ class Hole(NamedTuple):
 
 def tendon_holes(robot: Robot, number: int) -> list[Hole]:
     """Return the points that a tendon (counted from 0) runs through, base to tip."""
-    tendon = robot.tendon[number]
+    tendon, placed = robot.tendon[number], robot.geometry.holes
     last, side = tendon.end_body or robot.number_of_notches, np.radians(tendon.direction_deg)
     holes: list[Hole] = []
     walls = robot.geometry.walls(tendon.direction_deg, tendon.radius)
     for body, (start, end) in ((body, wall) for body, wall in enumerate(walls[: last + 1]) if wall):
         # Nothing leads it through a base without length; it ends at the first edge of its body.
         passes = end > 0.0 if body == 0 else body < last
-        for along in (start, end) if passes else (start,):
-            place = [tendon.radius * np.cos(side), tendon.radius * np.sin(side), along]
-            holes.append(Hole(body, np.array(place)))
+        for edge, along in enumerate((start, end) if passes else (start,)):
+            place = tendon.radius * np.array([np.cos(side), np.sin(side)])
+            if placed is not None:
+                place = (placed.enters, placed.leaves)[edge][body, number, :2]
+            holes.append(Hole(body, np.array([*place, along])))
     return holes

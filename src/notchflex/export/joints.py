@@ -374,6 +374,11 @@ def joint_model(robot: Robot, largest_tension: float | None = None) -> JointMode
 def _fitted(robot: Robot, top: float) -> JointModel:
     tendons = range(robot.number_of_tendons)
     pulls = tuple(_pulled(robot, tendon, top) for tendon in tendons)
+    if any(notch.is_round for notch in robot.notches) and pulls[0].chain.level == "space":
+        raise InputError.UNSUPPORTED(
+            f"the tendons of {robot.name} bend its backbone out of one plane, and a model of "
+            "hinges has one for each gap; export a solid, or keep the tendons in its plane."
+        )
     holes = tuple(tendon_holes(robot, tendon) for tendon in tendons)
     hinges = _hinges(robot, pulls)
     angle = np.concatenate([turned(path) for path in pulls])

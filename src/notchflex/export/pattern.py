@@ -244,7 +244,12 @@ def flat_pattern(subject: Subject, options: PatternOptions) -> FlatPattern:
             cuts meet, or kerf and radii do not fit.
     """
     robot = subject.robot
-    tube, placed, start, end, warnings = cuts_of(robot, options.shank, options.polishing)
+    tube, placed, start, end, warnings, rings = cuts_of(robot, options.shank, options.polishing)
+    if rings:
+        raise InputError.UNSUPPORTED(
+            "a robot of disks on a backbone is not cut from a tube, so it has no flat pattern; "
+            "export a solid, --stl or --step."
+        )
     if options.two_axis:
         _check_two_axis(placed)
     radius, corner = tube.outer_radius, max(options.corner_radius - options.polishing, 0.0)

@@ -13,7 +13,7 @@ load: what bends the joints is in the transmission table.
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import Any
 from xml.etree.ElementTree import TreeBuilder, XMLParser, fromstring, indent, tostring
@@ -24,7 +24,7 @@ from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from notchflex import __version__
+from notchflex import RodGap, __version__
 from notchflex.export.formats import Document, SimulatorOptions, Subject
 from notchflex.export.joints import (
     STEPS,
@@ -174,12 +174,28 @@ def _piece(model: JointModel, body: int) -> str:
                 contype="0" conaffinity="0" rgba="0.7 0.7 0.75 0.5"/>"""
         )
     parts += [
+        f"""<geom type="cylinder" size="{_digits(_METRE * 0.5 * notch.diameter)}"
+            fromto="{_digits(0, 0, _METRE * start, 0, 0, _METRE * end)}"
+            contype="0" conaffinity="0" rgba="0.5 0.5 0.55 1"/>"""
+        for number, start, end in _halves(model, body)
+        if isinstance(notch := model.robot.notches[number], RodGap)
+    ]
+    parts += [
         f'<site name="tendon_{k}_hole_{number}" pos="{_digits(_METRE * hole.place)}" size="5e-05"/>'
         for k, holes in enumerate(model.holes, start=1)
         for number, hole in enumerate(holes, start=1)
         if hole.body == body
     ]
     return "".join(parts)
+
+
+def _halves(model: JointModel, body: int) -> Iterator[tuple[int, float, float]]:
+    """Yield the flexures that adjoin a body, and the ends of their halves on its axis, mm."""
+    length, hinges = float(model.robot.geometry.body_length[body]), model.hinges
+    if body > 0:
+        yield body - 1, -(hinges.free_rotation[body - 1].T @ hinges.lever[body - 1])[2], 0.0
+    if body < len(hinges.lever):
+        yield body, length, (hinges.offset - hinges.lever)[body, 2]
 
 
 def _tendons(model: JointModel) -> str:

@@ -24,7 +24,7 @@ from scipy.interpolate import make_interp_spline
 from notchflex import EquilibriumPath, InputError, Robot, RobotShape, __version__
 from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject
-from notchflex.plotting import fair_growth, prism, shape_at, shape_from_angles, tube_wall
+from notchflex.plotting import fair_growth, prism, ring_solid, shape_at, shape_from_angles
 from notchflex.support import FlexureShape, NotchCut, outline, robot_digest
 
 if TYPE_CHECKING:
@@ -159,8 +159,18 @@ def _wall(
         for placed in cuts.cuts
         if placed.start < high and placed.end > low
     ]
-    wall = tube_wall(cuts.tube, (low, high), sides, fair=True)
-    return wall - Manifold.batch_boolean([*removed, *drills], OpType.Add)
+    radii = cuts.tube.outer_radius, cuts.tube.inner_radius
+    wall = ring_solid(radii, (low, high), sides)
+    left = wall - Manifold.batch_boolean([*removed, *drills], OpType.Add)
+    rings = [
+        ring_solid((ring.outer, ring.inner), ends, sides)
+        for ring in cuts.rings
+        if (ends := (max(low, ring.low), min(high, ring.high)))[0] < ends[1]
+    ]
+    if not rings:
+        return left
+    # Rings in one another leave edges of 1e-6 mm, which single precision would open.
+    return Manifold.batch_boolean([left, *rings], OpType.Add).as_original().simplify(1e-6)
 
 
 def _removed(cut: NotchCut, outer: float, sides: int, chord: float) -> Manifold:

@@ -85,7 +85,11 @@ def _straight(robot: Robot, cuts: RobotCuts, options: SolidOptions) -> Any:
     removed = [_cylinder(tube.inner_radius, *ends)]
     removed += [_removed(placed.cut, tube.outer_radius) for placed in cuts.cuts]
     removed += [_cylinder(drill, *ends, place) for place in places]
-    return _cylinder(tube.outer_radius, *ends).cut(*removed)
+    solid = _cylinder(tube.outer_radius, *ends).cut(*removed)
+    for low, high, outer, inner in cuts.rings:
+        ring = _cylinder(outer, low, high)
+        solid = solid.fuse(ring.cut(_cylinder(inner, low, high)) if inner else ring)
+    return solid
 
 
 def _removed(cut: NotchCut, outer: float) -> Any:

@@ -245,14 +245,21 @@ def body_masses(
     if density is None:
         return xp.zeros(len(length)), xp.zeros((len(length), 3))
     piece = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2) * length
+    masses = [None, *(notch.mass for notch in robot.notches)]
+    if any(mass is not None for mass in masses):
+        given = [piece[k] if m is None else 1e6 * m / density for k, m in enumerate(masses)]
+        piece = xp.stack(xp.broadcast_arrays(*given))
     half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1)
     end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
     before, behind = xp.append(half, 0.0), xp.append(0.0, half)
     # Every body has a volume: where no tube is left between two notches, half of each flexure.
     volume = piece + before + behind
     on_axis = (0.5 * length * piece)[:, None] * np.eye(3)[2]
-    at_starts = before[:, None] * xp.pad(rods.start_offset, ((0, 1), (0, 0)))
-    at_ends = behind[:, None] * xp.pad(end, ((1, 0), (0, 0)))
+    # The weight of a backbone turns its ends as a beam's does (w L^2/12): a sixth of L inside them.
+    is_round = xp.array([float(notch.is_round) for notch in robot.notches])
+    inside = (is_round * xp.sum(rods.length, axis=-1) / 6.0)[:, None] * TUBE_AXIS
+    at_starts = before[:, None] * xp.pad(rods.start_offset + inside, ((0, 1), (0, 0)))
+    at_ends = behind[:, None] * xp.pad(end - inside, ((1, 0), (0, 0)))
     return 1e-6 * density * volume, (on_axis + at_starts + at_ends) / volume[:, None]
 
 
@@ -274,7 +281,8 @@ def tendons_in_plane(robot: Robot) -> bool:
     normal = bending_normal(robot)
     if normal is None:
         return False
-    direction = xp.radians([tendon.direction_deg for tendon in robot.tendon])
+    sides = [tendon.holes[1] if tendon.holes else [tendon.direction_deg] for tendon in robot.tendon]
+    direction = xp.radians(xp.concatenate(sides))
     return bool(
         (xp.abs(xp.cos(direction) * normal[0] + xp.sin(direction) * normal[1]) < 1e-9).all()
     )
@@ -565,7 +573,8 @@ def _flat(chain: Chain, frame: Float[Array, "3 3"]) -> Chain:
     """Reduce a spatial chain that stays in the x-z plane of a frame to that plane."""
 
     def planar(part: Any) -> Any:
-        points = [name for name in ("leaves", "enters", "along", "normal") if hasattr(part, name)]
+        names = "leaves", "enters", "along", "along_left", "normal"
+        points = [name for name in names if getattr(part, name, None) is not None]
         return replace(
             part, **{name: (getattr(part, name) @ frame)[..., IN_PLANE] for name in points}
         )

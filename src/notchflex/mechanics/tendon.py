@@ -163,6 +163,8 @@ class Straight(TendonGroup):
     leaves: Points  # Where the tendon leaves its anchor, in the anchor's frame, mm
     enters: Points  # Where it enters the distal body, in that body's frame, mm
     along: Points  # Unit direction of its channels, in the frames of the bodies
+    # That of the channel it leaves, in the anchor's frame; None where all have one direction
+    along_left: Points | None
     # Along what it pulls: the "gap", or the channel of the body before ("dead") or behind
     # ("follower")
     pulls: str = static()
@@ -180,11 +182,11 @@ class Straight(TendonGroup):
         assert anchors is not None  # acts_on_bodies asks for it
         chord = rod.chord if self.turns_with_chord else None
 
-        def span(anchor: Motion, leaves: Array, enters: Array, channel: Array) -> Any:
+        def span(anchor: Motion, leaves: Array, enters: Array, channel: Array, left: Any) -> Any:
             reach = enters - anchor.point_inside(leaves)
             length = guarded_norm(reach)
             gap = reach / jnp.where(length == 0.0, 1.0, length)
-            before = channel @ anchor.rotation
+            before = (channel if left is None else left) @ anchor.rotation
             onward = channel
             if chord is not None:
                 pose, turn = flexure.pose, flexure.chord_turn
@@ -198,7 +200,8 @@ class Straight(TendonGroup):
             turns = turning(before, gap, axis), turning(gap, onward, axis)
             return length, wrench_at(enters, pulled), jnp.stack(turns)
 
-        length, wrench, turns = jax.vmap(span)(anchors, self.leaves, self.enters, self.along)
+        points = self.leaves, self.enters, self.along, self.along_left
+        length, wrench, turns = jax.vmap(span)(anchors, *points)
         return Crossing(length, wrench, slope=None, turning=turns)
 
 
@@ -323,6 +326,7 @@ def route(
     directions, radii = zip(*((each.direction_deg, each.radius) for each in tendons), strict=True)
     lines = passages(notches, body_length, directions, outer_radius, radii)
     place = on_tube(radii, directions)
+    holes = holes_of(tendons, place, rods, body_length)
     groups: list[TendonGroup] = []
     for path in ("wall-arc", *_PULLS):
         numbers = tuple(i for i, tendon in enumerate(tendons) if tendon.path == path)
@@ -343,6 +347,7 @@ def route(
                     place[columns],
                     line,
                     free,
+                    holes and Holes(*(part[:, columns] for part in holes)),
                     pulls=_PULLS[path],
                     turns_with_chord=turns_with_chord,
                 )
@@ -382,24 +387,70 @@ def on_tube(radii: Any, directions_deg: Any) -> Float[Array, "t 3"]:
     return constant(radii)[:, None] * xp.stack([xp.cos(angle), xp.sin(angle), 0.0 * angle], axis=-1)
 
 
+class Holes(NamedTuple):
+    """Holes of tendons through all bodies, base first, in the frames of the bodies."""
+
+    enters: Float[Array, "bodies t 3"]  # Where they begin in a section of the tube, mm
+    leaves: Float[Array, "bodies t 3"]  # Where they end in another, mm
+    along: Float[Array, "bodies t 3"]  # Their unit directions
+
+
+def holes_of(
+    tendons: Sequence[Tendon], place: Array, rods: Rod, body_length: Array
+) -> Holes | None:
+    """Lay holes where tendons say for each disk; None where all are parallel to the tube."""
+    if all(tendon.holes is None for tendon in tendons):
+        return None
+    bodies = range(len(body_length))
+    middle, ends = xp.stack([place for _ in bodies]), list[int]()
+    for number, tendon in enumerate(tendons):
+        ends.append(tendon.end_body or bodies[-1])
+        if tendon.holes is not None:  # the base has the place, as numbers may be traced
+            disks = on_tube(*(xp.array(values[1:]) for values in tendon.holes))
+            beyond = xp.broadcast_to(disks[-1], (bodies[-1] - len(disks), 3))
+            own = xp.concatenate([place[None, number], disks, beyond])
+            middle = xp.where((xp.arange(len(tendons)) == number)[:, None], own[:, None], middle)
+    rise = xp.sum(rods.length, axis=-1) + 0.5 * (body_length[1:] + body_length[:-1])
+    spans = xp.diff(middle, axis=0) + rise[:, None, None] * TUBE_AXIS
+    spans = spans / xp.linalg.norm(spans, axis=-1)[..., None]
+    # A hole halves the angle between the spans on both sides of its disk. Where a tendon ends it
+    # goes on along the last span; in the base it is parallel to the tube.
+    goes_on = (xp.arange(1, len(bodies))[:, None] < xp.array(ends))[..., None]
+    both = spans + goes_on * xp.concatenate([spans[1:], spans[-1:]])
+    both = xp.concatenate([xp.broadcast_to(TUBE_AXIS, both[:1].shape), both])
+    aside = 0.5 * body_length[:, None, None] * (both / both[..., 2:] - TUBE_AXIS)
+    along = both / xp.linalg.norm(both, axis=-1)[..., None]
+    return Holes(middle - aside, middle + aside, along)
+
+
 def _straight(
-    masks: dict[str, Any], place: Array, line: Passage, free: Motion, **options: Any
+    masks: dict[str, Any],
+    place: Array,
+    line: Passage,
+    free: Motion,
+    holes: Holes | None,
+    **options: Any,
 ) -> Straight:
-    entry = place + line.enters[..., None] * TUBE_AXIS
-    leave = place + line.leaves[..., None] * TUBE_AXIS
+    shape = (len(line.enters) + 1, *place.shape)
+    parallel = Holes(*(xp.broadcast_to(part, shape) for part in (place, place, TUBE_AXIS)))
+    enters, leaves, along = holes or parallel
+    entry = enters[1:] + line.enters[..., None] * TUBE_AXIS
+    leave = leaves[1:] + line.leaves[..., None] * TUBE_AXIS
     # Every straight span in the free robot; 0 where a tendon passes by.
-    point, across = place + line.base_leaves[:, None] * TUBE_AXIS, list[Any]()
-    for visits, enters, leaves, rotation, translation in zip(
+    point, across = leaves[0] + line.base_leaves[:, None] * TUBE_AXIS, list[Any]()
+    for visits, inward, outward, rotation, translation in zip(
         masks["visits"], entry, leave, *free, strict=True
     ):
         point = (point - translation) @ rotation
-        across.append(enters - point)
-        point = xp.where(visits[:, None] > 0.0, leaves, point)
+        across.append(inward - point)
+        point = xp.where(visits[:, None] > 0.0, outward, point)
     return Straight(
         **masks,
         **options,
         natural_gap=masks["visits"] * xp.linalg.norm(xp.stack(across), axis=-1),
-        leaves=place + line.left[..., None] * TUBE_AXIS,
+        # Tendons with holes of their own skip no body.
+        leaves=leaves[:-1] + line.left[..., None] * TUBE_AXIS,
         enters=entry,
-        along=xp.broadcast_to(TUBE_AXIS, entry.shape),
+        along=along[1:],
+        along_left=None if holes is None else along[:-1],
     )

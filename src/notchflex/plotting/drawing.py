@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain, repeat
 from textwrap import shorten
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from notchflex import ArcNotch, Robot, StripNotch, ULink
+from notchflex import ArcNotch, Robot, RodGap, StripNotch, ULink
 from notchflex.plotting.marks import Area, Array, Arrow, Colour, Curve, Mark, Note, box
 from notchflex.plotting.style import BLUE, VERMILLION, house_style
 from notchflex.plotting.with_matplotlib import draw_marks
@@ -50,6 +50,7 @@ _STUB, _LONGEST, _CHORD = 0.35, 1.6, 0.0005
 _PIECES: dict[type[Notch], tuple[str, ...]] = {
     ArcNotch: ("height", "uncut length"),
     StripNotch: ("height", "strip thickness", "uncut length"),
+    RodGap: ("length", "uncut length"),
     ULink: ("slot width", "strip thickness", "slot width", "uncut length"),
 }
 """Names of the lengths along a notch, from the base; other kinds have their numbers alone."""
@@ -174,6 +175,11 @@ class NotchRow:
         # Each column with the place where its extension lines begin.
         self.across = [(float(bottoms[-1].min()), lengths)]
         self.notes = list[str]()
+        if isinstance(notch, RodGap):
+            half, size = 0.5 * notch.diameter, self._sized("diameter", notch.diameter)
+            lengths[:] = [Dimension(-half, half, f"backbone\ndiameter\n{size}")]
+            bore = self._sized("inner_diameter", notch.inner_diameter)
+            self.notes.append(f"round backbone, inner diameter {bore}")
         strip = getattr(notch, "strip_length", None)
         if isinstance(notch, StripNotch):
             strip = notch.strip_length_in(tube)
@@ -397,9 +403,16 @@ def _side_view(row: NotchRow) -> Iterator[Mark]:
         yield _stroke([(0.0, inner), (length, inner)], width=0.6, dash=_HIDDEN)
     for cut in row.cuts:
         edge = scale * cut
+        edge[:, 1] = np.clip(edge[:, 1], -outer, outer)  # a gap goes through all
         out = np.array([0.0, np.sign(cut[0, 1]) * 0.02])  # over the line of the surface
         yield Area([np.concatenate([edge[:1] + out, edge, edge[-1:] + out])], "white", 1.0)
-        yield _ink(edge)
+        if isinstance(row.notch, RodGap):
+            half = 0.5 * scale * row.notch.diameter
+            rod = box(edge[0, 0], -half, edge[-1, 0], half)
+            yield Area([rod], INK, 1.0, 0.8, face=BLUE)
+            yield from map(_ink, (edge[:2], edge[2:]))
+        else:
+            yield _ink(edge)
     yield from (_ink(scale * face, 0.7) for face in row.faces)
     for tendon in row.robot.tendon:
         turn = math.radians(tendon.direction_deg - row.notch.direction_deg)
@@ -429,6 +442,9 @@ def _side_view(row: NotchRow) -> Iterator[Mark]:
 def _section_view(row: NotchRow) -> Iterator[Mark]:
     """Yield the cross-section as seen from the tip, with the bend upward."""
     radius, outer, inner = row.robot.tube.outer_radius, row.outer, row.inner
+    if isinstance(row.notch, RodGap):
+        yield from _backbone_section(row, row.notch)
+        return
     half = math.acos(-row.section[1] / radius)
     level = math.cos(half) * outer / inner  # of a straight edge, in radii of the bore
     half_inner = half if row.radial else math.acos(min(max(level, -1.0), 1.0))
@@ -443,8 +459,6 @@ def _section_view(row: NotchRow) -> Iterator[Mark]:
     if row.radial or level < 1.0:  # else less than the wall is left
         ring = np.concatenate([ring, arc(inner, half_inner)[::-1]])
     yield Area([ring], INK, 1.0, 0.8, face=BLUE)
-    for way in np.eye(2):
-        yield _stroke(np.outer([-outer - 0.1, outer + 0.1], way), dash=_CENTRE)
     # The dimension of the angle of what remains.
     edge = arc(outer + 0.12, half)
     yield _stroke(edge, width=0.7)
@@ -453,9 +467,29 @@ def _section_view(row: NotchRow) -> Iterator[Mark]:
         yield _stroke(np.outer([outer + 0.02, outer + 0.17], way))
     angle, length = math.degrees(2.0 * half), 2.0 * half * radius
     words = f"remaining arc {angle:.4g}°, {length:.4g} at the outer surface"
-    for number, text in enumerate((words, *row.notes, "A–A, seen from the tip")):
+    yield from _around(row, [words])
+
+
+def _backbone_section(row: NotchRow, gap: RodGap) -> Iterator[Mark]:
+    """Yield the disk behind a backbone, and the backbone."""
+    turns = np.linspace(0.0, 2.0 * math.pi, 121)
+    circle = np.column_stack([np.cos(turns), np.sin(turns)])
+    yield Area([row.outer * circle], _FINE, 1.0, 0.6, face=_BEYOND)
+    yield Area([row.inner * circle], _FINE, 1.0, 0.6, face="white")
+    half = 0.5 * row.scale
+    for size, face in ((gap.diameter, BLUE), (gap.inner_diameter, "white")):
+        if size:
+            yield Area([half * size * circle], INK, 1.0, 0.8, face=face)
+    yield from _around(row, [])
+
+
+def _around(row: NotchRow, words: Iterable[str]) -> Iterator[Mark]:
+    """Yield what stands round a cross-section: centre lines, texts, the bend, the axes x and y."""
+    outer, direction = row.outer, row.notch.direction_deg
+    for way in np.eye(2):
+        yield _stroke(np.outer([-outer - 0.1, outer + 0.1], way), dash=_CENTRE)
+    for number, text in enumerate((*words, *row.notes, "A–A, seen from the tip")):
         yield label((0.0, -outer - 0.3 - 0.17 * number), text, bold=text.startswith("A–A"))
-    direction = row.notch.direction_deg
     yield _arrow((0.0, outer + 0.1), (0.0, outer + 0.42), VERMILLION, 2.0)
     yield label((0.12, outer + 0.3), f"bends toward\ndirection {direction:g}°", "left center")
     corner = np.array([outer + 1.15, -0.3 * outer])

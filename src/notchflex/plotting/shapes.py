@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from notchflex import EquilibriumPath, Load, Robot, RobotShape, Tube, solve
+from notchflex import EquilibriumPath, Load, Robot, RobotShape, solve
 from notchflex.plotting.curves import evenly, prescribed
 from notchflex.plotting.marks import (
     BESIDE,
@@ -156,7 +156,10 @@ def project(points: Any, view: float) -> Array:
 
 def bending_plane(robot: Robot, offset: float = 1e-9) -> float | None:
     """Return the direction [rad] of the plane in which all notches bend, up to an offset [rad]."""
-    directions = np.radians([notch.direction_deg for notch in robot.notches])
+    sides = [notch.direction_deg for notch in robot.notches]
+    for tendon in robot.tendon if any(notch.is_round for notch in robot.notches) else ():
+        sides += tendon.holes[1] if tendon.holes else [tendon.direction_deg]
+    directions = np.radians(sides)
     first = float(directions[0])
     return first if np.all(np.abs(np.sin(directions - first)) < offset) else None
 
@@ -181,14 +184,25 @@ def outline(shape: RobotShape, view: float) -> ShapeOutline:
             for sign, wall in zip((1.0, -1.0), _sides(shape, body, view), strict=True)
             if wall is not None
         ],
-        flexures=[project(strip(flexure), view) for flexure in shape.flexures],
+        flexures=[
+            project(strip(flexure, across_of(view) if notch.is_round else None), view)
+            for flexure, notch in zip(shape.flexures, shape.robot.notches, strict=True)
+        ],
         tendons=[project(tendon_line(shape, i), view) for i in range(len(shape.robot.tendon))],
         held=place(0, box(-side, below, side, 0.0)),
     )
 
 
-def strip(flexure: FlexureShape) -> Array:
-    """Return the outline of a flexure: along its spine and back along its other edge, (k, 3)."""
+def strip(flexure: FlexureShape, across: Array | None = None) -> Array:
+    """Return the outline of a flexure: along its spine and back along its other edge, (k, 3).
+
+    A round one is seen from all sides alike, by the direction that a view has across.
+    """
+    if across is not None:
+        along = flexure.rotation[..., 2] @ np.stack([across, UP], axis=1)
+        size = np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+        aside = flexure.spine[:, None] * (along[:, 1:] * across - along[:, :1] * UP) / size
+        return np.concatenate([flexure.position - aside, (flexure.position + aside)[::-1]])
     return np.concatenate([flexure.fibre(-flexure.spine), flexure.fibre(flexure.near)[::-1]])
 
 
@@ -240,8 +254,13 @@ def body_faces(shape: RobotShape) -> Iterator[Array]:
 def flexure_faces(shape: RobotShape) -> Iterator[Array]:
     """Yield every flexure: the wall at its spine, or a band with its thickness and area."""
     outer = shape.robot.tube.outer_radius
-    for flexure, spine in zip(shape.flexures, shape.robot.geometry.has_spine, strict=True):
-        if spine:
+    robot = shape.robot
+    kinds = zip(shape.flexures, robot.geometry.has_spine, robot.notches, strict=True)
+    for flexure, spine, notch in kinds:
+        if notch.is_round:
+            angles = np.linspace(0.0, 2.0 * np.pi, 13)
+            edges = [*(flexure.spine[0] * np.column_stack([np.cos(angles), np.sin(angles)]))]
+        elif spine:
             axis = outer - flexure.spine  # from the neutral axis to the axis of the tube
             half = float(np.arccos(np.clip((axis[0] - flexure.near[0]) / outer, -1.0, 1.0)))
             angles = np.pi + np.linspace(-half, half, 9)
@@ -255,22 +274,21 @@ def flexure_faces(shape: RobotShape) -> Iterator[Array]:
         yield np.stack(corners, axis=2).reshape(-1, 4, 3)
 
 
-def tube_wall(tube: Tube, ends: tuple[float, float], sides: int, *, fair: bool = False) -> Manifold:
-    """Return the wall of a tube along z.
+def ring_solid(radii: tuple[float, float], ends: tuple[float, float], sides: int) -> Manifold:
+    """Return a tube along z, as large in volume as the round one.
 
     Args:
-        tube: The tube.
+        radii: Its outer and inner radius [mm]; an inner one of 0 is a solid.
         ends: Its lower and its upper end [mm].
-        sides: Flat sides of each surface.
-        fair: Whether the sides lie half inside and half outside the round surface, so that the
-            volume is that of the round tube; otherwise their corners lie on it.
+        sides: Flat sides of each surface, which lie half inside and half outside the round one.
     """
     from manifold3d import Manifold
 
-    grown = fair_growth(sides) if fair else 1.0
     outer, inner = (
-        Manifold.cylinder(ends[1] - ends[0], grown * radius, circular_segments=sides)
-        for radius in (tube.outer_radius, tube.inner_radius)
+        Manifold.cylinder(ends[1] - ends[0], fair_growth(sides) * radius, circular_segments=sides)
+        if radius
+        else Manifold()
+        for radius in radii
     )
     return (outer - inner).translate((0.0, 0.0, ends[0]))
 

@@ -17,6 +17,7 @@ from notchflex.robot.materials.nitinol import Nitinol, TensileTest
 from notchflex.robot.materials.stress_strain import StressStrain
 from notchflex.robot.materials.superelastic import Superelastic
 from notchflex.robot.notches.arc import ArcNotch
+from notchflex.robot.notches.rod import RodGap
 from notchflex.robot.notches.strip import StripNotch
 from notchflex.robot.notches.u_link import ULink
 from notchflex.robot.reading import load_robot, robot_from_text
@@ -40,6 +41,7 @@ __all__ = [
     "Notch",
     "Opening",
     "Robot",
+    "RodGap",
     "StressStrain",
     "StripNotch",
     "Superelastic",

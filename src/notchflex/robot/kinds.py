@@ -102,10 +102,16 @@ class Tendon:
         free_length: Length between the drive and the base [mm]; counts for stretch only.
         diameter: Its diameter [mm]; None is not known. It changes no result: a tendon that would
             cross the inner or outer surface of the tube is refused.
+        disk_radius: Over gaps of kind "rod", its distance from the axis in the middle of every
+            disk [mm], from body 1 to its end; None is `radius`, which then is that in the base.
+        disk_direction_deg: Its side there [deg]; None is `direction_deg`. The holes of the disks
+            point along the tendon in the straight robot, that of the base along the axis.
 
     Example:
         >>> Tendon(0.70, direction_deg=180.0).path
         'wall-arc'
+        >>> Tendon(10.0, path="straight", disk_radius=(8.0, 6.0)).holes
+        ((10.0, 8.0, 6.0), (0.0, 0.0, 0.0))
     """
 
     radius: Annotated[
@@ -137,6 +143,32 @@ class Tendon:
         Float | None,
         quantity("mm", "diameter of the tendon, which must fit the lumen or the wall", above=0),
     ] = None
+    disk_radius: Annotated[
+        tuple[Annotated[Float, quantity("mm", "distance from the axis", above=0)], ...] | None,
+        Field(
+            min_length=1,
+            max_length=10_000,
+            description="distance from the axis in each disk, from body 1 to the end",
+            json_schema_extra={"unit": "mm"},
+        ),
+    ] = None
+    disk_direction_deg: Annotated[
+        tuple[Annotated[Float, quantity("deg", "side of the disk")], ...] | None,
+        Field(
+            min_length=1,
+            max_length=10_000,
+            description="side in each disk, from body 1 to the end",
+            json_schema_extra={"unit": "deg"},
+        ),
+    ] = None
+
+    @property
+    def holes(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+        """Radii [mm] and sides [deg] in the base and in every disk; None where all are alike."""
+        disks = len(self.disk_radius or self.disk_direction_deg or ())
+        radii = self.disk_radius or (self.radius,) * disks
+        sides = self.disk_direction_deg or (self.direction_deg,) * disks
+        return ((self.radius, *radii), (self.direction_deg, *sides)) if disks else None
 
 
 # What parts are cited by.
@@ -170,6 +202,7 @@ class Notch:
         repeat: How many equal notches follow one another.
     """
 
+    is_round: ClassVar[bool] = False  # whether it bends to all sides alike
     kind: str
     uncut_length: Annotated[
         Float, quantity("mm", "uncut length behind the notch, toward the tip", at_least=0)
@@ -207,6 +240,11 @@ class Notch:
     def tendon_problems(self, tendon: Tendon) -> Problems:
         """Find why a tendon that ends behind this notch cannot run over it: keys of the tendon."""
         return ()
+
+    @property
+    def mass(self) -> float | None:
+        """Mass of the body behind it [g], where that is not a piece of the tube."""
+        return None
 
     @property
     def spine_cut(self) -> tuple[float, bool] | None:

@@ -267,6 +267,20 @@ def _tendon_problems(robot: "Robot", tendon: Tendon, on_notches: bool) -> Proble
                 f"{tube.inner_radius - tendon.diameter / 2:.6g} mm.",
             )
     end = tendon.end_body or number
+    for key in ("disk_radius", "disk_direction_deg"):
+        given = getattr(tendon, key)
+        if given is not None and len(given) != end <= number:
+            yield (
+                key,
+                f"has {len(given)} values; give {end}, one for each disk from body 1 to the body "
+                "in which the tendon ends.",
+            )
+    if max(tendon.disk_radius or (0.0,)) > tube.outer_radius:
+        yield (
+            "disk_radius",
+            f"has {max(tendon.disk_radius or ())} mm, outside the disks; it must be at most the "
+            f"outer radius of the tube, {tube.outer_radius} mm.",
+        )
     if end > number:
         yield (
             "end_body",
@@ -277,6 +291,7 @@ def _tendon_problems(robot: "Robot", tendon: Tendon, on_notches: bool) -> Proble
         for named in named_parts(robot):
             if isinstance(named.part, Notch) and named.first <= end:
                 problems |= dict.fromkeys(named.part.tendon_problems(tendon))
+                problems |= dict.fromkeys(_disk_problems(robot, named.part, tendon))
         yield from problems
         if problems or tendon.end_body is None:
             return
@@ -289,6 +304,28 @@ def _tendon_problems(robot: "Robot", tendon: Tendon, on_notches: bool) -> Proble
                 f"through the {'bodies' if len(near) > 1 else 'body'} "
                 f"{' and '.join(map(str, near))} there.",
             )
+
+
+def _disk_problems(robot: "Robot", notch: Notch, tendon: Tendon) -> Problems:
+    """Find holes of disks where there are none, and a bend that a curved law does not know."""
+    if tendon.holes is None and not notch.is_round:
+        return
+    key = "disk_direction_deg" if tendon.disk_radius is None else "disk_radius"
+    _, sides = tendon.holes or ((), (tendon.direction_deg,))
+    if not notch.is_round:
+        yield (
+            key,
+            f'is for gaps of kind = "rod"; leave it out over a notch of kind = "{notch.kind}".',
+        )
+    elif robot.material.kind != "linear" and any(
+        abs(math.sin(math.radians(side - notch.direction_deg))) > 1e-9 for side in sides
+    ):
+        yield (
+            key if tendon.disk_direction_deg else "direction_deg",
+            f'leaves the plane of the gaps, {notch.direction_deg} deg; a "{robot.material.kind}" '
+            "backbone bends by its law in that plane and linearly out of it. Give the gaps the "
+            'direction_deg of the tendons, or use material.kind = "linear".',
+        )
 
 
 _Unusual: TypeAlias = tuple[str, float, tuple[float, float], float | None]

@@ -195,4 +195,6 @@ def _stroke(robot: Robot, tendon: int, tension: float) -> tuple[float, bool] | N
     # With all its notches closed, a robot hardly bends further.
     can_close = np.isfinite(state.gap)
     closed = bool(can_close.any() and state.closed[can_close].all())
-    return float(state.stroke[tendon]), closed or np.abs(state.notch_angle).sum() >= WELL_BENT
+    # A backbone may bend to other sides than its notch angles tell.
+    bend = max(np.abs(state.notch_angle).sum(), state.tip_axis_angle)
+    return float(state.stroke[tendon]), closed or bend >= WELL_BENT
