@@ -399,7 +399,7 @@ class Stepper(Displayed):
     @cached_property
     def _drive_places(self) -> Int[np.ndarray, " t"]:
         indices: Any = self.prepared.state.unpack_indices()
-        return np.where(self._by_stroke, indices.stroke, indices.point.base_tension)
+        return np.where(self._by_stroke, indices.stroke, indices.tension)
 
     @cached_property
     def _one_load(self) -> LoadPath:

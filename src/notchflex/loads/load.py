@@ -197,9 +197,10 @@ class ExternalLoad:
         body_forces: Forces and moments on single bodies.
         tip_mass: Mass that hangs at the tip point, g.
         gravity: Acceleration of gravity in the world, m/s^2.
+        sheath_bend_deg: Total angle by which all sheaths are bent, deg; None as in the robot file.
 
     Raises:
-        InputError: An invalid value, one that is not finite, or a negative mass.
+        InputError: An invalid value, one that is not finite, or a negative mass or bend.
 
     Example:
         >>> ExternalLoad(tip_mass=20.0).weight(20.0)
@@ -213,6 +214,7 @@ class ExternalLoad:
     body_forces: Sequence[BodyForce] = ()
     tip_mass: float = 0.0
     gravity: Sequence[float] | None = None
+    sheath_bend_deg: float | None = None
 
     def __post_init__(self) -> None:
         """Check the numbers and keep them as tuples, so that equal loads are found equal."""
@@ -258,11 +260,11 @@ class ExternalLoad:
         return 1e-3 * mass * x, 1e-3 * mass * y, 1e-3 * mass * z
 
 
-def _mass(value: Any) -> float:
-    mass = check_number(value, "tip_mass", "a number of grams")
-    if not 0.0 <= mass < float("inf"):
-        raise InputError.NOT_FINITE(f"tip_mass must be finite and 0 g or more; got {mass:g}")
-    return mass
+def _not_negative(value: Any, what: str, unit: str) -> float:
+    number = check_number(value, what, f"a number in {unit}")
+    if not 0.0 <= number < float("inf"):
+        raise InputError.NOT_FINITE(f"{what} must be finite and 0 {unit} or more; got {number:g}")
+    return number
 
 
 def _body_forces(value: Any) -> tuple[BodyForce, ...]:
@@ -287,7 +289,8 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     },
     "following": partial(check_bool, what="following"),
     "body_forces": _body_forces,
-    "tip_mass": _mass,
+    "tip_mass": partial(_not_negative, what="tip_mass", unit="g"),
+    "sheath_bend_deg": partial(_not_negative, what="sheath_bend_deg", unit="deg"),
 }
 EXTERNAL = tuple(field.name for field in fields(ExternalLoad))
 _DEFAULTS = tuple((field.name, field.default) for field in fields(ExternalLoad))
@@ -344,8 +347,10 @@ class Load(ExternalLoad):
         tip_mass: Mass that hangs at the tip point, g.
         gravity: Acceleration of gravity in the world, m/s^2. Given, the robot's own weight counts
             where its material has a density. Not given, a tip mass hangs along (0, 0, -9.81).
+        sheath_bend_deg: Total angle by which all sheaths are bent, deg; not given, it is that of
+            the robot file. It changes where the shaft is moved.
 
-    A tendon of which neither tension nor stroke is commanded hangs slack (0 N).
+    With a sheath, tension and stroke are those of its drive. A tendon of which neither tension nor stroke is commanded hangs slack (0 N).
 
     Raises:
         InputError: A number that is not finite, text, an invalid external load, or a base turned

@@ -269,6 +269,7 @@ class LoadPath(ByValue, Displayed):
         body_forces: Sequence[BodyForce] | None = None,
         tip_mass: float | None = None,
         gravity: Sequence[float] | None = None,
+        sheath_bend_deg: float | None = None,
     ) -> LoadPath:
         """Return the path with external loads on all its steps.
 
@@ -280,6 +281,7 @@ class LoadPath(ByValue, Displayed):
             body_forces: Forces and moments on single bodies.
             tip_mass: Mass that hangs at the tip point, g.
             gravity: Acceleration of gravity in the world, m/s^2.
+            sheath_bend_deg: Total angle by which all sheaths are bent, deg.
 
         Returns:
             The path; what is not given stays as it is.
@@ -416,6 +418,7 @@ def external_words(load: ExternalLoad) -> list[str]:
         (any(load.tip_moment), f"tip moment {vector(load.tip_moment)} N mm{turning}"),
         (load.tip_mass, f"tip mass {short(load.tip_mass)} g{where_of_mass}"),
         (any(load.gravity or ()), f"gravity {vector(load.gravity or ())} m/s²"),
+        (load.sheath_bend_deg is not None, f"sheath bent by {short(load.sheath_bend_deg)} deg"),
     ]
     for force in load.body_forces:
         point = f" at {vector(force.point)} mm" if any(force.point) else ""

@@ -102,6 +102,16 @@ class Tendon:
         free_length: Length between the drive and the base [mm]; counts for stretch only.
         diameter: Its diameter [mm]; None is not known. It changes no result: a tendon that would
             cross the inner or outer surface of the tube is refused.
+        sheath_length: Length of the sheath that leads its wire from the drive to the base [mm];
+            None for no sheath. Tensions and strokes are commanded and measured at the drive.
+        sheath_friction: Coefficient of friction between wire and sheath.
+        sheath_bend_deg: Total angle by which the sheath is bent [deg], turns to all sides added.
+        sheath_wire_stiffness: E A of the wire in the sheath [N].
+        sheath_stiffness: E A of the sheath under compression [N]; infinite is not compressed.
+        backlash: Way of the drive on every reversal before the wire follows [mm].
+
+    Raises:
+        InputError: A value is not allowed; or there is one of a sheath and no `sheath_length`.
 
     Example:
         >>> Tendon(0.70, direction_deg=180.0).path
@@ -137,6 +147,42 @@ class Tendon:
         Float | None,
         quantity("mm", "diameter of the tendon, which must fit the lumen or the wall", above=0),
     ] = None
+    sheath_length: Annotated[
+        Float | None,
+        quantity("mm", "length of the sheath from the drive to the base; left out: none", above=0),
+    ] = None
+    sheath_friction: Annotated[
+        Float, quantity("", "coefficient of friction of wire in sheath", at_least=0, usual=(0, 0.5))
+    ] = 0.0
+    sheath_bend_deg: Annotated[
+        Float, quantity("deg", "total angle by which the sheath is bent", at_least=0)
+    ] = 0.0
+    sheath_wire_stiffness: Annotated[
+        Float | None, quantity("N", "E A of the wire in the sheath", above=0)
+    ] = None
+    sheath_stiffness: Annotated[
+        FloatOrInf, quantity("N", "E A of the sheath under compression; inf is rigid", above=0)
+    ] = math.inf
+    backlash: Annotated[
+        Float, quantity("mm", "way of the drive on a reversal before the wire follows", at_least=0)
+    ] = 0.0
+
+    def conflicts(self) -> Problems:
+        """Find a sheath without a wire, and values of a sheath that is not there."""
+        if self.sheath_length is not None:
+            if self.sheath_wire_stiffness is None:
+                yield (
+                    "sheath_wire_stiffness",
+                    "is missing; give E A of the wire in the sheath [N]: a steel wire of 0.3 mm "
+                    "has 14000 N.",
+                )
+            return
+        for key in (*_OF_SHEATH, "backlash"):
+            if getattr(self, key) not in (None, 0.0, math.inf):
+                yield key, "needs a sheath; give sheath_length [mm], or leave the key out."
+
+
+_OF_SHEATH = "sheath_friction", "sheath_bend_deg", "sheath_wire_stiffness", "sheath_stiffness"
 
 
 # What parts are cited by.

@@ -30,7 +30,14 @@ from notchflex.solver.linear_step import (
 )
 from notchflex.solver.programs.compiled import Native
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.residual import Memory, SolverState, bound_side, command_slopes, evaluate
+from notchflex.solver.residual import (
+    Memory,
+    SolverState,
+    aimed,
+    bound_side,
+    command_slopes,
+    evaluate,
+)
 
 # Springs this much stiffer than the notches hold closed contacts and tendons driven by stroke;
 # otherwise their forces would be multipliers and the stiffness undefined.
@@ -97,10 +104,14 @@ def _rows(chain: Chain, command: Command, solved: SolverState) -> tuple[Array, .
         for span, ratio in zip(evaluation.spans, unknowns.log_ratio, strict=True)
     )
     bound = tuple(span.bound for span in evaluation.spans)
-    memory = Memory(unknowns.log_ratio, slid, bound, solved.memory.material)
+    memory, sheath = Memory(unknowns.log_ratio, slid, bound, solved.memory.material), None
+    if (last := solved.memory.sheath) is not None:
+        side = bound_side(last.level[:, 0] - last.level[:, -1], last.limit)
+        sheath = last._replace(stroke=last.stroke - _SLIP * side)
     form = unit_rows(chain, by_stroke=command.by_stroke is not None)
     jacobians = StateJacobians(chain, unknowns, memory, solved.applied, evaluation, form)
-    return (*linearise(jacobians), jnp.stack(command_slopes(chain, command, evaluation.base)))
+    slopes = command_slopes(chain, aimed(chain, command, last), sheath, evaluation.base)
+    return (*linearise(jacobians), jnp.stack(slopes))
 
 
 def _assemble(

@@ -19,6 +19,16 @@ from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.contact import ContactGroup, closing_angles
 from notchflex.mechanics.flexure import FlexureState
 from notchflex.mechanics.motion import Motion, identity
+from notchflex.mechanics.sheath import (
+    SheathMemory,
+    from_base,
+    from_drive,
+    kept,
+    log_tension,
+    mean_tension,
+    slack_sheaths,
+    within,
+)
 from notchflex.mechanics.tendon import Crossing, TendonGroup, fibre_lengths
 
 # Poses of bodies: against the base, and against those before.
@@ -179,6 +189,7 @@ class Memory(NamedTuple):
             modes that it refers to; None otherwise.
         stick_compliance: Additional slip over a sticking contact, in heights of the notch, per
             change of its log ratio; None for none.
+        sheath: Memory of the sheaths; None where there are none.
     """
 
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
@@ -187,6 +198,7 @@ class Memory(NamedTuple):
     material: Any = ()
     damping: tuple[Float[Array, ""], Float[Array, "*n modes"]] | None = None
     stick_compliance: Float[Array, ""] | None = None
+    sheath: SheathMemory | None = None
 
     @property
     def slip_per_log_ratio(self) -> Float[Array, ""] | float:
@@ -244,7 +256,7 @@ class SolverState(NamedTuple):
     Attributes:
         point: Unknowns and base tensions.
         memory: History of contacts and material, as of this state.
-        stroke: Tendon drawn out at the base, mm.
+        stroke: Way of every drive, mm: the tendon drawn out at the base, with what a sheath adds.
         applied: External loads on the bodies; None for a chain assembled for tendons alone.
     """
 
@@ -253,18 +265,25 @@ class SolverState(NamedTuple):
     stroke: Float[Array, " t"]
     applied: BodyLoads | None
 
+    @property
+    def tension(self) -> Float[Array, " t"]:
+        """Tension of every drive, N."""
+        sheath = self.memory.sheath
+        return self.point.base_tension if sheath is None else sheath.tension
 
-def state_at(
-    chain: Chain, point: Iterate, evaluation: Evaluation, applied: BodyLoads | None
+
+def state_after(
+    chain: Chain,
+    command: Command,
+    point: Iterate,
+    memory: Memory,
+    drawn: Float[Array, " t"],
+    before: SheathMemory | None,
 ) -> SolverState:
-    """Return the state at a solved point, with its memory."""
-    memory = Memory(
-        log_ratio=point.unknowns.log_ratio,
-        slid=tuple(span.slid for span in evaluation.spans),
-        bound=tuple(span.bound for span in evaluation.spans),
-        material=evaluation.flexure.memory,
-    )
-    return SolverState(point, memory, stroke(chain, evaluation.base), applied)
+    """Return the state at a solved point, with the memory there and that of its sheaths before."""
+    if before is not None:
+        memory, drawn = _with_sheaths(chain, command, point, memory, drawn, before)
+    return SolverState(point, memory, drawn, command.applied)
 
 
 def at_rest(chain: Chain) -> SolverState:
@@ -278,7 +297,8 @@ def at_rest(chain: Chain) -> SolverState:
         log_ratio=none,
     )
     slack = constant(np.zeros(chain.tendons))
-    memory = Memory(none, none, none, chain.law.rest(chain.rods.section))
+    sheath = None if chain.sheath is None else slack_sheaths(chain.tendons)
+    memory = Memory(none, none, none, chain.law.rest(chain.rods.section), sheath=sheath)
     return SolverState(Iterate(unknowns, slack), memory, slack, unloaded(chain))
 
 
@@ -559,16 +579,114 @@ def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
     return closing
 
 
-def command_residual(chain: Chain, command: Command, base: BaseReaction) -> Float[Array, " t"]:
+def command_residual(
+    chain: Chain, command: Command, memory: SheathMemory | None, base: BaseReaction
+) -> Float[Array, " t"]:
     """Compute the deviation of the tendons from their command, scaled like angles."""
     # A tendon driven by stroke is slack where the robot has released more than is drawn: tension >=
     # 0, stroke released >= stroke commanded, product 0.
-    scale, base_tension = chain.stroke_stiffness, base.base_tension
-    missing = stroke(chain, base) - command.target
-    # Switching keeps the digits that a difference with a large tension would lose.
-    by_stroke = jnp.where(base_tension >= scale * missing, missing, base_tension / scale)
-    by_tension = (base_tension - command.target) / scale
-    return command.either(by_stroke, by_tension)
+    scale, drawn = chain.stroke_stiffness, stroke(chain, base)
+
+    def deviation(tension: Array, pulled: Array) -> Array:
+        missing = pulled - command.target
+        # Switching keeps the digits that a difference with a large tension would lose.
+        by_stroke = jnp.where(tension >= scale * missing, missing, tension / scale)
+        return command.either(by_stroke, (tension - command.target) / scale)
+
+    if chain.sheath is None or memory is None:
+        return deviation(base.base_tension, drawn)
+    # The sheath is one contact more. While the wire slides all along, drive and base are related by
+    # exponentials, and the command decides; while it sticks, its end at the base keeps its place.
+    # With the deviations where it would slide to either side, the law is that of friction:
+    # clip(slip, toward the base, toward the drive) = 0.
+    limit = chain.sheath.log_ratio(command.bend)
+    toward_base, toward_drive = (
+        deviation(
+            base.base_tension * jnp.exp(side * limit),
+            drawn + chain.sheath.end_stretch(side, limit, base.base_tension),
+        )
+        for side in (-1.0, 1.0)
+    )
+    slip = _sheath_slip(chain, memory, limit, base.base_tension, drawn)
+    held = jnp.where(slip <= toward_base, toward_base, slip)
+    return jnp.where(slip >= toward_drive, toward_drive, held)
+
+
+def _sheath_slip(
+    chain: Chain,
+    memory: SheathMemory,
+    limit: Float[Array, " t"],
+    tension: Float[Array, " t"],
+    drawn: Float[Array, " t"],
+) -> Float[Array, " t"]:
+    """Return the way of the stuck wire in its sheath toward the drive, mm."""
+    # Of a tendon that is inextensible in the robot the tension could be any while all contacts
+    # stick: the memory's stiffness keeps it.
+    assert chain.sheath is not None
+    profile = within(memory, limit)
+    moved = from_base(profile, log_tension(tension), limit)
+    stretched = chain.sheath.compliance * (mean_tension(moved) - mean_tension(profile))
+    change = tension - jnp.exp(memory.level[:, -1])
+    held = change * jnp.max(notch_heights(chain)) / chain.memory_stiffness
+    return drawn - memory.stroke + stretched + held
+
+
+def aimed(chain: Chain, command: Command, memory: SheathMemory | None) -> Command:
+    """Return a command with strokes of the wires' ends: a drive first goes through its backlash."""
+    if chain.sheath is None or memory is None or command.by_stroke is None:
+        return command
+    profile = memory.place, memory.level
+    end = memory.stroke + chain.sheath.compliance * mean_tension(profile)
+    stroke = jnp.clip(end, command.target, command.target + chain.sheath.backlash)
+    return command._replace(target=command.either(stroke, command.target))
+
+
+# Halvings of the range of a drive's ln T, and the least motion of a wire that its backlash follows,
+# mm.
+_HALVINGS, _MOTION = 54, 1e-9
+
+
+def _with_sheaths(
+    chain: Chain,
+    command: Command,
+    point: Iterate,
+    memory: Memory,
+    drawn: Float[Array, " t"],
+    before: SheathMemory,
+) -> tuple[Memory, Float[Array, " t"]]:
+    """Return the memory of a solved point with that of its sheaths, and the ways of the drives."""
+    sheath, stop = chain.sheath, jax.lax.stop_gradient
+    assert sheath is not None
+    limit, base = sheath.log_ratio(command.bend), log_tension(point.base_tension)
+    profile = within(before, limit)
+
+    def ends(drive: Array) -> tuple[Any, Array]:
+        moved = from_base(from_drive(profile, drive, limit), base, limit)
+        return moved, drawn + sheath.compliance * mean_tension(moved)
+
+    # The stroke of the wire's end rises with the tension of the drive: halving finds it. Its
+    # derivatives are those of a step of Newton's method from there.
+    target = aimed(chain, command, before).target
+
+    def halve(_: Any, limits: tuple[Array, Array]) -> tuple[Array, Array]:
+        middle = 0.5 * (limits[0] + limits[1])
+        less = ends(middle)[1] < target
+        return jnp.where(less, middle, limits[0]), jnp.where(less, limits[1], middle)
+
+    low, high = stop(jax.lax.fori_loop(0, _HALVINGS, halve, (base - limit, base + limit)))
+    found = 0.5 * (low + high)
+    end, slope = jax.jvp(lambda drive: ends(drive)[1], (found,), (jnp.ones_like(found),))
+    step = (target - end) / stop(jnp.where(slope > 0.0, slope, jnp.inf))
+    drive = command.either(found + (step - stop(step)), log_tension(command.target))
+    moved, end = ends(drive)
+    tight = point.base_tension > 0.0
+    tension = command.either(jnp.where(tight, jnp.exp(drive), 0.0), command.target)
+    motion = end - before.stroke - sheath.compliance * mean_tension((before.place, before.level))
+    turned = jnp.where(motion < -_MOTION, -sheath.backlash, before.play)
+    turned = jnp.where(motion > _MOTION, 0.0, turned)
+    play = command.either(jnp.clip(command.target - end, -sheath.backlash, 0.0), turned)
+    after = SheathMemory(tension, *kept(moved), limit, drawn, play)
+    return memory._replace(sheath=after), end + play
 
 
 def without_slack(
@@ -583,12 +701,12 @@ def without_slack(
 
 
 def command_slopes(
-    chain: Chain, command: Command, base: BaseReaction
+    chain: Chain, command: Command, memory: SheathMemory | None, base: BaseReaction
 ) -> tuple[Float[Array, "t t"], Float[Array, "t t"], Float[Array, "t t"]]:
     """Differentiate `command_residual` by base tension, released length, tension times length."""
 
-    def residual(tension: Array, released: Array, tension_length: Array) -> Array:
-        return command_residual(chain, command, BaseReaction(tension, released, tension_length))
+    def residual(*numbers: Array) -> Array:
+        return command_residual(chain, command, memory, BaseReaction(*numbers))
 
     arguments = (base.base_tension, base.released_length, base.tension_length)
     return jax.jacfwd(residual, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, arguments))
