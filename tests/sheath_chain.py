@@ -1,19 +1,23 @@
 """A wire over many contacts of equal angle, with elastic pieces between: a sheath in NumPy alone.
 
-It shares nothing with the library: every piece has its tension, every contact a place, and each
-load step is solved for all of them by Newton's method on Euler's law of the rope.
+Every piece of wire has its tension, every contact the way of the wire over it, and each load step
+must satisfy Euler's law of the rope at every contact. It shares nothing with the library.
 """
 
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import brentq
+
+ROUNDING = 1e-9
+"""Largest imbalance of a contact, as part of its friction."""
 
 
 class ChainOfContacts:
     """A wire from a drive to a robot over equal contacts, with its memory.
 
-    Contact i lies between the pieces i - 1 and i, the first behind the drive; n + 1 pieces. The end
-    pieces are half as long, so that contacts lie in the middle of their parts of the sheath.
+    Contact i lies between pieces i and i + 1 of the wire. The end pieces are half as long, so that
+    contacts lie in the middle of their parts of the sheath.
     """
 
     def __init__(self, contacts: int, log_ratio: float, compliance: float) -> None:
@@ -22,50 +26,60 @@ class ChainOfContacts:
         parts = np.ones(contacts + 1)
         parts[[0, -1]] = 0.5
         self.compliance = compliance * parts / contacts
-        self.level = np.full(contacts + 1, -6.0)  # ln T of the pieces
-        self.place = np.zeros(contacts)  # wire that has gone over every contact toward the drive
-        self.dissipated = 0.0
+        self.level = np.full(contacts + 1, -60.0)  # ln T of the pieces
+        self.way = np.zeros(contacts)  # of the wire over every contact, toward the drive
+        self.dissipated = self.work = self.stroke = self.drawn = 0.0
 
-    def places(self, level: np.ndarray, drawn: float) -> np.ndarray:
+    def set_tension(self, tension: float, stroke_of: Callable[[float], float]) -> None:
+        """Set the tension of the drive; `stroke_of` returns the stroke of the robot at a tension.
+
+        Raises:
+            AssertionError: A contact does not obey Euler's law.
+        """
+        drive, whole = np.log(tension), len(self.way) * self.limit
+
+        def held(base: float) -> float:
+            """Return the way of the wire over the contact that is farthest from sliding."""
+            level = self._levels(drive, base)
+            contact = np.argmin(np.abs(np.diff(level)))
+            return self._ways(level, stroke_of(np.exp(base)))[contact] - self.way[contact]
+
+        least, most = drive - whole, drive + whole
+        base = least
+        if held(least) < 0.0:
+            base = most if held(most) < 0.0 else brentq(held, least, most, xtol=1e-15, rtol=1e-15)
+        level, drawn = self._levels(drive, base), stroke_of(np.exp(base))
+        way = self._ways(level, drawn)
+        self._check(level, way)
+        middle = 0.5 * (np.exp(level) + np.exp(self.level))
+        stroke = float(drawn + np.sum(self.compliance * np.exp(level)))
+        self.dissipated -= np.sum(np.diff(middle) * (way - self.way))
+        self.work += middle[0] * (stroke - self.stroke)
+        self.level, self.way, self.drawn, self.stroke = level, way, drawn, stroke
+
+    def _levels(self, drive: float, base: float) -> np.ndarray:
+        """Return ln T of all pieces: what neither end has to change stays."""
+        level = self.level.copy()
+        level[0], level[-1] = drive, base
+        for piece in range(1, len(level) - 1):
+            level[piece] = np.clip(level[piece], level[piece - 1] - self.limit, level[piece - 1] + self.limit)
+        for piece in range(len(level) - 2, 0, -1):
+            level[piece] = np.clip(level[piece], level[piece + 1] - self.limit, level[piece + 1] + self.limit)
+        return level
+
+    def _ways(self, level: np.ndarray, drawn: float) -> np.ndarray:
         """Return the way of the wire over all contacts: the robot's, and the stretch beyond."""
         stretch = self.compliance * np.exp(level)
         return drawn + np.cumsum(stretch[::-1])[::-1][1:]
 
-    def pull(self, tension: float, stroke_at: Callable[[float], tuple[float, float]]) -> None:
-        """Set the tension of the drive; `stroke_at` returns the robot's stroke and its slope."""
-        count, scale = len(self.place), 30.0
-        level = self.level.copy()
-        level[0] = np.log(tension)
-        for piece in range(1, count + 1):  # a start: nothing slides that need not
-            level[piece] = np.clip(level[piece], *(level[piece - 1] + self.limit * np.array([-1, 1])))
-        for _ in range(400):
-            drawn, by_tension = stroke_at(np.exp(level[-1]))
-            place = self.places(level, drawn)
-            ratio = level[:-1] - level[1:]
-            trial = ratio + scale * (place - self.place)
-            residual = ratio - np.clip(trial, -self.limit, self.limit)
-            if np.abs(residual).max() < 1e-13:
-                break
-            # The change of a place by ln T of the pieces beyond it.
-            by_level = np.triu(np.tile(self.compliance[1:] * np.exp(level[1:]), (count, 1)))
-            by_level[:, -1] += by_tension * np.exp(level[-1])
-            by_ratio = np.eye(count, k=-1) - np.eye(count)
-            slides = np.abs(trial) >= self.limit
-            jacobian = np.where(slides[:, None], by_ratio, -scale * by_level)
-            step = np.linalg.solve(jacobian, -residual)
-            level[1:] += step * min(1.0, 0.5 / np.abs(step).max())
-        else:
-            raise AssertionError(f"no equilibrium of the chain: {np.abs(residual).max()}")
-        mean = 0.5 * (np.exp(level) + np.exp(self.level))
-        self.dissipated += np.sum((mean[:-1] - mean[1:]) * (place - self.place))
-        self.level, self.place, self.drawn = level, place, drawn
+    def _check(self, level: np.ndarray, way: np.ndarray) -> None:
+        """Check that every contact sticks, or slides in the direction of its friction."""
+        ratio, slip = -np.diff(level), way - self.way
+        assert np.abs(ratio).max() < self.limit * (1.0 + ROUNDING)
+        part = np.clip(ratio / self.limit + slip / 1e-6, -1.0, 1.0) - ratio / self.limit
+        assert np.abs(part).max() < 1e-3, (part.min(), part.max())
 
     @property
     def tension(self) -> float:
         """Tension at the robot, N."""
         return float(np.exp(self.level[-1]))
-
-    @property
-    def stroke(self) -> float:
-        """Way of the wire's end at the drive, mm."""
-        return float(self.drawn + np.sum(self.compliance * np.exp(self.level)))
