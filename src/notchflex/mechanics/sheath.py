@@ -23,6 +23,8 @@ from notchflex.robot import Tendon
 _CORNERS = 12
 # Tension that counts as none, N, so that logarithms stay finite.
 _MIN_TENSION = 1e-100
+# Differences of ln T that may be rounding.
+_ROUNDING = 1e-12
 # Half differences of ln T below which the mean of T is computed by a series.
 _SMALL = 0.05
 
@@ -115,12 +117,13 @@ def from_drive(profile: Corners, end: Float[Array, " t"], limit: Float[Array, " 
     end, slope = end[:, None], limit[:, None]
     side = jnp.where(end >= level[:, :1], 1.0, -1.0)
     ahead = side * (level - end) + slope * place
-    first, last = ahead[:, :-1], ahead[:, 1:]
-    crosses = (first < 0.0) & (last > 0.0)
-    part = jnp.where(crosses, -first / jnp.where(crosses, last - first, 1.0), 1.0 * (last <= 0.0))
-    part = jnp.where(first < 0.0, part, 0.0)
+    # It rises along the sheath, but for rounding where the profile is parallel to the line. There
+    # rounding must not decide: derivatives belong to corners.
+    covered = jax.lax.cummax(jax.lax.stop_gradient(ahead), axis=1) < -_ROUNDING
+    crosses = covered[:, :-1] & ~covered[:, 1:]
+    part = -ahead[:, :-1] / jnp.where(crosses, jnp.diff(ahead), 1.0)
+    part = jnp.where(crosses, jnp.minimum(part, 1.0), 1.0 * covered[:, 1:])
     front = jnp.sum(part * jnp.diff(place), axis=1, keepdims=True)
-    covered = ahead < 0.0
     place = jnp.where(covered, front, place)
     level = jnp.where(covered, end - side * slope * front, level)
     return jnp.concatenate([0.0 * front, place], 1), jnp.concatenate([end, level], 1)
@@ -160,6 +163,7 @@ def kept(profile: Corners) -> Corners:
         place, level = profile
         before, after = jnp.diff(place), jnp.diff(level)
         area = jnp.abs(before[:, :-1] * after[:, 1:] - before[:, 1:] * after[:, :-1])
+        area = jnp.where(area < _ROUNDING, 0.0, area)
         dropped = 1 + jnp.argmin(area, axis=1, keepdims=True)
         moves = jnp.arange(place.shape[1] - 1)[None] >= dropped
         profile = jax.tree.map(lambda line: jnp.where(moves, line[:, 1:], line[:, :-1]), profile)
