@@ -61,10 +61,11 @@ class ChainOfContacts:
         """Return ln T of all pieces: what neither end has to change stays."""
         level = self.level.copy()
         level[0], level[-1] = drive, base
-        for piece in range(1, len(level) - 1):
-            level[piece] = np.clip(level[piece], level[piece - 1] - self.limit, level[piece - 1] + self.limit)
-        for piece in range(len(level) - 2, 0, -1):
-            level[piece] = np.clip(level[piece], level[piece + 1] - self.limit, level[piece + 1] + self.limit)
+        inner = range(1, len(level) - 1)
+        for step, pieces in ((-1, inner), (1, reversed(inner))):
+            for piece in pieces:
+                beside = level[piece + step]
+                level[piece] = np.clip(level[piece], beside - self.limit, beside + self.limit)
         return level
 
     def _ways(self, level: np.ndarray, drawn: float) -> np.ndarray:

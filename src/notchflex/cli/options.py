@@ -371,6 +371,8 @@ class ExternalLoads:
         tip_mass: Mass that hangs at the tip [g]; along 0,0,-9.81 without --gravity.
         gravity: Gravity X,Y,Z in the world [m/s2]; the robot's own weight counts where
             material.density is known.
+        sheath_bend_deg: Total angle by which the sheaths of the tendons are bent [deg]; that of the
+            robot file where not given.
         following: Forces and moments turn with the body they act on, and are given in its frame.
     """
 
@@ -385,6 +387,9 @@ class ExternalLoads:
         float | None, number("a finite number of grams, 0 or more", "G", least=0.0)
     ] = None
     gravity: Annotated[Vector | None, vector("accelerations in m/s2")] = None
+    sheath_bend_deg: Annotated[
+        float | None, number("a finite angle in degrees, 0 or more", "DEG", least=0.0)
+    ] = None
     following: bool = False
 
     def __post_init__(self) -> None:
@@ -403,7 +408,7 @@ class ExternalLoads:
         """Return these loads as arguments of `notchflex.Load` and of `LoadPath.loaded`."""
         from notchflex import BodyForce
 
-        given = {name: value for name, value in vars(self).items() if value}
+        given = {name: value for name, value in vars(self).items() if value not in (None, ())}
         if forces := given.pop("body_force", ()):
             given["body_forces"] = [
                 BodyForce(body, force, point=point or (0.0, 0.0, 0.0), following=self.following)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import IntFlag
-from math import hypot, pi
+from math import hypot, pi, radians
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -264,8 +264,8 @@ def _bends(load: LoadPath, chain: Chain) -> Any:
     """Return the bend of the sheaths in every step, as `Command` has it."""
     if chain.sheath is None:
         return None
-    bends = [-180.0 / pi if each.sheath_bend_deg is None else each.sheath_bend_deg for each in load.different]
-    return np.radians(bends)[load.which]
+    bends = [external.sheath_bend_deg for external in load.different]
+    return np.array([-1.0 if bend is None else radians(bend) for bend in bends])[load.which]
 
 
 def _of_plane(frame: Float[Array, "3 3"]) -> tuple[np.ndarray, np.ndarray]:

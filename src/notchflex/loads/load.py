@@ -350,7 +350,8 @@ class Load(ExternalLoad):
         sheath_bend_deg: Total angle by which all sheaths are bent, deg; not given, it is that of
             the robot file. It changes where the shaft is moved.
 
-    With a sheath, tension and stroke are those of its drive. A tendon of which neither tension nor stroke is commanded hangs slack (0 N).
+    With a sheath, tension and stroke are those of its drive. A tendon of which neither tension nor
+    stroke is commanded hangs slack (0 N).
 
     Raises:
         InputError: A number that is not finite, text, an invalid external load, or a base turned

@@ -418,8 +418,9 @@ def external_words(load: ExternalLoad) -> list[str]:
         (any(load.tip_moment), f"tip moment {vector(load.tip_moment)} N mm{turning}"),
         (load.tip_mass, f"tip mass {short(load.tip_mass)} g{where_of_mass}"),
         (any(load.gravity or ()), f"gravity {vector(load.gravity or ())} m/s²"),
-        (load.sheath_bend_deg is not None, f"sheath bent by {short(load.sheath_bend_deg)} deg"),
     ]
+    if load.sheath_bend_deg is not None:
+        words.append((True, f"sheath bent by {short(load.sheath_bend_deg)} deg"))
     for force in load.body_forces:
         point = f" at {vector(force.point)} mm" if any(force.point) else ""
         body = f"on body {force.body}"

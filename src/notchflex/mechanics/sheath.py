@@ -75,19 +75,18 @@ def build_sheath(tendons: Sequence[Tendon]) -> Sheath | None:
     """Build the sheaths of all tendons; None where there is none."""
     if all(tendon.sheath_length is None for tendon in tendons):
         return None
+
+    def given(key: str, otherwise: float = 0.0) -> Array:
+        values = (getattr(tendon, key) for tendon in tendons)
+        return constant([otherwise if value is None else value for value in values])
+
+    stretch = 1.0 / given("sheath_wire_stiffness", np.inf) + 1.0 / given("sheath_stiffness", np.inf)
     return Sheath(
-        friction=constant([tendon.sheath_friction for tendon in tendons]),
-        bend=xp.radians(constant([tendon.sheath_bend_deg for tendon in tendons])),
-        compliance=constant([_compliance(tendon) for tendon in tendons]),
-        backlash=constant([tendon.backlash for tendon in tendons]),
+        friction=given("sheath_friction"),
+        bend=xp.radians(given("sheath_bend_deg")),
+        compliance=given("sheath_length") * stretch,
+        backlash=given("backlash"),
     )
-
-
-def _compliance(tendon: Tendon) -> float:
-    """Return the stretch of a wire in its sheath, with the compression of the sheath, mm/N."""
-    if tendon.sheath_length is None or tendon.sheath_wire_stiffness is None:
-        return 0.0
-    return tendon.sheath_length * (1.0 / tendon.sheath_wire_stiffness + 1.0 / tendon.sheath_stiffness)
 
 
 def slack_sheaths(tendons: int) -> SheathMemory:
@@ -103,7 +102,7 @@ def log_tension(tension: Float[Array, " t"]) -> Float[Array, " t"]:
 
 
 def within(memory: SheathMemory, limit: Float[Array, " t"]) -> Corners:
-    """Return the profiles where the friction has fallen to a limit: the wire slides from the base."""
+    """Return the profiles under a friction that may have fallen: the wire then slides."""
     widths, steps = jnp.diff(memory.place), jnp.diff(memory.level)
     steps = jnp.clip(steps, -limit[:, None] * widths, limit[:, None] * widths)
     rises = jnp.cumsum(steps, axis=1)
@@ -111,7 +110,7 @@ def within(memory: SheathMemory, limit: Float[Array, " t"]) -> Corners:
 
 
 def from_drive(profile: Corners, end: Float[Array, " t"], limit: Float[Array, " t"]) -> Corners:
-    """Return the profiles after the drives have brought ln T there to `end`, with one more corner."""
+    """Return the profiles, with a corner more, after drives have brought ln T there to `end`."""
     # The line ln T = end -+ limit * place covers the profile up to where it meets it.
     place, level = profile
     end, slope = end[:, None], limit[:, None]
@@ -165,6 +164,7 @@ def kept(profile: Corners) -> Corners:
         area = jnp.abs(before[:, :-1] * after[:, 1:] - before[:, 1:] * after[:, :-1])
         area = jnp.where(area < _ROUNDING, 0.0, area)
         dropped = 1 + jnp.argmin(area, axis=1, keepdims=True)
-        moves = jnp.arange(place.shape[1] - 1)[None] >= dropped
-        profile = jax.tree.map(lambda line: jnp.where(moves, line[:, 1:], line[:, :-1]), profile)
+        stays = jnp.arange(place.shape[1] - 1)[None] < dropped
+        place, level = (jnp.where(stays, line[:, :-1], line[:, 1:]) for line in profile)
+        profile = place, level
     return profile

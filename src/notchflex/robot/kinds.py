@@ -104,11 +104,12 @@ class Tendon:
             cross the inner or outer surface of the tube is refused.
         sheath_length: Length of the sheath that leads its wire from the drive to the base [mm];
             None for no sheath. Tensions and strokes are commanded and measured at the drive.
-        sheath_friction: Coefficient of friction between wire and sheath.
-        sheath_bend_deg: Total angle by which the sheath is bent [deg], turns to all sides added.
+        sheath_friction: Coefficient of friction between wire and sheath; None is 0.
+        sheath_bend_deg: Total angle by which the sheath is bent [deg], turns to all sides added;
+            None is 0.
         sheath_wire_stiffness: E A of the wire in the sheath [N].
-        sheath_stiffness: E A of the sheath under compression [N]; infinite is not compressed.
-        backlash: Way of the drive on every reversal before the wire follows [mm].
+        sheath_stiffness: E A of the sheath under compression [N]; None is rigid.
+        backlash: Way of the drive on every reversal before the wire follows [mm]; None is 0.
 
     Raises:
         InputError: A value is not allowed; or there is one of a sheath and no `sheath_length`.
@@ -152,34 +153,35 @@ class Tendon:
         quantity("mm", "length of the sheath from the drive to the base; left out: none", above=0),
     ] = None
     sheath_friction: Annotated[
-        Float, quantity("", "coefficient of friction of wire in sheath", at_least=0, usual=(0, 0.5))
-    ] = 0.0
+        Float | None,
+        quantity("", "coefficient of friction of wire in sheath", at_least=0, usual=(0, 0.5)),
+    ] = None
     sheath_bend_deg: Annotated[
-        Float, quantity("deg", "total angle by which the sheath is bent", at_least=0)
-    ] = 0.0
+        Float | None, quantity("deg", "total angle by which the sheath is bent", at_least=0)
+    ] = None
     sheath_wire_stiffness: Annotated[
         Float | None, quantity("N", "E A of the wire in the sheath", above=0)
     ] = None
     sheath_stiffness: Annotated[
-        FloatOrInf, quantity("N", "E A of the sheath under compression; inf is rigid", above=0)
-    ] = math.inf
+        Float | None, quantity("N", "E A of the sheath under compression; left out: rigid", above=0)
+    ] = None
     backlash: Annotated[
-        Float, quantity("mm", "way of the drive on a reversal before the wire follows", at_least=0)
-    ] = 0.0
+        Float | None,
+        quantity("mm", "way of the drive on a reversal before the wire follows", at_least=0),
+    ] = None
 
     def conflicts(self) -> Problems:
         """Find a sheath without a wire, and values of a sheath that is not there."""
-        if self.sheath_length is not None:
-            if self.sheath_wire_stiffness is None:
-                yield (
-                    "sheath_wire_stiffness",
-                    "is missing; give E A of the wire in the sheath [N]: a steel wire of 0.3 mm "
-                    "has 14000 N.",
-                )
-            return
-        for key in (*_OF_SHEATH, "backlash"):
-            if getattr(self, key) not in (None, 0.0, math.inf):
-                yield key, "needs a sheath; give sheath_length [mm], or leave the key out."
+        if self.sheath_length is None:
+            for key in (*_OF_SHEATH, "backlash"):
+                if getattr(self, key) is not None:
+                    yield key, "needs a sheath; give sheath_length [mm], or leave the key out."
+        elif self.sheath_wire_stiffness is None:
+            yield (
+                "sheath_wire_stiffness",
+                "is missing; give E A of the wire in the sheath [N]: a steel wire of 0.3 mm has "
+                "14000 N.",
+            )
 
 
 _OF_SHEATH = "sheath_friction", "sheath_bend_deg", "sheath_wire_stiffness", "sheath_stiffness"

@@ -19,7 +19,8 @@ from notchflex.solver.newton import (
     newton,
     predict_log_ratios,
 )
-from notchflex.solver.residual import Iterate, Memory, SolverState, aimed, state_after
+from notchflex.solver.residual import Iterate, Memory, SolverState
+from notchflex.solver.sheaths import aimed, state_after
 
 
 class LoadStepResult(NamedTuple):

@@ -30,14 +30,8 @@ from notchflex.solver.linear_step import (
 )
 from notchflex.solver.programs.compiled import Native
 from notchflex.solver.programs.prepare import PreparedChain
-from notchflex.solver.residual import (
-    Memory,
-    SolverState,
-    aimed,
-    bound_side,
-    command_slopes,
-    evaluate,
-)
+from notchflex.solver.residual import Memory, SolverState, bound_side, command_slopes, evaluate
+from notchflex.solver.sheaths import aimed
 
 # Springs this much stiffer than the notches hold closed contacts and tendons driven by stroke;
 # otherwise their forces would be multipliers and the stiffness undefined.

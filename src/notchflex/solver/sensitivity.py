@@ -16,7 +16,8 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import interpolate_command
 from notchflex.solver.linear_step import linear_step
-from notchflex.solver.residual import Memory, SolverState, aimed, evaluate, state_after, stroke
+from notchflex.solver.residual import Memory, SolverState, evaluate, stroke
+from notchflex.solver.sheaths import aimed, state_after
 
 
 def attach_derivatives(

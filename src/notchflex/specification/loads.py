@@ -24,7 +24,8 @@ from notchflex.support import (
 
 _DRIVES = ("tension", "stroke")
 _VECTORS = ("tip_force", "tip_moment", "tip_point", "gravity")
-LOAD_KEYS = (*_DRIVES, "base_rotation", *_VECTORS, "tip_mass", "body_force", "following")
+_NUMBERS = "tip_mass", "sheath_bend_deg"
+LOAD_KEYS = (*_DRIVES, "base_rotation", *_VECTORS, *_NUMBERS, "body_force", "following")
 """Keys of a load in a file."""
 
 LoadTables = Annotated[dict[str, dict[str, Any]], Field(min_length=1, max_length=100)]
@@ -82,7 +83,7 @@ def _with_external(path: LoadPath, table: Mapping[str, Any]) -> LoadPath:
     ]
     return path.loaded(
         **{key: _vector(key, table[key]) for key in _VECTORS if key in table},
-        tip_mass=table.get("tip_mass"),
+        **{key: table.get(key) for key in _NUMBERS},
         body_forces=forces or None,
         following=following if {"tip_force", "tip_moment"} & {*table} else None,
     )

@@ -38,6 +38,7 @@ _LOADS = {
     "following": "following",
     "tip_mass": "tip_mass_g",
     "gravity": "gravity_{axis}_m_s2",
+    "sheath_bend_deg": "sheath_bend_deg",
 }
 _ON_BODIES = {
     "force": "body_{body}_force_{axis}_N",
