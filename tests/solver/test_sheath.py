@@ -229,13 +229,19 @@ def test_states_and_batches_know_the_sheath(tmp_path, margin):
     )
     for name in ("stroke", "base_tension", "total_angle"):
         margin.within(f"batch, {name}", rows[name][1] - getattr(path, name), 1e-9)
-    stepper = nf.Stepper(robot, ("stroke", "base_tension"))
+    stepper = nf.Stepper(robot, ("stroke", "total_angle"))
     step_state = stepper.rest()
     for number, tension in enumerate(drive):
         step = stepper.step(step_state, [tension])
         step_state = step.state
         np.testing.assert_array_equal(step.values["stroke"], path.stroke[number])
         assert stepper.drives_of(step_state) == tension
+    low, high = stepper.dead_band(step_state)[0]
+    ends = [stepper.step(step_state, [side]).values for side in (1.01 * low, 0.99 * high)]
+    beyond = [stepper.step(step_state, [side]).values for side in (0.99 * low, 1.01 * high)]
+    here = path.total_angle[-1]
+    assert max(abs(end["total_angle"] - here) for end in ends) < 1e-9
+    assert min(abs(end["total_angle"] - here) for end in beyond) > 1e-5
 
 
 NUMBERS = (

@@ -353,6 +353,7 @@ def tendon_command(option: str, *, negative: bool = False) -> Parameter:
 
 Tensions = Annotated[tuple[TendonCommand, ...], tendon_command("--tension")]
 Strokes = Annotated[tuple[TendonCommand, ...], tendon_command("--stroke", negative=True)]
+Spools = Annotated[tuple[TendonCommand, ...], tendon_command("--spool", negative=True)]
 
 
 @Parameter(name="*", group=LOADS)

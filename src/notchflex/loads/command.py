@@ -380,9 +380,10 @@ class Command(NamedTuple):
         return jnp.where(self.by_stroke, by_stroke, by_tension)
 
 
-def tension_commands(tension: Float[np.ndarray, "s t"]) -> Command:
+def tension_commands(tension: Float[np.ndarray, "s t"], chain: Chain) -> Command:
     """Return commands of tensions alone (N), loads as leading axis."""
-    return Command(constant(tension), None, None)
+    none: Any = None if chain.sheath is None else np.zeros(tension.shape, bool)
+    return Command(constant(tension), none, None, none if none is None else -np.ones(len(tension)))
 
 
 def make_commands(load: LoadPath, robot: Robot, chain: Chain) -> Command:

@@ -101,6 +101,12 @@ class Chain(Pytree):
         return self.axial_stiffness.shape[0]
 
     @property
+    def inextensible(self) -> Array:
+        """Whether each tendon keeps its length, that of its wire in a sheath included."""
+        rigid = xp.isinf(self.axial_stiffness)
+        return rigid if self.sheath is None else rigid & (self.sheath.compliance == 0.0)
+
+    @property
     def tendon_order(self) -> Int[Array, " t"]:
         """Numbers of the tendons, group by group."""
         return xp.array([number for group in self.groups for number in group.numbers], int)

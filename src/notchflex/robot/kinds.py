@@ -187,6 +187,27 @@ class Tendon:
 _OF_SHEATH = "sheath_friction", "sheath_bend_deg", "sheath_wire_stiffness", "sheath_stiffness"
 
 
+@part(kw_only=True)
+class Drive:
+    """Two tendons on one spool: what it draws of one it releases of the other.
+
+    Args:
+        tendon: The tendon that it draws where it turns forward, counted from 1.
+        antagonist: The tendon that it releases then.
+        pretension: Tension of both drives where it stands at 0 [N].
+
+    Example:
+        >>> Drive(tendon=1, antagonist=2, pretension=0.5).antagonist
+        2
+    """
+
+    tendon: Annotated[Int, Field(ge=1, description="tendon that is drawn forward, from 1")]
+    antagonist: Annotated[Int, Field(ge=1, description="tendon that is released then, from 1")]
+    pretension: Annotated[
+        Float, quantity("N", "tension of both where the spool stands at 0", above=0)
+    ]
+
+
 # What parts are cited by.
 PACHECO = (
     "Pacheco, Gafford, Atalla, Webster, Fichera: Beyond Constant Curvature: A New Mechanics Model "

@@ -15,6 +15,7 @@ from notchflex.errors import InputError, InputWarning
 from notchflex.robot.kinds import (
     PRINTABLE,
     Drawing,
+    Drive,
     Friction,
     Material,
     Notch,
@@ -57,6 +58,7 @@ class Robot:
         tolerance: How far values may lie from these, by name, such as `{"notch.depth": 0.01}`;
             see `notchflex.uncertain`.
         drawing: What the title block of its drawing says.
+        drive: Spools that drive two tendons each; see `notchflex.spool_path`.
 
     Raises:
         InputError: A value is not allowed; the message names it as `--set` does.
@@ -89,6 +91,7 @@ class Robot:
     drawing: Annotated[Drawing, Field(description="what the title block of a drawing says")] = (
         Drawing()
     )
+    drive: Annotated[tuple[Drive, ...], Field(description="spools of two tendons each")] = ()
 
     def conflicts(self) -> Problems:
         """Find parts that do not fit each other."""
@@ -178,7 +181,7 @@ class Robot:
 
         Args:
             parts: New values for any of `name`, `tube`, `notch`, `tendon`, `material`, `friction`,
-                `tolerance` and `drawing`.
+                `tolerance`, `drawing` and `drive`.
 
         Raises:
             InputError: A value is not allowed, or there is no such part.

@@ -222,7 +222,7 @@ def _result_after(
     overdrawn = result.overdrawn
     if target.by_stroke is not None:
         least = chain.closing_force * jnp.maximum(_OVERDRAWN, new.residual / _BALANCED)
-        pulled = (new.point.base_tension > least) & jnp.isinf(chain.axial_stiffness)
+        pulled = (new.point.base_tension > least) & chain.inextensible
         overdrawn = target.by_stroke & pulled
     success = result._replace(
         solved=state_after(

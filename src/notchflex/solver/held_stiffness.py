@@ -158,7 +158,7 @@ def _independent(
 ) -> Bool[np.ndarray, " s"]:
     """Return whether the strokes of the inextensible tendons that are held are independent."""
     nearly = _NEARLY_HELD * float(np.asarray(chain.rods.length).sum(axis=-1).min())
-    held = by_stroke & np.isinf(np.asarray(chain.axial_stiffness)) & (missing < nearly)
+    held = by_stroke & np.asarray(chain.inextensible) & (missing < nearly)
     scaled = strokes / np.sqrt(np.asarray(chain.stiffness).ravel())
     scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=-1, keepdims=True), 1e-300)
     return np.array(

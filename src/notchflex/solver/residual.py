@@ -649,5 +649,5 @@ def tension_is_bounded(chain: Chain, command: Command, point: Iterate) -> Bool[A
     if command.by_stroke is None:
         return True
     limit = _MAX_CLOSING_FORCES * chain.closing_force
-    limit = jnp.where(chain.axial_stiffness < jnp.inf, jnp.inf, limit)
+    limit = jnp.where(chain.inextensible, limit, jnp.inf)
     return jnp.all(jnp.where(command.by_stroke, point.base_tension, 0.0) <= limit)

@@ -20,9 +20,11 @@ from notchflex.cli.options import (
     File,
     PathOutputs,
     Refinement,
+    Spools,
     StateFile,
     Strokes,
     Tensions,
+    exclude,
     integer,
     save_state,
     vector,
@@ -65,6 +67,7 @@ def simulate(
     *,
     tension: Tensions = (),
     stroke: Strokes = (),
+    spool: Spools = (),
     base_rotation: Annotated[Vector | None, vector("angles in deg", "RX,RY,RZ")] = None,
     external: ExternalLoads = NO_LOADS,
     refinement: Refinement = 0,
@@ -88,6 +91,9 @@ def simulate(
             ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. For one of several tendons
             `1=SPEC`; those without hang slack.
         stroke: Tendon length drawn out at the base [mm], step by step; written as --tension.
+        spool: Way of a spool that drives two tendons ([[drive]] of the robot file) from where both
+            have its pretension [mm], step by step; written as --stroke. A step with the pretension
+            comes first.
         base_rotation: Turn the base by a rotation vector RX,RY,RZ [deg], for example `90,0,0`.
         uncertain: Carry the tolerances of the robot (its [tolerance] table, else assumed ones)
             through all steps: table, picture, CSV and JSON have the 5th, 50th and 95th percentile.
@@ -106,7 +112,9 @@ def simulate(
     chosen = chosen_robot(robot, settings)
     title = changed_title(chosen, settings)
     robots = beside_robots(chosen, robot, beside)
-    if external != NO_LOADS and not tension and not stroke:
+    if spool and (tension or stroke):
+        raise exclude("--spool", "--tension" if tension else "--stroke")
+    if external != NO_LOADS and not (tension or stroke or spool):
         tension = (TendonCommand("--tension", 1, [math.nan]),)  # all hang slack, in one step
     if uncertain and (beside or from_state is not None):
         excluded = "--beside" if beside else "--from-state"
@@ -115,7 +123,8 @@ def simulate(
         )
     if draws is not None and not uncertain:
         raise InputError.CONFLICT("--draws counts the robots of --uncertain; give both or neither.")
-    tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
+    what, count = ("spool", len(chosen.drive)) if spool else ("tendon", chosen.number_of_tendons)
+    tensions, strokes = load_columns(tension or spool, stroke, count, what)
     outputs.check(
         robot_files(robot, *(variant.robot for variant in beside)),
         pictures=PAPER + BROWSER + (() if beside else MOVING),  # several robots do not move
@@ -133,6 +142,9 @@ def simulate(
 
         start = None if from_state is None else _start(from_state)
         turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
+        if spool:
+            ahead = analysis.spool_path(chosen, np.nan_to_num(tensions))
+            tensions, strokes = ahead.tension, ahead.stroke
         load = LoadPath(tensions, strokes, turn).loaded(**external.arguments())
         if uncertain:
             more: dict[str, Any] = {} if draws is None else {"draws": draws}
