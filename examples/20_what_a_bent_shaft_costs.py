@@ -1,4 +1,4 @@
-"""How much tension and stroke does the sheath before a wrist take, and what if its shaft is bent?"""
+"""How much tension and stroke does the sheath before a wrist take, straight and bent?"""
 
 from math import degrees
 

@@ -17,13 +17,13 @@ FOLDER = Path(nf.__file__).parent
 # fmt: off
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
-    "Drawing", "Geometry", "RobotShape",
+    "Drawing", "Drive", "Geometry", "RobotShape",
     "Linear", "Superelastic", "Nitinol", "StressStrain", "Frictionless", "Capstan", "Load",
     "LoadPath", "pull", "solve",
     "simulate", "Equilibrium", "EquilibriumPath", "State", "tip_from_angles", "equal_stroke",
     "closing", "annular_sector", "annular_segment", "Section", "InputError",
     "InputWarning", "RobotFileError",
-    "plot", "stroke_path", "solve_each", "Batch", "solve_batch", "simulate_batch",
+    "plot", "stroke_path", "spool_path", "solve_each", "Batch", "solve_batch", "simulate_batch",
     "uncertain", "Bands", "Band",
     "Differentiable", "differentiable", "TipResponse", "tip_response", "Step", "Stepper", "batch",
     "PathGradient",

@@ -1,7 +1,7 @@
 """Draws the pictures of the pages on sweeps, tolerances, sensing, sheaths and workspaces.
 
-`python docs/make/analyses.py [FOLDER]` writes to docs/images; FOLDER has the measured angles of Pacheco 2021, which one
-picture needs.
+`python docs/make/analyses.py [FOLDER]` writes to docs/images; FOLDER has the measured angles of
+Pacheco 2021, which one picture needs.
 """
 
 from __future__ import annotations
@@ -78,14 +78,14 @@ def transmission(by_tension: Axes, by_stroke: Axes, along: Axes) -> None:
         angle = np.degrees(path.total_angle)
         by_tension.plot(path.tension, angle, color=colour, lw=1.0, label=f"{bend:.0f} deg")
         by_stroke.plot(path.stroke, angle, color=colour, lw=1.0)
-    by_tension.legend(title="bend of the sheath")
+    by_tension.legend()
     for step, label in ((81, "pulled"), (110, "let go"), (150, "pulled again")):
         memory = path.run.solved.memory.sheath
         along.plot(memory.place[step, 0], np.exp(memory.level[step, 0]), lw=1.0, label=label)
     along.legend()
     by_tension.set(xlabel="tension of the drive [N]", ylabel=TOTAL)
     by_stroke.set(xlabel="way of the drive [mm]", ylabel=TOTAL)
-    along.set(xlabel="place in the sheath, drive to base", ylabel="tension of the wire [N]")
+    along.set(xlabel="place: drive to base", ylabel="tension of the wire [N]")
 
 
 @picture("accuracy.svg", 7.2, 2.9, columns=3)

@@ -31,7 +31,12 @@ def sums(load, *, robot=ROBOT, mass=None, centre=None) -> BodyLoads:
     mass = np.zeros(BODIES) if mass is None else mass
     centre = np.zeros((BODIES, 3)) if centre is None else centre
     chain: Any = SimpleNamespace(
-        body_mass=mass, body_centre=centre, body_length=LENGTH, frame=None, loaded=True
+        body_mass=mass,
+        body_centre=centre,
+        body_length=LENGTH,
+        frame=None,
+        loaded=True,
+        sheath=None,
     )
     command = make_commands(load_path(load, robot.number_of_tendons), robot, chain)
     assert command.applied is not None

@@ -20,7 +20,8 @@ def spool_path(robot: Robot, ways: ArrayLike) -> LoadPath:
 
     Args:
         robot: A robot with `drive` in its description.
-        ways: Ways of the spools, mm: steps by spools; of a single spool a list of steps.
+        ways: Ways of the spools, mm: steps by spools, NaN for one that stands at 0; of a single
+            spool a list of steps.
 
     Returns:
         The path: the pretension, then a step for each row of `ways`. Other tendons hang slack.
@@ -41,7 +42,7 @@ def spool_path(robot: Robot, ways: ArrayLike) -> LoadPath:
     drives = check_is_robot(robot).drive
     if not drives:
         raise InputError.NO_DATA(f"{robot.name} has no spool; give [[drive]] in its robot file")
-    table = check_table(ways, "the ways of spools")
+    table = np.nan_to_num(check_table(ways, "the ways of spools"))
     table = table[:, None] if table.ndim == 1 else table
     if table.ndim != 2 or table.shape[1] != len(drives):
         raise InputError.WRONG_SHAPE(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -123,8 +123,8 @@ def simulate(
         )
     if draws is not None and not uncertain:
         raise InputError.CONFLICT("--draws counts the robots of --uncertain; give both or neither.")
-    what, count = ("spool", len(chosen.drive)) if spool else ("tendon", chosen.number_of_tendons)
-    tensions, strokes = load_columns(tension or spool, stroke, count, what)
+    driven = ("spool", chosen.drive) if spool else ("tendon", chosen.tendon)
+    tensions, strokes = load_columns(tension or spool, stroke, len(driven[1]), driven[0])
     outputs.check(
         robot_files(robot, *(variant.robot for variant in beside)),
         pictures=PAPER + BROWSER + (() if beside else MOVING),  # several robots do not move
@@ -142,10 +142,8 @@ def simulate(
 
         start = None if from_state is None else _start(from_state)
         turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
-        if spool:
-            ahead = analysis.spool_path(chosen, np.nan_to_num(tensions))
-            tensions, strokes = ahead.tension, ahead.stroke
-        load = LoadPath(tensions, strokes, turn).loaded(**external.arguments())
+        load = analysis.spool_path(chosen, tensions) if spool else LoadPath(tensions, strokes)
+        load = replace(load, base_rotation=turn).loaded(**external.arguments())
         if uncertain:
             more: dict[str, Any] = {} if draws is None else {"draws": draws}
             bands = analysis.uncertain(
