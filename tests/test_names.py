@@ -35,5 +35,6 @@ def test_few_files_of_the_solver_know_the_tension_at_the_base() -> None:
         "newton.py",
         "quantities.py",
         "residual.py",
+        "sheaths.py",
         "solved_state.py",
     }

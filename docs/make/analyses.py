@@ -1,7 +1,7 @@
-"""Draws the pictures of the pages on sweeps, tolerances, sensing and workspaces into docs/images.
+"""Draws the pictures of the pages on sweeps, tolerances, sensing, sheaths and workspaces.
 
-`python docs/make/analyses.py [FOLDER]`; FOLDER has the measured angles of Pacheco 2021, which one
-picture needs.
+`python docs/make/analyses.py [FOLDER]` writes to docs/images; FOLDER has the measured angles of
+Pacheco 2021, which one picture needs.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from pictures import HOLLOW, IMAGES, beside, label_all, picture, shown_file
+from pictures import HOLLOW, IMAGES, TOTAL, beside, label_all, picture, shown_file
 
 import notchflex as nf
 from notchflex.plotting import sensed_picture, sweep_picture
@@ -60,6 +60,32 @@ def workspace(images: Path = IMAGES) -> None:
     """The workspace of the two-axis wrist."""
     robot = nf.load_robot("two-axis-wrist")
     nf.plot(nf.workspace(robot, states=20_000, stiffness=300)).save(images / "workspace.png")
+
+
+@picture("transmission.svg", 7.2, 2.9, columns=3)
+def transmission(by_tension: Axes, by_stroke: Axes, along: Axes) -> None:
+    """Loops of wrist A behind the sheath of the page, at three bends, and ln T along the sheath."""
+    sheath = {
+        "length": 1000.0, "friction": 0.15, "bend_deg": 180.0, "wire_stiffness": 14137.0
+    }  # fmt: skip
+    named = {f"tendon.sheath_{key}": value for key, value in sheath.items()}
+    wrist = nf.load_robot("pacheco2021-a").with_values(named)
+    up, down = np.linspace(0.0, 2.0, 81), np.linspace(2.0, 0.0, 81)
+    part = np.concatenate([up, down[:50], np.linspace(down[49], 1.6, 40), np.linspace(1.6, 0, 60)])
+    for bend, colour in ((0.0, BLUE), (90.0, GREEN), (180.0, VERMILLION)):
+        loads = [nf.Load(tension=tension, sheath_bend_deg=bend) for tension in part]
+        path = nf.simulate(wrist, loads).raise_if_failed()
+        angle = np.degrees(path.total_angle)
+        by_tension.plot(path.tension, angle, color=colour, lw=1.0, label=f"{bend:.0f} deg")
+        by_stroke.plot(path.stroke, angle, color=colour, lw=1.0)
+    by_tension.legend()
+    for step, label in ((81, "pulled"), (110, "let go"), (150, "pulled again")):
+        memory = path.run.solved.memory.sheath
+        along.plot(memory.place[step, 0], np.exp(memory.level[step, 0]), lw=1.0, label=label)
+    along.legend()
+    by_tension.set(xlabel="tension of the drive [N]", ylabel=TOTAL)
+    by_stroke.set(xlabel="way of the drive [mm]", ylabel=TOTAL)
+    along.set(xlabel="place: drive to base", ylabel="tension of the wire [N]")
 
 
 @picture("accuracy.svg", 7.2, 2.9, columns=3)
@@ -114,7 +140,7 @@ def accuracy(*axes: Axes, measured: Path) -> None:
 
 
 if __name__ == "__main__":
-    for draw in (sweep, tolerances, sensing, workspace):
+    for draw in (sweep, tolerances, sensing, workspace, transmission):
         draw()
     if len(sys.argv) > 1:
         accuracy(measured=Path(sys.argv[1]))

@@ -17,6 +17,7 @@ from page import rewrite, table
 
 PAGE = "../robot_file.md"  # from the folder of page.py
 SINGLE = ("Tube", "Tendon", "Fatigue", "Drawing")
+SINGLE = ("Tube", "Tendon", "Drive", "Drawing")
 KINDS = ("notch", "material", "friction")
 
 
@@ -40,7 +41,9 @@ def _top(schema: dict[str, Any]) -> str:
         else:
             single = f"`[{key}]`" if value.get("type") == "object" else f'`{key} = "..."`'
             written = f"`[[{key}]]`" if several else single
-        number = "one or more" if several else "one" if key in schema["required"] else "none or one"
+        needed = key in schema["required"]
+        least = "one" if needed else "none"
+        number = f"{least} or more" if several else "one" if needed else "none or one"
         rows.append((written, number, MEANING[key]))
     return table(("written", "how many", "meaning"), rows)
 
@@ -55,6 +58,7 @@ MEANING = {
     "tolerance": "how far values may lie from these, by name: see below",
     "fatigue": "the limit line that its [strain cycles](fatigue.md) are compared with",
     "drawing": "what the title block of a drawing says",
+    "drive": "spools that drive two tendons each: see [Sheaths and spools](transmission.md)",
 }
 
 

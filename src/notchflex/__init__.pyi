@@ -22,6 +22,7 @@ from notchflex.analysis import simulate_batch as simulate_batch
 from notchflex.analysis import solve as solve
 from notchflex.analysis import solve_batch as solve_batch
 from notchflex.analysis import solve_each as solve_each
+from notchflex.analysis import spool_path as spool_path
 from notchflex.analysis import tip_from_angles as tip_from_angles
 from notchflex.analysis import tip_response as tip_response
 from notchflex.analysis import uncertain as uncertain
@@ -110,6 +111,7 @@ from notchflex.robot import Capstan as Capstan
 from notchflex.robot import Corner as Corner
 from notchflex.robot import Drawing as Drawing
 from notchflex.robot import Fatigue as Fatigue
+from notchflex.robot import Drive as Drive
 from notchflex.robot import Frictionless as Frictionless
 from notchflex.robot import Linear as Linear
 from notchflex.robot import Nitinol as Nitinol

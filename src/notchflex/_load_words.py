@@ -146,7 +146,10 @@ def read_command(option: str, negative: bool, text: str) -> TendonCommand:
 
 
 def load_columns(
-    tension: Sequence[TendonCommand], stroke: Sequence[TendonCommand], tendons: int
+    tension: Sequence[TendonCommand],
+    stroke: Sequence[TendonCommand],
+    tendons: int,
+    what: str = "tendon",
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the commanded tensions and strokes of every step.
 
@@ -166,10 +169,10 @@ def load_columns(
     commanded: dict[int, str] = {}
     for kind, commands in enumerate((tension, stroke)):
         for source, number, steps in commands:
-            tendon = _tendon(source, number, tendons)
+            tendon = _tendon(source, number, tendons, what)
             if tendon in commanded:
                 raise InputError.CONFLICT(
-                    f"{source}: tendon {tendon} already has {commanded[tendon]}; give each tendon "
+                    f"{source}: {what} {tendon} already has {commanded[tendon]}; give each {what} "
                     "one tension or one stroke."
                 )
             if len(steps) not in (1, len(longest.steps)):
@@ -182,9 +185,9 @@ def load_columns(
     return tables[0], tables[1]
 
 
-def _tendon(source: str, number: int | None, tendons: int) -> int:
-    """Return the tendon of a command, counted from 1."""
-    has = "1 tendon" if tendons == 1 else f"{tendons} tendons"
+def _tendon(source: str, number: int | None, tendons: int, what: str) -> int:
+    """Return the tendon or spool of a command, counted from 1."""
+    has = f"{tendons} {what}{'s' * (tendons != 1)}"
     if number is None and tendons > 1:
         option, _, text = source.partition(" ")
         raise InputError.MISSING_VALUE(
@@ -193,7 +196,7 @@ def _tendon(source: str, number: int | None, tendons: int) -> int:
     chosen = 1 if number is None else number
     if not 1 <= chosen <= tendons:
         raise InputError.UNKNOWN_NAME(
-            f"{source}: there is no tendon {chosen}; the robot has {has}."
+            f"{source}: there is no {what} {chosen}; the robot has {has}."
         )
     return chosen
 

@@ -369,3 +369,21 @@ def test_strain_cycle():
     """Mean and amplitude from rest to the strain e are e / 2: 0.55 % - 0.13 e / 2 = e / 2."""
     names, _ = ran(23)
     assert names["bent"].peak_strain.max() == pytest.approx(2.0 * 0.0055 / 1.13, abs=1e-7)
+
+
+def test_what_a_bent_shaft_costs(margin):
+    """Tensions, and stretch while the wire slides one way, are those of Euler's rope."""
+    names, printed = ran(20)
+    loop, limit = names["loop"], 0.15 * np.pi
+    drive, base = loop.tension[:, 0], loop.base_tension[:, 0]
+    held = np.clip(1.5 * np.exp(-limit), None, drive * np.exp(limit))
+    margin.within("base", base - held, 1e-12, "N")
+    wire = 1000.0 / 14137.0 * np.abs(drive - base) / limit
+    stretch = (loop.stroke - loop.base_stroke)[:, 0]
+    margin.within("stretch", (stretch - wire)[[0, 4, 5]], 1e-12, "mm")
+    # The base falls at 0.58 N; the first contact of the wrist holds on until 0.5 N.
+    moved = np.abs(loop.total_angle - loop.total_angle[0]) > 1e-9
+    assert moved.tolist() == [False] * 5 + [True]
+    assert (held < held[0]).tolist() == [False] * 4 + [True] * 2
+    angle, _ = A.pull(1.5 * np.exp(-2.0 * limit))
+    assert f"bent by 360 deg: {np.degrees(np.sum(angle)):5.1f} deg" in printed

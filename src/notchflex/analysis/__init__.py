@@ -17,6 +17,7 @@ from notchflex.analysis.kinematics import (
 )
 from notchflex.analysis.slopes import PathGradient
 from notchflex.analysis.solve import simulate, solve, solve_each
+from notchflex.analysis.spool import spool_path
 from notchflex.analysis.stepping import Step, Stepper
 from notchflex.analysis.tangent import Kink
 
@@ -48,6 +49,7 @@ __all__ = [
     "solve",
     "solve_batch",
     "solve_each",
+    "spool_path",
     "tip_from_angles",
     "tip_response",
     "uncertain",

@@ -344,7 +344,7 @@ def _tensions(
         value = np.zeros((chain.flexures, chain.tendons))
         value[rows, tendon[searched]] = np.resize(tension, chain.flexures)
         force, gap, converged = solve_contacts(
-            ready, tension_commands(value), ready.rest, Settings()
+            ready, tension_commands(value, chain), ready.rest, Settings()
         )
         overlap = force[rows, searched] / stiffness[searched] - gap[rows, searched]
         return np.where(converged, overlap, np.nan)[: len(notches)]
@@ -406,7 +406,9 @@ def _pull(
     """Compute every notch's overlap (contact force / stiffness - gap, mm) and angle (rad)."""
     value = np.zeros((len(tensions), ready.chain.tendons))
     value[:, tendon] = tensions
-    states = run(ready, tension_commands(value), ready.rest, Settings(), each_from_start=False)
+    states = run(
+        ready, tension_commands(value, ready.chain), ready.rest, Settings(), each_from_start=False
+    )
     stiffness = np.asarray(ready.chain.contact_stiffness)
     overlap = states.quantity("contact_force") / stiffness - states.quantity("gap")
     converged = states.converged[:, None]

@@ -267,7 +267,8 @@ def _packed(path: EquilibriumPath, by: BodyLoads) -> Float[np.ndarray, "k s comm
     """Pack changes of the loads on bodies."""
     commands = path.commands
     none: Any = np.zeros((len(by.dead_force), *np.shape(commands.target)))
-    still = Command(none, None if commands.by_stroke is None else none, by)
+    bend = None if commands.bend is None else none[..., 0]
+    still = Command(none, None if commands.by_stroke is None else none, by, bend)
     return path.prepared.command_layout(commands).pack(still, leading=2)
 
 

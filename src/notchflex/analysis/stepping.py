@@ -273,8 +273,9 @@ class Stepper(Displayed):
         """Return between which drives nothing moves, while those of the other tendons stay.
 
         There the first contact of a tendon sticks: its tension passes nothing on until it has
-        changed by the friction of that contact. A stroke always moves something. With a
-        `constant_loss` of friction the band is approximate, to a part of that loss.
+        changed by the friction of that contact, and by that of its sheath. A stroke always moves
+        something: for one behind a sheath there is no band, though the robot may stand still. With
+        a `constant_loss` of friction the band is approximate, to a part of that loss.
 
         Args:
             state: A state of this stepper.
@@ -283,6 +284,10 @@ class Stepper(Displayed):
             Lowest and highest drive as last axis, N or mm.
         """
         ratio, bound = state[..., self.contact_places[:2, :, 0]].swapaxes(0, -2)
+        places: Any = self.prepared.state.unpack_indices()
+        if (sheath := places.memory.sheath) is not None:
+            ratio = ratio + state[..., sheath.level[:, 0]] - state[..., sheath.level[:, -1]]
+            bound = bound + state[..., sheath.limit]
         return np.stack(dead_band(self.drives_of(state), ratio, bound, self._by_stroke), axis=-1)
 
     def path(self, state: Float[np.ndarray, " state"], drives: Any) -> EquilibriumPath:
@@ -399,7 +404,7 @@ class Stepper(Displayed):
     @cached_property
     def _drive_places(self) -> Int[np.ndarray, " t"]:
         indices: Any = self.prepared.state.unpack_indices()
-        return np.where(self._by_stroke, indices.stroke, indices.point.base_tension)
+        return np.where(self._by_stroke, indices.stroke, indices.tension)
 
     @cached_property
     def _one_load(self) -> LoadPath:

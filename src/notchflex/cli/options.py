@@ -354,6 +354,7 @@ def tendon_command(option: str, *, negative: bool = False) -> Parameter:
 
 Tensions = Annotated[tuple[TendonCommand, ...], tendon_command("--tension")]
 Strokes = Annotated[tuple[TendonCommand, ...], tendon_command("--stroke", negative=True)]
+Spools = Annotated[tuple[TendonCommand, ...], tendon_command("--spool", negative=True)]
 
 
 @Parameter(name="*", group=LOADS)
@@ -374,6 +375,8 @@ class ExternalLoads:
             material.density is known.
         temperature: Temperature of the robot [deg C]: one for all steps, or start:stop:count and
             values joined by commas for each; needs material.reference_temperature.
+        sheath_bend_deg: Total angle by which the sheaths of the tendons are bent [deg]; that of the
+            robot file where not given.
         following: Forces and moments turn with the body they act on, and are given in its frame.
     """
 
@@ -389,6 +392,9 @@ class ExternalLoads:
     ] = None
     gravity: Annotated[Vector | None, vector("accelerations in m/s2")] = None
     temperature: Annotated[list[float] | None, converted(parse_spec, "SPEC")] = None
+    sheath_bend_deg: Annotated[
+        float | None, number("a finite angle in degrees, 0 or more", "DEG", least=0.0)
+    ] = None
     following: bool = False
 
     def __post_init__(self) -> None:
@@ -407,7 +413,7 @@ class ExternalLoads:
         """Return these loads as arguments of `notchflex.Load` and of `LoadPath.loaded`."""
         from notchflex import BodyForce
 
-        given = {name: value for name, value in vars(self).items() if value}
+        given = {name: value for name, value in vars(self).items() if value not in (None, ())}
         if forces := given.pop("body_force", ()):
             given["body_forces"] = [
                 BodyForce(body, force, point=point or (0.0, 0.0, 0.0), following=self.following)

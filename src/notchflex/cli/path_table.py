@@ -219,7 +219,10 @@ def path_columns(path: EquilibriumPath, rows: Sequence[int], name: str) -> list[
     unit = "%" if name in PERCENT else quantity.unit
     form = FORMS.get(unit, ".4g")
     short = HEADS.get(name, "")
-    meaning = f"{short}{': ' * bool(short)}{MEANINGS.get(name, quantity.title)}"
+    text = MEANINGS.get(name, quantity.title)
+    if path.chain.sheath is not None and name in MEANINGS:
+        text = text.replace("at the base", "at its drive")
+    meaning = f"{short}{': ' * bool(short)}{text}"
     meaning += f" [{unit}]" if unit else ""
     # Of a step that was not solved, what was commanded.
     command = QUANTITIES.get(f"commanded_{name}")

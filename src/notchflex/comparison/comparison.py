@@ -18,7 +18,14 @@ from notchflex.support import DEGREES, QUANTITIES, document_head
 Numbers = Float[np.ndarray, "..."]
 
 # Quantities without a column of their own in a comparison: only their errors are kept.
-_OTHERS = ("edge_angle", "tip_rotation", "tip_tension", "axis_points")
+_OTHERS = (
+    "edge_angle",
+    "tip_rotation",
+    "tip_tension",
+    "drive_tension",
+    "drive_stroke",
+    "axis_points",
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -12,7 +12,7 @@ import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import IntFlag
-from math import hypot, pi
+from math import hypot, pi, radians
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -265,10 +265,19 @@ def row_commands(
     """Return the commands of k rows, each with s of the steps of all paths, by their numbers."""
     # Masses and lengths of the bodies of the chain may have the rows as leading axis.
     commanded = steps, slice(chain.tendons)
+    draws, bends = draws or chain.sheath is not None, _bends(load, chain)
     by_stroke: Any = ~np.isnan(load.stroke[commanded]) if draws else None
     target: Any = load.target[commanded]
     loads = applied(load, chain, steps, tip=tip) if chain.loaded else None
-    return Command(target, by_stroke, loads)
+    return Command(target, by_stroke, loads, bends if bends is None else bends[steps])
+
+
+def _bends(load: LoadPath, chain: Chain) -> Any:
+    """Return the bend of the sheaths in every step, as `Command` has it."""
+    if chain.sheath is None:
+        return None
+    bends = [external.sheath_bend_deg for external in load.different]
+    return np.array([-1.0 if bend is None else radians(bend) for bend in bends])[load.which]
 
 
 def _of_plane(frame: Float[Array, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
@@ -369,15 +378,18 @@ class Command(NamedTuple):
         target: Tension (N) or stroke (mm).
         by_stroke: Whether it is a stroke; None where all are tensions.
         applied: External loads on the bodies; None for a chain assembled for tendons alone.
+        bend: Total bend angle of the sheaths, rad, -1 where it is that of the robot; None where
+            there are none.
     """
 
     target: Float[Array, " t"]
     by_stroke: Bool[Array, " t"] | None
     applied: BodyLoads | None
+    bend: Any = None
 
     def packed(self) -> Float[np.ndarray, "s command"]:
         """Return a row for each load: all its numbers, in the order of the fields."""
-        fields: Any = (self.target, self.by_stroke, *(self.applied or ()))
+        fields: Any = (self.target, self.by_stroke, *(self.applied or ()), self.bend)
         rows = [field.reshape(len(field), -1) for field in fields if field is not None]
         return rows[0].copy() if len(rows) == 1 else np.concatenate(rows, axis=1, dtype=float)
 
@@ -388,20 +400,21 @@ class Command(NamedTuple):
         return jnp.where(self.by_stroke, by_stroke, by_tension)
 
 
-def tension_commands(tension: Float[np.ndarray, "s t"]) -> Command:
+def tension_commands(tension: Float[np.ndarray, "s t"], chain: Chain) -> Command:
     """Return commands of tensions alone (N), loads as leading axis."""
-    return Command(constant(tension), None, None)
+    none: Any = None if chain.sheath is None else np.zeros(tension.shape, bool)
+    return Command(constant(tension), none, None, none if none is None else -np.ones(len(tension)))
 
 
 def make_commands(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     """Return the commands of a path; a tendon without one is slack (0 N)."""
-    by_stroke = ~np.isnan(load.stroke) if load.draws else None
-    external = None
+    draws, external = load.draws or chain.sheath is not None, None
+    by_stroke = ~np.isnan(load.stroke) if draws else None
     if chain.loaded:
         for distinct in load.different:
             _check(distinct, robot)
         external = applied(load, chain, np.arange(len(load)))
-    return Command(cast("Any", load.target), cast("Any", by_stroke), external)
+    return Command(cast("Any", load.target), cast("Any", by_stroke), external, _bends(load, chain))
 
 
 # Loads that were probably not meant, such as mN typed as N.

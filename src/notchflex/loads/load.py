@@ -198,9 +198,10 @@ class ExternalLoad:
         tip_mass: Mass that hangs at the tip point, g.
         gravity: Acceleration of gravity in the world, m/s^2.
         temperature: Temperature of the robot, deg C.
+        sheath_bend_deg: Total angle by which all sheaths are bent, deg; None as in the robot file.
 
     Raises:
-        InputError: An invalid value, one that is not finite, or a negative mass.
+        InputError: An invalid value, one that is not finite, or a negative mass or bend.
 
     Example:
         >>> ExternalLoad(tip_mass=20.0).weight(20.0)
@@ -215,6 +216,7 @@ class ExternalLoad:
     tip_mass: float = 0.0
     gravity: Sequence[float] | None = None
     temperature: float | None = None
+    sheath_bend_deg: float | None = None
 
     def __post_init__(self) -> None:
         """Check the numbers and keep them as tuples, so that equal loads are found equal."""
@@ -261,11 +263,11 @@ class ExternalLoad:
         return 1e-3 * mass * x, 1e-3 * mass * y, 1e-3 * mass * z
 
 
-def _mass(value: Any) -> float:
-    mass = check_number(value, "tip_mass", "a number of grams")
-    if not 0.0 <= mass < float("inf"):
-        raise InputError.NOT_FINITE(f"tip_mass must be finite and 0 g or more; got {mass:g}")
-    return mass
+def _not_negative(value: Any, what: str, unit: str) -> float:
+    number = check_number(value, what, f"a number in {unit}")
+    if not 0.0 <= number < float("inf"):
+        raise InputError.NOT_FINITE(f"{what} must be finite and 0 {unit} or more; got {number:g}")
+    return number
 
 
 def _body_forces(value: Any) -> tuple[BodyForce, ...]:
@@ -292,6 +294,8 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "body_forces": _body_forces,
     "tip_mass": _mass,
     "temperature": lambda value: _finite(value, "temperature", "a number of deg C"),
+    "tip_mass": partial(_not_negative, what="tip_mass", unit="g"),
+    "sheath_bend_deg": partial(_not_negative, what="sheath_bend_deg", unit="deg"),
 }
 EXTERNAL = tuple(field.name for field in fields(ExternalLoad))
 _DEFAULTS = tuple((field.name, field.default) for field in fields(ExternalLoad))
@@ -350,8 +354,11 @@ class Load(ExternalLoad):
             where its material has a density. Not given, a tip mass hangs along (0, 0, -9.81).
         temperature: Temperature of the robot, deg C, which moves the plateaus of a material with a
             `reference_temperature`; not given, that of its material.
+        sheath_bend_deg: Total angle by which all sheaths are bent, deg; not given, it is that of
+            the robot file. It changes where the shaft is moved.
 
-    A tendon of which neither tension nor stroke is commanded hangs slack (0 N).
+    With a sheath, tension and stroke are those of its drive. A tendon of which neither tension nor
+    stroke is commanded hangs slack (0 N).
 
     Raises:
         InputError: A number that is not finite, text, an invalid external load, or a base turned

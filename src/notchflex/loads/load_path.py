@@ -270,6 +270,7 @@ class LoadPath(ByValue, Displayed):
         tip_mass: float | None = None,
         gravity: Sequence[float] | None = None,
         temperature: float | Sequence[float] | None = None,
+        sheath_bend_deg: float | None = None,
     ) -> LoadPath:
         """Return the path with external loads on all its steps.
 
@@ -283,6 +284,7 @@ class LoadPath(ByValue, Displayed):
             gravity: Acceleration of gravity in the world, m/s^2.
             temperature: Temperature of the robot, deg C, or one for each step; a path of a single
                 step is repeated for several.
+            sheath_bend_deg: Total angle by which all sheaths are bent, deg.
 
         Returns:
             The path; what is not given stays as it is.
@@ -437,6 +439,8 @@ def external_words(load: ExternalLoad) -> list[str]:
         (any(load.gravity or ()), f"gravity {vector(load.gravity or ())} m/s²"),
         (load.temperature is not None, f"temperature {short(load.temperature or 0.0)} °C"),
     ]
+    if load.sheath_bend_deg is not None:
+        words.append((True, f"sheath bent by {short(load.sheath_bend_deg)} deg"))
     for force in load.body_forces:
         point = f" at {vector(force.point)} mm" if any(force.point) else ""
         body = f"on body {force.body}"

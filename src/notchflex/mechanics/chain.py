@@ -38,6 +38,7 @@ from notchflex.mechanics.material import Fibres, LimitLine, SectionLaw, limit_li
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
+from notchflex.mechanics.sheath import Sheath, build_sheath
 from notchflex.mechanics.tendon import TUBE_AXIS, TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
 from notchflex.robot.kinds import Friction, Material, Notch
@@ -58,6 +59,7 @@ class Chain(Pytree):
     axial_stiffness: Float[Array, " t"]
     # Length of each tendon before its first contact, from its actuator on and through the base, mm
     free_length: Float[Array, " t"]
+    sheath: Sheath | None  # The sheaths between drives and base; None where there are none
     body_length: Float[Array, " bodies"]  # Length of each body on the tube axis, mm
     body_mass: Float[Array, " bodies"]  # Mass of each body, g; 0 where the material has no density
     body_centre: Float[Array, "bodies 3"]  # Its centre, in its frame, mm
@@ -98,6 +100,12 @@ class Chain(Pytree):
     def tendons(self) -> int:
         """Number of tendons."""
         return self.axial_stiffness.shape[0]
+
+    @property
+    def inextensible(self) -> Array:
+        """Whether each tendon keeps its length, that of its wire in a sheath included."""
+        rigid = xp.isinf(self.axial_stiffness)
+        return rigid if self.sheath is None else rigid & (self.sheath.compliance == 0.0)
 
     @property
     def tendon_order(self) -> Int[Array, " t"]:
@@ -445,6 +453,7 @@ def assemble(
         contact_pairs=template.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
         free_length=template.base_length + constant([tendon.free_length for tendon in tendons]),
+        sheath=build_sheath(tendons),
         body_length=body_length,
         body_mass=body_mass,
         body_centre=body_centre,

@@ -245,7 +245,7 @@ def _said(failure: Failure, last: str = "", **values: object) -> tuple[Failure, 
 def _past_closing(path: EquilibriumPath, step: int) -> bool:
     """Return whether a stroke of a step exceeds the closing stroke of an inextensible tendon."""
     reach = closing_stroke(path.chain)
-    inextensible = np.isinf(np.asarray(path.chain.axial_stiffness))
+    inextensible = np.asarray(path.chain.inextensible)
     return bool((inextensible & (path.load.stroke[step] >= reach)).any())
 
 

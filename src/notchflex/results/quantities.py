@@ -285,6 +285,10 @@ class _Quantities:
     """Tendon tension, N, shape (t)."""
     stroke = Array()
     """Tendon stroke, mm, shape (t)."""
+    base_tension = Array()
+    """Tendon tension at the base, N, shape (t)."""
+    base_stroke = Array()
+    """Tendon stroke at the base, mm, shape (t)."""
     notch_angle = Array()
     """Notch angle, rad, shape (n)."""
     edge_angle = Array()

@@ -159,6 +159,7 @@ _LOAD_KEYS = {
     "tip_mass": ("tip_mass_g", "g"),
     "gravity": ("gravity_m_s2", "m/s^2"),
     "temperature": ("temperature_C", "deg C"),
+    "sheath_bend_deg": ("sheath_bend_deg", "deg"),
     "force": ("body_forces.force_N", "N"),
     "moment": ("body_forces.moment_Nmm", "N mm"),
     "point": ("body_forces.point_mm", "mm"),
@@ -247,7 +248,7 @@ def _step(path: EquilibriumPath, index: int, external: list[dict[str, Any]]) -> 
 
 def _external(path: EquilibriumPath) -> list[dict[str, Any]]:
     """External loads of every step; nothing at all where no step has any."""
-    if all(load.is_nothing for load in path.load.external):
+    if all(load.is_nothing and load.sheath_bend_deg is None for load in path.load.different):
         return []
     return [_with_units(asdict(load)) for load in path.load.external]
 

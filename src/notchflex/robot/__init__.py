@@ -21,7 +21,15 @@ from notchflex.robot.notches.rod import RodGap
 from notchflex.robot.notches.strip import StripNotch
 from notchflex.robot.notches.u_link import ULink
 from notchflex.robot.reading import load_robot, robot_from_text
-from notchflex.robot.robot import Drawing, Robot, from_table, json_schema, set_values, to_table
+from notchflex.robot.robot import (
+    Drawing,
+    Drive,
+    Robot,
+    from_table,
+    json_schema,
+    set_values,
+    to_table,
+)
 from notchflex.robot.value_names import parse_assignment
 
 if TYPE_CHECKING:
@@ -33,6 +41,7 @@ __all__ = [
     "Corner",
     "Drawing",
     "Fatigue",
+    "Drive",
     "Friction",
     "Frictionless",
     "Linear",

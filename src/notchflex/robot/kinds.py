@@ -106,6 +106,17 @@ class Tendon:
             disk [mm], from body 1 to its end; None is `radius`, which then is that in the base.
         disk_direction_deg: Its side there [deg]; None is `direction_deg`. The holes of the disks
             point along the tendon in the straight robot, that of the base along the axis.
+        sheath_length: Length of the sheath that leads its wire from the drive to the base [mm];
+            None for no sheath. Tensions and strokes are commanded and measured at the drive.
+        sheath_friction: Coefficient of friction between wire and sheath; None is 0.
+        sheath_bend_deg: Total angle by which the sheath is bent [deg], turns to all sides added;
+            None is 0.
+        sheath_wire_stiffness: E A of the wire in the sheath [N].
+        sheath_stiffness: E A of the sheath under compression [N]; None is rigid.
+        backlash: Way of the drive on every reversal before the wire follows [mm]; None is 0.
+
+    Raises:
+        InputError: A value is not allowed; or there is one of a sheath and no `sheath_length`.
 
     Example:
         >>> Tendon(0.70, direction_deg=180.0).path
@@ -169,6 +180,64 @@ class Tendon:
         radii = self.disk_radius or (self.radius,) * disks
         sides = self.disk_direction_deg or (self.direction_deg,) * disks
         return ((self.radius, *radii), (self.direction_deg, *sides)) if disks else None
+    sheath_length: Annotated[
+        Float | None,
+        quantity("mm", "length of the sheath from the drive to the base; left out: none", above=0),
+    ] = None
+    sheath_friction: Annotated[
+        Float | None,
+        quantity("", "coefficient of friction of wire in sheath", at_least=0, usual=(0, 0.5)),
+    ] = None
+    sheath_bend_deg: Annotated[
+        Float | None, quantity("deg", "total angle by which the sheath is bent", at_least=0)
+    ] = None
+    sheath_wire_stiffness: Annotated[
+        Float | None, quantity("N", "E A of the wire in the sheath", above=0)
+    ] = None
+    sheath_stiffness: Annotated[
+        Float | None, quantity("N", "E A of the sheath under compression; left out: rigid", above=0)
+    ] = None
+    backlash: Annotated[
+        Float | None,
+        quantity("mm", "way of the drive on a reversal before the wire follows", at_least=0),
+    ] = None
+
+    def conflicts(self) -> Problems:
+        """Find a sheath without a wire, and values of a sheath that is not there."""
+        if self.sheath_length is None:
+            for key in (*_OF_SHEATH, "backlash"):
+                if getattr(self, key) is not None:
+                    yield key, "needs a sheath; give sheath_length [mm], or leave the key out."
+        elif self.sheath_wire_stiffness is None:
+            yield (
+                "sheath_wire_stiffness",
+                "is missing; give E A of the wire in the sheath [N]: a steel wire of 0.3 mm has "
+                "14000 N.",
+            )
+
+
+_OF_SHEATH = "sheath_friction", "sheath_bend_deg", "sheath_wire_stiffness", "sheath_stiffness"
+
+
+@part(kw_only=True)
+class Drive:
+    """Two tendons on one spool: what it draws of one it releases of the other.
+
+    Args:
+        tendon: The tendon that it draws where it turns forward, counted from 1.
+        antagonist: The tendon that it releases then.
+        pretension: Tension of both drives where it stands at 0 [N].
+
+    Example:
+        >>> Drive(tendon=1, antagonist=2, pretension=0.5).antagonist
+        2
+    """
+
+    tendon: Annotated[Int, Field(ge=1, description="tendon that is drawn forward, from 1")]
+    antagonist: Annotated[Int, Field(ge=1, description="tendon that is released then, from 1")]
+    pretension: Annotated[
+        Float, quantity("N", "tension of both where the spool stands at 0", above=0)
+    ]
 
 
 # What parts are cited by.

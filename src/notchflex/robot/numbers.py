@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from notchflex.robot.part import unchecked
 from notchflex.robot.robot import Robot
-from notchflex.robot.value_names import SECTIONS, NamedPart, named_parts, parse_path
+from notchflex.robot.value_names import PLURAL, SECTIONS, NamedPart, named_parts, parse_path
 
 Place = tuple[int, str]
 """Where a number stands: its part, counted from 0, and its key."""
@@ -79,8 +79,8 @@ def robot_of(parts: Sequence[Any]) -> Robot:
     robot = object.__new__(Robot)
     values: dict[str, Any] = dict.fromkeys(field.name for field in dataclasses.fields(Robot))
     for section, base in SECTIONS.items():
-        same = tuple(part for part in parts if isinstance(part, base))
-        values[section] = same if section in ("notch", "tendon") else next(iter(same), None)
+        same, listed = tuple(part for part in parts if isinstance(part, base)), section in PLURAL
+        values[section] = same if listed else next(iter(same), None)
     vars(robot).update(values)
     return robot
 

@@ -203,8 +203,30 @@ def robot_problems(robot: "Robot") -> Problems:
     for i, tendon in enumerate(robot.tendon, start=1):
         for key, text in _tendon_problems(robot, tendon, bool(of_notches)):
             yield f"tendon[{i}].{key}", text
+    yield from _drive_problems(robot)
     if not of_notches:
         yield from _tolerance_problems(robot)
+
+
+def _drive_problems(robot: "Robot") -> Problems:
+    """Find spools of tendons that are not there, are driven twice, or cannot be stretched."""
+    driven = set[int]()
+    for i, drive in enumerate(robot.drive, start=1):
+        for key in ("tendon", "antagonist"):
+            name, number = f"drive[{i}].{key}", getattr(drive, key)
+            if number > robot.number_of_tendons:
+                yield name, f"is {number}, but the robot has {robot.number_of_tendons} tendons."
+                continue
+            if number in driven:
+                yield name, f"is {number}, which a spool drives already; give each tendon once."
+            driven.add(number)
+            tendon = robot.tendon[number - 1]
+            if tendon.sheath_length is None and math.isinf(tendon.axial_stiffness):
+                yield (
+                    name,
+                    f"is {number}, which cannot be stretched: a pretension needs an elastic tendon "
+                    f"(tendon[{number}].axial_stiffness [N]) or one in a sheath.",
+                )
 
 
 def _tolerance_problems(robot: "Robot") -> Problems:

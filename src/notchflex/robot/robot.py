@@ -16,6 +16,7 @@ from notchflex.robot.fatigue import Fatigue
 from notchflex.robot.kinds import (
     PRINTABLE,
     Drawing,
+    Drive,
     Friction,
     Material,
     Notch,
@@ -59,6 +60,7 @@ class Robot:
             see `notchflex.uncertain`.
         fatigue: The limit line that its strain cycles are compared with.
         drawing: What the title block of its drawing says.
+        drive: Spools that drive two tendons each; see `notchflex.spool_path`.
 
     Raises:
         InputError: A value is not allowed; the message names it as `--set` does.
@@ -92,6 +94,7 @@ class Robot:
     drawing: Annotated[Drawing, Field(description="what the title block of a drawing says")] = (
         Drawing()
     )
+    drive: Annotated[tuple[Drive, ...], Field(description="spools of two tendons each")] = ()
 
     def conflicts(self) -> Problems:
         """Find parts that do not fit each other."""
@@ -182,6 +185,7 @@ class Robot:
         Args:
             parts: New values for any of `name`, `tube`, `notch`, `tendon`, `material`, `friction`,
                 `tolerance`, `fatigue` and `drawing`.
+                `tolerance`, `drawing` and `drive`.
 
         Raises:
             InputError: A value is not allowed, or there is no such part.

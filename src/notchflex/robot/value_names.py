@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from notchflex.errors import InputError
 from notchflex.robot.fatigue import Fatigue
 from notchflex.robot.kinds import Drawing, Friction, Material, Notch, Tendon, Tube, kinds_of
+from notchflex.robot.kinds import Drawing, Drive, Friction, Material, Notch, Tendon, Tube, kinds_of
 from notchflex.robot.part import fields_of, nearest, unit_of, unknown_key
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ SECTIONS: dict[str, type] = {
     "tube": Tube,
     "notch": Notch,
     "tendon": Tendon,
+    "drive": Drive,
     "material": Material,
     "friction": Friction,
     "fatigue": Fatigue,
@@ -30,7 +32,7 @@ SECTIONS: dict[str, type] = {
 }
 EXAMPLES = "write it like material.elastic_modulus, notch[2].depth or notch[*].depth"
 
-_PLURAL = {"notch": "notches", "tendon": "tendons"}
+PLURAL = {"notch": "notches", "tendon": "tendons", "drive": "drives"}
 _PATH = re.compile(r"(?P<section>\w+)(?:\[(?P<index>\*|\d+)\])?(?:\.(?P<key>\w+))?")
 # More digits than the number of any notch has.
 _DIGITS = 10
@@ -64,7 +66,7 @@ class NamedPart(NamedTuple):
 def named_parts(robot: "Robot") -> Iterator[NamedPart]:
     """Yield the parts of a robot in the order of its file."""
     for section in SECTIONS:
-        if section not in _PLURAL:
+        if section not in PLURAL:
             yield NamedPart(section, 0, getattr(robot, section))
             continue
         first = 1
@@ -93,7 +95,7 @@ class ValuePath(NamedTuple):
         if self.number is not None and not 1 <= self.number <= count:
             raise InputError.OUT_OF_RANGE(
                 f"`{self.path}`: the robot has {count} "
-                f"{self.section if count == 1 else _PLURAL[self.section]}; "
+                f"{self.section if count == 1 else PLURAL[self.section]}; "
                 f"give a number from 1 to {count}."
             )
 
@@ -119,7 +121,7 @@ def parse_path(path: str) -> ValuePath:
         raise InputError.UNKNOWN_NAME(f"`{path}` is not the name of a value{meant}; {EXAMPLES}.")
     if key is None:
         raise InputError.UNKNOWN_NAME(f"`{path}` names no single value; {EXAMPLES}.")
-    if index is not None and section not in _PLURAL:
+    if index is not None and section not in PLURAL:
         raise InputError.UNKNOWN_NAME(
             f"`{path}` has a number, but there is one {section}: `{section}.{key}`."
         )
@@ -270,7 +272,8 @@ class Described(NamedTuple):
 def _owners(robot: "Robot", path: str) -> tuple[str, list[Any]]:
     """Return the key of a path, and those that have it of the parts that the path means."""
     target = parse_path(path)
-    target.check_number(len(robot.notches if target.section == "notch" else robot.tendon))
+    of_list = robot.notches if target.section == "notch" else robot.drive
+    target.check_number(len(robot.tendon if target.section == "tendon" else of_list))
     parts = [named.part for named in named_parts(robot) if named.is_meant(target)]
     owners = [part for part in parts if target.key in fields_of(type(part))]
     if not owners:

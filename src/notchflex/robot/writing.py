@@ -25,6 +25,7 @@ _HEADER = re.compile(
     re.MULTILINE,
 )
 _OPTIONAL = "tolerance", "fatigue", "drawing"
+_OPTIONAL = "tolerance", "drive", "drawing"
 """Tables that a robot file may have."""
 
 _Notes = Mapping[str, str]
@@ -162,12 +163,14 @@ def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
     for block in _split(template):
         blocks.setdefault(block.name, []).append(block)
     for name in _OPTIONAL:
-        blocks.setdefault(name, [_Block(name, "\n", f"[{name}]\n")])
+        header = "[[drive]]" if name == "drive" else f"[{name}]"
+        blocks.setdefault(name, [_Block(name, "\n", f"{header}\n")])
     # the head of the file: the name, and whatever is not under a header of its own
     new[""] = {name: table for name, table in new.items() if name not in blocks}
     texts: list[str] = []
     for name, pieces in blocks.items():
-        for block, first, table in _matched(pieces, old.get(name), new.get(name, [])):
+        tables = new.get(name, [])
+        for block, first, table in _matched(pieces, old.get(name, tables), tables):
             named = NamedPart(name, first, table)
             targets = ((parse_path(path), note) for path, note in notes.items())
             of_keys = {target.key: note for target, note in targets if named.is_meant(target)}
@@ -201,7 +204,7 @@ def _matched(
     first, used = 1, None
     for table in cast("list[dict[str, Any]]", new):
         repeats = [former.get("repeat", 1) for former in old]
-        block = blocks[group_of(min(first, sum(repeats)), repeats)[0]]
+        block = blocks[group_of(min(first, sum(repeats)), repeats)[0] % len(blocks)]
         # a group of equal notches that was split: its comment stands once
         yield (replace(block, lead="\n") if block is used else block), first, table
         first, used = first + table.get("repeat", 1), block

@@ -20,6 +20,7 @@ from notchflex.solver.newton import (
     predict_log_ratios,
 )
 from notchflex.solver.residual import Iterate, Memory, SolverState
+from notchflex.solver.sheaths import aimed, state_after
 
 
 class LoadStepResult(NamedTuple):
@@ -221,10 +222,12 @@ def _result_after(
     overdrawn = result.overdrawn
     if target.by_stroke is not None:
         least = chain.closing_force * jnp.maximum(_OVERDRAWN, new.residual / _BALANCED)
-        pulled = (new.point.base_tension > least) & jnp.isinf(chain.axial_stiffness)
+        pulled = (new.point.base_tension > least) & chain.inextensible
         overdrawn = target.by_stroke & pulled
     success = result._replace(
-        solved=SolverState(new.point, memory, new.stroke, target.applied),
+        solved=state_after(
+            chain, target, new.point, memory, new.stroke, result.solved.memory.sheath
+        ),
         converged=end >= 1.0,
         reached=end,
         substeps=result.substeps + 1,
@@ -251,7 +254,12 @@ def _solve_substep(
     # The history is that of the last solved state, not of regularised shapes.
     attempt, solved = state.attempt, state.result.solved
     memory, before = solved.memory, solved.point.base_tension
-    base_tension = command.either(before, command.target)
+    towards = command.target
+    if memory.sheath is not None:
+        assert chain.sheath is not None
+        largest = jnp.exp(chain.sheath.log_ratio(command.bend))
+        towards = jnp.clip(before, towards / largest, towards * largest)
+    base_tension = command.either(before, towards)
     log_ratio = predict_log_ratios(chain, before, base_tension, memory)
     predicts = attempt.predicts & (attempt.mode != _Mode.RELAXED)
     if command.by_stroke is not None:
@@ -271,7 +279,8 @@ def _solve_substep(
     residual_target = jnp.where(relaxed, _RELAXED_RESIDUAL, residual_target)
     most = jnp.where(relaxed, _RELAXED_ITERATIONS, settings.max_iterations)
     settings = dataclasses.replace(settings, max_iterations=most)
-    problem = NewtonProblem(chain, command, memory, solved.point, predicts)
+    aim = aimed(chain, command, memory.sheath)
+    problem = NewtonProblem(chain, aim, memory, solved.point, predicts)
     return newton(problem, start, settings, residual_target)
 
 
@@ -280,14 +289,14 @@ def interpolate_command(
 ) -> Command:
     """Interpolate between a solved state and a command; exact at the end."""
     complete = _external_complete(chain, last)
-    from_here = command.either(last.stroke, last.point.base_tension)
+    from_here = command.either(last.stroke, last.tension)
     external = jnp.minimum(fraction / complete, 1.0)
     tendons = jnp.maximum((fraction - (1.0 - complete)) / complete, 0.0)
     only_external = (complete < 1.0) & (tendons == 0.0)
     by_stroke = None if command.by_stroke is None else command.by_stroke & ~only_external
     target = jnp.where(only_external, 0.0, _interpolate(from_here, command.target, tendons))
     applied = jax.tree.map(partial(_interpolate, fraction=external), last.applied, command.applied)
-    return Command(target, by_stroke, applied)
+    return Command(target, by_stroke, applied, command.bend)
 
 
 def before_tendons(chain: Chain, last: SolverState, fraction: Array) -> Bool[Array, ""]:

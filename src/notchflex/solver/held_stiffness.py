@@ -31,6 +31,7 @@ from notchflex.solver.linear_step import (
 from notchflex.solver.programs.compiled import Native
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.residual import Memory, SolverState, bound_side, command_slopes, evaluate
+from notchflex.solver.sheaths import aimed
 
 # Springs this much stiffer than the notches hold closed contacts and tendons driven by stroke;
 # otherwise their forces would be multipliers and the stiffness undefined.
@@ -97,10 +98,14 @@ def _rows(chain: Chain, command: Command, solved: SolverState) -> tuple[Array, .
         for span, ratio in zip(evaluation.spans, unknowns.log_ratio, strict=True)
     )
     bound = tuple(span.bound for span in evaluation.spans)
-    memory = Memory(unknowns.log_ratio, slid, bound, solved.memory.material)
+    memory, sheath = Memory(unknowns.log_ratio, slid, bound, solved.memory.material), None
+    if (last := solved.memory.sheath) is not None:
+        side = bound_side(last.level[:, 0] - last.level[:, -1], last.limit)
+        sheath = last._replace(stroke=last.stroke - _SLIP * side)
     form = unit_rows(chain, by_stroke=command.by_stroke is not None)
     jacobians = StateJacobians(chain, unknowns, memory, solved.applied, evaluation, form)
-    return (*linearise(jacobians), jnp.stack(command_slopes(chain, command, evaluation.base)))
+    slopes = command_slopes(chain, aimed(chain, command, last), sheath, evaluation.base)
+    return (*linearise(jacobians), jnp.stack(slopes))
 
 
 def _assemble(
@@ -153,7 +158,7 @@ def _independent(
 ) -> Bool[np.ndarray, " s"]:
     """Return whether the strokes of the inextensible tendons that are held are independent."""
     nearly = _NEARLY_HELD * float(np.asarray(chain.rods.length).sum(axis=-1).min())
-    held = by_stroke & np.isinf(np.asarray(chain.axial_stiffness)) & (missing < nearly)
+    held = by_stroke & np.asarray(chain.inextensible) & (missing < nearly)
     scaled = strokes / np.sqrt(np.asarray(chain.stiffness).ravel())
     scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=-1, keepdims=True), 1e-300)
     return np.array(

@@ -581,7 +581,7 @@ def linear_step(
     condensed, back = _condense(insert(rows.to_next), insert(rows.to_previous), unit)
     tension_step = command.target - point.base_tension
     if command.by_stroke is not None:
-        slopes, count = command_slopes(chain, command, evaluation.base), len(order)
+        slopes, count = command_slopes(chain, command, memory.sheath, evaluation.base), len(order)
         by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ at_base], axis=1)
         lengths = by_tension[len(back) - 2 * count :].reshape(2, count, -1)
         # Rows in the order of the robot's tendons.
@@ -591,7 +591,7 @@ def linear_step(
         # Where every contact sticks, the stroke does not depend on the tension; a small pivot keeps
         # the step finite.
         undetermined = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _ZERO_SLOPE)
-        missing = command_residual(chain, command, evaluation.base) + by_base[:, 0]
+        missing = command_residual(chain, command, memory.sheath, evaluation.base) + by_base[:, 0]
         pivots = _PIVOT_SHIFT * jnp.diag(undetermined.astype(float))
         tension_step = -gauss_jordan(matrix + pivots, missing[:, None])[:, 0]
 

@@ -192,7 +192,7 @@ def newton(
         best = search.best
         trial = jax.tree.map(lambda x, dx: x + search.fraction * dx, best.point, search.step)
         evaluation = evaluate(chain, trial, memory, command.applied)
-        demand = command_residual(chain, command, evaluation.base)
+        demand = command_residual(chain, command, memory.sheath, evaluation.base)
         scaled_residual = ravel_pytree((evaluation.residual, demand))[0]
         largest, size = jnp.max(jnp.abs(scaled_residual)), jnp.linalg.norm(scaled_residual)
         unguarded = (best.iterations < _UNGUARDED_STEPS) & (best.residual >= _ROUNDING * tolerance)

@@ -17,6 +17,7 @@ from notchflex.mechanics.flexure import in_space, rotation_error_estimate
 from notchflex.mechanics.material import edge_strain
 from notchflex.mechanics.material import peak_strain as peak_strain_of_section
 from notchflex.mechanics.motion import IN_PLANE
+from notchflex.mechanics.sheath import mean_tension
 from notchflex.solver.programs.static_structure import PytreeLayout
 from notchflex.solver.residual import Iterate, SolverState, bound_side, evaluate
 from notchflex.solver.solved_state import SolvedState
@@ -37,15 +38,31 @@ _MAX_ROTATION_ERROR = 2e-6
 @Quantity("solve", "tendon tension", "T", "N", key="tendon_tension_N",
           column="tendon{tendon}_force_N", per=("tendon",))  # fmt: skip
 def tension(state: SolvedState) -> Array:
-    """Tension of a tendon at the base, as it is in the solved state."""
-    return state.solved.point.base_tension
+    """Tension of a tendon at its drive, as it is in the solved state: without a sheath the base."""
+    return state.solved.tension
 
 
 @Quantity("solve", "tendon stroke", "u", "mm", key="tendon_stroke_mm",
           column="tendon{tendon}_displacement_mm", per=("tendon",))  # fmt: skip
 def stroke(state: SolvedState) -> Array:
-    """Tendon length drawn out at the base since the state without load."""
+    """Way of the drive of a tendon since the state without load: without a sheath, drawn out."""
     return state.solved.stroke
+
+
+@Quantity("state", "tendon tension at the base", r"T_\mathrm{b}", "N", key="base_tension_N",
+          column="tendon{tendon}_base_force_N", per=("tendon",), optional=True)  # fmt: skip
+def base_tension(state: SolvedState) -> Array:
+    """Tension of a tendon at the base, behind its sheath; empty (NaN) without sheaths."""
+    none = state.solved.memory.sheath is None
+    return state.solved.point.base_tension + (jnp.nan if none else 0.0)
+
+
+@Quantity("state", "tendon stroke at the base", r"u_\mathrm{b}", "mm", key="base_stroke_mm",
+          column="tendon{tendon}_base_displacement_mm", per=("tendon",), optional=True)  # fmt: skip
+def base_stroke(state: SolvedState) -> Array:
+    """Tendon length drawn out at the base, behind its sheath; empty (NaN) without sheaths."""
+    sheath = state.solved.memory.sheath
+    return state.solved.stroke * jnp.nan if sheath is None else sheath.stroke
 
 
 @Quantity("solve", "notch angle", r"\theta_j", "deg", key="notch_angle_deg",
@@ -342,8 +359,12 @@ def bend_possible(state: SolvedState) -> Array:
 @Quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",
           column="stored_energy_Nmm")  # fmt: skip
 def stored_energy(state: SolvedState) -> Array:
-    """Elastic energy held by flexures, lips that press and stretched tendons."""
+    """Elastic energy held by flexures, lips that press, stretched tendons and their sheaths."""
     chain, base_tension = state.chain, state.solved.point.base_tension
+    sheath, in_sheaths = state.solved.memory.sheath, jnp.zeros(())
+    if chain.sheath is not None and sheath is not None:
+        squared = mean_tension((sheath.place, sheath.level), power=2)
+        in_sheaths = 0.5 * jnp.sum(chain.sheath.compliance * squared)
     density, _ = state.stored_energy_density
     in_gap, in_body = jnp.moveaxis(state.tensions, -1, 0)
     in_tendons = in_gap**2 * state.by_tendon("natural_gap")
@@ -356,6 +377,7 @@ def stored_energy(state: SolvedState) -> Array:
         in_contacts = 0.5 * jnp.sum(chain.contact_flexibility[None] * jnp.stack(squares))
     return (
         in_contacts
+        + in_sheaths
         + jnp.sum(chain.rods.length * density)
         + 0.5 * jnp.sum(in_tendons * state.by_tendon("visits") * state.compliance)
         + 0.5 * jnp.sum(base_tension**2 * chain.free_length / chain.axial_stiffness)

@@ -20,6 +20,14 @@ from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.contact import ContactGroup, closing_angles
 from notchflex.mechanics.flexure import FlexureState
 from notchflex.mechanics.motion import Motion, identity
+from notchflex.mechanics.sheath import (
+    SheathMemory,
+    from_base,
+    log_tension,
+    mean_tension,
+    slack_sheaths,
+    within,
+)
 from notchflex.mechanics.tendon import Crossing, TendonGroup, fibre_lengths
 
 # Poses of bodies: against the base, and against those before.
@@ -180,6 +188,7 @@ class Memory(NamedTuple):
             modes that it refers to; None otherwise.
         stick_compliance: Additional slip over a sticking contact, in heights of the notch, per
             change of its log ratio; None for none.
+        sheath: Memory of the sheaths; None where there are none.
     """
 
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
@@ -188,6 +197,7 @@ class Memory(NamedTuple):
     material: Any = ()
     damping: tuple[Float[Array, ""], Float[Array, "*n modes"]] | None = None
     stick_compliance: Float[Array, ""] | None = None
+    sheath: SheathMemory | None = None
 
     @property
     def slip_per_log_ratio(self) -> Float[Array, ""] | float:
@@ -245,7 +255,7 @@ class SolverState(NamedTuple):
     Attributes:
         point: Unknowns and base tensions.
         memory: History of contacts and material, as of this state.
-        stroke: Tendon drawn out at the base, mm.
+        stroke: Way of every drive, mm: the tendon drawn out at the base, with what a sheath adds.
         applied: External loads on the bodies; None for a chain assembled for tendons alone.
     """
 
@@ -254,18 +264,11 @@ class SolverState(NamedTuple):
     stroke: Float[Array, " t"]
     applied: BodyLoads | None
 
-
-def state_at(
-    chain: Chain, point: Iterate, evaluation: Evaluation, applied: BodyLoads | None
-) -> SolverState:
-    """Return the state at a solved point, with its memory."""
-    memory = Memory(
-        log_ratio=point.unknowns.log_ratio,
-        slid=tuple(span.slid for span in evaluation.spans),
-        bound=tuple(span.bound for span in evaluation.spans),
-        material=evaluation.flexure.memory,
-    )
-    return SolverState(point, memory, stroke(chain, evaluation.base), applied)
+    @property
+    def tension(self) -> Float[Array, " t"]:
+        """Tension of every drive, N."""
+        sheath = self.memory.sheath
+        return self.point.base_tension if sheath is None else sheath.tension
 
 
 def at_rest(chain: Chain) -> SolverState:
@@ -279,7 +282,8 @@ def at_rest(chain: Chain) -> SolverState:
         log_ratio=none,
     )
     slack = constant(np.zeros(chain.tendons))
-    memory = Memory(none, none, none, chain.law.rest(chain.rods.section))
+    sheath = None if chain.sheath is None else slack_sheaths(chain.tendons)
+    memory = Memory(none, none, none, chain.law.rest(chain.rods.section), sheath=sheath)
     return SolverState(Iterate(unknowns, slack), memory, slack, unloaded(chain))
 
 
@@ -567,16 +571,56 @@ def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
     return closing
 
 
-def command_residual(chain: Chain, command: Command, base: BaseReaction) -> Float[Array, " t"]:
+def command_residual(
+    chain: Chain, command: Command, memory: SheathMemory | None, base: BaseReaction
+) -> Float[Array, " t"]:
     """Compute the deviation of the tendons from their command, scaled like angles."""
     # A tendon driven by stroke is slack where the robot has released more than is drawn: tension >=
     # 0, stroke released >= stroke commanded, product 0.
-    scale, base_tension = chain.stroke_stiffness, base.base_tension
-    missing = stroke(chain, base) - command.target
-    # Switching keeps the digits that a difference with a large tension would lose.
-    by_stroke = jnp.where(base_tension >= scale * missing, missing, base_tension / scale)
-    by_tension = (base_tension - command.target) / scale
-    return command.either(by_stroke, by_tension)
+    scale, drawn = chain.stroke_stiffness, stroke(chain, base)
+
+    def deviation(tension: Array, pulled: Array) -> Array:
+        missing = pulled - command.target
+        # Switching keeps the digits that a difference with a large tension would lose.
+        by_stroke = jnp.where(tension >= scale * missing, missing, tension / scale)
+        return command.either(by_stroke, (tension - command.target) / scale)
+
+    if chain.sheath is None or memory is None:
+        return deviation(base.base_tension, drawn)
+    # The sheath is one contact more. While the wire slides all along, drive and base are related by
+    # exponentials, and the command decides; while it sticks, its end at the base keeps its place.
+    # With the deviations where it would slide to either side, the law is that of friction:
+    # clip(slip, toward the base, toward the drive) = 0.
+    limit = chain.sheath.log_ratio(command.bend)
+    toward_base, toward_drive = (
+        deviation(
+            base.base_tension * jnp.exp(side * limit),
+            drawn + chain.sheath.end_stretch(side, limit, base.base_tension),
+        )
+        for side in (-1.0, 1.0)
+    )
+    slip = _sheath_slip(chain, memory, limit, base.base_tension, drawn)
+    held = jnp.where(slip <= toward_base, toward_base, slip)
+    return jnp.where(slip >= toward_drive, toward_drive, held)
+
+
+def _sheath_slip(
+    chain: Chain,
+    memory: SheathMemory,
+    limit: Float[Array, " t"],
+    tension: Float[Array, " t"],
+    drawn: Float[Array, " t"],
+) -> Float[Array, " t"]:
+    """Return the way of the stuck wire in its sheath toward the drive, mm."""
+    # Of a tendon that is inextensible in the robot the tension could be any while all contacts
+    # stick: the memory's stiffness keeps it.
+    assert chain.sheath is not None
+    profile = within(memory, limit)
+    moved = from_base(profile, log_tension(tension), limit)
+    stretched = chain.sheath.compliance * (mean_tension(moved) - mean_tension(profile))
+    change = tension - jnp.exp(memory.level[:, -1])
+    held = change * jnp.max(notch_heights(chain)) / chain.memory_stiffness
+    return drawn - memory.stroke + stretched + held
 
 
 def without_slack(
@@ -591,12 +635,12 @@ def without_slack(
 
 
 def command_slopes(
-    chain: Chain, command: Command, base: BaseReaction
+    chain: Chain, command: Command, memory: SheathMemory | None, base: BaseReaction
 ) -> tuple[Float[Array, "t t"], Float[Array, "t t"], Float[Array, "t t"]]:
     """Differentiate `command_residual` by base tension, released length, tension times length."""
 
-    def residual(tension: Array, released: Array, tension_length: Array) -> Array:
-        return command_residual(chain, command, BaseReaction(tension, released, tension_length))
+    def residual(*numbers: Array) -> Array:
+        return command_residual(chain, command, memory, BaseReaction(*numbers))
 
     arguments = (base.base_tension, base.released_length, base.tension_length)
     return jax.jacfwd(residual, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, arguments))
@@ -613,5 +657,5 @@ def tension_is_bounded(chain: Chain, command: Command, point: Iterate) -> Bool[A
     if command.by_stroke is None:
         return True
     limit = _MAX_CLOSING_FORCES * chain.closing_force
-    limit = jnp.where(chain.axial_stiffness < jnp.inf, jnp.inf, limit)
+    limit = jnp.where(chain.inextensible, limit, jnp.inf)
     return jnp.all(jnp.where(command.by_stroke, point.base_tension, 0.0) <= limit)

@@ -16,7 +16,8 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import interpolate_command
 from notchflex.solver.linear_step import linear_step
-from notchflex.solver.residual import SolverState, evaluate, state_at
+from notchflex.solver.residual import Memory, SolverState, evaluate, stroke
+from notchflex.solver.sheaths import aimed, state_after
 
 
 def attach_derivatives(
@@ -62,11 +63,18 @@ def attach_to_part(
 ) -> SolverState:
     """Attach the derivatives to the solution of one substep; NaN where it was not reached."""
     point = _stop_gradient(solved.point)
-    evaluation = evaluate(chain, point, last.memory, command.applied)
-    step = linear_step(chain, command, point, last.memory, evaluation)
+    evaluation, sheath = evaluate(chain, point, last.memory, command.applied), last.memory.sheath
+    step = linear_step(chain, aimed(chain, command, sheath), point, last.memory, evaluation)
     point = jax.tree.map(lambda value, by: value + by, point, step)
     evaluation = evaluate(chain, point, last.memory, command.applied)
-    varied_state = state_at(chain, point, evaluation, command.applied)
+    memory = Memory(
+        log_ratio=point.unknowns.log_ratio,
+        slid=tuple(span.slid for span in evaluation.spans),
+        bound=tuple(span.bound for span in evaluation.spans),
+        material=evaluation.flexure.memory,
+    )
+    drawn = stroke(chain, evaluation.base)
+    varied_state = state_after(chain, command, point, memory, drawn, sheath)
     return jax.tree.map(
         lambda value, varied: value + _zero_with_tangent(reached, varied),
         _stop_gradient(solved),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,11 +20,13 @@ from notchflex.cli.options import (
     File,
     PathOutputs,
     Refinement,
+    Spools,
     StateFile,
     Strokes,
     TableOutputs,
     Tensions,
     as_csv,
+    exclude,
     integer,
     save_state,
     vector,
@@ -67,6 +69,7 @@ def simulate(
     *,
     tension: Tensions = (),
     stroke: Strokes = (),
+    spool: Spools = (),
     base_rotation: Annotated[Vector | None, vector("angles in deg", "RX,RY,RZ")] = None,
     external: ExternalLoads = NO_LOADS,
     refinement: Refinement = 0,
@@ -90,6 +93,9 @@ def simulate(
             ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. For one of several tendons
             `1=SPEC`; those without hang slack.
         stroke: Tendon length drawn out at the base [mm], step by step; written as --tension.
+        spool: Way of a spool that drives two tendons ([[drive]] of the robot file) from where both
+            have its pretension [mm], step by step; written as --stroke. A step with the pretension
+            comes first.
         base_rotation: Turn the base by a rotation vector RX,RY,RZ [deg], for example `90,0,0`.
         uncertain: Carry the tolerances of the robot (its [tolerance] table, else assumed ones)
             through all steps: table, picture, CSV and JSON have the 5th, 50th and 95th percentile.
@@ -108,7 +114,9 @@ def simulate(
     chosen = chosen_robot(robot, settings)
     title = changed_title(chosen, settings)
     robots = beside_robots(chosen, robot, beside)
-    if external != NO_LOADS and not tension and not stroke:
+    if spool and (tension or stroke):
+        raise exclude("--spool", "--tension" if tension else "--stroke")
+    if external != NO_LOADS and not (tension or stroke or spool):
         tension = (TendonCommand("--tension", 1, [math.nan]),)  # all hang slack, in one step
     if uncertain and (beside or from_state is not None):
         excluded = "--beside" if beside else "--from-state"
@@ -117,7 +125,8 @@ def simulate(
         )
     if draws is not None and not uncertain:
         raise InputError.CONFLICT("--draws counts the robots of --uncertain; give both or neither.")
-    tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
+    driven = ("spool", chosen.drive) if spool else ("tendon", chosen.tendon)
+    tensions, strokes = load_columns(tension or spool, stroke, len(driven[1]), driven[0])
     outputs.check(
         robot_files(robot, *(variant.robot for variant in beside)),
         pictures=PAPER + BROWSER + (() if beside else MOVING),  # several robots do not move
@@ -135,7 +144,8 @@ def simulate(
 
         start = None if from_state is None else _start(from_state)
         turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
-        load = LoadPath(tensions, strokes, turn).loaded(**external.arguments())
+        load = analysis.spool_path(chosen, tensions) if spool else LoadPath(tensions, strokes)
+        load = replace(load, base_rotation=turn).loaded(**external.arguments())
         if uncertain:
             more: dict[str, Any] = {} if draws is None else {"draws": draws}
             bands = analysis.uncertain(

@@ -42,6 +42,7 @@ _LOADS = {
 }
 # A gravity of 0 differs from none given, with which a mass hangs; a temperature of 0 likewise.
 _OPTIONAL = ("gravity", "temperature")
+_BEND = "sheath_bend_deg"
 _ON_BODIES = {
     "force": "body_{body}_force_{axis}_N",
     "moment": "body_{body}_moment_{axis}_Nmm",
@@ -228,6 +229,7 @@ class MeasurementReader:
         acting = [on_bodies[name].any(axis=-1) for name in ("force", "moment") if name in on_bodies]
         acts = np.any(acting, axis=0)
         loads: list[ExternalLoad] = []
+        bends = self.array(_BEND, np.nan, may_miss=True)
         for row in range(len(self.table)):
             place = self.table.place_of(row)
             forces = [
@@ -236,6 +238,8 @@ class MeasurementReader:
             ]
             try:
                 tip = {name: values[row] for name, values in arrays.items()}
+                if bends is not None and not np.isnan(bends[row]):
+                    tip[_BEND] = round(np.degrees(bends[row]), 9)  # as it stands in the file
                 load = ExternalLoad(**tip, body_forces=forces)
             except InputError as problem:
                 raise InputError(f"{place}: {problem}.", problem.code) from None
@@ -443,6 +447,10 @@ def write_measurements(measurements: Measurements, target: str | Path) -> None:
     for name, pattern in _LOADS.items():
         values = np.array([getattr(load, name) for load in loads], float)
         table |= _filled(pattern, values if name in _OPTIONAL else _nan_for_zeros(values))
+        # Gravity of 0 differs from no gravity given, with which a mass hangs.
+        table |= _filled(pattern, values if name == "gravity" else _nan_for_zeros(values))
+    bends = [getattr(load, _BEND) for load in loads]
+    table |= _filled(_BEND, np.radians(np.array(bends, float)))
     for name, values in _on_bodies(loads).items():
         table |= _filled(_ON_BODIES[name], _nan_for_zeros(values))
     table |= _filled(_BASE_ROTATION, _nan_for_zeros(np.tile(load.base_rotation, (len(loads), 1))))

@@ -63,6 +63,12 @@ MEASURED = {
     "tip_tension": MeasuredQuantity(
         "tension at the tip", "tendon{tendon}_tip_force_N", "span_tension"
     ),
+    "drive_tension": MeasuredQuantity(
+        "tension of the drive", "tendon{tendon}_drive_force_N", "tension"
+    ),
+    "drive_stroke": MeasuredQuantity(
+        "way of the drive", "tendon{tendon}_drive_displacement_mm", "stroke"
+    ),
     "axis_points": MeasuredQuantity("points on the axis", "axis_{point}_{axis}_mm", "axis_points"),
 }
 """Quantities that can be measured, by name."""
@@ -94,7 +100,8 @@ class Measurements:
             "notch_angle" (P, n) and "total_angle" (P,) rad, between the faces of notches
             "edge_angle" (P, n) and their sum "total_edge_angle" (P,) rad, "tip_position" (P, 3) mm,
             "tip_rotation" (P, 3) as rotation vectors in the world rad, "tip_tension" (P, t) N in
-            the last span of every tendon, "axis_points" (P, m, 3) mm on the tube axis.
+            the last span of every tendon, "drive_tension" (P, t) N and "drive_stroke" (P, t) mm of
+            drives that are commanded the other, "axis_points" (P, m, 3) mm on the tube axis.
         deviation: Their standard deviations, in the same shapes; NaN, or left out, if unknown.
         axis_at: Distances of the points on the axis from the base of the straight robot, mm, (m,).
         measured_tension: Tensions as measured, N, (P, t); those of `load` by default.

@@ -112,6 +112,7 @@ def _commands(measurements: Measurements) -> Numbers:
             *external_load.weight(external_load.tip_mass),
             *gravity,
             external_load.temperature or 0.0,
+            -1.0 if external_load.sheath_bend_deg is None else external_load.sheath_bend_deg,
         ]
         for force in external_load.body_forces:
             row += [float(force.body), *force.force, *force.moment, *force.point]

@@ -134,8 +134,11 @@ class PreparedChain:
     @cached_property
     def _command_layouts(self) -> dict[bool, PytreeLayout]:
         target: Any = np.zeros(self.chain.tendons)
+        bend = None if self.chain.sheath is None else target[0]
         return {
-            by_stroke is not None: PytreeLayout.of(Command(target, by_stroke, unloaded(self.chain)))
+            by_stroke is not None: PytreeLayout.of(
+                Command(target, by_stroke, unloaded(self.chain), bend)
+            )
             for by_stroke in (None, target > 0.0)
         }
 

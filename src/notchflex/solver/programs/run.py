@@ -144,7 +144,7 @@ class SolverRun:
         """Return a quantity of the state before the first load: all but the shape of a solve."""
         start: SolverState = self._prepared.state.unpack(self.first)
         known = {
-            "tension": start.point.base_tension,
+            "tension": start.tension,
             "stroke": start.stroke,
             "material": start.memory.material,
         }

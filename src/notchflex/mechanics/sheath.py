@@ -1,0 +1,170 @@
+"""Sheaths that lead the tendons from their drives to the base: friction, stretch and backlash.
+
+The wire of a sheath of length L and total bend angle Theta loses tension by |d ln T / dx| =
+mu Theta / L wherever it slides (Euler's law of the rope). The tension along it is its memory: a
+change at one end moves a front into the sheath, behind which the wire slides, and beyond which
+nothing has changed. So ln T is a line of straight pieces, kept by its corners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._arrays import xp
+from notchflex._jax import Pytree, constant, jax, jnp
+from notchflex.robot import Tendon
+
+# Corners kept of a profile: 10 reversals within each other. One more drops the corner that changes
+# the profile least.
+_CORNERS = 12
+# Tension that counts as none, N, so that logarithms stay finite.
+_MIN_TENSION = 1e-100
+# Differences of ln T that may be rounding.
+_ROUNDING = 1e-12
+# Half differences of ln T below which the mean of T is computed by a series.
+_SMALL = 0.05
+
+Corners = tuple[Float[Array, "t corners"], Float[Array, "t corners"]]
+"""Places of corners, 0 at the drive and 1 at the base, and ln T there."""
+
+
+class Sheath(Pytree):
+    """Sheaths of t tendons; a tendon without one has 0 everywhere."""
+
+    friction: Float[Array, " t"]  # Coefficient of friction
+    bend: Float[Array, " t"]  # Total bend angle, rad
+    compliance: Float[Array, " t"]  # Stretch of wire and sheath under one tension all along, mm/N
+    backlash: Float[Array, " t"]  # Way of the drive on a reversal before the wire follows, mm
+
+    def log_ratio(self, bend: Float[Array, ""]) -> Float[Array, " t"]:
+        """Return ln of the largest tension ratio over the sheaths; bent by a load from 0 rad on."""
+        return self.friction * jnp.where(bend < 0.0, self.bend, bend)
+
+    def end_stretch(self, side: float, log_ratio: Array, tension: Array) -> Float[Array, " t"]:
+        """Return the stretch, mm, of a wire that slides all along toward drive (1) or base (-1)."""
+        # The mean of exp over the profile: T (exp(c) - 1) / c while it is pulled.
+        mean = jnp.exp(0.5 * side * log_ratio) * _relative_mean(0.5 * log_ratio)
+        return self.compliance * tension * mean
+
+
+class SheathMemory(NamedTuple):
+    """What sheaths remember of the last solved state.
+
+    Attributes:
+        tension: Tension of the drives, N.
+        place: Corners of the profiles of ln T, from 0 at the drive to 1 at the base.
+        level: ln T there, T in N.
+        limit: ln of the largest tension ratio over the sheath.
+        stroke: Tendon drawn out at the base, mm.
+        play: Position of the drive within its backlash, 0 where it pulls, mm.
+    """
+
+    tension: Float[Array, "*s t"]
+    place: Float[Array, "*s t corners"]
+    level: Float[Array, "*s t corners"]
+    limit: Float[Array, "*s t"]
+    stroke: Float[Array, "*s t"]
+    play: Float[Array, "*s t"]
+
+
+def build_sheath(tendons: Sequence[Tendon]) -> Sheath | None:
+    """Build the sheaths of all tendons; None where there is none."""
+    if all(tendon.sheath_length is None for tendon in tendons):
+        return None
+
+    def given(key: str, otherwise: float = 0.0) -> Array:
+        values = (getattr(tendon, key) for tendon in tendons)
+        return constant([otherwise if value is None else value for value in values])
+
+    stretch = 1.0 / given("sheath_wire_stiffness", np.inf) + 1.0 / given("sheath_stiffness", np.inf)
+    return Sheath(
+        friction=given("sheath_friction"),
+        bend=xp.radians(given("sheath_bend_deg")),
+        compliance=given("sheath_length") * stretch,
+        backlash=given("backlash"),
+    )
+
+
+def slack_sheaths(tendons: int) -> SheathMemory:
+    """Return the memory of slack wires."""
+    none = constant(np.zeros(tendons))
+    place = constant(np.tile(np.linspace(0.0, 1.0, _CORNERS), (tendons, 1)))
+    return SheathMemory(none, place, 0.0 * place + np.log(_MIN_TENSION), none, none, none)
+
+
+def log_tension(tension: Float[Array, " t"]) -> Float[Array, " t"]:
+    """Return ln T, finite for slack wires."""
+    return jnp.log(jnp.maximum(tension, 0.0) + _MIN_TENSION)
+
+
+def within(memory: SheathMemory, limit: Float[Array, " t"]) -> Corners:
+    """Return the profiles under a friction that may have fallen: the wire then slides."""
+    widths, steps = jnp.diff(memory.place), jnp.diff(memory.level)
+    steps = jnp.clip(steps, -limit[:, None] * widths, limit[:, None] * widths)
+    rises = jnp.cumsum(steps, axis=1)
+    return memory.place, memory.level[:, :1] + jnp.pad(rises, ((0, 0), (1, 0)))
+
+
+def from_drive(profile: Corners, end: Float[Array, " t"], limit: Float[Array, " t"]) -> Corners:
+    """Return the profiles, with a corner more, after drives have brought ln T there to `end`."""
+    # The line ln T = end -+ limit * place covers the profile up to where it meets it.
+    place, level = profile
+    end, slope = end[:, None], limit[:, None]
+    side = jnp.where(end >= level[:, :1], 1.0, -1.0)
+    ahead = side * (level - end) + slope * place
+    # It rises along the sheath, but for rounding where the profile is parallel to the line. There
+    # rounding must not decide: derivatives belong to corners.
+    covered = jax.lax.cummax(jax.lax.stop_gradient(ahead), axis=1) < -_ROUNDING
+    crosses = covered[:, :-1] & ~covered[:, 1:]
+    part = -ahead[:, :-1] / jnp.where(crosses, jnp.diff(ahead), 1.0)
+    part = jnp.where(crosses, jnp.minimum(part, 1.0), 1.0 * covered[:, 1:])
+    front = jnp.sum(part * jnp.diff(place), axis=1, keepdims=True)
+    place = jnp.where(covered, front, place)
+    level = jnp.where(covered, end - side * slope * front, level)
+    return jnp.concatenate([0.0 * front, place], 1), jnp.concatenate([end, level], 1)
+
+
+def from_base(profile: Corners, end: Float[Array, " t"], limit: Float[Array, " t"]) -> Corners:
+    """Return the profiles after the robot has brought ln T at the base to `end`."""
+    place, level = from_drive(_reversed(profile), end, limit)
+    return _reversed((place, level))
+
+
+def _reversed(profile: Corners) -> Corners:
+    place, level = profile
+    return 1.0 - place[:, ::-1], level[:, ::-1]
+
+
+def mean_tension(profile: Corners, power: int = 1) -> Float[Array, " t"]:
+    """Return the mean of a power of the tension along the sheaths."""
+    place, level = profile[0], power * profile[1]
+    middle, half = 0.5 * (level[:, 1:] + level[:, :-1]), 0.5 * jnp.diff(level)
+    mean = jnp.sum(jnp.diff(place) * jnp.exp(middle) * _relative_mean(half), axis=1)
+    return jnp.maximum(mean - 2.0 * _MIN_TENSION**power, 0.0)  # 0 for slack wires
+
+
+def _relative_mean(half: Array) -> Array:
+    """Return sinh(h) / h."""
+    small = jnp.abs(half) < _SMALL
+    squared = half * half
+    series = 1.0 + squared / 6.0 * (1.0 + squared / 20.0 * (1.0 + squared / 42.0))
+    safe = jnp.where(small, 1.0, half)
+    return jnp.where(small, series, (jnp.exp(safe) - jnp.exp(-safe)) / (2.0 * safe))
+
+
+def kept(profile: Corners) -> Corners:
+    """Return the profiles by as many corners as a memory has, without those that change least."""
+    while profile[0].shape[1] > _CORNERS:
+        place, level = profile
+        before, after = jnp.diff(place), jnp.diff(level)
+        area = jnp.abs(before[:, :-1] * after[:, 1:] - before[:, 1:] * after[:, :-1])
+        area = jnp.where(area < _ROUNDING, 0.0, area)
+        dropped = 1 + jnp.argmin(area, axis=1, keepdims=True)
+        stays = jnp.arange(place.shape[1] - 1)[None] < dropped
+        place, level = (jnp.where(stays, line[:, :-1], line[:, 1:]) for line in profile)
+        profile = place, level
+    return profile
