@@ -16,8 +16,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "papers"))
 from page import rewrite, table
 
 PAGE = "../robot_file.md"  # from the folder of page.py
-SINGLE = ("Tube", "Tendon", "Fatigue", "Drawing")
-SINGLE = ("Tube", "Tendon", "Drive", "Drawing")
+SINGLE = ("Tube", "Tendon", "Fatigue", "Drive", "Drawing")
 KINDS = ("notch", "material", "friction")
 
 

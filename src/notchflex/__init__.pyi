@@ -110,8 +110,8 @@ from notchflex.robot import ArcNotch as ArcNotch
 from notchflex.robot import Capstan as Capstan
 from notchflex.robot import Corner as Corner
 from notchflex.robot import Drawing as Drawing
-from notchflex.robot import Fatigue as Fatigue
 from notchflex.robot import Drive as Drive
+from notchflex.robot import Fatigue as Fatigue
 from notchflex.robot import Frictionless as Frictionless
 from notchflex.robot import Linear as Linear
 from notchflex.robot import Nitinol as Nitinol

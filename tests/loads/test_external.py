@@ -37,11 +37,6 @@ def sums(load, *, robot=ROBOT, mass=None, centre=None) -> BodyLoads:
         frame=None,
         loaded=True,
         law=SimpleNamespace(temperature=None),
-        body_mass=mass,
-        body_centre=centre,
-        body_length=LENGTH,
-        frame=None,
-        loaded=True,
         sheath=None,
     )
     command = make_commands(load_path(load, robot.number_of_tendons), robot, chain)

@@ -292,7 +292,6 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     },
     "following": partial(check_bool, what="following"),
     "body_forces": _body_forces,
-    "tip_mass": _mass,
     "temperature": lambda value: _finite(value, "temperature", "a number of deg C"),
     "tip_mass": partial(_not_negative, what="tip_mass", unit="g"),
     "sheath_bend_deg": partial(_not_negative, what="sheath_bend_deg", unit="deg"),

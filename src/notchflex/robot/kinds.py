@@ -180,6 +180,7 @@ class Tendon:
         radii = self.disk_radius or (self.radius,) * disks
         sides = self.disk_direction_deg or (self.direction_deg,) * disks
         return ((self.radius, *radii), (self.direction_deg, *sides)) if disks else None
+
     sheath_length: Annotated[
         Float | None,
         quantity("mm", "length of the sheath from the drive to the base; left out: none", above=0),

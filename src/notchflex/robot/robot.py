@@ -184,8 +184,7 @@ class Robot:
 
         Args:
             parts: New values for any of `name`, `tube`, `notch`, `tendon`, `material`, `friction`,
-                `tolerance`, `fatigue` and `drawing`.
-                `tolerance`, `drawing` and `drive`.
+                `tolerance`, `fatigue`, `drawing` and `drive`.
 
         Raises:
             InputError: A value is not allowed, or there is no such part.

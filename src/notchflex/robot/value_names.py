@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from notchflex.errors import InputError
 from notchflex.robot.fatigue import Fatigue
-from notchflex.robot.kinds import Drawing, Friction, Material, Notch, Tendon, Tube, kinds_of
 from notchflex.robot.kinds import Drawing, Drive, Friction, Material, Notch, Tendon, Tube, kinds_of
 from notchflex.robot.part import fields_of, nearest, unit_of, unknown_key
 

@@ -24,8 +24,7 @@ _HEADER = re.compile(
     r"""([ \t]*\[{1,2}[ \t]*["']?(\w+)["']?[ \t]*\]{1,2}[ \t\r]*(?:\#.*)?\n)""",
     re.MULTILINE,
 )
-_OPTIONAL = "tolerance", "fatigue", "drawing"
-_OPTIONAL = "tolerance", "drive", "drawing"
+_OPTIONAL = "tolerance", "fatigue", "drive", "drawing"
 """Tables that a robot file may have."""
 
 _Notes = Mapping[str, str]

@@ -25,10 +25,9 @@ from notchflex.support import (
 
 _DRIVES = ("tension", "stroke")
 _VECTORS = ("tip_force", "tip_moment", "tip_point", "gravity")
-_OTHERS = ("tip_mass", "temperature", "body_force", "following")
-LOAD_KEYS = (*_DRIVES, "base_rotation", *_VECTORS, *_OTHERS)
 _NUMBERS = "tip_mass", "sheath_bend_deg"
-LOAD_KEYS = (*_DRIVES, "base_rotation", *_VECTORS, *_NUMBERS, "body_force", "following")
+_OTHERS = "temperature", "body_force", "following"
+LOAD_KEYS = (*_DRIVES, "base_rotation", *_VECTORS, *_NUMBERS, *_OTHERS)
 """Keys of a load in a file."""
 
 LoadTables = Annotated[dict[str, dict[str, Any]], Field(min_length=1, max_length=100)]
@@ -86,7 +85,6 @@ def _with_external(path: LoadPath, table: Mapping[str, Any]) -> LoadPath:
     ]
     return path.loaded(
         **{key: _vector(key, table[key]) for key in _VECTORS if key in table},
-        tip_mass=table.get("tip_mass"),
         temperature=parse_spec(str(table["temperature"])) if "temperature" in table else None,
         **{key: table.get(key) for key in _NUMBERS},
         body_forces=forces or None,
