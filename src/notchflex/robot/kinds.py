@@ -153,6 +153,56 @@ GAO = "Gao et al.: IEEE/ASME Transactions on Mechatronics 22:465, 2017 (27-joint
 YORK = "York et al.: IEEE International Conference on Robotics and Automation, 2015 (off-axis cuts)"
 
 
+# How kinds are looked for.
+
+_FOLDERS = {"Notch": "notches", "Material": "materials", "Friction": "friction"}
+
+
+@functools.cache  # asked for each value that is set by its name
+def _import_all(folder: str) -> None:
+    import_all(f"notchflex.robot.{folder}", [str(Path(__file__).parent / folder)])
+
+
+def kinds_of(base: type) -> dict[str, type]:
+    """Find every kind of notch, material or friction, by the word that names it."""
+    _import_all(_FOLDERS[base.__name__])
+    return {kind_of(cls): cls for cls in sorted(base.__subclasses__(), key=kind_of)}
+
+
+def any_kind_of(base: type) -> Any:
+    """Make the type of a field that takes any kind of `base`, selected by its key `kind`."""
+    return Annotated[Union[tuple(kinds_of(base).values())], Field(discriminator="kind")]  # noqa: UP007
+
+
+@part(kw_only=True)
+class Material:
+    """What every kind of material has.
+
+    Args:
+        kind: The word that names the kind in a file.
+        poisson_ratio: Poisson's ratio, for shear and torsion.
+        density: Density [kg/m3], for the weight of the robot; None where it is not needed.
+        allowed_strain: Strain beyond which a simulation warns; None never warns.
+
+    Of a class `by_fibres` tells whether its law sums up the fibres of a section.
+    """
+
+    papers: ClassVar[tuple[str, ...]] = ()
+    by_fibres: ClassVar[bool] = False
+    kind: str
+    poisson_ratio: Annotated[
+        Float,
+        quantity("", "Poisson's ratio, for shear and torsion", above=-1, at_most=0.5),
+    ] = 0.33
+    density: Annotated[
+        Float | None, quantity("kg/m3", "density, for the weight", above=0, usual=(200, 25_000))
+    ] = None
+    allowed_strain: Annotated[
+        Float | None,
+        quantity("", "strain beyond which a simulation warns", above=0, at_most=MOST_STRAIN),
+    ] = None
+
+
 @part(kw_only=True)
 class Notch:
     """What every kind of notch has.
@@ -168,6 +218,8 @@ class Notch:
         stiffness_factor: Factor on its stiffness in all directions, for what the law of the notch
             leaves out.
         repeat: How many equal notches follow one another.
+        tube: The tube of this notch and of the rigid piece behind it; None is that of the robot.
+        material: Their material; None is that of the robot.
     """
 
     kind: str
@@ -185,6 +237,13 @@ class Notch:
         Int,
         Field(ge=1, le=10_000, description="how many equal notches follow"),
     ] = 1
+    tube: Annotated[Tube | None, Field(description="its own tube, also of the piece behind it")] = (
+        None
+    )
+    material: Annotated[
+        any_kind_of(Material) | None,
+        Field(description="its own material, also of the piece behind it"),
+    ] = None
 
     @property
     def papers(self) -> tuple[str, ...]:
@@ -195,6 +254,10 @@ class Notch:
     def has_elastic_ends(self) -> bool:
         """Whether its stiffness depends on the rings or walls beside it."""
         return getattr(self, "ends", "rigid") != "rigid"
+
+    def made_of(self, material: Material) -> Any:
+        """Return what its section law follows from, where the robot is of a material."""
+        return self.material or material
 
     def problems(self, tube: Tube) -> Problems:
         """Find what does not fit the tube: pairs of a key and the rest of the sentence."""
@@ -244,35 +307,6 @@ def openings_along(notches: Sequence[Notch], direction_deg: float) -> Iterator[t
         for opening in notch.openings(neighbours[number - 1], neighbours[number + 1]):
             if opening.admits(direction_deg):
                 yield number, opening
-
-
-@part(kw_only=True)
-class Material:
-    """What every kind of material has.
-
-    Args:
-        kind: The word that names the kind in a file.
-        poisson_ratio: Poisson's ratio, for shear and torsion.
-        density: Density [kg/m3], for the weight of the robot; None where it is not needed.
-        allowed_strain: Strain beyond which a simulation warns; None never warns.
-
-    Of a class `by_fibres` tells whether its law sums up the fibres of a section.
-    """
-
-    papers: ClassVar[tuple[str, ...]] = ()
-    by_fibres: ClassVar[bool] = False
-    kind: str
-    poisson_ratio: Annotated[
-        Float,
-        quantity("", "Poisson's ratio, for shear and torsion", above=-1, at_most=0.5),
-    ] = 0.33
-    density: Annotated[
-        Float | None, quantity("kg/m3", "density, for the weight", above=0, usual=(200, 25_000))
-    ] = None
-    allowed_strain: Annotated[
-        Float | None,
-        quantity("", "strain beyond which a simulation warns", above=0, at_most=MOST_STRAIN),
-    ] = None
 
 
 @part(kw_only=True)
@@ -341,24 +375,3 @@ class Drawing:
     finish: Annotated[_Entry, Field(description="finish of the surface")] = None
     drawn: Annotated[_Entry, Field(description="who has drawn it")] = None
     date: Annotated[_Entry, Field(description="date")] = None
-
-
-# How kinds are looked for.
-
-_FOLDERS = {Notch: "notches", Material: "materials", Friction: "friction"}
-
-
-@functools.cache  # asked for each value that is set by its name
-def _import_all(folder: str) -> None:
-    import_all(f"notchflex.robot.{folder}", [str(Path(__file__).parent / folder)])
-
-
-def kinds_of(base: type) -> dict[str, type]:
-    """Find every kind of notch, material or friction, by the word that names it."""
-    _import_all(_FOLDERS[base])
-    return {kind_of(cls): cls for cls in sorted(base.__subclasses__(), key=kind_of)}
-
-
-def any_kind_of(base: type) -> Any:
-    """Make the type of a field that takes any kind of `base`, selected by its key `kind`."""
-    return Annotated[Union[tuple(kinds_of(base).values())], Field(discriminator="kind")]  # noqa: UP007

@@ -88,6 +88,15 @@ def fields_of(cls: type) -> Mapping[str, Any]:
     return types.MappingProxyType(dict(order))
 
 
+def fields_in(part: Any) -> dict[str, Any]:
+    """Return the fields of a part, and those of its own parts as `material.density`."""
+    fields = dict(fields_of(type(part)))
+    for name in [*fields]:
+        if dataclasses.is_dataclass(own := getattr(part, name)):
+            fields |= {f"{name}.{key}": field for key, field in fields_in(own).items()}
+    return fields
+
+
 # Clear sentences instead of pydantic's error records.
 
 _LONGEST = 80

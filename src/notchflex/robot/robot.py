@@ -4,6 +4,7 @@ import functools
 import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
 from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias, cast, overload
 
@@ -104,7 +105,7 @@ class Robot:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without what is derived; a hash differs between processes."""
-        left_out = "_hash", "geometry", "warnings"
+        left_out = "_hash", "geometry", "warnings", "tubes", "materials"
         return {name: value for name, value in vars(self).items() if name not in left_out}
 
     def __repr__(self) -> str:
@@ -140,6 +141,16 @@ class Robot:
         return tuple(single for notch in self.notch for single in notch.expanded())
 
     @functools.cached_property
+    def tubes(self) -> tuple[Tube, ...]:
+        """The tube of every body, base first."""
+        return (self.tube, *(notch.tube or self.tube for notch in self.notches))
+
+    @functools.cached_property
+    def materials(self) -> tuple[Material, ...]:
+        """The material of every body, base first."""
+        return (self.material, *(notch.material or self.material for notch in self.notches))
+
+    @functools.cached_property
     def geometry(self) -> "Geometry":
         """Its bodies, cuts, walls, closing angles and masses, without loads."""
         from notchflex.analysis.geometry import Geometry
@@ -159,7 +170,7 @@ class Robot:
             >>> [paper.partition(":")[0] for paper in load_robot("liu2022").citations()]
             ['notchflex 0.1.0', 'Liu et al.', 'Gao et al.']
         """
-        parts = (*self.notch, self.material, self.friction)
+        parts = (*self.notch, *self.materials, self.friction)
         papers = dict.fromkeys(paper for part in parts for paper in part.papers)
         return (f"notchflex {__version__}: statics of tendon-driven notched-tube robots", *papers)
 
@@ -237,19 +248,23 @@ def set_values(
 
 def to_table(robot: Robot) -> dict[str, Any]:
     """Convert a robot to the plain table of its file: dicts, lists, numbers and text."""
-    tables = {name: _plain(getattr(robot, name)) for name in fields_of(Robot)}
+    tables = {name: plain(getattr(robot, name)) for name in fields_of(Robot)}
     tables["tolerance"] = {tolerance.value: tolerance.written for tolerance in robot.tolerance}
     return {name: table for name, table in tables.items() if table}
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Convert a part, parts, or a name to what stands in a file: the values that are said."""
     if isinstance(value, tuple):
-        return [_plain(part) for part in cast("tuple[Any, ...]", value)]
+        return [plain(part) for part in cast("tuple[Any, ...]", value)]
     if isinstance(value, str):
         return value
     values = {name: getattr(value, name) for name in fields_of(type(value))}
-    return {name: said for name, said in values.items() if not is_unsaid(name, said)}
+    return {
+        name: plain(said) if is_dataclass(said) else said
+        for name, said in values.items()
+        if not is_unsaid(name, said)
+    }
 
 
 def from_table(table: Mapping[str, Any]) -> Robot:
