@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,7 @@ from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import Chain, assemble, sites_of
 from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.mechanics.flexure import Site, rod_at
-from notchflex.mechanics.material import FibreSection, SectionLaw, peak_strain, section_strain
+from notchflex.mechanics.material import FibreSection, Law, peak_strain, section_strain
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities import DEGREES, QUANTITIES
 from notchflex.robot import Robot, Tube
@@ -300,10 +299,10 @@ def closing(robot: Robot) -> Closing:
 
 
 @jit
-def _strains(law: SectionLaw, sections: FibreSection, curvature: Any, memory: Any) -> Any:
+def _strains(law: Law, sections: FibreSection, curvature: Any, memory: Any) -> Any:
     """Return the strain of the outer fibre and the largest one, of sections that are bent."""
     bending = jnp.where(jnp.arange(6) == 1, curvature[:, None], 0.0)
-    strain = jax.vmap(partial(section_strain, law))(bending, sections, memory)
+    strain = jax.vmap(section_strain, (law.axis, 0, 0, 0))(law, bending, sections, memory)
     outer = strain.stretch + strain.curvature * sections.edge_spine
     return outer, peak_strain(strain, sections)
 
@@ -478,8 +477,8 @@ def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict
     arms = moment_arms(assemble(robot, flat=False))
     placed = list(zip(robot.notches, sites_of(robot), strict=True))
     described = {
-        placed_notch: _description(*placed_notch, robot.tube)
-        for placed_notch in dict.fromkeys(placed)
+        (notch, site): _description(notch, site, notch.tube or robot.tube)
+        for notch, site in dict.fromkeys(placed)
     }
     return [
         {

@@ -7,6 +7,7 @@ The zeros of a rod that happens to be straight are not structural.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -34,13 +35,13 @@ from notchflex.mechanics.flexure import (
     with_level,
 )
 from notchflex.mechanics.friction import FrictionLaw, friction_law
-from notchflex.mechanics.material import Fibres, SectionLaw, section_law
+from notchflex.mechanics.material import Fibres, Law, MixedLaw, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
 from notchflex.mechanics.tendon import TUBE_AXIS, TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
-from notchflex.robot.kinds import Friction, Material, Notch
+from notchflex.robot.kinds import Notch
 from notchflex.robot.part import unchecked
 
 
@@ -50,7 +51,7 @@ class Chain(Pytree):
     # The flexures, each from the frame of body j - 1 to that of body j. A body's frame lies on the
     # tube axis at its proximal face
     rods: Rod
-    law: SectionLaw  # The material
+    law: Law  # The material, or the materials of the flexures
     friction: FrictionLaw  # The friction between tendons and tube
     groups: tuple[TendonGroup, ...]  # The tendons, by the way they run
     contact_pairs: tuple[ContactGroup, ...]  # The contacts that close notches, by kind
@@ -138,7 +139,7 @@ def flexure_states(
 ) -> FlexureState:
     """Return the state of all flexures at once, after a memory of the material at every node."""
     state = partial(flexure_state, with_pose=with_pose)
-    return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, memory, modes)
+    return jax.vmap(state, (0, chain.law.axis, 0, 0))(chain.rods, chain.law, memory, modes)
 
 
 def structural(chain: Chain) -> Chain:
@@ -211,6 +212,7 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
     return replace(
         chain,
         rods=rods,
+        law=chain.law if chain.law.axis is None else longer(chain.law),
         groups=tuple(longer(group, **idle) for group in chain.groups),
         contact_pairs=tuple(longer(pair, has_contact=0.0, back=1) for pair in chain.contact_pairs),
         stiffness=stiffness,
@@ -241,10 +243,14 @@ def body_masses(
     # (area of its sections times the length of the neutral axis) is lumped: half at the start of
     # the neutral axis on the body before it, half at its end on the body after it.
     length, density = body_lengths(robot.tube, robot.notches), robot.material.density
-    if density is None:
+    if not robot.has_mass:
         return xp.zeros(len(length)), xp.zeros((len(length), 3))
-    piece = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2) * length
-    half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1)
+    # Volumes count as those of the robot's material.
+    relative = xp.array([material.density / density for material in robot.materials])
+    radii = [(tube.outer_radius, tube.inner_radius) for tube in robot.tubes]
+    outer, inner = xp.array(radii).T
+    piece = np.pi * (outer**2 - inner**2) * length * relative
+    half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1) * relative[1:]
     end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
     before, behind = xp.append(half, 0.0), xp.append(0.0, half)
     # Every body has a volume: where no tube is left between two notches, half of each flexure.
@@ -324,17 +330,17 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
             return None
         sides = side(index, notch, before), side(index + 1, notch, after)
         key = (*map(id, (before, notch, after)), *boundaries[index : index + 2])
-        return shared.setdefault(key, Site(*sides, robot.material.poisson_ratio))
+        return shared.setdefault(key, Site(*sides, robot.materials[index + 1].poisson_ratio))
 
     return tuple(map(site, range(len(notches))))
 
 
 def law_errors(robot: Robot) -> tuple[float, float]:
     """Return relative errors (SD) of the stiffness by finite elements: of notches, of the last."""
-    yields = robot.material.by_fibres
+    parts = zip(robot.notches, robot.tubes[1:], sites_of(robot), robot.materials[1:], strict=True)
     each = [
-        0.0 if site is None else law_error(notch, robot.tube, site, yields)
-        for notch, site in zip(robot.notches, sites_of(robot), strict=True)
+        0.0 if site is None else law_error(notch, tube, site, material.by_fibres)
+        for notch, tube, site, material in parts
     ]
     return float(np.sqrt(np.mean(np.square(each[:-1] or each)))), each[-1]
 
@@ -345,7 +351,7 @@ def unchecked_dimensions(robot: Robot) -> list[str]:
     sites = sites_of(robot)
     for number, (notch, site) in enumerate(zip(robot.notches, sites, strict=True), 1):
         if site is not None:
-            for warning in validity_warnings(notch, robot.tube, site):
+            for warning in validity_warnings(notch, robot.tubes[number], site):
                 notches_of.setdefault(warning, []).append(str(number))
     if not notches_of:
         return []
@@ -380,6 +386,7 @@ def flexure(
     notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int, by_fibres: bool
 ) -> tuple[Rod, Motion]:
     """Make a flexure without its factor on stiffness, and its pose in the free robot; cached."""
+    tube = notch.tube or tube
     rod = with_level(rod_at(site, notch, tube, refinement), level)
     rod = with_fibres(rod, notch, tube, refinement) if by_fibres else rod
     return rod, relative_pose(rod, xp.zeros(rod.modes))
@@ -415,7 +422,7 @@ def assemble(
         >>> assemble(load_robot("pacheco2021-a")).flexures
         5
     """
-    chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
+    chord, fibres = robot.friction.turns_with_chord, by_fibres(robot)
     sites, tendons = sites_of(robot), robot.tendon
     shape = robot.tube, robot.notches, sites, tendons, level, refinement, chord, fibres
     template = _template(*shape, flexures or flexure)
@@ -443,8 +450,8 @@ def assemble(
             (int(xp.max(part.back)) for part in (*groups, *template.contact_pairs)),
             default=1,
         ),
-        **laws(robot.material, template),
-        **laws(robot.friction, template),
+        friction=friction_law(robot.friction),
+        **_of_materials(robot, template),
     )
     normal = bending_normal(robot)
     if not flat or level == "space" or normal is None or not tendons_in_plane(robot):
@@ -452,13 +459,26 @@ def assemble(
     return _flat(chain, xp.stack([xp.cross(normal, TUBE_AXIS), normal, TUBE_AXIS], axis=1))
 
 
-def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
-    """Return the fields of a chain that follow from its material, or from its friction."""
-    if isinstance(part, Friction):
-        return {"friction": friction_law(part)}
-    law = section_law(part)
-    rods = template.distinct_rods
-    weighted = rods.length[..., None, None] * (law.stiffness(rods.section) @ rods.basis)
+def by_fibres(robot: Robot) -> bool:
+    """Return whether any of the laws of a robot sums up the fibres of a section."""
+    return any(material.by_fibres for material in robot.materials)
+
+
+def _of_materials(robot: Robot, template: ChainTemplate) -> dict[str, Any]:
+    """Return the fields of a chain that follow from its materials."""
+    rods, of_notches = template.distinct_rods, [n.made_of(robot.material) for n in robot.notches]
+    law = section_law(robot.material)
+    # Of the form of the robot alone: equal materials of several notches are several.
+    if all(source is robot.material for source in of_notches):
+        stiffness = law.stiffness(rods.section)
+    else:
+        known = {id(source): section_law(source) for source in of_notches}
+        each = [known[id(source)] for source in of_notches]
+        law, first = MixedLaw.of(each), np.unique(template.rod_index, return_index=True)[1]
+        sections = [jax.tree.map(operator.itemgetter(k), rods.section) for k in range(len(first))]
+        pairs = zip((each[notch] for notch in first), sections, strict=True)
+        stiffness = xp.stack([one.stiffness(section) for one, section in pairs])
+    weighted = rods.length[..., None, None] * (stiffness @ rods.basis)
     elastic = xp.einsum("niam,niak->nmk", rods.basis, weighted)
     elastic = elastic + rods.padding_mask[:, None] * xp.eye(rods.modes)
     elastic = template.stiffness_factor[:, None, None] * elastic[template.rod_index]

@@ -240,6 +240,12 @@ def _notch_problems(robot: "Robot") -> Problems:
             continue
         if notch.tube and notch.tube.base_length:
             yield f"{named.name}.tube.base_length", "is for [tube]; leave it out."
+        if notch.material and (notch.material.density is None) != (robot.material.density is None):
+            yield (
+                f"{named.name}.material.density",
+                "is known of one material and not of the other; give the densities of both, or "
+                "neither.",
+            )
         for key, text in notch.problems(notch.tube or robot.tube):
             yield f"{named.name}.{key}", text
         if last and not row:

@@ -150,6 +150,11 @@ class Robot:
         """The material of every body, base first."""
         return (self.material, *(notch.material or self.material for notch in self.notches))
 
+    @property
+    def has_mass(self) -> bool:
+        """Whether the densities of all its materials are known."""
+        return all(material.density is not None for material in self.materials)
+
     @functools.cached_property
     def geometry(self) -> "Geometry":
         """Its bodies, cuts, walls, closing angles and masses, without loads."""

@@ -303,16 +303,20 @@ def moment_error(state: SolvedState) -> Array:
 def bend_possible(state: SolvedState) -> Array:
     """Whether every flexure is bent as it can be, and as its pose can be computed.
 
-    By less than half a turn, with no fibre shortened to nothing, and not so far about several axes
-    that the order of its turns is not known well.
+    By less than half a turn, with no fibre shortened to nothing, not beyond the ends of a table,
+    and not so far about several axes that the order of its turns is not known well.
     """
     chain, modes = state.chain, state.solved.point.unknowns.modes
     below_half_turn = jnp.sum(state.evaluation.flexure.bend**2, axis=-1) < np.pi**2
     accurate = jax.vmap(rotation_error_estimate)(chain.rods, modes) < _MAX_ROTATION_ERROR
     section = chain.rods.section
     farthest = jnp.maximum(section.edge_spine, section.edge_near)
-    bending = jnp.abs(in_space(state.evaluation.flexure.strain)[..., 1]) * farthest
-    return jnp.all(below_half_turn & accurate) & jnp.all(bending < 1.0)
+    strain = in_space(state.evaluation.flexure.strain)
+    bending = jnp.abs(strain[..., 1]) * farthest
+    possible = jnp.all(below_half_turn & accurate) & jnp.all(bending < 1.0)
+    if chain.law.axis is None:
+        return possible
+    return possible & jnp.all(jax.vmap(type(chain.law).covers)(chain.law, strain))
 
 
 @Quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",

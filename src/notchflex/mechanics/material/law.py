@@ -22,15 +22,15 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial, singledispatch
 from typing import Any, ClassVar, NamedTuple
 
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from notchflex._arrays import decide, xp
 from notchflex._imports import unregistered
-from notchflex._jax import Pytree, constant, jax, jnp
+from notchflex._jax import Pytree, choose, constant, jax, jnp
 from notchflex.mechanics.section import gauss_on
 
 Scalar = Float[Array, ""]
@@ -329,18 +329,20 @@ class Transformed(NamedTuple):
 _WEAK = xp.arange(6) == 1
 
 
-class SectionLaw(Pytree, ABC):
-    """Section law of a material. Tangents are derivatives of the resultants.
+class Law(Pytree):
+    """What the chain needs of the law of a section, of any kind.
 
     Attributes:
         is_linear: Whether the moment of a section is proportional to its curvature.
-        elastic_modulus: Young's modulus in the free robot, MPa.
-        shear_modulus: Shear modulus, MPa.
+        axis: Axis of its numbers that runs along the flexures; None where one law serves all.
     """
 
     is_linear: ClassVar[bool] = False
-    elastic_modulus: Scalar
-    shear_modulus: Scalar
+    axis: ClassVar[int | None] = None
+    respond: ClassVar[Callable[..., SectionResponse]]
+    bent: ClassVar[Callable[..., Bending]]
+    elastic: ClassVar[Callable[..., Strain]]
+    stored_energy_density: ClassVar[Callable[..., tuple[Scalar, Flattening]]]
 
     @property
     def remembers(self) -> bool:
@@ -356,6 +358,34 @@ class SectionLaw(Pytree, ABC):
         """Return the energy per length lost between two memories, N mm/mm; for plain arrays."""
         del before, after
         return xp.zeros(xp.shape(section.area))
+
+    def covers(self, strain: Strain) -> Any:
+        """Return whether strains lie in the range that the law is known for."""
+        del strain
+        return xp.asarray(True)
+
+    def tangent(self, strain: Strain, slope: Array, section: FibreSection) -> Strain:
+        """Return the change of the resultants with many strains, of the slope about y."""
+        columns = jax.tree.map(lambda leaf: leaf[..., None], section)
+        return jnp.where(_WEAK, slope * strain, self.elastic(strain.T, columns))
+
+    def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
+        """Compute the stiffness in the free robot, of a section or of many."""
+        plain = dataclasses.replace(section, fibres=None)
+        columns = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], plain)
+        return self.elastic(constant(xp.eye(6)), columns).swapaxes(-1, -2)
+
+
+class SectionLaw(Law, ABC):
+    """Section law of a material. Tangents are derivatives of the resultants.
+
+    Attributes:
+        elastic_modulus: Young's modulus in the free robot, MPa.
+        shear_modulus: Shear modulus, MPa.
+    """
+
+    elastic_modulus: Scalar
+    shear_modulus: Scalar
 
     @abstractmethod
     def moment(self, curvature: Scalar, section: FibreSection) -> Scalar:
@@ -457,11 +487,97 @@ class SectionLaw(Pytree, ABC):
         ]
         return xp.stack(resultants, axis=-1)
 
-    def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
-        """Compute the stiffness in the free robot, of a section or of many."""
-        plain = dataclasses.replace(section, fibres=None)
-        columns = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], plain)
-        return self.elastic(constant(xp.eye(6)), columns).swapaxes(-1, -2)
+
+class MixedLaw(Law):
+    """Laws of several materials: each flexure has one; its methods are for one flexure."""
+
+    axis = 0
+    kind: Int[Array, "*n"]  # Which of the laws it is
+    laws: tuple[Law, ...]  # One of every kind; where it is not meant its numbers are of another
+
+    @classmethod
+    def of(cls, laws: Sequence[Law]) -> MixedLaw:
+        """Join the laws of flexures, one for each."""
+        forms = [
+            (str(jax.tree.structure(law)), *map(xp.shape, jax.tree.leaves(law))) for law in laws
+        ]
+        kinds = [*dict.fromkeys(forms)]
+        columns = (
+            [
+                law if own == form else laws[forms.index(form)]
+                for law, own in zip(laws, forms, strict=True)
+            ]
+            for form in kinds
+        )
+        return cls(
+            xp.array([kinds.index(form) for form in forms]),
+            tuple(jax.tree.map(lambda *leaves: xp.stack(leaves), *column) for column in columns),
+        )
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether all are."""
+        return all(law.is_linear for law in self.laws)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether any of them does."""
+        return any(law.remembers for law in self.laws)
+
+    def rest(self, section: FibreSection) -> Any:
+        """Return the memory of free sections, which serves all laws that remember."""
+        return next((law.rest(section) for law in self.laws if law.remembers), ())
+
+    def _of_kind(self, results: list[Any]) -> Any:
+        chosen = results[0]
+        for number, result in enumerate(results[1:], 1):
+            chosen = choose(self.kind == number, result, chosen)
+        return chosen
+
+    def _chosen(self, name: str, *arguments: Any, memory: tuple[Any, ...] = ()) -> Any:
+        """Return what the law of the flexure gives; one without memory leaves that as it is."""
+        results: list[Any] = []
+        for law in self.laws:
+            past = memory if law.remembers else [()] * len(memory)
+            results.append(getattr(law, name)(*arguments, *past))
+            if memory and not law.remembers and hasattr(results[-1], "memory"):
+                results[-1] = results[-1]._replace(memory=memory[0])
+        return self._of_kind(results)
+
+    def respond(self, strain: Strain, section: FibreSection, memory: Any) -> SectionResponse:
+        """Compute resultants and memory."""
+        return self._chosen("respond", strain, section, memory=(memory,))
+
+    def bent(self, reduced: Each, section: FibreSection, memory: Any) -> Bending:
+        """Bend sections between their ends."""
+        return self._chosen("bent", reduced, section, memory=(memory,))
+
+    def stored_energy_density(
+        self, strain: Strain, section: FibreSection, memory: Any
+    ) -> tuple[Scalar, Flattening]:
+        """Compute the stored energy per length, and the flattening."""
+        return self._chosen("stored_energy_density", strain, section, memory=(memory,))
+
+    def elastic(self, strain: Strain, section: FibreSection) -> Strain:
+        """Compute the resultants with the moduli of the free robot."""
+        return self._chosen("elastic", strain, section)
+
+    def tangent(self, strain: Strain, slope: Array, section: FibreSection) -> Strain:
+        """Return the change of the resultants with many strains."""
+        return self._chosen("tangent", strain, slope, section)
+
+    def covers(self, strain: Strain) -> Any:
+        """Return whether strains lie in the range that the law is known for."""
+        return self._chosen("covers", strain)
+
+    def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
+        """Return the energy per length lost in all flexures between rows of their memories."""
+
+        def lost(law: MixedLaw, section: FibreSection, before: Array, after: Array) -> Array:
+            loss = [one.dissipated(section, before, after) for one in law.laws]
+            return law._of_kind(loss)
+
+        return jax.vmap(lost, (0, 0, 1, 1), 1)(self, section, before, after)
 
 
 def moduli(material: Any) -> tuple[Array, Array]:
@@ -471,7 +587,7 @@ def moduli(material: Any) -> tuple[Array, Array]:
 
 
 @singledispatch
-def section_law(material: Any) -> SectionLaw:
+def section_law(material: Any) -> Law:
     """Return the section law of a material description."""
     raise unregistered("section law", material, "material", "section_law")
 
@@ -492,7 +608,7 @@ class SectionStrain(NamedTuple):
 
 
 def section_strain(
-    law: SectionLaw, strain: Strain, section: FibreSection, memory: object
+    law: Law, strain: Strain, section: FibreSection, memory: object
 ) -> SectionStrain:
     """Compute the strains of a section from those of its flexure, which holds its ends too."""
     ends, curvature = section.compliance, strain[1]

@@ -19,7 +19,15 @@ from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._arrays import Decisions
 from notchflex._jax import jax, jnp
-from notchflex.mechanics.chain import Chain, assemble, body_lengths, flexure, sites_of, tip_anchor
+from notchflex.mechanics.chain import (
+    Chain,
+    assemble,
+    body_lengths,
+    by_fibres,
+    flexure,
+    sites_of,
+    tip_anchor,
+)
 from notchflex.mechanics.flexure import Site
 from notchflex.mechanics.ring import Side
 from notchflex.robot import Robot
@@ -324,7 +332,7 @@ class AssembledRobots:
         for number, (notch, site) in enumerate(zip(example.notches, sites, strict=True)):
             first.setdefault((id(notch), id(site)), number)
         group_of = np.repeat(np.arange(len(robot.notch)), [group.repeat for group in robot.notch])
-        options = chain.level, chain.refinement, robot.material.by_fibres
+        options = chain.level, chain.refinement, by_fibres(robot)
         made, trees = dict[tuple[int, _NotchForm], list[int]](), dict[int, Any]()
         for number in first.values():
             notch, site = example.notches[number], sites[number]
@@ -459,7 +467,8 @@ class AssembledRobots:
             lengths = np.asarray(body_lengths(robot.tube, robot.notches)).T
             rings[..., :2] = lengths[..., notches.first[..., None] + np.arange(2)]
             rings[..., 2:8] = notches.boundaries
-            rings[..., 8] = np.reshape(robot.material.poisson_ratio, (-1, 1, 1))
+            ratios = np.broadcast_arrays(*(each.poisson_ratio for each in robot.materials[1:]))
+            rings[..., 8] = np.reshape(ratios, (len(ratios), -1)).T[:, notches.first]
             is_free = notches.boundaries[..., 5]
             rings[..., 9] = is_free * np.reshape(tip_anchor(robot), (-1, 1, 1))
         return np.concatenate([of_parts, rings.reshape(*of_parts.shape[:2], -1)], axis=-1)
