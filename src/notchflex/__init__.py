@@ -41,6 +41,7 @@ _HOME = {
             "StressStrain",
             "StripNotch",
             "Superelastic",
+            "TableNotch",
             "Tendon",
             "Tube",
             "ULink",

@@ -114,6 +114,7 @@ from notchflex.robot import Robot as Robot
 from notchflex.robot import StressStrain as StressStrain
 from notchflex.robot import StripNotch as StripNotch
 from notchflex.robot import Superelastic as Superelastic
+from notchflex.robot import TableNotch as TableNotch
 from notchflex.robot import Tendon as Tendon
 from notchflex.robot import Tube as Tube
 from notchflex.robot import ULink as ULink

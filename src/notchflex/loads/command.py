@@ -274,7 +274,7 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
                 f"{last}, one after each notch"
             )
     pulls = external.gravity is not None and any(external.gravity)
-    if pulls and not robot.has_mass and external.tip_mass == 0.0:
+    if pulls and robot.densities is None and external.tip_mass == 0.0:
         raise InputError.UNSUPPORTED(
             f"gravity has nothing to act on: the density of {robot.name} is not known and no mass "
             "hangs at its tip; give material.density (kg/m3) or a tip_mass (g)"

@@ -242,11 +242,12 @@ def body_masses(
     # its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure
     # (area of its sections times the length of the neutral axis) is lumped: half at the start of
     # the neutral axis on the body before it, half at its end on the body after it.
-    length, density = body_lengths(robot.tube, robot.notches), robot.material.density
-    if not robot.has_mass:
+    length = body_lengths(robot.tube, robot.notches)
+    densities = robot.densities
+    if densities is None:
         return xp.zeros(len(length)), xp.zeros((len(length), 3))
     # Volumes count as those of the robot's material.
-    relative = xp.array([material.density / density for material in robot.materials])
+    relative = xp.array([each / densities[0] for each in densities])
     radii = [(tube.outer_radius, tube.inner_radius) for tube in robot.tubes]
     outer, inner = xp.array(radii).T
     piece = np.pi * (outer**2 - inner**2) * length * relative
@@ -258,7 +259,7 @@ def body_masses(
     on_axis = (0.5 * length * piece)[:, None] * np.eye(3)[2]
     at_starts = before[:, None] * xp.pad(rods.start_offset, ((0, 1), (0, 0)))
     at_ends = behind[:, None] * xp.pad(end, ((1, 0), (0, 0)))
-    return 1e-6 * density * volume, (on_axis + at_starts + at_ends) / volume[:, None]
+    return 1e-6 * densities[0] * volume, (on_axis + at_starts + at_ends) / volume[:, None]
 
 
 # Whether a robot stays in one plane under its tendons alone.
@@ -268,7 +269,8 @@ def body_masses(
 def bending_normal(robot: Robot) -> Float[Array, " 3"] | None:
     """Return the normal of the plane in which all notches bend, in the base frame, or None."""
     direction = xp.radians([notch.direction_deg for notch in robot.notches])
-    if (xp.abs(xp.sin(direction - direction[0])) > 1e-12).any():
+    off_plane = (xp.abs(xp.sin(direction - direction[0])) > 1e-12).any()
+    if off_plane or not all(notch.stays_in_plane for notch in robot.notches):
         return None
     return xp.array([-xp.sin(direction[0]), xp.cos(direction[0]), 0.0])
 
@@ -466,22 +468,21 @@ def by_fibres(robot: Robot) -> bool:
 
 def _of_materials(robot: Robot, template: ChainTemplate) -> dict[str, Any]:
     """Return the fields of a chain that follow from its materials."""
-    rods, of_notches = template.distinct_rods, [n.made_of(robot.material) for n in robot.notches]
-    law = section_law(robot.material)
+    rods, index, law = template.distinct_rods, template.rod_index, section_law(robot.material)
+    sources = [notch.made_of(robot.material) for notch in robot.notches]
     # Of the form of the robot alone: equal materials of several notches are several.
-    if all(source is robot.material for source in of_notches):
+    if all(source is robot.material for source in sources):
         stiffness = law.stiffness(rods.section)
     else:
-        known = {id(source): section_law(source) for source in of_notches}
-        each = [known[id(source)] for source in of_notches]
-        law, first = MixedLaw.of(each), np.unique(template.rod_index, return_index=True)[1]
-        sections = [jax.tree.map(operator.itemgetter(k), rods.section) for k in range(len(first))]
-        pairs = zip((each[notch] for notch in first), sections, strict=True)
-        stiffness = xp.stack([one.stiffness(section) for one, section in pairs])
+        known, rods, index = {id(s): section_law(s) for s in sources}, template.rods, ...
+        laws = [known[id(source)] for source in sources]
+        sections = [jax.tree.map(operator.itemgetter(k), rods.section) for k in range(len(laws))]
+        stiffness = xp.stack([*map(Law.stiffness, laws, sections)])
+        law = MixedLaw.of(laws)
     weighted = rods.length[..., None, None] * (stiffness @ rods.basis)
     elastic = xp.einsum("niam,niak->nmk", rods.basis, weighted)
     elastic = elastic + rods.padding_mask[:, None] * xp.eye(rods.modes)
-    elastic = template.stiffness_factor[:, None, None] * elastic[template.rod_index]
+    elastic = template.stiffness_factor[:, None, None] * elastic[index]
     stiffness = (elastic * np.eye(elastic.shape[-1])).sum(axis=-1)
     stop = template.rods.stop_flexibility
     linear = law.is_linear and not rods.section.softens

@@ -17,6 +17,7 @@ from notchflex.robot.materials.stress_strain import StressStrain
 from notchflex.robot.materials.superelastic import Superelastic
 from notchflex.robot.notches.arc import ArcNotch
 from notchflex.robot.notches.strip import StripNotch
+from notchflex.robot.notches.table import TableNotch
 from notchflex.robot.notches.u_link import ULink
 from notchflex.robot.reading import load_robot, robot_from_text
 from notchflex.robot.robot import Drawing, Robot, from_table, json_schema, set_values, to_table
@@ -41,6 +42,7 @@ __all__ = [
     "StressStrain",
     "StripNotch",
     "Superelastic",
+    "TableNotch",
     "Tendon",
     "Tube",
     "ULink",

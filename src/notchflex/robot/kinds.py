@@ -251,6 +251,11 @@ class Notch:
         return ()
 
     @property
+    def stays_in_plane(self) -> bool:
+        """Whether forces in its plane of bending move it in that plane alone."""
+        return True
+
+    @property
     def has_elastic_ends(self) -> bool:
         """Whether its stiffness depends on the rings or walls beside it."""
         return getattr(self, "ends", "rigid") != "rigid"

@@ -151,9 +151,10 @@ class Robot:
         return (self.material, *(notch.material or self.material for notch in self.notches))
 
     @property
-    def has_mass(self) -> bool:
-        """Whether the densities of all its materials are known."""
-        return all(material.density is not None for material in self.materials)
+    def densities(self) -> tuple[float, ...] | None:
+        """The density of every body [kg/m3]; None where none is known."""
+        known = tuple(each.density for each in self.materials if each.density is not None)
+        return known or None
 
     @functools.cached_property
     def geometry(self) -> "Geometry":

@@ -309,14 +309,9 @@ def bend_possible(state: SolvedState) -> Array:
     chain, modes = state.chain, state.solved.point.unknowns.modes
     below_half_turn = jnp.sum(state.evaluation.flexure.bend**2, axis=-1) < np.pi**2
     accurate = jax.vmap(rotation_error_estimate)(chain.rods, modes) < _MAX_ROTATION_ERROR
-    section = chain.rods.section
-    farthest = jnp.maximum(section.edge_spine, section.edge_near)
-    strain = in_space(state.evaluation.flexure.strain)
-    bending = jnp.abs(strain[..., 1]) * farthest
-    possible = jnp.all(below_half_turn & accurate) & jnp.all(bending < 1.0)
-    if chain.law.axis is None:
-        return possible
-    return possible & jnp.all(jax.vmap(type(chain.law).covers)(chain.law, strain))
+    law, strain = chain.law, in_space(state.evaluation.flexure.strain)
+    covered = jax.vmap(type(law).covers, (law.axis, 0, 0))(law, strain, chain.rods.section)
+    return jnp.all(below_half_turn & accurate) & jnp.all(covered)
 
 
 @Quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",

@@ -26,7 +26,7 @@ from collections.abc import Callable, Sequence
 from functools import partial, singledispatch
 from typing import Any, ClassVar, NamedTuple
 
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._arrays import decide, xp
 from notchflex._imports import unregistered
@@ -342,6 +342,8 @@ class Law(Pytree):
     respond: ClassVar[Callable[..., SectionResponse]]
     bent: ClassVar[Callable[..., Bending]]
     elastic: ClassVar[Callable[..., Strain]]
+    tangent: ClassVar[Callable[..., Strain]]
+    covers: ClassVar[Callable[..., Array]]
     stored_energy_density: ClassVar[Callable[..., tuple[Scalar, Flattening]]]
 
     @property
@@ -358,16 +360,6 @@ class Law(Pytree):
         """Return the energy per length lost between two memories, N mm/mm; for plain arrays."""
         del before, after
         return xp.zeros(xp.shape(section.area))
-
-    def covers(self, strain: Strain) -> Any:
-        """Return whether strains lie in the range that the law is known for."""
-        del strain
-        return xp.asarray(True)
-
-    def tangent(self, strain: Strain, slope: Array, section: FibreSection) -> Strain:
-        """Return the change of the resultants with many strains, of the slope about y."""
-        columns = jax.tree.map(lambda leaf: leaf[..., None], section)
-        return jnp.where(_WEAK, slope * strain, self.elastic(strain.T, columns))
 
     def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
         """Compute the stiffness in the free robot, of a section or of many."""
@@ -386,6 +378,16 @@ class SectionLaw(Law, ABC):
 
     elastic_modulus: Scalar
     shear_modulus: Scalar
+
+    def covers(self, strain: Strain, section: FibreSection) -> Bool[Array, "*shape"]:
+        """Return whether no fibre is shortened to nothing."""
+        farthest = jnp.maximum(section.edge_spine, section.edge_near)
+        return jnp.abs(strain[..., 1]) * farthest < 1.0
+
+    def tangent(self, strain: Strain, slope: Array, section: FibreSection) -> Strain:
+        """Return the change of the resultants with many strains, of the slope about y."""
+        columns = jax.tree.map(lambda leaf: leaf[..., None], section)
+        return jnp.where(_WEAK, slope * strain, self.elastic(strain.T, columns))
 
     @abstractmethod
     def moment(self, curvature: Scalar, section: FibreSection) -> Scalar:
@@ -488,34 +490,48 @@ class SectionLaw(Law, ABC):
         return xp.stack(resultants, axis=-1)
 
 
+def _of_kind(name: str, *, after: bool = False) -> Any:
+    """Return a method of a mixed law; `after` a memory, which is then its last argument."""
+
+    def method(mixed: MixedLaw, *arguments: Any) -> Any:
+        *others, memory = arguments
+        results: list[Any] = []
+        for law in mixed.laws:
+            forgets = after and not law.remembers
+            results.append(getattr(law, name)(*others, () if forgets else memory))
+            if forgets and hasattr(results[-1], "memory"):
+                results[-1] = results[-1]._replace(memory=memory)
+        return mixed.chosen(results)
+
+    return method
+
+
 class MixedLaw(Law):
-    """Laws of several materials: each flexure has one; its methods are for one flexure."""
+    """Laws of several materials, one for each flexure; its methods are those of one flexure."""
 
     axis = 0
     kind: Int[Array, "*n"]  # Which of the laws it is
     laws: tuple[Law, ...]  # One of every kind; where it is not meant its numbers are of another
 
+    respond = _of_kind("respond", after=True)
+    bent = _of_kind("bent", after=True)
+    stored_energy_density = _of_kind("stored_energy_density", after=True)
+    elastic, tangent, covers = map(_of_kind, ("elastic", "tangent", "covers"))
+
     @classmethod
     def of(cls, laws: Sequence[Law]) -> MixedLaw:
         """Join the laws of flexures, one for each."""
-        forms = [
-            (str(jax.tree.structure(law)), *map(xp.shape, jax.tree.leaves(law))) for law in laws
-        ]
+        forms = [repr(jax.tree.map(xp.shape, law)) for law in laws]
         kinds = [*dict.fromkeys(forms)]
-        columns = (
-            [
-                law if own == form else laws[forms.index(form)]
-                for law, own in zip(laws, forms, strict=True)
-            ]
+        columns = [
+            [laws[k if own == form else forms.index(form)] for k, own in enumerate(forms)]
             for form in kinds
-        )
-        return cls(
-            xp.array([kinds.index(form) for form in forms]),
-            tuple(jax.tree.map(lambda *leaves: xp.stack(leaves), *column) for column in columns),
-        )
+        ]
+        stacked = (jax.tree.map(lambda *leaves: xp.stack(leaves), *same) for same in columns)
+        return cls(xp.array([*map(kinds.index, forms)]), tuple(stacked))
 
     @property
-    def is_linear(self) -> bool:
+    def is_linear(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Whether all are."""
         return all(law.is_linear for law in self.laws)
 
@@ -528,54 +544,18 @@ class MixedLaw(Law):
         """Return the memory of free sections, which serves all laws that remember."""
         return next((law.rest(section) for law in self.laws if law.remembers), ())
 
-    def _of_kind(self, results: list[Any]) -> Any:
+    def chosen(self, results: Sequence[Any]) -> Any:
+        """Choose among what each of the laws gives."""
         chosen = results[0]
         for number, result in enumerate(results[1:], 1):
             chosen = choose(self.kind == number, result, chosen)
         return chosen
 
-    def _chosen(self, name: str, *arguments: Any, memory: tuple[Any, ...] = ()) -> Any:
-        """Return what the law of the flexure gives; one without memory leaves that as it is."""
-        results: list[Any] = []
-        for law in self.laws:
-            past = memory if law.remembers else [()] * len(memory)
-            results.append(getattr(law, name)(*arguments, *past))
-            if memory and not law.remembers and hasattr(results[-1], "memory"):
-                results[-1] = results[-1]._replace(memory=memory[0])
-        return self._of_kind(results)
-
-    def respond(self, strain: Strain, section: FibreSection, memory: Any) -> SectionResponse:
-        """Compute resultants and memory."""
-        return self._chosen("respond", strain, section, memory=(memory,))
-
-    def bent(self, reduced: Each, section: FibreSection, memory: Any) -> Bending:
-        """Bend sections between their ends."""
-        return self._chosen("bent", reduced, section, memory=(memory,))
-
-    def stored_energy_density(
-        self, strain: Strain, section: FibreSection, memory: Any
-    ) -> tuple[Scalar, Flattening]:
-        """Compute the stored energy per length, and the flattening."""
-        return self._chosen("stored_energy_density", strain, section, memory=(memory,))
-
-    def elastic(self, strain: Strain, section: FibreSection) -> Strain:
-        """Compute the resultants with the moduli of the free robot."""
-        return self._chosen("elastic", strain, section)
-
-    def tangent(self, strain: Strain, slope: Array, section: FibreSection) -> Strain:
-        """Return the change of the resultants with many strains."""
-        return self._chosen("tangent", strain, slope, section)
-
-    def covers(self, strain: Strain) -> Any:
-        """Return whether strains lie in the range that the law is known for."""
-        return self._chosen("covers", strain)
-
     def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
         """Return the energy per length lost in all flexures between rows of their memories."""
 
-        def lost(law: MixedLaw, section: FibreSection, before: Array, after: Array) -> Array:
-            loss = [one.dissipated(section, before, after) for one in law.laws]
-            return law._of_kind(loss)
+        def lost(law: MixedLaw, *between: Any) -> Array:
+            return law.chosen([one.dissipated(*between) for one in law.laws])
 
         return jax.vmap(lost, (0, 0, 1, 1), 1)(self, section, before, after)
 

@@ -1,0 +1,159 @@
+"""A flexure that was measured or computed elsewhere: its moment over its angle, or a stiffness."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import KW_ONLY
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from notchflex.robot.kinds import Material, Notch, Tube
+from notchflex.robot.part import Float, FloatOrInf, Problems, part, quantity
+
+COLUMNS = ("angle_deg", "moment_Nmm")
+"""Columns of a file of the curve, and the keys that hold it."""
+
+
+@part
+class TableNotch(Notch):
+    """A flexure given by numbers: a measured joint, another cut, a result of finite elements.
+
+    It is a short rod along its neutral axis with the same strains all along. The material counts
+    for its mass alone, that of the uncut tube; its strain is not known (NaN).
+
+    Args:
+        length: Length along the neutral axis, and of the gap in the tube [mm].
+        angle_deg: Angles of bending, beyond the free shape [deg], rising. Where all have one sign
+            the curve goes on to the other side with opposite moments. A state beyond its ends
+            counts as not converged.
+        moment_Nmm: Moment about the neutral axis at each angle [N mm], of the same sign, not
+            falling.
+        file: CSV file of both, with columns of these names; its path starts at the folder of the
+            robot file. Reading a robot file takes the numbers from there.
+        stiffness: Stiffness about x, y, z [N mm/rad] and along x, y, z [N/mm], of the far end
+            against the near one, about the middle of the neutral axis. Bending is about y. Six
+            numbers, infinite where it is rigid; or the 36 of a matrix by rows, symmetric and
+            positive definite, of moments and forces by rotations [rad] and displacements [mm]. A
+            curve replaces the second of six; where they are left out the rest is rigid.
+        axis_offset: Distance of the neutral axis from the tube axis, away from the bend [mm].
+        closing_angle_deg: Angle at which it closes, precurvature included [deg].
+        uncut_length: Uncut length behind it, toward the tip [mm].
+        direction_deg: Side toward which it bends [deg].
+        precurvature_deg: Angle when nothing pulls [deg].
+        repeat: How many equal ones follow one another.
+
+    Raises:
+        InputError: A value is not allowed, the curve falls, or the stiffness is not positive.
+
+    Example:
+        >>> joint = TableNotch(2.0, angle_deg=(5.0, 20.0), moment_Nmm=(1.0, 3.0), uncut_length=1.0)
+        >>> joint.curve
+        ((-20.0, -5.0, 0.0, 5.0, 20.0), (-3.0, -1.0, 0.0, 1.0, 3.0))
+    """
+
+    length: Annotated[Float, quantity("mm", "length along the neutral axis", above=0)]
+    angle_deg: Annotated[
+        tuple[Annotated[Float, quantity("deg", "angle", above=-180, below=180)], ...],
+        Field(description="angles of bending, rising", json_schema_extra={"unit": "deg"}),
+    ] = ()
+    moment_Nmm: Annotated[  # noqa: N815
+        tuple[Float, ...],
+        Field(description="moment at each angle", json_schema_extra={"unit": "N mm"}),
+    ] = ()
+    file: Annotated[
+        str | None, Field(description="CSV file with the columns angle_deg and moment_Nmm")
+    ] = None
+    stiffness: Annotated[
+        tuple[FloatOrInf, ...],
+        Field(description="stiffness about and along x, y, z: 6 numbers, or 36 by rows"),
+    ] = ()
+    _: KW_ONLY
+    kind: Literal["table"] = "table"
+    axis_offset: Annotated[
+        Float, quantity("mm", "distance of the neutral axis from the tube axis, off the bend")
+    ] = 0.0
+    closing_angle_deg: Annotated[
+        Float | None, quantity("deg", "angle at which it closes", above=0, below=180)
+    ] = None
+
+    def made_of(self, material: Material) -> Any:
+        """Return itself: its numbers are its law."""
+        del material
+        return self
+
+    @property
+    def curve(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Angles [deg] and moments [N mm] on both sides, with 0."""
+        if not self.angle_deg:
+            half_turn = math.pi * self.stiffness[7 if len(self.stiffness) == 36 else 1]
+            return (-180.0, 0.0, 180.0), (-half_turn, 0.0, half_turn)
+        points = {0.0: 0.0, **dict(zip(self.angle_deg, self.moment_Nmm, strict=True))}
+        if min(points) == 0.0 or max(points) == 0.0:
+            points |= {-angle: -moment for angle, moment in points.items() if angle}
+        angles, moments = zip(*sorted(points.items()), strict=True)
+        return angles, moments
+
+    @property
+    def stays_in_plane(self) -> bool:
+        """Whether nothing couples its plane of bending with the directions out of it."""
+        coupled = (each for k, each in enumerate(self.stiffness) if (k // 6 + k) % 2)
+        return len(self.stiffness) < 36 or not any(coupled)
+
+    def conflicts(self) -> Problems:
+        """Find a curve that falls, a stiffness that is not positive, or none of both."""
+        angles, moments = self.angle_deg, self.moment_Nmm
+        if self.file is not None:
+            yield "file", "is taken from robot files; give `angle_deg` and `moment_Nmm` here."
+        elif not angles and not self.stiffness:
+            yield "angle_deg", "is missing; give angles and moments, a file, or a stiffness."
+        elif len(angles) != len(moments):
+            yield "moment_Nmm", f"has {len(moments)} numbers and `angle_deg` {len(angles)}."
+        elif angles and (not any(angles) or any(low >= high for low, high in pairwise(angles))):
+            yield "angle_deg", f"is {list(angles)} deg; angles must rise, and one is not 0."
+        elif (angles and any(low > high for low, high in pairwise(self.curve[1]))) or any(
+            angle * moment <= 0.0 and (angle or moment)
+            for angle, moment in zip(angles, moments, strict=True)
+        ):
+            yield (
+                "moment_Nmm",
+                f"is {list(moments)} N mm; moments must have the signs of their angles and not "
+                "fall: a falling piece has no unique equilibrium. Smooth a noisy curve first.",
+            )
+        elif len(self.stiffness) not in ((0, 6) if angles else (6, 36)):
+            yield (
+                "stiffness",
+                f"has {len(self.stiffness)} numbers; give 6, or 36 without a curve.",
+            )
+        elif self.stiffness and not self._is_positive():
+            yield (
+                "stiffness",
+                "is not positive; six numbers are greater than 0, and the second one is finite where no "
+                "curve replaces it; 36 are a symmetric and positive "
+                "definite matrix, moments about x, y, z and forces along x, y, z as rows.",
+            )
+
+    def _is_positive(self) -> bool:
+        """Return whether the stiffness is positive definite, up to rounding."""
+        import numpy as np  # robots without such a matrix are read without it
+
+        if len(self.stiffness) == 6:
+            bends = bool(self.angle_deg) or math.isfinite(self.stiffness[1])
+            return bends and min(self.stiffness) > 0.0
+        matrix = np.reshape(self.stiffness, (6, 6))
+        if not np.isfinite(matrix).all() or matrix.diagonal().min() <= 0.0:
+            return False
+        size = np.sqrt(matrix.diagonal())
+        scaled = matrix / np.outer(size, size)
+        error = np.abs(scaled - scaled.T).max()
+        return bool(error < 1e-6 and np.linalg.eigvalsh(scaled).min() > 1e-9)
+
+    def problems(self, tube: Tube) -> Problems:
+        """Find a free shape beyond the closing angle."""
+        del tube
+        if self.closing_angle_deg is not None and self.precurvature_deg >= self.closing_angle_deg:
+            yield (
+                "precurvature_deg",
+                f"is {self.precurvature_deg} deg; it must be less than the closing angle, "
+                f"{self.closing_angle_deg} deg.",
+            )
