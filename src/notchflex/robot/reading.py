@@ -65,6 +65,7 @@ def load_changed(
     text = read_text(path, "robot file", shown, RobotFileError)
     table = parse_toml(text, shown)
     try:
+        _read_curves(table, path.parent)
         robot, dropped = from_table(table), ()
     except InputError as error:
         if not values:
@@ -79,6 +80,20 @@ def load_changed(
     if values:
         robot, dropped = set_values(robot, values)
     return Changed(remember_source(robot, text), dropped)
+
+
+def _read_curves(table: dict[str, Any], folder: Path) -> None:
+    """Put the numbers of CSV files of curves into the table of a robot."""
+    from notchflex.robot.csv_table import csv_table  # with numpy, which most robots do not need
+
+    rows: Any = table.get("notch")
+    for row in rows if isinstance(rows, list) else ():
+        name = row.get("file") if isinstance(row, dict) else None
+        if isinstance(name, str):
+            curve = csv_table(folder / name)
+            for key, column in ("angle_deg", "angle_deg"), ("moment", "moment_Nmm"):
+                row[key] = curve.numbers(column).tolist()
+            del row["file"]
 
 
 def in_file(shown: str, error: InputError, kind: type[Refused]) -> Refused:

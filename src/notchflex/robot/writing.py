@@ -243,7 +243,7 @@ _COMMENT = re.compile(
 
 def _set_value(table: Any, key: str, value: object, note: str | None) -> None:
     """Set a value, and say beside it from what it changed and to what it was fitted."""
-    was = table[key]
+    was, value = table[key], list(value) if isinstance(value, tuple) else value
     comment, changed = cast("re.Match[str]", _COMMENT.fullmatch(was.trivia.comment)).groups()
     if was != value:
         table[key] = value

@@ -41,6 +41,7 @@ _FAR = 10.0  # an angle that no flexure reaches, rad
 class TableLaw(Law):
     """Resultants of the section of a table's rod; the torsion constant, 1, is their factor."""
 
+    lumped = True
     length: Float[Array, ""]  # Length of the rod, mm
     matrix: Float[Array, "6 6"]  # At the angle 0; 0 for rigid directions
     # Of each piece of the curve: side of the angles (1 or -1), start and width (rad), three

@@ -335,10 +335,12 @@ class Law(Pytree):
     Attributes:
         is_linear: Whether the moment of a section is proportional to its curvature.
         axis: Axis of its numbers that runs along the flexures; None where one law serves all.
+        lumped: Whether it is that of a flexure as a whole, so that no moment between is missed.
     """
 
     is_linear: ClassVar[bool] = False
     axis: ClassVar[int | None] = None
+    lumped: ClassVar[bool] = False
     respond: ClassVar[Callable[..., SectionResponse]]
     bent: ClassVar[Callable[..., Bending]]
     elastic: ClassVar[Callable[..., Strain]]
@@ -534,6 +536,11 @@ class MixedLaw(Law):
     def is_linear(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Whether all are."""
         return all(law.is_linear for law in self.laws)
+
+    @property
+    def lumped(self) -> Any:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Whether that of each flexure is."""
+        return self.chosen([law.lumped for law in self.laws])
 
     @property
     def remembers(self) -> bool:

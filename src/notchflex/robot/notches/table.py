@@ -27,7 +27,7 @@ class TableNotch(Notch):
         angle_deg: Angles of bending, beyond the free shape [deg], rising. Where all have one sign
             the curve goes on to the other side with opposite moments. A state beyond its ends
             counts as not converged.
-        moment_Nmm: Moment about the neutral axis at each angle [N mm], of the same sign, not
+        moment: Moment about the neutral axis at each angle [N mm], of the same sign, not
             falling.
         file: CSV file of both, with columns of these names; its path starts at the folder of the
             robot file. Reading a robot file takes the numbers from there.
@@ -47,7 +47,7 @@ class TableNotch(Notch):
         InputError: A value is not allowed, the curve falls, or the stiffness is not positive.
 
     Example:
-        >>> joint = TableNotch(2.0, angle_deg=(5.0, 20.0), moment_Nmm=(1.0, 3.0), uncut_length=1.0)
+        >>> joint = TableNotch(2.0, angle_deg=(5.0, 20.0), moment=(1.0, 3.0), uncut_length=1.0)
         >>> joint.curve
         ((-20.0, -5.0, 0.0, 5.0, 20.0), (-3.0, -1.0, 0.0, 1.0, 3.0))
     """
@@ -57,7 +57,7 @@ class TableNotch(Notch):
         tuple[Annotated[Float, quantity("deg", "angle", above=-180, below=180)], ...],
         Field(description="angles of bending, rising", json_schema_extra={"unit": "deg"}),
     ] = ()
-    moment_Nmm: Annotated[  # noqa: N815
+    moment: Annotated[
         tuple[Float, ...],
         Field(description="moment at each angle", json_schema_extra={"unit": "N mm"}),
     ] = ()
@@ -88,7 +88,7 @@ class TableNotch(Notch):
         if not self.angle_deg:
             half_turn = math.pi * self.stiffness[7 if len(self.stiffness) == 36 else 1]
             return (-180.0, 0.0, 180.0), (-half_turn, 0.0, half_turn)
-        points = {0.0: 0.0, **dict(zip(self.angle_deg, self.moment_Nmm, strict=True))}
+        points = {0.0: 0.0, **dict(zip(self.angle_deg, self.moment, strict=True))}
         if min(points) == 0.0 or max(points) == 0.0:
             points |= {-angle: -moment for angle, moment in points.items() if angle}
         angles, moments = zip(*sorted(points.items()), strict=True)
@@ -102,13 +102,13 @@ class TableNotch(Notch):
 
     def conflicts(self) -> Problems:
         """Find a curve that falls, a stiffness that is not positive, or none of both."""
-        angles, moments = self.angle_deg, self.moment_Nmm
+        angles, moments = self.angle_deg, self.moment
         if self.file is not None:
-            yield "file", "is taken from robot files; give `angle_deg` and `moment_Nmm` here."
+            yield "file", "is taken from robot files; give `angle_deg` and `moment` here."
         elif not angles and not self.stiffness:
             yield "angle_deg", "is missing; give angles and moments, a file, or a stiffness."
         elif len(angles) != len(moments):
-            yield "moment_Nmm", f"has {len(moments)} numbers and `angle_deg` {len(angles)}."
+            yield "moment", f"has {len(moments)} numbers and `angle_deg` {len(angles)}."
         elif angles and (not any(angles) or any(low >= high for low, high in pairwise(angles))):
             yield "angle_deg", f"is {list(angles)} deg; angles must rise, and one is not 0."
         elif (angles and any(low > high for low, high in pairwise(self.curve[1]))) or any(
@@ -116,7 +116,7 @@ class TableNotch(Notch):
             for angle, moment in zip(angles, moments, strict=True)
         ):
             yield (
-                "moment_Nmm",
+                "moment",
                 f"is {list(moments)} N mm; moments must have the signs of their angles and not "
                 "fall: a falling piece has no unique equilibrium. Smooth a noisy curve first.",
             )
@@ -128,9 +128,9 @@ class TableNotch(Notch):
         elif self.stiffness and not self._is_positive():
             yield (
                 "stiffness",
-                "is not positive; six numbers are greater than 0, and the second one is finite where no "
-                "curve replaces it; 36 are a symmetric and positive "
-                "definite matrix, moments about x, y, z and forces along x, y, z as rows.",
+                "is not positive; six numbers are greater than 0, the second one finite where no "
+                "curve replaces it; 36 are a symmetric, positive definite matrix, with moments "
+                "about x, y, z and forces along x, y, z as rows.",
             )
 
     def _is_positive(self) -> bool:
