@@ -8,8 +8,9 @@ costs a notch one trial, not its result.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from enum import StrEnum
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities import DEGREES, QUANTITIES
 from notchflex.robot import Robot, Tube
 from notchflex.robot.kinds import Notch
-from notchflex.robot.part import fields_of, unit_of
+from notchflex.robot.part import fields_in, unit_of
 from notchflex.robot.value_names import number_at
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import number_of_cores
@@ -501,10 +502,11 @@ def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict
 def named_values(notch: Notch) -> dict[str, Any]:
     """Return the values of a notch as in a robot file, their units in their names."""
     values: dict[str, Any] = {}
-    for name, field in fields_of(type(notch)).items():
-        unit = unit_of(field)
+    for name, field in fields_in(notch).items():
+        unit, value = unit_of(field), attrgetter(name)(notch)
         with_unit = f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name
-        values[with_unit] = getattr(notch, name)
+        if not is_dataclass(value):  # its values follow
+            values[with_unit] = value
     del values["repeat"]
     return values
 

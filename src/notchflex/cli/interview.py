@@ -113,7 +113,7 @@ NOTES = {
 }
 """By kind, or by section for all kinds, and key."""
 
-_UNASKED = ("ends", "stiffness_factor")
+_UNASKED = ("ends", "stiffness_factor", "tube", "material", "file")
 """Keys that are never asked for."""
 
 _DECIMAL_COMMAS = " For decimal commas, separate numbers by semicolons, or write a point: 1.9."

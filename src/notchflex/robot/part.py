@@ -69,7 +69,7 @@ def unit_of(field: Any) -> str:
 
 def is_unsaid(name: str, value: object) -> bool:
     """Return whether files and lists leave a key out: without a value, or a factor of 1."""
-    return value is None or value == () or (name.endswith("_factor") and value == 1.0)
+    return value is None or (name.endswith("_factor") and value == 1.0)
 
 
 @functools.cache

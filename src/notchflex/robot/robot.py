@@ -420,4 +420,6 @@ def _values(values: Sequence[Any]) -> str:
     numbers = all(isinstance(value, (int, float)) for value in values)
     if numbers and len(values) > MOST:
         return f"{short(min(values))} to {short(max(values))}"
-    return "/".join(short(value) if isinstance(value, float) else str(value) for value in values)
+    texts = (_words([value]) if is_dataclass(value) else str(value) for value in values)
+    pairs = zip(values, texts, strict=True)
+    return "/".join(short(value) if isinstance(value, float) else text for value, text in pairs)

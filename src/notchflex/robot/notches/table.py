@@ -54,20 +54,20 @@ class TableNotch(Notch):
 
     length: Annotated[Float, quantity("mm", "length along the neutral axis", above=0)]
     angle_deg: Annotated[
-        tuple[Annotated[Float, quantity("deg", "angle", above=-180, below=180)], ...],
+        tuple[Annotated[Float, quantity("deg", "angle", above=-180, below=180)], ...] | None,
         Field(description="angles of bending, rising", json_schema_extra={"unit": "deg"}),
-    ] = ()
+    ] = None
     moment: Annotated[
-        tuple[Float, ...],
+        tuple[Float, ...] | None,
         Field(description="moment at each angle", json_schema_extra={"unit": "N mm"}),
-    ] = ()
+    ] = None
     file: Annotated[
         str | None, Field(description="CSV file with the columns angle_deg and moment_Nmm")
     ] = None
     stiffness: Annotated[
-        tuple[FloatOrInf, ...],
+        tuple[FloatOrInf, ...] | None,
         Field(description="stiffness about and along x, y, z: 6 numbers, or 36 by rows"),
-    ] = ()
+    ] = None
     _: KW_ONLY
     kind: Literal["table"] = "table"
     axis_offset: Annotated[
@@ -86,9 +86,10 @@ class TableNotch(Notch):
     def curve(self) -> tuple[Sequence[float], Sequence[float]]:
         """Angles [deg] and moments [N mm] on both sides, with 0."""
         if not self.angle_deg:
-            half_turn = math.pi * self.stiffness[7 if len(self.stiffness) == 36 else 1]
+            numbers = self.stiffness or ()
+            half_turn = math.pi * numbers[7 if len(numbers) == 36 else 1]
             return (-180.0, 0.0, 180.0), (-half_turn, 0.0, half_turn)
-        points = {0.0: 0.0, **dict(zip(self.angle_deg, self.moment, strict=True))}
+        points = {0.0: 0.0, **dict(zip(self.angle_deg, self.moment or (), strict=True))}
         if min(points) == 0.0 or max(points) == 0.0:
             points |= {-angle: -moment for angle, moment in points.items() if angle}
         angles, moments = zip(*sorted(points.items()), strict=True)
@@ -97,21 +98,22 @@ class TableNotch(Notch):
     @property
     def stays_in_plane(self) -> bool:
         """Whether nothing couples its plane of bending with the directions out of it."""
-        coupled = (each for k, each in enumerate(self.stiffness) if (k // 6 + k) % 2)
-        return len(self.stiffness) < 36 or not any(coupled)
+        numbers = self.stiffness or ()
+        coupled = (each for k, each in enumerate(numbers) if (k // 6 + k) % 2)
+        return len(numbers) < 36 or not any(coupled)
 
     def conflicts(self) -> Problems:
         """Find a curve that falls, a stiffness that is not positive, or none of both."""
-        angles, moments = self.angle_deg, self.moment
+        angles, moments, numbers = self.angle_deg or (), self.moment or (), self.stiffness or ()
         if self.file is not None:
             yield "file", "is taken from robot files; give `angle_deg` and `moment` here."
-        elif not angles and not self.stiffness:
+        elif not angles and not numbers:
             yield "angle_deg", "is missing; give angles and moments, a file, or a stiffness."
         elif len(angles) != len(moments):
             yield "moment", f"has {len(moments)} numbers and `angle_deg` {len(angles)}."
         elif angles and (not any(angles) or any(low >= high for low, high in pairwise(angles))):
             yield "angle_deg", f"is {list(angles)} deg; angles must rise, and one is not 0."
-        elif (angles and any(low > high for low, high in pairwise(self.curve[1]))) or any(
+        elif any(low > high for low, high in pairwise(moments)) or any(
             angle * moment <= 0.0 and (angle or moment)
             for angle, moment in zip(angles, moments, strict=True)
         ):
@@ -120,33 +122,15 @@ class TableNotch(Notch):
                 f"is {list(moments)} N mm; moments must have the signs of their angles and not "
                 "fall: a falling piece has no unique equilibrium. Smooth a noisy curve first.",
             )
-        elif len(self.stiffness) not in ((0, 6) if angles else (6, 36)):
-            yield (
-                "stiffness",
-                f"has {len(self.stiffness)} numbers; give 6, or 36 without a curve.",
-            )
-        elif self.stiffness and not self._is_positive():
+        elif len(numbers) not in ((0, 6) if angles else (6, 36)):
+            yield "stiffness", f"has {len(numbers)} numbers; give 6, or 36 without a curve."
+        elif numbers and not _is_positive(numbers, bool(angles)):
             yield (
                 "stiffness",
                 "is not positive; six numbers are greater than 0, the second one finite where no "
                 "curve replaces it; 36 are a symmetric, positive definite matrix, with moments "
                 "about x, y, z and forces along x, y, z as rows.",
             )
-
-    def _is_positive(self) -> bool:
-        """Return whether the stiffness is positive definite, up to rounding."""
-        import numpy as np  # robots without such a matrix are read without it
-
-        if len(self.stiffness) == 6:
-            bends = bool(self.angle_deg) or math.isfinite(self.stiffness[1])
-            return bends and min(self.stiffness) > 0.0
-        matrix = np.reshape(self.stiffness, (6, 6))
-        if not np.isfinite(matrix).all() or matrix.diagonal().min() <= 0.0:
-            return False
-        size = np.sqrt(matrix.diagonal())
-        scaled = matrix / np.outer(size, size)
-        error = np.abs(scaled - scaled.T).max()
-        return bool(error < 1e-6 and np.linalg.eigvalsh(scaled).min() > 1e-9)
 
     def problems(self, tube: Tube) -> Problems:
         """Find a free shape beyond the closing angle."""
@@ -157,3 +141,18 @@ class TableNotch(Notch):
                 f"is {self.precurvature_deg} deg; it must be less than the closing angle, "
                 f"{self.closing_angle_deg} deg.",
             )
+
+
+def _is_positive(numbers: Sequence[float], has_curve: bool) -> bool:
+    """Return whether a stiffness is positive definite, up to rounding."""
+    import numpy as np  # robots without such a matrix are read without it
+
+    if len(numbers) == 6:
+        return min(numbers) > 0.0 and (has_curve or math.isfinite(numbers[1]))
+    matrix = np.reshape(numbers, (6, 6))
+    if not np.isfinite(matrix).all() or matrix.diagonal().min() <= 0.0:
+        return False
+    size = np.sqrt(matrix.diagonal())
+    scaled = matrix / np.outer(size, size)
+    error = np.abs(scaled - scaled.T).max()
+    return bool(error < 1e-6 and np.linalg.eigvalsh(scaled).min() > 1e-9)
