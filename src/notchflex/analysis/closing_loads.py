@@ -31,7 +31,7 @@ from notchflex.mechanics.flexure import Site, rod_at
 from notchflex.mechanics.material import FibreSection, Law, peak_strain, section_strain
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities import DEGREES, QUANTITIES
-from notchflex.robot import Robot, Tube
+from notchflex.robot import Robot, TableNotch, Tube
 from notchflex.robot.kinds import Notch
 from notchflex.robot.part import fields_in, unit_of
 from notchflex.robot.value_names import number_at
@@ -280,9 +280,9 @@ def closing(robot: Robot) -> Closing:
     arm = moment_arms(chain)
     tendon, longest = arm.argmax(axis=1), arm.max(axis=1)
     has_spine = np.isfinite(closing_angle)
-    if has_spine.all():
+    if not any(pair.acts_on_bodies for pair in chain.contact_pairs):
         tension, status = _tensions(prepare(robot), tendon, longest, closing_angle)
-        contact_angle = closing_angle
+        contact_angle = np.full(len(height), np.nan)
     else:
         tension, contact_angle, status = _edge_closing(prepare(robot), tendon, longest)
     elastic = np.where(has_spine, closing_angle / height, np.nan)
@@ -330,7 +330,7 @@ def _tensions(
     chain = ready.chain
     tension = np.full(chain.flexures, np.nan)
     status = np.full(chain.flexures, ClosingStatus.NEVER, dtype=object)
-    notches = np.flatnonzero((arm > 0.0) & (closing_angle > 0.0))
+    notches = np.flatnonzero((arm > 0.0) & (closing_angle > 0.0) & np.isfinite(closing_angle))
     if len(notches) == 0:
         return tension, status
     stiffness = np.asarray(chain.contact_stiffness)
@@ -512,6 +512,8 @@ def named_values(notch: Notch) -> dict[str, Any]:
 
 
 def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
+    if isinstance(notch, TableNotch):  # of no section
+        return named_values(notch)
     rod = rod_at(site, notch, tube)
     section = rod.section
     weakest = int(np.argmin(section.second_moment_weak))

@@ -34,7 +34,7 @@ from notchflex.mechanics.section import FibresAt, two_walls_fibres
 from notchflex.robot import TableNotch, Tube
 
 _PLANAR = (1, 3, 5)  # directions of the plane of bending: about y, along x and z
-_BENDING = np.eye(6)[1]
+_WEAK = np.arange(6) == 1
 _FAR = 10.0  # an angle that no flexure reaches, rad
 
 
@@ -51,7 +51,9 @@ class TableLaw(Law):
 
     def curve(self, angle: Float[Array, "*shape"]) -> tuple[Array, Array]:
         """Return moment and energy at an angle, of what the stiffness lacks."""
-        side, start, width, first, second, third = self.pieces
+        side, start, width, first, second, third = jnp.reshape(
+            self.pieces, (6, *(1,) * angle.ndim, -1)
+        )
         beyond = side * angle[..., None] - start
         part = jnp.clip(beyond, 0.0, width)
         moment = part * (first + part * (second + part * third))
@@ -64,7 +66,7 @@ class TableLaw(Law):
         """Return moments and forces."""
         angle, factor = self.length * strain[..., 1], section.torsion_constant
         moment, slope = jax.jvp(lambda at: self.curve(at)[0], (angle,), (jnp.ones_like(angle),))
-        added = (factor * moment)[..., None] * _BENDING
+        added = jnp.where(_WEAK, (factor * moment)[..., None], 0.0)
         resultants = self.elastic(jnp.moveaxis(strain, -1, 0), section) + added
         slope = factor * self.length * (self.matrix[1, 1] + slope)
         return SectionResponse(resultants, memory, slope)
@@ -78,7 +80,7 @@ class TableLaw(Law):
         """Return the change of the resultants with many strains, of the slope about y."""
         factor = section.torsion_constant * self.length
         columns = jax.tree.map(lambda leaf: leaf[..., None], section)
-        added = (slope - factor * self.matrix[1, 1]) * strain * _BENDING
+        added = jnp.where(_WEAK, (slope - factor * self.matrix[1, 1]) * strain, 0.0)
         return self.elastic(strain.T, columns) + added
 
     def stored_energy_density(
