@@ -564,7 +564,8 @@ class MixedLaw(Law):
         def lost(law: MixedLaw, *between: Any) -> Array:
             return law.chosen([one.dissipated(*between) for one in law.laws])
 
-        return jax.vmap(lost, (0, 0, 1, 1), 1)(self, section, before, after)
+        rows = jax.vmap(lost, (None, None, 0, 0))
+        return jax.vmap(rows, (0, 0, 1, 1), 1)(self, section, before, after)
 
 
 def moduli(material: Any) -> tuple[Array, Array]:
