@@ -11,6 +11,7 @@ from shared_data import measured, numbers
 NAMES = [
     "gao2017",
     "liu2022",
+    "measured-backbone",
     "pacheco2021-a",
     "pacheco2021-a-specimen",
     "pacheco2021-a-true",

@@ -18,9 +18,9 @@ from notchflex._quantity import Quantity
 from notchflex.errors import InputError
 from notchflex.results.io import read_columns
 from notchflex.results.quantities import AXES, QUANTITIES
-from notchflex.robot.csv_table import TOLD_COLUMNS, Table, csv_table
+from notchflex.robot.files import TOLD_COLUMNS, Table, csv_table, read_text
 from notchflex.robot.part import sentences
-from notchflex.robot.reading import in_file, load_robot, parse_toml, read_text
+from notchflex.robot.reading import in_file, load_robot, parse_toml
 from notchflex.robot.robot import Robot
 
 

@@ -26,8 +26,9 @@ from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
 from notchflex.results.quantities import QUANTITIES, EquilibriumQuantities
 from notchflex.robot import Robot
+from notchflex.robot.files import read_text
 from notchflex.robot.part import fields_in
-from notchflex.robot.reading import read_text, robot_from_text
+from notchflex.robot.reading import robot_from_text
 from notchflex.robot.robot import to_table
 from notchflex.robot.value_names import named_parts
 from notchflex.solver.residual import SolverState, at_rest

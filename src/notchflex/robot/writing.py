@@ -13,9 +13,10 @@ from tomlkit.exceptions import ParseError
 
 from notchflex._replacing import replacing
 from notchflex.errors import InputError, RobotFileError
+from notchflex.robot.files import read_text
 from notchflex.robot.part import fields_of, unit_of
 from notchflex.robot.problems import read_tolerances
-from notchflex.robot.reading import read_text, robot_from_text
+from notchflex.robot.reading import robot_from_text
 from notchflex.robot.robot import Robot, plain, source_of, to_table
 from notchflex.robot.value_names import NamedPart, class_of, group_of, named_parts, parse_path
 

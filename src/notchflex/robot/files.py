@@ -1,4 +1,4 @@
-"""Tables of numbers from CSV files; errors name the line and the column.
+"""Reading text files, and tables of numbers from CSV files; errors name the line and the column.
 
 A table is UTF-8 with commas and its header first; empty lines and lines that start with `#` are
 skipped. Semicolons between the columns, as spreadsheets write them where numbers have a decimal
@@ -8,18 +8,79 @@ comma, are read too.
 from __future__ import annotations
 
 import csv
+import errno
+import io
 import math
 import os
 import re
+import select
+import stat
 from collections.abc import Container, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from notchflex.errors import InputError
-from notchflex.robot.reading import read_text
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+_LARGEST = 50_000_000
+"""Bytes of the largest text file that is read."""
+_PART, _WRITER_COMES = 2**16, 3.0
+"""Bytes that are read at once, and how long a pipe waits for its writer, s."""
+
+
+def bounded_bytes(path: str | os.PathLike[str], most: int = _LARGEST) -> bytes:
+    """Read a file of at most so many bytes; a pipe without a writer raises `OSError` too."""
+    with open(path, "rb", buffering=0, opener=_at_once) as file:
+        pipe = stat.S_ISFIFO(os.fstat(file.fileno()).st_mode)
+        ready = not pipe or select.select([file], [], [], _WRITER_COMES)[0]
+        # Without waiting a pipe reads as None where its writer is only slow.
+        part = file.read(_PART)
+        if part == b"" and not ready:
+            raise OSError(errno.EPIPE, "it is a pipe into which no program writes")
+        if pipe:
+            os.set_blocking(file.fileno(), True)
+        data = bytearray(part or b"")
+        while part is None or part:
+            part = file.read(_PART)
+            data += part or b""
+            if len(data) > most:
+                raise OSError(errno.EFBIG, f"it has more than {most / 1e6:.0f} MB")
+    return bytes(data)
+
+
+def _at_once(path: str, flags: int) -> int:
+    """Open a pipe without waiting for its writer, anything else as usual."""
+    pipe = stat.S_ISFIFO(os.stat(path).st_mode)
+    return os.open(path, flags | (os.O_NONBLOCK if pipe else 0))
+
+
+def read_text(
+    source: str | os.PathLike[str],
+    kind: str,
+    shown: str | None = None,
+    error_class: type[InputError] = InputError,
+) -> str:
+    """Read a text file in UTF-8, without the byte-order mark that spreadsheets put before it."""
+    shown = shown or str(source)
+    try:
+        return io.TextIOWrapper(io.BytesIO(bounded_bytes(source)), "utf-8-sig").read()
+    except FileNotFoundError:
+        raise error_class.FILE_NOT_FOUND(f"{shown}: there is no such file.") from None
+    except IsADirectoryError:
+        raise error_class.FILE_UNREADABLE(f"{shown} is a folder; name a {kind}.") from None
+    except UnicodeDecodeError:
+        form = kind.removesuffix(" file")  # such as "CSV file"
+        form = form if form[0].isupper() else "text"
+        saved = f"save it as {form} in UTF-8"
+        raise error_class.FILE_UNREADABLE(f"{shown} is not text in UTF-8; {saved}.") from None
+    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
+        words = getattr(problem, "strerror", None) or problem
+        raise error_class.FILE_UNREADABLE(f"{shown} cannot be read: {words}.") from None
+
 
 TOLD_COLUMNS = (
     "give tension, stroke, total, notch_1 or the usual name of a column with its unit, such as "
@@ -87,6 +148,8 @@ class Table:
         Raises:
             InputError: An entry is not a finite number; the message names line and column.
         """
+        import numpy as np  # robots without a file are read without it
+
         hint = "; leave the entry empty where there is none" if may_miss and not is_load else ""
         return np.array(
             [
