@@ -17,8 +17,8 @@ FOLDER = Path(nf.__file__).parent
 # fmt: off
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
-    "Drawing", "Geometry", "RobotShape",
-    "Linear", "Superelastic", "Nitinol", "StressStrain", "TableNotch", "Frictionless", "Capstan", "Load",
+    "Drawing", "Geometry", "RobotShape", "TableNotch",
+    "Linear", "Superelastic", "Nitinol", "StressStrain", "Frictionless", "Capstan", "Load",
     "LoadPath", "pull", "solve",
     "simulate", "Equilibrium", "EquilibriumPath", "State", "tip_from_angles", "equal_stroke",
     "closing", "annular_sector", "annular_segment", "Section", "InputError",
