@@ -89,7 +89,7 @@ class Geometry:
     @property
     def has_spine(self) -> NDArray[np.bool_]:
         """Whether every notch leaves a spine along the tube, not strips across it."""
-        return read_only(self._chain.rods.section.outer_radius[:, 0] > 0.0)
+        return read_only(np.asarray(self._chain.rods.section.outer_radius)[:, 0] > 0.0)
 
     @property
     def notch_stiffness(self) -> Array:

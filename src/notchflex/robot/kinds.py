@@ -11,7 +11,7 @@ import math
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias, Union
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias, Union
 
 from pydantic import AfterValidator, BeforeValidator, Field
 from pydantic_core import PydanticCustomError
@@ -203,6 +203,12 @@ class Material:
     ] = None
 
 
+if TYPE_CHECKING:
+    AnyMaterial: TypeAlias = Material
+else:
+    AnyMaterial = any_kind_of(Material)
+
+
 @part(kw_only=True)
 class Notch:
     """What every kind of notch has.
@@ -241,7 +247,7 @@ class Notch:
         None
     )
     material: Annotated[
-        any_kind_of(Material) | None,
+        AnyMaterial | None,
         Field(description="its own material, also of the piece behind it"),
     ] = None
 

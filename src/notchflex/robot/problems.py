@@ -315,7 +315,8 @@ def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
     by_unit: dict[tuple[str, str], list[_Unusual]] = {}
     for named in named_parts(robot):
         for key, field in fields_in(named.part).items():
-            usual, value = (field.json_schema_extra or {}).get("usual"), attrgetter(key)(named.part)
+            usual = (field.json_schema_extra or {}).get("usual")
+            value = usual and attrgetter(key)(named.part)
             if usual and value is not None and not usual[0] <= value <= usual[1]:
                 other, meant = _meant(value, usual, unit_of(field))
                 unusual = (f"{named.name}.{key}", value, usual, meant)

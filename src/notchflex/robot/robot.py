@@ -15,6 +15,7 @@ from notchflex._summary import MOST, Summary, short
 from notchflex.errors import InputError, InputWarning
 from notchflex.robot.kinds import (
     PRINTABLE,
+    AnyMaterial,
     Drawing,
     Friction,
     Material,
@@ -23,7 +24,7 @@ from notchflex.robot.kinds import (
     Tube,
     any_kind_of,
 )
-from notchflex.robot.part import Problems, fields_of, is_unsaid, part, sentences, unit_of
+from notchflex.robot.part import Problems, fields_of, is_unsaid, own_parts, part, sentences, unit_of
 from notchflex.robot.problems import Tolerances, robot_problems, robot_warnings
 from notchflex.robot.value_names import change_table
 
@@ -34,14 +35,9 @@ if TYPE_CHECKING:
     from notchflex.analysis.geometry import Geometry
 
     AnyNotch: TypeAlias = Notch
-    AnyMaterial: TypeAlias = Material
     AnyFriction: TypeAlias = Friction
 else:
-    AnyNotch, AnyMaterial, AnyFriction = (
-        any_kind_of(Notch),
-        any_kind_of(Material),
-        any_kind_of(Friction),
-    )
+    AnyNotch, AnyFriction = any_kind_of(Notch), any_kind_of(Friction)
 
 
 @part
@@ -267,7 +263,7 @@ def plain(value: Any) -> Any:
         return value
     values = {name: getattr(value, name) for name in fields_of(type(value))}
     return {
-        name: plain(said) if is_dataclass(said) else said
+        name: plain(said) if name in own_parts(type(value)) and said else said
         for name, said in values.items()
         if not is_unsaid(name, said)
     }

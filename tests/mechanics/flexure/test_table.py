@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,8 +14,8 @@ PATH = [nf.Load(tension=tension) for tension in (0.3, 0.9, 1.4, 1.8, 1.1, 0.4, 0
 TUBE = nf.Tube(1.62, 1.40)
 
 
-def robot_of(*notches: nf.TableNotch | nf.ArcNotch, **parts: object) -> nf.Robot:
-    usual = {
+def robot_of(*notches: nf.TableNotch | nf.ArcNotch, **parts: Any) -> nf.Robot:
+    usual: dict[str, Any] = {
         "name": "table",
         "tube": TUBE,
         "tendon": (nf.Tendon(0.70),),
@@ -37,6 +39,7 @@ def made_from(robot: nf.Robot) -> list[nf.TableNotch]:
     for notch, arm, angle, closing in zip(
         robot.notches, arms[0], angles.T, robot.geometry.closing_angle, strict=True
     ):
+        assert isinstance(notch, nf.ArcNotch)
         moment = arm * tension
         if isinstance(robot.material, nf.Superelastic):
             angle, moment = two_branches(angle, moment)
@@ -131,7 +134,7 @@ def test_stiffness_of_a_rod_is_that_of_the_beam(full: bool):
     robot, small = robot_of(notch), 1e-5
 
     def tip(**load: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
-        scaled = {name: small * np.array(vector) for name, vector in load.items()}
+        scaled: dict[str, Any] = {name: small * np.array(load[name]) for name in load}
         state = nf.solve(robot, nf.Load(tension=0.0, **scaled))
         assert state.converged
         turn = state.tip_rotation

@@ -157,12 +157,18 @@ def _(notch: TableNotch, tube: Tube, refinement: int = 0, site: Site | None = No
     return build_rod(
         NeutralAxis(points, shifted(-offset), shifted(offset), strain=strain),
         FibreSection(
-            *map(constant, (area, second, second, 1.0, 0.0, radius - offset, radius + offset)),
+            area=constant(area),
+            second_moment_weak=constant(second),
+            second_moment_strong=constant(second),
+            torsion_constant=constant(1.0),
+            shear_centre=constant(0.0),
+            edge_spine=constant(radius - offset),
+            edge_near=constant(radius + offset),
             outer_radius=constant(radius),
             half_angle=constant(np.pi),
             edge_across=constant(0.0),
         ),
-        StrainModes(basis, (few, few, len(free))),
+        StrainModes(constant(basis), (few, few, len(free))),
         None if closing is None else notch.length / xp.radians(closing),
         direction_deg=notch.direction_deg,
     )
