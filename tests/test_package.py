@@ -18,10 +18,7 @@ FOLDER = Path(nf.__file__).parent
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
     "RodGap",
-    "Drawing", "Geometry", "RobotShape",
-    "Linear", "Superelastic", "Nitinol", "TensileTest", "StressStrain", "Frictionless", "Capstan",
-    "Load",
-    "Drawing", "Drive", "Geometry", "RobotShape",
+    "Drawing", "Drive", "Geometry", "RobotShape", "TableNotch", "TensileTest",
     "Linear", "Superelastic", "Nitinol", "StressStrain", "Frictionless", "Capstan", "Load",
     "LoadPath", "pull", "solve",
     "simulate", "Equilibrium", "EquilibriumPath", "State", "tip_from_angles", "equal_stroke",

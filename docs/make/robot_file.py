@@ -105,6 +105,10 @@ def _allowed(value: dict[str, Any]) -> str:
         return " or ".join(f'`"{one}"`' for one in value["enum"])
     if "anyOf" in value:
         return " or ".join(filter(None, map(_allowed, value["anyOf"])))
+    if "$ref" in value or "oneOf" in value:
+        return "a table"
+    if value.get("type") == "array" and "minItems" not in value:
+        return f"list of: {_allowed(value['items'])}"
     if value.get("type") == "array":
         return f"{value['minItems']} to {value['maxItems']} of: {_allowed(value['items'])}"
     word = {"integer": "whole number", "number": "number", "string": "text"}[value["type"]]

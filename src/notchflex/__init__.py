@@ -45,6 +45,7 @@ _HOME = {
             "StressStrain",
             "StripNotch",
             "Superelastic",
+            "TableNotch",
             "Tendon",
             "Tube",
             "ULink",

@@ -120,6 +120,7 @@ from notchflex.robot import RodGap as RodGap
 from notchflex.robot import StressStrain as StressStrain
 from notchflex.robot import StripNotch as StripNotch
 from notchflex.robot import Superelastic as Superelastic
+from notchflex.robot import TableNotch as TableNotch
 from notchflex.robot import Tendon as Tendon
 from notchflex.robot import TensileTest as TensileTest
 from notchflex.robot import Tube as Tube

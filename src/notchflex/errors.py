@@ -33,7 +33,7 @@ class Failure(_Coded):
     )
     BENT_TOO_FAR = (
         "a notch is bent by more than half a turn, so sharply that a fibre would have no length "
-        "left, or too far about several axes at once",
+        "left, beyond the ends of its table, or too far about several axes at once",
         "take smaller loads",
     )
     TOO_FEW_MODES = (

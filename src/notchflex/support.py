@@ -151,11 +151,13 @@ _HOME = {
             "Tolerances",
             "with_limits",
         ),
-        "notchflex.robot.reading": (
+        "notchflex.robot.files": (
             "bounded_bytes",
+            "read_text",
+        ),
+        "notchflex.robot.reading": (
             "load_changed",
             "parse_toml",
-            "read_text",
         ),
         "notchflex.robot.robot": (
             "remember_source",

@@ -99,6 +99,8 @@ from notchflex.robot.cuts import Point as Point
 from notchflex.robot.cuts import outline as outline
 from notchflex.robot.cuts import pieces as pieces
 from notchflex.robot.cuts import shrunk as shrunk
+from notchflex.robot.files import bounded_bytes as bounded_bytes
+from notchflex.robot.files import read_text as read_text
 from notchflex.robot.part import Float as Float
 from notchflex.robot.part import FloatOrInf as FloatOrInf
 from notchflex.robot.part import Int as Int
@@ -113,10 +115,8 @@ from notchflex.robot.part import quantity as quantity
 from notchflex.robot.problems import Tolerance as Tolerance
 from notchflex.robot.problems import Tolerances as Tolerances
 from notchflex.robot.problems import with_limits as with_limits
-from notchflex.robot.reading import bounded_bytes as bounded_bytes
 from notchflex.robot.reading import load_changed as load_changed
 from notchflex.robot.reading import parse_toml as parse_toml
-from notchflex.robot.reading import read_text as read_text
 from notchflex.robot.robot import remember_source as remember_source
 from notchflex.robot.robot import schema_of as schema_of
 from notchflex.robot.robot import source_of as source_of

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 import notchflex as nf
@@ -387,3 +388,22 @@ def test_what_a_bent_shaft_costs(margin):
     assert (held < held[0]).tolist() == [False] * 4 + [True] * 2
     angle, _ = A.pull(1.5 * np.exp(-2.0 * limit))
     assert f"bent by 360 deg: {np.degrees(np.sum(angle)):5.1f} deg" in printed
+
+
+def test_measured_joint_and_shaft():
+    """Every joint has the moment of its tension, by a spline of SciPy through the points."""
+    names, printed = ran(21)
+    path, robot = names["path"], names["chain"]
+    tension = path.span_tension[:, 0, 1::2][:, :4]  # in the gaps; along the wall the arm is 1.4
+    angle, moment = (
+        np.array([*np.negative(one[::-1]), 0.0, *one]) for one in (names["angle"], names["moment"])
+    )
+    angle = np.radians(angle)
+    curve = CubicHermiteSpline(angle, moment, np.gradient(moment, angle, edge_order=2))
+    np.testing.assert_allclose(curve(path.notch_angle), 1.4 * tension, rtol=1e-9, atol=1e-12)
+    assert robot.number_of_notches == 4
+    # The shaft bends by its moment over its stiffness, three times.
+    state = nf.solve(names["both"], nf.Load(tension=1.0))
+    shaft = np.degrees(0.7 * state.span_tension[0, 1:6:2] / 55.0)
+    np.testing.assert_allclose(np.degrees(state.notch_angle[:3]), shaft, rtol=1e-9)
+    assert f"the wrist bends {np.degrees(state.notch_angle[-5:].sum()):.2f} deg" in printed

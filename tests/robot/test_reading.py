@@ -101,7 +101,10 @@ OUTSIDE = [
     # words
     (('"on-axis"', '"onaxis"'), ["`notch[1].cut`", '"on-axis"', '"off-axis"', "did you mean"]),
     (('kind = "capstan"', 'kind = "capstn"'), ["`friction.kind`", "did you mean `capstan`"]),
-    (('kind = "arc"', 'kind = "v"'), ["`notch[1].kind`", '"arc", "rod", "strip", "u-link"']),
+    (
+        ('kind = "arc"', 'kind = "v"'),
+        ["`notch[1].kind`", '"rod", "strip", "table", "u-link"'],
+    ),
     (("coefficient = 0.13", 'coefficient = 0.1\nwrap = "x"'), ["`friction.wrap`", "whole-before"]),
     (("radius = 0.70", 'radius = 0.70\npath = "straight-ded"'), ["mean `straight-dead`?"]),
     # unknown keys

@@ -12,6 +12,7 @@ NAMES = [
     "disks-two-segments",
     "gao2017",
     "liu2022",
+    "measured-backbone",
     "pacheco2021-a",
     "pacheco2021-a-specimen",
     "pacheco2021-a-true",

@@ -8,9 +8,9 @@ costs a notch one trial, not its result.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from enum import StrEnum
-from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -28,12 +28,12 @@ from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import Chain, assemble, sites_of
 from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.mechanics.flexure import Site, rod_at
-from notchflex.mechanics.material import FibreSection, SectionLaw, peak_strain, section_strain
+from notchflex.mechanics.material import FibreSection, Law, peak_strain, section_strain
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities import DEGREES, QUANTITIES
-from notchflex.robot import Robot, Tube
+from notchflex.robot import Robot, TableNotch, Tube
 from notchflex.robot.kinds import Notch
-from notchflex.robot.part import fields_of, unit_of
+from notchflex.robot.part import fields_in, unit_of
 from notchflex.robot.value_names import number_at
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import number_of_cores
@@ -280,9 +280,9 @@ def closing(robot: Robot) -> Closing:
     arm = moment_arms(chain)
     tendon, longest = arm.argmax(axis=1), arm.max(axis=1)
     has_spine = np.isfinite(closing_angle)
-    if has_spine.all():
+    if not any(pair.acts_on_bodies for pair in chain.contact_pairs):
         tension, status = _tensions(prepare(robot), tendon, longest, closing_angle)
-        contact_angle = closing_angle
+        contact_angle = np.full(len(height), np.nan)
     else:
         # A backbone has no edges that meet.
         meets = sum((pair.has_contact.sum(axis=-1) for pair in chain.contact_pairs), 0.0 * longest)
@@ -303,10 +303,10 @@ def closing(robot: Robot) -> Closing:
 
 
 @jit
-def _strains(law: SectionLaw, sections: FibreSection, curvature: Any, memory: Any) -> Any:
+def _strains(law: Law, sections: FibreSection, curvature: Any, memory: Any) -> Any:
     """Return the strain of the outer fibre and the largest one, of sections that are bent."""
     bending = jnp.where(jnp.arange(6) == 1, curvature[:, None], 0.0)
-    strain = jax.vmap(partial(section_strain, law))(bending, sections, memory)
+    strain = jax.vmap(section_strain, (law.axis, 0, 0, 0))(law, bending, sections, memory)
     outer = strain.stretch + strain.curvature * sections.edge_spine
     return outer, peak_strain(strain, sections)
 
@@ -333,7 +333,7 @@ def _tensions(
     chain = ready.chain
     tension = np.full(chain.flexures, np.nan)
     status = np.full(chain.flexures, ClosingStatus.NEVER, dtype=object)
-    notches = np.flatnonzero((arm > 0.0) & (closing_angle > 0.0))
+    notches = np.flatnonzero((arm > 0.0) & (closing_angle > 0.0) & np.isfinite(closing_angle))
     if len(notches) == 0:
         return tension, status
     stiffness = np.asarray(chain.contact_stiffness)
@@ -483,8 +483,8 @@ def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict
     arms = moment_arms(assemble(robot, flat=False))
     placed = list(zip(robot.notches, sites_of(robot), strict=True))
     described = {
-        placed_notch: _description(*placed_notch, robot.tube)
-        for placed_notch in dict.fromkeys(placed)
+        (notch, site): _description(notch, site, notch.tube or robot.tube)
+        for notch, site in dict.fromkeys(placed)
     }
     return [
         {
@@ -507,15 +507,18 @@ def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict
 def named_values(notch: Notch) -> dict[str, Any]:
     """Return the values of a notch as in a robot file, their units in their names."""
     values: dict[str, Any] = {}
-    for name, field in fields_of(type(notch)).items():
-        unit = unit_of(field)
+    for name, field in fields_in(notch).items():
+        unit, value = unit_of(field), attrgetter(name)(notch)
         with_unit = f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name
-        values[with_unit] = getattr(notch, name)
+        if not is_dataclass(value):  # its values follow
+            values[with_unit] = value
     del values["repeat"]
     return values
 
 
 def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
+    if isinstance(notch, TableNotch):  # of no section
+        return named_values(notch)
     rod = rod_at(site, notch, tube)
     section = rod.section
     weakest = int(np.argmin(section.second_moment_weak))

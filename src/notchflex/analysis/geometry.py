@@ -97,8 +97,7 @@ class Geometry:
     @property
     def has_spine(self) -> NDArray[np.bool_]:
         """Whether every notch leaves a spine along the tube, not strips across it."""
-        is_round = [notch.is_round for notch in self.robot.notches]
-        return read_only((self._chain.rods.has_closure > 0.0) | np.array(is_round))
+        return read_only(np.asarray(self._chain.rods.section.outer_radius)[:, 0] > 0.0)
 
     @property
     def notch_stiffness(self) -> Array:
@@ -115,7 +114,8 @@ class Geometry:
         tube, start = self.robot.tube, self.robot.tube.base_length
         neighbours, layouts = (None, *self.robot.notches, None), list[CutLayout]()
         for number, notch in enumerate(self.robot.notches):
-            layout = notch.cut_layout(tube, neighbours[number], neighbours[number + 2])
+            beside = neighbours[number], neighbours[number + 2]
+            layout = notch.cut_layout(notch.tube or tube, *beside)
             if layout is None:
                 raise InputError.UNSUPPORTED(
                     f'a notch of kind = "{notch.kind}" has no definition of its cuts, so there is '

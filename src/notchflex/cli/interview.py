@@ -120,7 +120,7 @@ NOTES = {
 }
 """By kind, or by section for all kinds, and key."""
 
-_UNASKED = ("ends", "stiffness_factor")
+_UNASKED = ("ends", "stiffness_factor", "file")
 """Keys that are never asked for."""
 
 _DECIMAL_COMMAS = " For decimal commas, separate numbers by semicolons, or write a point: 1.9."
@@ -136,7 +136,7 @@ def keys_of(kind: type) -> dict[str, Field]:
     return {
         key: {**field, **field.get("anyOf", [{}])[0]}
         for key, field in schema["properties"].items()
-        if key not in ("kind", "repeat")
+        if key not in ("kind", "repeat", "tube", "material")
     }
 
 

@@ -182,7 +182,7 @@ def usual_columns(path: EquilibriumPath, rows: Sequence[int]) -> dict[str, list[
     shown = {
         name: path_columns(path, rows, name) for name in USUAL if holds(path, QUANTITIES[name])
     }
-    largest = 100.0 * np.abs(path.peak_strain).max(axis=1)
+    largest = 100.0 * np.fmax.reduce(np.abs(path.peak_strain), axis=1)
     cells = [cell(largest[row] if path.converged[row] else None, ".2f") for row in rows]
     meaning = "strain: largest strain of all notches [%]"
     shown["peak_strain"] = [PathColumn("strain\n%", cells, meaning)]

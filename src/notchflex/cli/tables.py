@@ -52,6 +52,8 @@ def cell(value: Any, form: str = "") -> str:
         return value
     value = getattr(value, "tolist", lambda: value)()
     if isinstance(value, list | tuple):
+        if len(value) > 2:
+            return f"{len(value)} values"
         ends: Iterable[Any] = value
         return " to ".join("open" if end is None else cell(end, form) for end in ends)
     if value is None or not math.isfinite(value):

@@ -90,6 +90,7 @@ def cuts_of(robot: Robot, shank: float = 0.0, polishing: float = 0.0) -> RobotCu
         >>> len(cuts.cuts), round(cuts.cuts[-1].start, 9), round(cuts.end, 9)
         (5, 8.0, 10.0)
     """
+    check_one_tube(robot)
     tube, layouts, warnings = robot.tube, robot.geometry.cuts, ()
     with naming("the tube before polishing"):
         stock = Tube(tube.outer_diameter + 2.0 * polishing, tube.inner_diameter - 2.0 * polishing)
@@ -131,6 +132,15 @@ def _rings(robot: Robot, cuts: list[PlacedCut], low: float, high: float) -> Iter
             yield from (
                 ring for ring in (*rings, Ring(end, stop, reach, inner)) if ring.low < ring.high
             )
+
+
+def check_one_tube(robot: Robot) -> None:
+    """Refuse a robot that is made of several tubes or materials."""
+    if len({*robot.tubes, *robot.materials}) > 2:
+        raise InputError.UNSUPPORTED(
+            f"{robot.name} is made of several tubes or materials, and this file is of one piece; "
+            "export a robot file for each of them."
+        )
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from notchflex import (
     pull,
     simulate,
 )
-from notchflex.export.cuts import tendon_holes
+from notchflex.export.cuts import check_one_tube, tendon_holes
 from notchflex.export.formats import DeckOptions, Document, Subject
 from notchflex.export.mesh import TubeMesh, mesh_of
 from notchflex.support import ExternalLoad, Material, robot_digest, unchecked_dimensions
@@ -339,6 +339,7 @@ def deck_document(subject: Subject, options: DeckOptions) -> Document:
             mesh can have.
     """
     robot, path, step = subject.robot, subject.path, subject.step
+    check_one_tube(robot)
     warnings = _warnings(robot)
     tension = np.zeros((0, 1))
     if path is None and not options.tip_moment:

@@ -85,7 +85,7 @@ def _inertia(model: JointModel, body: int) -> tuple[float, Array, float, float]:
 
     The moments of inertia are those across and along the tube, kg m².
     """
-    tube, geometry = model.robot.tube, model.robot.geometry
+    tube, geometry = model.robot.tubes[body], model.robot.geometry
     mass = _METRE * max(float(geometry.body_mass[body]), _MIN_MASS)
     radii = (_METRE * tube.outer_radius) ** 2 + (_METRE * tube.inner_radius) ** 2
     along, length = 0.5 * mass * radii, _METRE * float(geometry.body_length[body])
@@ -168,7 +168,7 @@ def _piece(model: JointModel, body: int) -> str:
             diaginertia="{_digits(across, across, along)}"/>"""
     ]
     if half > 0.0:
-        radius = _METRE * model.robot.tube.outer_radius
+        radius = _METRE * model.robot.tubes[body].outer_radius
         parts.append(
             f"""<geom type="cylinder" size="{_digits(radius, half)}" pos="{_digits(0, 0, half)}"
                 contype="0" conaffinity="0" rgba="0.7 0.7 0.75 0.5"/>"""
@@ -290,7 +290,7 @@ def urdf(model: JointModel, head: str = "") -> str:
 
 def _link(model: JointModel, body: int, position: Array) -> str:
     """Return a link; its frame lies at a place of the body's frame, mm."""
-    length, radius = model.robot.geometry.body_length[body], model.robot.tube.outer_radius
+    length, radius = model.robot.geometry.body_length[body], model.robot.tubes[body].outer_radius
     mass, centre, across, along = _inertia(model, body)
     middle = np.array([0.0, 0.0, 0.5 * length]) - position
     visual = f"""<visual><origin xyz="{_digits(_METRE * middle)}" rpy="0 0 0"/><geometry>

@@ -289,6 +289,11 @@ def _of_plane(frame: Float[Array, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
 def _check(external: ExternalLoad, robot: Robot) -> None:
     last, material = robot.number_of_notches, robot.material
     if external.temperature is not None:
+        if len(set(robot.materials)) > 1:
+            raise InputError.UNSUPPORTED(
+                f"a load cannot give {robot.name} a temperature, as it has several materials; give "
+                "each its own in the robot file (material.temperature, notch.material.temperature)"
+            )
         if not isinstance(material, Transforming) or material.reference_temperature is None:
             raise InputError.UNSUPPORTED(
                 f"temperature has no effect on {robot.name}: it is not known at which temperature "
@@ -303,7 +308,7 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
                 f"{last}, one after each notch"
             )
     pulls = external.gravity is not None and any(external.gravity)
-    if pulls and robot.material.density is None and external.tip_mass == 0.0:
+    if pulls and robot.densities is None and external.tip_mass == 0.0:
         raise InputError.UNSUPPORTED(
             f"gravity has nothing to act on: the density of {robot.name} is not known and no mass "
             "hangs at its tip; give material.density (kg/m3) or a tip_mass (g)"

@@ -7,6 +7,7 @@ The zeros of a rod that happens to be straight are not structural.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -34,14 +35,14 @@ from notchflex.mechanics.flexure import (
     with_level,
 )
 from notchflex.mechanics.friction import FrictionLaw, friction_law
-from notchflex.mechanics.material import Fibres, LimitLine, SectionLaw, limit_line, section_law
+from notchflex.mechanics.material import Fibres, Law, LimitLine, MixedLaw, limit_line, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
 from notchflex.mechanics.sheath import Sheath, build_sheath
 from notchflex.mechanics.tendon import TUBE_AXIS, TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
-from notchflex.robot.kinds import Friction, Material, Notch
+from notchflex.robot.kinds import Notch
 from notchflex.robot.part import unchecked
 
 
@@ -51,7 +52,7 @@ class Chain(Pytree):
     # The flexures, each from the frame of body j - 1 to that of body j. A body's frame lies on the
     # tube axis at its proximal face
     rods: Rod
-    law: SectionLaw  # The material
+    law: Law  # The material, or the materials of the flexures
     friction: FrictionLaw  # The friction between tendons and tube
     groups: tuple[TendonGroup, ...]  # The tendons, by the way they run
     contact_pairs: tuple[ContactGroup, ...]  # The contacts that close notches, by kind
@@ -147,7 +148,7 @@ def flexure_states(
 ) -> FlexureState:
     """Return the state of all flexures at once, after a memory of the material at every node."""
     state = partial(flexure_state, with_pose=with_pose)
-    return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, memory, modes)
+    return jax.vmap(state, (0, chain.law.axis, 0, 0))(chain.rods, chain.law, memory, modes)
 
 
 def structural(chain: Chain) -> Chain:
@@ -220,6 +221,7 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
     return replace(
         chain,
         rods=rods,
+        law=chain.law if chain.law.axis is None else longer(chain.law),
         groups=tuple(longer(group, **idle) for group in chain.groups),
         contact_pairs=tuple(longer(pair, has_contact=0.0, back=1) for pair in chain.contact_pairs),
         stiffness=stiffness,
@@ -249,15 +251,20 @@ def body_masses(
     # its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure
     # (area of its sections times the length of the neutral axis) is lumped: half at the start of
     # the neutral axis on the body before it, half at its end on the body after it.
-    length, density = body_lengths(robot.tube, robot.notches), robot.material.density
-    if density is None:
+    length = body_lengths(robot.tube, robot.notches)
+    densities = robot.densities
+    if densities is None:
         return xp.zeros(len(length)), xp.zeros((len(length), 3))
-    piece = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2) * length
+    # Volumes count as those of the robot's material.
+    relative = xp.array([each / densities[0] for each in densities])
+    radii = [(tube.outer_radius, tube.inner_radius) for tube in robot.tubes]
+    outer, inner = xp.array(radii).T
+    piece = np.pi * (outer**2 - inner**2) * length * relative
     masses = [None, *(notch.mass for notch in robot.notches)]
     if any(mass is not None for mass in masses):
-        given = [piece[k] if m is None else 1e6 * m / density for k, m in enumerate(masses)]
+        given = [piece[k] if m is None else 1e6 * m / densities[0] for k, m in enumerate(masses)]
         piece = xp.stack(xp.broadcast_arrays(*given))
-    half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1)
+    half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1) * relative[1:]
     end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
     before, behind = xp.append(half, 0.0), xp.append(0.0, half)
     # Every body has a volume: where no tube is left between two notches, half of each flexure.
@@ -268,7 +275,7 @@ def body_masses(
     inside = (is_round * xp.sum(rods.length, axis=-1) / 6.0)[:, None] * TUBE_AXIS
     at_starts = before[:, None] * xp.pad(rods.start_offset + inside, ((0, 1), (0, 0)))
     at_ends = behind[:, None] * xp.pad(end - inside, ((1, 0), (0, 0)))
-    return 1e-6 * density * volume, (on_axis + at_starts + at_ends) / volume[:, None]
+    return 1e-6 * densities[0] * volume, (on_axis + at_starts + at_ends) / volume[:, None]
 
 
 # Whether a robot stays in one plane under its tendons alone.
@@ -278,7 +285,8 @@ def body_masses(
 def bending_normal(robot: Robot) -> Float[Array, " 3"] | None:
     """Return the normal of the plane in which all notches bend, in the base frame, or None."""
     direction = xp.radians([notch.direction_deg for notch in robot.notches])
-    if (xp.abs(xp.sin(direction - direction[0])) > 1e-12).any():
+    off_plane = (xp.abs(xp.sin(direction - direction[0])) > 1e-12).any()
+    if off_plane or not all(notch.stays_in_plane for notch in robot.notches):
         return None
     return xp.array([-xp.sin(direction[0]), xp.cos(direction[0]), 0.0])
 
@@ -341,7 +349,7 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
             return None
         sides = side(index, notch, before), side(index + 1, notch, after)
         key = (*map(id, (before, notch, after)), *boundaries[index : index + 2])
-        return shared.setdefault(key, Site(*sides, robot.material.poisson_ratio))
+        return shared.setdefault(key, Site(*sides, robot.materials[index + 1].poisson_ratio))
 
     return tuple(map(site, range(len(notches))))
 
@@ -352,12 +360,13 @@ def law_errors(robot: Robot) -> dict[str, float]:
     Where all notches have elastic ends, `notch` has the mean square of all but the last. Else every
     notch with such ends has its own.
     """
-    yields, count = robot.material.by_fibres, robot.number_of_notches
+    parts = zip(robot.notches, robot.tubes[1:], sites_of(robot), robot.materials[1:], strict=True)
     each = {
-        f"notch[{number}]": law_error(notch, robot.tube, site, yields)
-        for number, (notch, site) in enumerate(zip(robot.notches, sites_of(robot), strict=True), 1)
+        f"notch[{number}]": law_error(notch, tube, site, material.by_fibres)
+        for number, (notch, tube, site, material) in enumerate(parts, 1)
         if site is not None
     }
+    count = robot.number_of_notches
     if len(each) < count:
         return each
     *others, last = each.values()
@@ -370,7 +379,7 @@ def unchecked_dimensions(robot: Robot) -> list[str]:
     sites = sites_of(robot)
     for number, (notch, site) in enumerate(zip(robot.notches, sites, strict=True), 1):
         if site is not None:
-            for warning in validity_warnings(notch, robot.tube, site):
+            for warning in validity_warnings(notch, robot.tubes[number], site):
                 notches_of.setdefault(warning, []).append(str(number))
     if not notches_of:
         return []
@@ -405,6 +414,7 @@ def flexure(
     notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int, by_fibres: bool
 ) -> tuple[Rod, Motion]:
     """Make a flexure without its factor on stiffness, and its pose in the free robot; cached."""
+    tube = notch.tube or tube
     rod = with_level(rod_at(site, notch, tube, refinement), level)
     rod = with_fibres(rod, notch, tube, refinement) if by_fibres else rod
     return rod, relative_pose(rod, xp.zeros(rod.modes))
@@ -440,7 +450,7 @@ def assemble(
         >>> assemble(load_robot("pacheco2021-a")).flexures
         5
     """
-    chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
+    chord, fibres = robot.friction.turns_with_chord, by_fibres(robot)
     sites, tendons = sites_of(robot), robot.tendon
     shape = robot.tube, robot.notches, sites, tendons, level, refinement, chord, fibres
     template = _template(*shape, flexures or flexure)
@@ -470,8 +480,8 @@ def assemble(
             (int(xp.max(part.back)) for part in (*groups, *template.contact_pairs)),
             default=1,
         ),
-        **laws(robot.material, template),
-        **laws(robot.friction, template),
+        friction=friction_law(robot.friction),
+        **_of_materials(robot, template),
     )
     normal = bending_normal(robot)
     if not flat or level == "space" or normal is None or not tendons_in_plane(robot):
@@ -479,16 +489,28 @@ def assemble(
     return _flat(chain, xp.stack([xp.cross(normal, TUBE_AXIS), normal, TUBE_AXIS], axis=1))
 
 
-def laws(part: Material | Friction, template: ChainTemplate) -> dict[str, Any]:
-    """Return the fields of a chain that follow from its material, or from its friction."""
-    if isinstance(part, Friction):
-        return {"friction": friction_law(part)}
-    law = section_law(part)
-    rods = template.distinct_rods
-    weighted = rods.length[..., None, None] * (law.stiffness(rods.section) @ rods.basis)
+def by_fibres(robot: Robot) -> bool:
+    """Return whether any of the laws of a robot sums up the fibres of a section."""
+    return any(material.by_fibres for material in robot.materials)
+
+
+def _of_materials(robot: Robot, template: ChainTemplate) -> dict[str, Any]:
+    """Return the fields of a chain that follow from its materials."""
+    rods, index, law = template.distinct_rods, template.rod_index, section_law(robot.material)
+    sources = [notch.made_of(robot.material) for notch in robot.notches]
+    # Of the form of the robot alone: equal materials of several notches are several.
+    if all(source is robot.material for source in sources):
+        stiffness = law.stiffness(rods.section)
+    else:
+        known, rods, index = {id(s): section_law(s) for s in sources}, template.rods, ...
+        laws = [known[id(source)] for source in sources]
+        sections = [jax.tree.map(operator.itemgetter(k), rods.section) for k in range(len(laws))]
+        stiffness = xp.stack([*map(Law.stiffness, laws, sections)])
+        law = MixedLaw.of(laws)
+    weighted = rods.length[..., None, None] * (stiffness @ rods.basis)
     elastic = xp.einsum("niam,niak->nmk", rods.basis, weighted)
     elastic = elastic + rods.padding_mask[:, None] * xp.eye(rods.modes)
-    elastic = template.stiffness_factor[:, None, None] * elastic[template.rod_index]
+    elastic = template.stiffness_factor[:, None, None] * elastic[index]
     stiffness = (elastic * np.eye(elastic.shape[-1])).sum(axis=-1)
     stop = template.rods.stop_flexibility
     linear = law.is_linear and not rods.section.softens

@@ -112,7 +112,8 @@ def build_contacts(
     sides = _sides(notches)
     if sides:
         line = passages(notches, body_length, sides)
-        across = on_tube([tube.outer_radius] * len(sides), sides)
+        radii = xp.stack([(notch.tube or tube).outer_radius for notch in notches])
+        across = radii[:, None, None] * on_tube([1.0] * len(sides), sides)
         # Keep as many contacts as close at one flexure, on any side.
         count = int(line.on_side.sum(axis=1).max(initial=1.0))
         chosen = xp.argsort(-line.on_side, axis=1, kind="stable")[:, :count]

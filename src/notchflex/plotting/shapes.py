@@ -119,7 +119,7 @@ def lips(shape: RobotShape, notch: int, radius: float | None = None) -> Array:
 
     It lies at a radius [mm] from the tube axis, by default the outer one.
     """
-    outer = shape.robot.tube.outer_radius if radius is None else radius
+    outer = shape.robot.tubes[notch + 1].outer_radius if radius is None else radius
     pairs: list[Array] = []
     for turn in (0.0, 180.0):
         side = shape.robot.notches[notch].direction_deg + turn
@@ -166,7 +166,7 @@ def bending_plane(robot: Robot, offset: float = 1e-9) -> float | None:
 
 def outline(shape: RobotShape, view: float) -> ShapeOutline:
     """Return the outline of a robot, with a direction [rad] of the base drawn to the right."""
-    outer, inner = shape.robot.tube.outer_radius, shape.robot.tube.inner_radius
+    outer, tubes = shape.robot.tube.outer_radius, shape.robot.tubes
 
     def place(body: int, corners: Any) -> Array:
         local = np.asarray(corners, float)
@@ -179,7 +179,7 @@ def outline(shape: RobotShape, view: float) -> ShapeOutline:
     return ShapeOutline(
         bodies=[place(body, body_corners(shape, body, view)) for body in bodies],
         bores=[
-            place(body, [(sign * inner, end) for end in wall])
+            place(body, [(sign * tubes[body].inner_radius, end) for end in wall])
             for body in bodies
             for sign, wall in zip((1.0, -1.0), _sides(shape, body, view), strict=True)
             if wall is not None
@@ -211,7 +211,8 @@ def body_corners(shape: RobotShape, body: int, view: float) -> Corners:
 
     A body with wall on one side reaches from there to the flexures that are attached to it.
     """
-    outer, (right, left) = shape.robot.tube.outer_radius, _sides(shape, body, view)
+    tube, (right, left) = shape.robot.tubes[body], _sides(shape, body, view)
+    outer = tube.outer_radius
     if right and left:
         return [(outer, right[0]), (outer, right[1]), (-outer, left[1]), (-outer, left[0])]
     sign, (low, high) = (1.0, right) if right else (-1.0, left or (0.0, 0.0))
@@ -223,7 +224,7 @@ def body_corners(shape: RobotShape, body: int, view: float) -> Corners:
         for across in (-flexure.spine, flexure.near)
     ]
     across = (np.array(edges) - shape.position[body]) @ shape.rotation[body] @ across_of(view)
-    inside = max(min(shape.robot.tube.inner_radius, float(np.min(sign * across))), 0.0)
+    inside = max(min(tube.inner_radius, float(np.min(sign * across))), 0.0)
     ring = [(outer, low), (outer, high), (inside, high), (inside, low)]
     return [(sign * across, along) for across, along in ring]
 
@@ -239,9 +240,10 @@ _ROUND = 32  # flat pieces round the tube in space
 def body_faces(shape: RobotShape) -> Iterator[Array]:
     """Yield the outer wall of every body, (pieces, 4, 3)."""
     edges = 2.0 * np.pi * np.arange(_ROUND + 1) / _ROUND
-    rim = shape.robot.tube.outer_radius * np.stack([np.cos(edges), np.sin(edges)], axis=1)
+    circle = np.stack([np.cos(edges), np.sin(edges)], axis=1)
     sides = [walls(shape.robot, float(np.degrees(angle))) for angle in edges[:-1] + np.pi / _ROUND]
-    for body in range(len(shape.position)):
+    for body, tube in enumerate(shape.robot.tubes):
+        rim = tube.outer_radius * circle
         corners = [
             np.column_stack([rim[[i, i + 1, i + 1, i]], np.repeat(wall, 2)])
             for i in range(_ROUND)
@@ -253,10 +255,12 @@ def body_faces(shape: RobotShape) -> Iterator[Array]:
 
 def flexure_faces(shape: RobotShape) -> Iterator[Array]:
     """Yield every flexure: the wall at its spine, or a band with its thickness and area."""
-    outer = shape.robot.tube.outer_radius
     robot = shape.robot
-    kinds = zip(shape.flexures, robot.geometry.has_spine, robot.notches, strict=True)
-    for flexure, spine, notch in kinds:
+    kinds = zip(
+        shape.flexures, robot.geometry.has_spine, robot.notches, robot.tubes[1:], strict=True
+    )
+    for flexure, spine, notch, tube in kinds:
+        outer = tube.outer_radius
         if notch.is_round:
             angles = np.linspace(0.0, 2.0 * np.pi, 13)
             edges = [*(flexure.spine[0] * np.column_stack([np.cos(angles), np.sin(angles)]))]

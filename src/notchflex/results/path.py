@@ -24,7 +24,7 @@ from notchflex.mechanics.flexure import MAX_REFINEMENT
 from notchflex.mechanics.tendon import Straight
 from notchflex.results.quantities import QUANTITIES, PathQuantities, friction_front
 from notchflex.results.state import Equilibrium, State, path_summary, state_of
-from notchflex.robot import Robot
+from notchflex.robot import Material, Robot
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import SolverRun
@@ -126,7 +126,12 @@ def _snaps(path: EquilibriumPath) -> Iterator[str]:
 
 
 def _strains(path: EquilibriumPath) -> Iterator[str]:
-    material = path.robot.material
+    for material in dict.fromkeys(path.robot.materials[1:]):
+        yield from _strains_of(path, material)
+
+
+def _strains_of(path: EquilibriumPath, material: Material) -> Iterator[str]:
+    is_of = np.array([each == material for each in path.robot.materials[1:]])
     # The law is fitted in the outer strain of eq. 16, which therefore selects its branch.
     for strain, limit, description, consequence in (
         (
@@ -145,7 +150,7 @@ def _strains(path: EquilibriumPath) -> Iterator[str]:
         if limit is None:
             continue
         values = getattr(path, strain.replace(" ", "_"))
-        size = np.where(path.converged[:, None], np.abs(values), -np.inf)
+        size = np.where(path.converged[:, None] & is_of, np.abs(values), -np.inf)
         beyond = size > limit
         if not beyond.any():
             continue
@@ -154,7 +159,7 @@ def _strains(path: EquilibriumPath) -> Iterator[str]:
         yield (
             f"the {strain} passes {description.format(100 * limit)} in notch"
             f"{'es' if len(notches) > 1 else ''} {', '.join(notches)}, first at step {step + 1} "
-            f"({_load(path, step)}), at most {100 * size.max():.3g} %: {consequence}."
+            f"({_load(path, step)}), at most {100 * np.nanmax(size):.3g} %: {consequence}."
         )
 
 

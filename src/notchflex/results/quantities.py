@@ -67,7 +67,8 @@ def material_dissipation(path: EquilibriumPath) -> np.ndarray:
     if isinstance(after, tuple):  # no memory
         return np.zeros((len(path), chain.flexures))
     before, after = _before_and_after(path, after, "material")
-    loss = np.sum(chain.law.dissipated(chain.rods.section, before, after) * chain.rods.length, -1)
+    per_length = np.asarray(chain.law.dissipated(chain.rods.section, before, after))
+    loss = np.sum(per_length * chain.rods.length, -1)
     flat_before, flat_after = _before_and_after(
         path, path.solver_quantity("flattening"), "flattening"
     )

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, overload
 
@@ -25,8 +26,9 @@ from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
 from notchflex.results.quantities import QUANTITIES, EquilibriumQuantities
 from notchflex.robot import Robot
-from notchflex.robot.part import fields_of
-from notchflex.robot.reading import read_text, robot_from_text
+from notchflex.robot.files import read_text
+from notchflex.robot.part import fields_in
+from notchflex.robot.reading import robot_from_text
 from notchflex.robot.robot import to_table
 from notchflex.robot.value_names import named_parts
 from notchflex.solver.residual import SolverState, at_rest
@@ -62,10 +64,10 @@ def differences(robot: Robot, other: Robot) -> list[str]:
 def _values(robot: Robot) -> dict[str, Any]:
     """Return every value that has an effect on states by its name, notch by notch."""
     return {
-        f"{named.name}.{key}": getattr(named.part, key)
+        f"{named.name}.{key}": attrgetter(key)(named.part)
         for named in named_parts(robot.replace(notch=robot.notches))
-        for key in fields_of(type(named.part))
-        if named.section != "drawing" and key != "allowed_strain"
+        for key in fields_in(named.part)
+        if named.section != "drawing" and "allowed_strain" not in key
     }
 
 

@@ -19,6 +19,7 @@ from notchflex.robot.materials.superelastic import Superelastic
 from notchflex.robot.notches.arc import ArcNotch
 from notchflex.robot.notches.rod import RodGap
 from notchflex.robot.notches.strip import StripNotch
+from notchflex.robot.notches.table import TableNotch
 from notchflex.robot.notches.u_link import ULink
 from notchflex.robot.reading import load_robot, robot_from_text
 from notchflex.robot.robot import (
@@ -54,6 +55,7 @@ __all__ = [
     "StressStrain",
     "StripNotch",
     "Superelastic",
+    "TableNotch",
     "Tendon",
     "TensileTest",
     "Tube",

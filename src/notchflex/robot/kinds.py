@@ -11,7 +11,7 @@ import math
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias, Union
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias, Union
 
 from pydantic import AfterValidator, BeforeValidator, Field
 from pydantic_core import PydanticCustomError
@@ -255,103 +255,25 @@ GAO = "Gao et al.: IEEE/ASME Transactions on Mechatronics 22:465, 2017 (27-joint
 YORK = "York et al.: IEEE International Conference on Robotics and Automation, 2015 (off-axis cuts)"
 
 
-@part(kw_only=True)
-class Notch:
-    """What every kind of notch has.
+# How kinds are looked for.
 
-    The methods say where the rigid bodies and the tendons lie; they describe a slot across one
-    side of the tube with a rigid piece behind it, and a kind that differs overrides them.
-
-    Args:
-        kind: The word that names the kind in a file.
-        uncut_length: Uncut length behind the notch, toward the tip [mm].
-        direction_deg: Side toward which the notch bends [deg], about the tube axis from x to y.
-        precurvature_deg: Angle of the notch when nothing pulls [deg], positive toward the bend.
-        stiffness_factor: Factor on its stiffness in all directions, for what the law of the notch
-            leaves out.
-        repeat: How many equal notches follow one another.
-    """
-
-    is_round: ClassVar[bool] = False  # whether it bends to all sides alike
-    kind: str
-    uncut_length: Annotated[
-        Float, quantity("mm", "uncut length behind the notch, toward the tip", at_least=0)
-    ]
-    direction_deg: Annotated[Float, quantity("deg", "side toward which the notch bends")] = 0.0
-    precurvature_deg: Annotated[
-        Float, quantity("deg", "angle of the notch when nothing pulls", above=-180, below=180)
-    ] = 0.0
-    stiffness_factor: Annotated[
-        Float, quantity("", "factor on its stiffness in all directions", above=0, usual=(0.5, 2))
-    ] = 1.0
-    repeat: Annotated[
-        Int,
-        Field(ge=1, le=10_000, description="how many equal notches follow"),
-    ] = 1
-
-    @property
-    def papers(self) -> tuple[str, ...]:
-        """Papers to cite for its model."""
-        return ()
-
-    @property
-    def has_elastic_ends(self) -> bool:
-        """Whether its stiffness depends on the rings or walls beside it."""
-        return getattr(self, "ends", "rigid") != "rigid"
-
-    def problems(self, tube: Tube) -> Problems:
-        """Find what does not fit the tube: pairs of a key and the rest of the sentence."""
-        return ()
-
-    def row_problems(self, before: "Notch") -> Problems:
-        """Find what does not fit the notch right before this one, toward the base."""
-        return ()
-
-    def tendon_problems(self, tendon: Tendon) -> Problems:
-        """Find why a tendon that ends behind this notch cannot run over it: keys of the tendon."""
-        return ()
-
-    @property
-    def mass(self) -> float | None:
-        """Mass of the body behind it [g], where that is not a piece of the tube."""
-        return None
-
-    @property
-    def spine_cut(self) -> tuple[float, bool] | None:
-        """Depth [mm] of the cut that leaves the spine, if any; whether its edges are radial."""
-        return None
-
-    def expanded(self) -> tuple["Notch", ...]:
-        """Return the notches that this one stands for: `repeat` of them, each with `repeat` 1."""
-        return (self if self.repeat == 1 else unchecked(self, repeat=1),) * self.repeat
-
-    @classmethod
-    def further_on(cls, table: Mapping[str, Any], count: int) -> dict[str, Any]:
-        """Return the table of what is left of a row behind `count` notches, `repeat` as it was."""
-        return dict(table)
-
-    def spacing(self, following: "Notch | None") -> float:
-        """Return the rigid length along the axis up to the next notch, or to the tip [mm]."""
-        return self.uncut_length
-
-    def cut_layout(
-        self, tube: Tube, before: "Notch | None", after: "Notch | None"
-    ) -> CutLayout | None:
-        """Return the cuts between its neighbours (None at an end), if they are known."""
-        return None
-
-    def openings(self, before: "Notch | None", after: "Notch | None") -> tuple[Opening, ...]:
-        """Return the openings through which tendons enter the body behind this notch."""
-        return (Opening(None, 0.0, 0.0),)
+_FOLDERS = {"Notch": "notches", "Material": "materials", "Friction": "friction"}
 
 
-def openings_along(notches: Sequence[Notch], direction_deg: float) -> Iterator[tuple[int, Opening]]:
-    """Yield the bodies that a tendon on one side [deg] enters, from 1, and their openings."""
-    neighbours = (None, *notches, None)
-    for number, notch in enumerate(notches, start=1):
-        for opening in notch.openings(neighbours[number - 1], neighbours[number + 1]):
-            if opening.admits(direction_deg):
-                yield number, opening
+@functools.cache  # asked for each value that is set by its name
+def _import_all(folder: str) -> None:
+    import_all(f"notchflex.robot.{folder}", [str(Path(__file__).parent / folder)])
+
+
+def kinds_of(base: type) -> dict[str, type]:
+    """Find every kind of notch, material or friction, by the word that names it."""
+    _import_all(_FOLDERS[base.__name__])
+    return {kind_of(cls): cls for cls in sorted(base.__subclasses__(), key=kind_of)}
+
+
+def any_kind_of(base: type) -> Any:
+    """Make the type of a field that takes any kind of `base`, selected by its key `kind`."""
+    return Annotated[Union[tuple(kinds_of(base).values())], Field(discriminator="kind")]  # noqa: UP007
 
 
 @part(kw_only=True)
@@ -445,6 +367,129 @@ class Transforming:
             )
 
 
+if TYPE_CHECKING:
+    AnyMaterial: TypeAlias = Material
+else:
+    AnyMaterial = any_kind_of(Material)
+
+
+@part(kw_only=True)
+class Notch:
+    """What every kind of notch has.
+
+    The methods say where the rigid bodies and the tendons lie; they describe a slot across one
+    side of the tube with a rigid piece behind it, and a kind that differs overrides them.
+
+    Args:
+        kind: The word that names the kind in a file.
+        uncut_length: Uncut length behind the notch, toward the tip [mm].
+        direction_deg: Side toward which the notch bends [deg], about the tube axis from x to y.
+        precurvature_deg: Angle of the notch when nothing pulls [deg], positive toward the bend.
+        stiffness_factor: Factor on its stiffness in all directions, for what the law of the notch
+            leaves out.
+        repeat: How many equal notches follow one another.
+        tube: The tube of this notch and of the rigid piece behind it; None is that of the robot.
+        material: Their material; None is that of the robot.
+    """
+
+    is_round: ClassVar[bool] = False  # whether it bends to all sides alike
+    kind: str
+    uncut_length: Annotated[
+        Float, quantity("mm", "uncut length behind the notch, toward the tip", at_least=0)
+    ]
+    direction_deg: Annotated[Float, quantity("deg", "side toward which the notch bends")] = 0.0
+    precurvature_deg: Annotated[
+        Float, quantity("deg", "angle of the notch when nothing pulls", above=-180, below=180)
+    ] = 0.0
+    stiffness_factor: Annotated[
+        Float, quantity("", "factor on its stiffness in all directions", above=0, usual=(0.5, 2))
+    ] = 1.0
+    repeat: Annotated[
+        Int,
+        Field(ge=1, le=10_000, description="how many equal notches follow"),
+    ] = 1
+    tube: Annotated[Tube | None, Field(description="its own tube, also of the piece behind it")] = (
+        None
+    )
+    material: Annotated[
+        AnyMaterial | None,
+        Field(description="its own material, also of the piece behind it"),
+    ] = None
+
+    @property
+    def papers(self) -> tuple[str, ...]:
+        """Papers to cite for its model."""
+        return ()
+
+    @property
+    def stays_in_plane(self) -> bool:
+        """Whether forces in its plane of bending move it in that plane alone."""
+        return True
+
+    @property
+    def has_elastic_ends(self) -> bool:
+        """Whether its stiffness depends on the rings or walls beside it."""
+        return getattr(self, "ends", "rigid") != "rigid"
+
+    def made_of(self, material: Material) -> Any:
+        """Return what its section law follows from, where the robot is of a material."""
+        return self.material or material
+
+    def problems(self, tube: Tube) -> Problems:
+        """Find what does not fit the tube: pairs of a key and the rest of the sentence."""
+        return ()
+
+    def row_problems(self, before: "Notch") -> Problems:
+        """Find what does not fit the notch right before this one, toward the base."""
+        return ()
+
+    def tendon_problems(self, tendon: Tendon) -> Problems:
+        """Find why a tendon that ends behind this notch cannot run over it: keys of the tendon."""
+        return ()
+
+    @property
+    def mass(self) -> float | None:
+        """Mass of the body behind it [g], where that is not a piece of the tube."""
+        return None
+
+    @property
+    def spine_cut(self) -> tuple[float, bool] | None:
+        """Depth [mm] of the cut that leaves the spine, if any; whether its edges are radial."""
+        return None
+
+    def expanded(self) -> tuple["Notch", ...]:
+        """Return the notches that this one stands for: `repeat` of them, each with `repeat` 1."""
+        return (self if self.repeat == 1 else unchecked(self, repeat=1),) * self.repeat
+
+    @classmethod
+    def further_on(cls, table: Mapping[str, Any], count: int) -> dict[str, Any]:
+        """Return the table of what is left of a row behind `count` notches, `repeat` as it was."""
+        return dict(table)
+
+    def spacing(self, following: "Notch | None") -> float:
+        """Return the rigid length along the axis up to the next notch, or to the tip [mm]."""
+        return self.uncut_length
+
+    def cut_layout(
+        self, tube: Tube, before: "Notch | None", after: "Notch | None"
+    ) -> CutLayout | None:
+        """Return the cuts between its neighbours (None at an end), if they are known."""
+        return None
+
+    def openings(self, before: "Notch | None", after: "Notch | None") -> tuple[Opening, ...]:
+        """Return the openings through which tendons enter the body behind this notch."""
+        return (Opening(None, 0.0, 0.0),)
+
+
+def openings_along(notches: Sequence[Notch], direction_deg: float) -> Iterator[tuple[int, Opening]]:
+    """Yield the bodies that a tendon on one side [deg] enters, from 1, and their openings."""
+    neighbours = (None, *notches, None)
+    for number, notch in enumerate(notches, start=1):
+        for opening in notch.openings(neighbours[number - 1], neighbours[number + 1]):
+            if opening.admits(direction_deg):
+                yield number, opening
+
+
 @part(kw_only=True)
 class Friction:
     """What every kind of friction has: a name.
@@ -511,24 +556,3 @@ class Drawing:
     finish: Annotated[_Entry, Field(description="finish of the surface")] = None
     drawn: Annotated[_Entry, Field(description="who has drawn it")] = None
     date: Annotated[_Entry, Field(description="date")] = None
-
-
-# How kinds are looked for.
-
-_FOLDERS = {Notch: "notches", Material: "materials", Friction: "friction"}
-
-
-@functools.cache  # asked for each value that is set by its name
-def _import_all(folder: str) -> None:
-    import_all(f"notchflex.robot.{folder}", [str(Path(__file__).parent / folder)])
-
-
-def kinds_of(base: type) -> dict[str, type]:
-    """Find every kind of notch, material or friction, by the word that names it."""
-    _import_all(_FOLDERS[base])
-    return {kind_of(cls): cls for cls in sorted(base.__subclasses__(), key=kind_of)}
-
-
-def any_kind_of(base: type) -> Any:
-    """Make the type of a field that takes any kind of `base`, selected by its key `kind`."""
-    return Annotated[Union[tuple(kinds_of(base).values())], Field(discriminator="kind")]  # noqa: UP007

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Collection, Sequence
+import operator
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,8 +40,8 @@ class PartsForm:
         content, places = list[Any](), list[Place]()
         for number, part in enumerate(parts):
             words = dict[str, Any]()
-            for key in (field.name for field in dataclasses.fields(part)):
-                value, place = getattr(part, key), (number, key)
+            for key, value in _values(part):
+                place = (number, key)
                 # Directions decide which notches and tendons share a plane.
                 varies = (value != 0.0 or place in varied) and key != "direction_deg"
                 if type(value) is float and math.isfinite(value) and varies:
@@ -52,15 +53,28 @@ class PartsForm:
 
     def numbers_of(self, parts: Sequence[Any]) -> Float[np.ndarray, " numbers"]:
         """Return the numbers of parts of this form."""
-        return np.array([getattr(parts[number], key) for number, key in self.places])
+        return np.array([operator.attrgetter(key)(parts[number]) for number, key in self.places])
 
     def with_numbers(self, numbers: Any) -> tuple[Any, ...]:
         """Return parts with other numbers, which nothing checks: plain or traced ones."""
         changed: list[dict[str, Any]] = [{} for _ in self.parts]
         for (number, key), value in zip(self.places, numbers, strict=True):
-            changed[number][key] = value
+            name, _, inner = key.partition(".")
+            if inner:
+                own = changed[number].get(name, getattr(self.parts[number], name))
+                value = unchecked(own, **{inner: value})
+            changed[number][name] = value
         pairs = zip(self.parts, changed, strict=True)
         return tuple(unchecked(part, **values) for part, values in pairs)
+
+
+def _values(part: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the values of a part by their keys, and behind its own parts theirs."""
+    for key in (field.name for field in dataclasses.fields(part)):
+        value = getattr(part, key)
+        own = _values(value) if dataclasses.is_dataclass(value) else ()
+        yield key, type(value) if own else value
+        yield from ((f"{key}.{inner}", each) for inner, each in own)
 
 
 def parts_of(robot: Robot) -> tuple[Any, ...]:
@@ -110,6 +124,6 @@ def differing(parts: Sequence[Any], others: Sequence[Any]) -> list[Place] | None
     if list(map(type, parts)) != list(map(type, others)):
         return None
     for number, (part, other) in enumerate(zip(parts, others, strict=True)):
-        keys = (field.name for field in dataclasses.fields(part))
-        places += [(number, key) for key in keys if getattr(part, key) != getattr(other, key)]
+        values = dict(_values(other))
+        places += [(number, key) for key, value in _values(part) if value != values.get(key)]
     return places if set(places) <= set(PartsForm.of(parts, places).places) else None

@@ -88,6 +88,21 @@ def fields_of(cls: type) -> Mapping[str, Any]:
     return types.MappingProxyType(dict(order))
 
 
+@functools.cache
+def own_parts(cls: type) -> tuple[str, ...]:
+    """Return the keys of a part that hold a part of its own."""
+    return tuple(name for name, field in fields_of(cls).items() if any(kinds_in(field.annotation)))
+
+
+def fields_in(part: Any) -> dict[str, Any]:
+    """Return the fields of a part, and those of its own parts as `material.density`."""
+    fields: Any = fields_of(type(part))
+    for name in own_parts(type(part)):
+        if (own := getattr(part, name)) is not None:
+            fields = {**fields, **{f"{name}.{key}": each for key, each in fields_in(own).items()}}
+    return fields
+
+
 # Clear sentences instead of pydantic's error records.
 
 _LONGEST = 80

@@ -5,13 +5,14 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from math import pi
+from operator import attrgetter
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, cast
 
 from pydantic import BeforeValidator, WithJsonSchema
 
 from notchflex.errors import InputError, InputWarning
-from notchflex.robot.kinds import Notch, Tendon, openings_along
-from notchflex.robot.part import ProblemError, Problems, fields_of, unit_of, unknown_key
+from notchflex.robot.kinds import Notch, Tendon, Tube, openings_along
+from notchflex.robot.part import ProblemError, Problems, fields_in, unit_of, unknown_key
 from notchflex.robot.value_names import described_at, named_parts, numbers_at
 
 if TYPE_CHECKING:
@@ -259,7 +260,15 @@ def _notch_problems(robot: "Robot") -> Problems:
     for named in named_parts(robot):
         if not isinstance(notch := named.part, Notch):
             continue
-        for key, text in notch.problems(robot.tube):
+        if notch.tube and notch.tube.base_length:
+            yield f"{named.name}.tube.base_length", "is for [tube]; leave it out."
+        if notch.material and (notch.material.density is None) != (robot.material.density is None):
+            yield (
+                f"{named.name}.material.density",
+                "is known of one material and not of the other; give the densities of both, or "
+                "neither.",
+            )
+        for key, text in notch.problems(notch.tube or robot.tube):
             yield f"{named.name}.{key}", text
         if last and not row:
             row = [(f"{named.name}.{key}", text) for key, text in notch.row_problems(last)]
@@ -269,25 +278,7 @@ def _notch_problems(robot: "Robot") -> Problems:
 
 def _tendon_problems(robot: "Robot", tendon: Tendon, on_notches: bool) -> Problems:
     """Check a tendon in the tube, and unless notches are wrong over them and in its last body."""
-    tube, number = robot.tube, robot.number_of_notches
-    if tendon.radius > tube.outer_radius:
-        yield (
-            "radius",
-            f"is {tendon.radius} mm, outside the wall; it must be at most the outer "
-            f"radius, {tube.outer_radius} mm.",
-        )
-    if tendon.diameter is not None:
-        inside, outside = (tendon.radius + sign * tendon.diameter / 2 for sign in (-1, 1))
-        lumen, surface = tube.inner_radius * (1 + 1e-9), tube.outer_radius * (1 + 1e-9)
-        if outside > lumen and (outside > surface or inside < tube.inner_radius * (1 - 1e-9)):
-            yield (
-                "diameter",
-                f"is {tendon.diameter} mm; at a radius of {tendon.radius} mm the tendon reaches "
-                f"from {inside:.6g} to {outside:.6g} mm, neither all in the lumen (to "
-                f"{tube.inner_radius:.6g} mm) nor all in the wall (to {tube.outer_radius:.6g} mm); "
-                "in the lumen its radius is at most "
-                f"{tube.inner_radius - tendon.diameter / 2:.6g} mm.",
-            )
+    number = robot.number_of_notches
     end = tendon.end_body or number
     for key in ("disk_radius", "disk_direction_deg"):
         given = getattr(tendon, key)
@@ -297,12 +288,16 @@ def _tendon_problems(robot: "Robot", tendon: Tendon, on_notches: bool) -> Proble
                 f"has {len(given)} values; give {end}, one for each disk from body 1 to the body "
                 "in which the tendon ends.",
             )
-    if max(tendon.disk_radius or (0.0,)) > tube.outer_radius:
-        yield (
-            "disk_radius",
-            f"has {max(tendon.disk_radius or ())} mm, outside the disks; it must be at most the "
-            f"outer radius of the tube, {tube.outer_radius} mm.",
-        )
+    for radius, tube in zip(tendon.disk_radius or (), robot.tubes[1:], strict=False):
+        if radius > tube.outer_radius:
+            yield (
+                "disk_radius",
+                f"has {radius} mm, outside the disk; it must be at most the outer radius of its "
+                f"tube, {tube.outer_radius} mm.",
+            )
+            break
+    for tube in dict.fromkeys(robot.tubes[: end + 1]):
+        yield from _place_problems(tube, tendon)
     if end > number:
         yield (
             "end_body",
@@ -339,15 +334,37 @@ def _disk_problems(robot: "Robot", notch: Notch, tendon: Tendon) -> Problems:
             key,
             f'is for gaps of kind = "rod"; leave it out over a notch of kind = "{notch.kind}".',
         )
-    elif robot.material.kind != "linear" and any(
+    elif (kind := (notch.material or robot.material).kind) != "linear" and any(
         abs(math.sin(math.radians(side - notch.direction_deg))) > 1e-9 for side in sides
     ):
         yield (
             key if tendon.disk_direction_deg else "direction_deg",
-            f'leaves the plane of the gaps, {notch.direction_deg} deg; a "{robot.material.kind}" '
+            f'leaves the plane of the gaps, {notch.direction_deg} deg; a "{kind}" '
             "backbone bends by its law in that plane and linearly out of it. Give the gaps the "
             'direction_deg of the tendons, or use material.kind = "linear".',
         )
+
+
+def _place_problems(tube: Tube, tendon: Tendon) -> Problems:
+    """Check where a tendon lies in a tube."""
+    if tendon.radius > tube.outer_radius:
+        yield (
+            "radius",
+            f"is {tendon.radius} mm, outside the wall; it must be at most the outer "
+            f"radius, {tube.outer_radius} mm.",
+        )
+    if tendon.diameter is not None:
+        inside, outside = (tendon.radius + sign * tendon.diameter / 2 for sign in (-1, 1))
+        lumen, surface = tube.inner_radius * (1 + 1e-9), tube.outer_radius * (1 + 1e-9)
+        if outside > lumen and (outside > surface or inside < tube.inner_radius * (1 - 1e-9)):
+            yield (
+                "diameter",
+                f"is {tendon.diameter} mm; at a radius of {tendon.radius} mm the tendon reaches "
+                f"from {inside:.6g} to {outside:.6g} mm, neither all in the lumen (to "
+                f"{tube.inner_radius:.6g} mm) nor all in the wall (to {tube.outer_radius:.6g} mm); "
+                "in the lumen its radius is at most "
+                f"{tube.inner_radius - tendon.diameter / 2:.6g} mm.",
+            )
 
 
 _Unusual: TypeAlias = tuple[str, float, tuple[float, float], float | None]
@@ -358,8 +375,9 @@ def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
     """Yield a warning for each value that was probably not meant; lengths in metres are one."""
     by_unit: dict[tuple[str, str], list[_Unusual]] = {}
     for named in named_parts(robot):
-        for key, field in fields_of(type(named.part)).items():
-            usual, value = (field.json_schema_extra or {}).get("usual"), getattr(named.part, key)
+        for key, field in fields_in(named.part).items():
+            usual = (field.json_schema_extra or {}).get("usual")
+            value = usual and attrgetter(key)(named.part)
             if usual and value is not None and not usual[0] <= value <= usual[1]:
                 other, meant = _meant(value, usual, unit_of(field))
                 unusual = (f"{named.name}.{key}", value, usual, meant)

@@ -1,11 +1,7 @@
 """Reading robots: the ready ones by name, others from TOML files."""
 
-import errno
-import io
 import os
 import re
-import select
-import stat
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +9,7 @@ from typing import Any, TypeVar
 
 from notchflex._ready import READY, ready_names
 from notchflex.errors import InputError, RobotFileError
+from notchflex.robot.files import csv_table, read_text
 from notchflex.robot.part import nearest
 from notchflex.robot.robot import (
     Changed,
@@ -25,11 +22,6 @@ from notchflex.robot.robot import (
 from notchflex.robot.value_names import change_table
 
 Refused = TypeVar("Refused", bound=InputError)
-
-_LARGEST = 50_000_000
-"""Bytes of the largest text file that is read."""
-_PART, _WRITER_COMES = 2**16, 3.0
-"""Bytes that are read at once, and how long a pipe waits for its writer, s."""
 
 
 def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
@@ -65,6 +57,7 @@ def load_changed(
     text = read_text(path, "robot file", shown, RobotFileError)
     table = parse_toml(text, shown)
     try:
+        _read_curves(table, path.parent)
         robot, dropped = from_table(table), ()
     except InputError as error:
         if not values:
@@ -79,6 +72,18 @@ def load_changed(
     if values:
         robot, dropped = set_values(robot, values)
     return Changed(remember_source(robot, text), dropped)
+
+
+def _read_curves(table: dict[str, Any], folder: Path) -> None:
+    """Put the numbers of CSV files of curves into the table of a robot."""
+    rows: Any = table.get("notch")
+    for row in rows if isinstance(rows, list) else ():
+        name = row.get("file") if isinstance(row, dict) else None
+        if isinstance(name, str):
+            curve = csv_table(folder / name)
+            for key, column in ("angle_deg", "angle_deg"), ("moment", "moment_Nmm"):
+                row[key] = curve.numbers(column).tolist()
+            del row["file"]
 
 
 def in_file(shown: str, error: InputError, kind: type[Refused]) -> Refused:
@@ -117,56 +122,6 @@ def _find(name_or_path: str | os.PathLike[str]) -> Path:
         f"`{text}` is neither a ready robot{nearest(text, names)} nor a robot file. "
         f"Ready robots: {', '.join(names)}."
     )
-
-
-def bounded_bytes(path: str | os.PathLike[str], most: int = _LARGEST) -> bytes:
-    """Read a file of at most so many bytes; a pipe without a writer raises `OSError` too."""
-    with open(path, "rb", buffering=0, opener=_at_once) as file:
-        pipe = stat.S_ISFIFO(os.fstat(file.fileno()).st_mode)
-        ready = not pipe or select.select([file], [], [], _WRITER_COMES)[0]
-        # Without waiting a pipe reads as None where its writer is only slow.
-        part = file.read(_PART)
-        if part == b"" and not ready:
-            raise OSError(errno.EPIPE, "it is a pipe into which no program writes")
-        if pipe:
-            os.set_blocking(file.fileno(), True)
-        data = bytearray(part or b"")
-        while part is None or part:
-            part = file.read(_PART)
-            data += part or b""
-            if len(data) > most:
-                raise OSError(errno.EFBIG, f"it has more than {most / 1e6:.0f} MB")
-    return bytes(data)
-
-
-def _at_once(path: str, flags: int) -> int:
-    """Open a pipe without waiting for its writer, anything else as usual."""
-    pipe = stat.S_ISFIFO(os.stat(path).st_mode)
-    return os.open(path, flags | (os.O_NONBLOCK if pipe else 0))
-
-
-def read_text(
-    source: str | os.PathLike[str],
-    kind: str,
-    shown: str | None = None,
-    error_class: type[InputError] = InputError,
-) -> str:
-    """Read a text file in UTF-8, without the byte-order mark that spreadsheets put before it."""
-    shown = shown or str(source)
-    try:
-        return io.TextIOWrapper(io.BytesIO(bounded_bytes(source)), "utf-8-sig").read()
-    except FileNotFoundError:
-        raise error_class.FILE_NOT_FOUND(f"{shown}: there is no such file.") from None
-    except IsADirectoryError:
-        raise error_class.FILE_UNREADABLE(f"{shown} is a folder; name a {kind}.") from None
-    except UnicodeDecodeError:
-        form = kind.removesuffix(" file")  # such as "CSV file"
-        form = form if form[0].isupper() else "text"
-        saved = f"save it as {form} in UTF-8"
-        raise error_class.FILE_UNREADABLE(f"{shown} is not text in UTF-8; {saved}.") from None
-    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
-        words = getattr(problem, "strerror", None) or problem
-        raise error_class.FILE_UNREADABLE(f"{shown} cannot be read: {words}.") from None
 
 
 def parse_toml(

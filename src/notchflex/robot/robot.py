@@ -4,6 +4,7 @@ import functools
 import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
 from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias, cast, overload
 
@@ -15,6 +16,7 @@ from notchflex.errors import InputError, InputWarning
 from notchflex.robot.fatigue import Fatigue
 from notchflex.robot.kinds import (
     PRINTABLE,
+    AnyMaterial,
     Drawing,
     Drive,
     Friction,
@@ -24,7 +26,7 @@ from notchflex.robot.kinds import (
     Tube,
     any_kind_of,
 )
-from notchflex.robot.part import Problems, fields_of, is_unsaid, part, sentences, unit_of
+from notchflex.robot.part import Problems, fields_of, is_unsaid, own_parts, part, sentences, unit_of
 from notchflex.robot.problems import Tolerances, robot_problems, robot_warnings
 from notchflex.robot.value_names import change_table
 
@@ -35,14 +37,9 @@ if TYPE_CHECKING:
     from notchflex.analysis.geometry import Geometry
 
     AnyNotch: TypeAlias = Notch
-    AnyMaterial: TypeAlias = Material
     AnyFriction: TypeAlias = Friction
 else:
-    AnyNotch, AnyMaterial, AnyFriction = (
-        any_kind_of(Notch),
-        any_kind_of(Material),
-        any_kind_of(Friction),
-    )
+    AnyNotch, AnyFriction = any_kind_of(Notch), any_kind_of(Friction)
 
 
 @part
@@ -110,7 +107,7 @@ class Robot:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without what is derived; a hash differs between processes."""
-        left_out = "_hash", "geometry", "warnings"
+        left_out = "_hash", "geometry", "warnings", "tubes", "materials"
         return {name: value for name, value in vars(self).items() if name not in left_out}
 
     def __repr__(self) -> str:
@@ -146,6 +143,22 @@ class Robot:
         return tuple(single for notch in self.notch for single in notch.expanded())
 
     @functools.cached_property
+    def tubes(self) -> tuple[Tube, ...]:
+        """The tube of every body, base first."""
+        return (self.tube, *(notch.tube or self.tube for notch in self.notches))
+
+    @functools.cached_property
+    def materials(self) -> tuple[Material, ...]:
+        """The material of every body, base first."""
+        return (self.material, *(notch.material or self.material for notch in self.notches))
+
+    @property
+    def densities(self) -> tuple[float, ...] | None:
+        """The density of every body [kg/m3]; None where none is known."""
+        known = tuple(each.density for each in self.materials if each.density is not None)
+        return known or None
+
+    @functools.cached_property
     def geometry(self) -> "Geometry":
         """Its bodies, cuts, walls, closing angles and masses, without loads."""
         from notchflex.analysis.geometry import Geometry
@@ -165,7 +178,7 @@ class Robot:
             >>> [paper.partition(":")[0] for paper in load_robot("liu2022").citations()]
             ['notchflex 0.1.0', 'Liu et al.', 'Gao et al.']
         """
-        parts = (*self.notch, self.material, self.friction)
+        parts = (*self.notch, *self.materials, self.friction)
         papers = dict.fromkeys(paper for part in parts for paper in part.papers)
         return (f"notchflex {__version__}: statics of tendon-driven notched-tube robots", *papers)
 
@@ -243,19 +256,23 @@ def set_values(
 
 def to_table(robot: Robot) -> dict[str, Any]:
     """Convert a robot to the plain table of its file: dicts, lists, numbers and text."""
-    tables = {name: _plain(getattr(robot, name)) for name in fields_of(Robot)}
+    tables = {name: plain(getattr(robot, name)) for name in fields_of(Robot)}
     tables["tolerance"] = {tolerance.value: tolerance.written for tolerance in robot.tolerance}
     return {name: table for name, table in tables.items() if table}
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Convert a part, parts, or a name to what stands in a file: the values that are said."""
     if isinstance(value, tuple):
-        return [_plain(part) for part in cast("tuple[Any, ...]", value)]
+        return [plain(part) for part in cast("tuple[Any, ...]", value)]
     if isinstance(value, str):
         return value
     values = {name: getattr(value, name) for name in fields_of(type(value))}
-    return {name: said for name, said in values.items() if not is_unsaid(name, said)}
+    return {
+        name: plain(said) if name in own_parts(type(value)) and said else said
+        for name, said in values.items()
+        if not is_unsaid(name, said)
+    }
 
 
 def from_table(table: Mapping[str, Any]) -> Robot:
@@ -405,4 +422,6 @@ def _values(values: Sequence[Any]) -> str:
     numbers = all(isinstance(value, (int, float)) for value in values)
     if numbers and len(values) > MOST:
         return f"{short(min(values))} to {short(max(values))}"
-    return "/".join(short(value) if isinstance(value, float) else str(value) for value in values)
+    texts = (_words([value]) if is_dataclass(value) else str(value) for value in values)
+    pairs = zip(values, texts, strict=True)
+    return "/".join(short(value) if isinstance(value, float) else text for value, text in pairs)

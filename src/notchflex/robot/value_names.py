@@ -7,12 +7,13 @@ from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import accumulate
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from notchflex.errors import InputError
 from notchflex.robot.fatigue import Fatigue
 from notchflex.robot.kinds import Drawing, Drive, Friction, Material, Notch, Tendon, Tube, kinds_of
-from notchflex.robot.part import fields_of, nearest, unit_of, unknown_key
+from notchflex.robot.part import fields_in, fields_of, nearest, unit_of, unknown_key
 
 if TYPE_CHECKING:
     from notchflex.robot.robot import Robot
@@ -32,7 +33,7 @@ SECTIONS: dict[str, type] = {
 EXAMPLES = "write it like material.elastic_modulus, notch[2].depth or notch[*].depth"
 
 PLURAL = {"notch": "notches", "tendon": "tendons", "drive": "drives"}
-_PATH = re.compile(r"(?P<section>\w+)(?:\[(?P<index>\*|\d+)\])?(?:\.(?P<key>\w+))?")
+_PATH = re.compile(r"(?P<section>\w+)(?:\[(?P<index>\*|\d+)\])?(?:\.(?P<key>\w+(?:\.\w+)?))?")
 # More digits than the number of any notch has.
 _DIGITS = 10
 
@@ -158,7 +159,7 @@ def change_table(
             table.setdefault("tolerance", {})[path.strip().removeprefix(_TOLERANCE)] = value
         else:
             targets.append((parse_path(path), value))
-    targets.sort(key=lambda item: (item[0].key != "kind", item[0].number is not None))
+    targets.sort(key=lambda item: (not _is_kind(item[0]), item[0].number is not None))
     dropped: dict[str, None] = {}
     seen: set[tuple[Any, ...]] = set()
     for target, value in targets:
@@ -167,13 +168,28 @@ def change_table(
         seen.add(target[1:])
         if target.section == "name":
             table["name"] = value
-        elif target.key == "kind":
+        elif _is_kind(target):
             dropped |= dict.fromkeys(_set_kind(table, target, value))
         else:
             _set_key(table, target, value)
     for path in dropped:
         table.get("tolerance", {}).pop(path, None)
     return tuple(dropped)
+
+
+def _is_kind(target: ValuePath) -> bool:
+    return target.key.endswith("kind")
+
+
+def _owners_at(table: dict[str, Any], target: ValuePath) -> tuple[str, str, list[dict[str, Any]]]:
+    """Find the section of the tables that have the key of a path, the key there, the tables."""
+    tables, (*own, key) = _tables_at(table, target), target.key.split(".")
+    for name in own:
+        tables = [part for part in tables if name in part or key == "kind"]
+        for part in tables:  # those of a row that was split share it
+            part[name] = {**part.get(name, {})}
+        tables = [part[name] for part in tables]
+    return [target.section, *own][-1], key, tables
 
 
 def _tables_at(table: dict[str, Any], target: ValuePath) -> list[dict[str, Any]]:
@@ -205,18 +221,21 @@ def _set_key(table: dict[str, Any], target: ValuePath, value: object) -> None:
             "file instead."
         )
     allowed: dict[str, None] = {}
-    for part in _tables_at(table, target):
-        keys = fields_of(class_of(target.section, part))
+    section, key, parts = _owners_at(table, target)
+    for part in parts:
+        keys = fields_of(class_of(section, part))
         allowed |= dict.fromkeys(keys)
-        if target.key in keys:
-            part[target.key] = value
-    if target.key not in allowed:
-        raise InputError.UNKNOWN_NAME(unknown_key(target.path, target.key, allowed))
+        if key in keys:
+            part[key] = value
+    if key not in allowed:
+        allowed = allowed or dict.fromkeys(fields_of(SECTIONS[section]))
+        raise InputError.UNKNOWN_NAME(unknown_key(target.path, key, allowed))
 
 
 def _set_kind(table: dict[str, Any], target: ValuePath, value: object) -> Iterator[str]:
     """Replace a kind: keep the keys that both kinds share, and yield the paths of the others."""
-    base = SECTIONS[target.section]
+    section, _, parts = _owners_at(table, target)
+    base = SECTIONS[section]
     if "kind" not in fields_of(base):
         raise InputError.UNKNOWN_NAME(unknown_key(target.path, "kind", fields_of(base)))
     kinds = kinds_of(base)
@@ -225,7 +244,7 @@ def _set_kind(table: dict[str, Any], target: ValuePath, value: object) -> Iterat
         raise InputError.UNKNOWN_NAME(
             f'`{target.path}` is "{value}"; allowed: {allowed}{nearest(str(value), kinds)}.'
         )
-    for part in _tables_at(table, target):
+    for part in parts:
         for key in [key for key in part if key not in fields_of(kinds[str(value)])]:
             yield target.path.removesuffix("kind") + key
             del part[key]
@@ -274,9 +293,9 @@ def _owners(robot: "Robot", path: str) -> tuple[str, list[Any]]:
     of_list = robot.notches if target.section == "notch" else robot.drive
     target.check_number(len(robot.tendon if target.section == "tendon" else of_list))
     parts = [named.part for named in named_parts(robot) if named.is_meant(target)]
-    owners = [part for part in parts if target.key in fields_of(type(part))]
+    owners = [part for part in parts if target.key in fields_in(part)]
     if not owners:
-        allowed = dict.fromkeys(name for part in parts for name in fields_of(type(part)))
+        allowed = dict.fromkeys(name for part in parts for name in fields_in(part))
         raise InputError.UNKNOWN_NAME(
             f"`{path}` is not the name of a number of this robot{nearest(target.key, allowed)}; "
             f"{EXAMPLES}."
@@ -287,7 +306,7 @@ def _owners(robot: "Robot", path: str) -> tuple[str, list[Any]]:
 def number_at(robot: "Robot", path: str) -> float:
     """Return a number of a robot by its name (see `Robot.with_value`), in the units of its file."""
     key, owners = _owners(robot, path)
-    numbers = {getattr(part, key) for part in owners}
+    numbers = set(map(attrgetter(key), owners))
     if len(numbers) > 1:
         raise InputError.UNSUPPORTED(
             f"`{path}` has unlike values in this robot; name one, such as [1]."
@@ -321,7 +340,7 @@ def numbers_at(robot: "Robot", path: str) -> dict[str, float]:
 def described_at(robot: "Robot", path: str) -> Described:
     """Return unit and limits of a number of a robot by its name."""
     key, owners = _owners(robot, path)
-    field = fields_of(type(owners[0]))[key]
+    field = fields_in(owners[0])[key]
     below = (getattr(rule, name, -math.inf) for rule in field.metadata for name in ("gt", "ge"))
     above = (getattr(rule, name, math.inf) for rule in field.metadata for name in ("lt", "le"))
     return Described(unit_of(field), max(below, default=-math.inf), min(above, default=math.inf))

@@ -13,10 +13,11 @@ from tomlkit.exceptions import ParseError
 
 from notchflex._replacing import replacing
 from notchflex.errors import InputError, RobotFileError
-from notchflex.robot.part import fields_of, is_unsaid, unit_of
+from notchflex.robot.files import read_text
+from notchflex.robot.part import fields_of, unit_of
 from notchflex.robot.problems import read_tolerances
-from notchflex.robot.reading import read_text, robot_from_text
-from notchflex.robot.robot import Robot, source_of, to_table
+from notchflex.robot.reading import robot_from_text
+from notchflex.robot.robot import Robot, plain, source_of, to_table
 from notchflex.robot.value_names import NamedPart, class_of, group_of, named_parts, parse_path
 
 _HEADER = re.compile(
@@ -110,26 +111,26 @@ def _fresh(robot: Robot) -> str:
 
 def _tolerance_lines(table: Mapping[str, Any]) -> list[str]:
     """Write tolerances, a name a line; TOML wants quotes around those with brackets."""
-    lines: list[str] = []
-    for name, tolerance in table.items():
-        item: Any = tomlkit.item(tolerance)
-        if isinstance(tolerance, dict):
-            item = tomlkit.inline_table()
-            item.update(tolerance)
-        lines.append(
-            f'"{name}" = {item.as_string()}' if "[" in name else f"{name} = {item.as_string()}"
-        )
-    return lines
+    names = ((f'"{name}"' if "[" in name else name, tolerance) for name, tolerance in table.items())
+    return [f"{name} = {_written(tolerance)}" for name, tolerance in names]
+
+
+def _written(value: Any) -> str:
+    """Write a value; a table on one line."""
+    item: Any = tomlkit.item(value)
+    if isinstance(value, dict):
+        item = tomlkit.inline_table()
+        item.update(value)
+    return item.as_string()
 
 
 def _fresh_part(part: Any) -> list[str]:
     lines: list[str] = []
-    for key, record in fields_of(type(part)).items():
-        value = getattr(part, key)
-        if not is_unsaid(key, value):
-            comment = ", ".join(filter(None, (unit_of(record), record.description)))
-            line = f"{key} = {tomlkit.item(value).as_string()}"
-            lines.append(f"{line}  # {comment}" if comment else line)
+    fields = fields_of(type(part))
+    for key, value in plain(part).items():
+        comment = ", ".join(filter(None, (unit_of(fields[key]), fields[key].description)))
+        line = f"{key} = {_written(value)}"
+        lines.append(f"{line}  # {comment}" if comment else line)
     return lines
 
 
@@ -149,9 +150,10 @@ class _Block:
             if read_tolerances(tomllib.loads(text)) != read_tolerances(values):
                 text = "\n".join([*_tolerance_lines(values), ""])
         else:
-            body = tomlkit.parse(text)
+            # Tables of a part of its own are inside it.
+            body = tomlkit.parse(text.replace(f"[{self.name}.", "["))
             _update(body, values, self.name, notes)
-            text = tomlkit.dumps(body)
+            text = re.sub(r"(?m)^\[(tube|material)]", rf"[{self.name}.\1]", tomlkit.dumps(body))
         return self.lead + self.header + text
 
 
@@ -244,7 +246,7 @@ _COMMENT = re.compile(
 
 def _set_value(table: Any, key: str, value: object, note: str | None) -> None:
     """Set a value, and say beside it from what it changed and to what it was fitted."""
-    was = table[key]
+    was, value = table[key], list(value) if isinstance(value, tuple) else value
     comment, changed = cast("re.Match[str]", _COMMENT.fullmatch(was.trivia.comment)).groups()
     if was != value:
         table[key] = value

@@ -17,6 +17,7 @@ from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.contact import ContactGroup
 from notchflex.mechanics.flexure import flexure_state, geometric_stiffness, material_tangent
 from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.material import Law
 from notchflex.mechanics.motion import Motion, angular, skew, turned, wrench_turn
 from notchflex.mechanics.tendon import TendonGroup
 from notchflex.solver.residual import (
@@ -221,15 +222,17 @@ class StateJacobians:
         with_pose = anchors is not None and group.acts_on_bodies
         anchors = select_anchors(anchors, group.back) if with_pose else None
 
-        def slopes(part: Any, rod: Rod, memory: Any, anchor: Any, modes: Array) -> Any:
+        def slopes(part: Any, rod: Rod, law: Law, memory: Any, anchor: Any, modes: Array) -> Any:
             def moved(varied: Array) -> Any:
-                state = flexure_state(rod, chain.law, memory, varied, with_pose=with_pose)
+                state = flexure_state(rod, law, memory, varied, with_pose=with_pose)
                 return part.cross(rod, state, anchor)
 
             return jax.jacfwd(moved)(modes)
 
         memory = self.evaluation.flexure.memory
-        return jax.vmap(slopes)(group, chain.rods, memory, anchors, self.unknowns.modes)
+        return jax.vmap(slopes, (0, 0, chain.law.axis, 0, 0, 0))(
+            group, chain.rods, chain.law, memory, anchors, self.unknowns.modes
+        )
 
     def _tendon(self, k: int) -> TendonJacobian:
         """Linearise the k-th group of tendons."""
@@ -439,7 +442,7 @@ def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], lis
     chain, evaluation, unit = jacobians.chain, jacobians.evaluation, jacobians.unit
     elastic = chain.elastic
     if elastic is None:
-        elastic = jax.vmap(material_tangent, (0, None, 0))(
+        elastic = jax.vmap(material_tangent, (0, chain.law.axis, 0))(
             chain.rods, chain.law, evaluation.flexure
         )
         # Just beyond the strain where plastic hardening begins (exp(b / x) at x = 0) the law is

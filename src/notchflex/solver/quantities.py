@@ -330,6 +330,8 @@ def moment_error(state: SolvedState) -> Array:
     chain, bending = state.chain, slice(1 if state.chain.frame is not None else 2)
     required = state.required()[..., bending]
     real = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
+    if chain.law.axis is not None:
+        real = real & ~jnp.asarray(chain.law.lumped)
     has_length = (real[:, None] & (chain.rods.length > 0.0))[..., None]
     carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
     missing = state.evaluation.flexure.resultants[..., bending] - required
@@ -344,16 +346,15 @@ def moment_error(state: SolvedState) -> Array:
 def bend_possible(state: SolvedState) -> Array:
     """Whether every flexure is bent as it can be, and as its pose can be computed.
 
-    By less than half a turn, with no fibre shortened to nothing, and not so far about several axes
-    that the order of its turns is not known well.
+    By less than half a turn, with no fibre shortened to nothing, not beyond the ends of a table,
+    and not so far about several axes that the order of its turns is not known well.
     """
     chain, modes = state.chain, state.solved.point.unknowns.modes
     below_half_turn = jnp.sum(state.evaluation.flexure.bend**2, axis=-1) < np.pi**2
     accurate = jax.vmap(rotation_error_estimate)(chain.rods, modes) < _MAX_ROTATION_ERROR
-    section = chain.rods.section
-    farthest = jnp.maximum(section.edge_spine, section.edge_near)
-    bending = jnp.abs(in_space(state.evaluation.flexure.strain)[..., 1]) * farthest
-    return jnp.all(below_half_turn & accurate) & jnp.all(bending < 1.0)
+    law, strain = chain.law, in_space(state.evaluation.flexure.strain)
+    covered = jax.vmap(type(law).covers, (law.axis, 0, 0))(law, strain, chain.rods.section)
+    return jnp.all(below_half_turn & accurate) & jnp.all(covered)
 
 
 @Quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",

@@ -6,8 +6,9 @@ The modes satisfy equilibrium only in a weighted mean along a flexure. The large
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import cached_property, partial
+from collections.abc import Callable, Iterable
+from functools import cached_property
+from typing import Any
 
 from jaxtyping import Array, Float
 
@@ -82,17 +83,19 @@ class SolvedState:
     @cached_property
     def section_strain(self) -> SectionStrain:
         """Strains of the section at every node of every notch."""
-        strain, memory = in_space(self.evaluation.flexure.strain), self.solved.memory.material
-        of_section = partial(section_strain, self.law)
-        return jax.vmap(jax.vmap(of_section))(strain, self.chain.rods.section, memory)
+        return self._by_law(section_strain)
 
     @cached_property
     def stored_energy_density(self) -> tuple[Float[Array, "n nodes"], Flattening]:
         """Energy stored per length, and flattening, at every node of every notch."""
+        return self._by_law(lambda law, *state: law.stored_energy_density(*state))
+
+    def _by_law(self, function: Callable[..., Any]) -> Any:
+        """Return a function of law, strain, section and memory at every node of every notch."""
         strain, memory = in_space(self.evaluation.flexure.strain), self.solved.memory.material
-        return jax.vmap(jax.vmap(self.law.stored_energy_density))(
-            strain, self.chain.rods.section, memory
-        )
+        law, section = self.law, self.chain.rods.section
+        at_nodes = jax.vmap(function, (None, 0, 0, 0))
+        return jax.vmap(at_nodes, (law.axis, 0, 0, 0))(law, strain, section, memory)
 
     @cached_property
     def turning(self) -> Float[Array, "n t 2"]:

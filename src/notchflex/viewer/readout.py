@@ -89,7 +89,8 @@ def rows(session: Session) -> list[tuple[str, str, str]]:
 
 def _strain(session: Session) -> tuple[float, float | None]:
     """Return the largest strain and the allowed one, if any is set."""
-    return float(np.max(np.abs(session.state.peak_strain))), session.robot.material.allowed_strain
+    largest = float(np.fmax.reduce(np.abs(session.state.peak_strain)))
+    return largest, session.robot.material.allowed_strain
 
 
 def readout(session: Session) -> str:

@@ -283,7 +283,7 @@ class WorkspaceTask(PieceTask):
             "tip": tip,
             "direction": outputs["tip_rotation"][..., 2],
             "loading": np.broadcast_to(np.arange(_STATES) < _LEVELS, keeps.shape),
-            "strain": np.abs(outputs["peak_strain"]).max(axis=2),
+            "strain": np.fmax.reduce(np.abs(outputs["peak_strain"]), axis=2),
             "angle": outputs["total_angle"],
             "hysteresis": np.where(keeps[:, ::-1], apart, np.nan),
         }

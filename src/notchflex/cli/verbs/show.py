@@ -168,8 +168,8 @@ def _print_differences(robot: Robot) -> None:
     names = [
         name
         for same in kinds.values()
-        for name in same[0]
-        if len({notch[name] for notch in same}) > 1 or (name == "kind" and len(kinds) > 1)
+        for name in dict.fromkeys(name for notch in same for name in notch)
+        if len({notch.get(name) for notch in same}) > 1 or (name == "kind" and len(kinds) > 1)
     ]
     if differ := list(dict.fromkeys(names)):
         equal: dict[tuple[Any, ...], list[str]] = {}

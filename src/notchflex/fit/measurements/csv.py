@@ -243,7 +243,7 @@ class MeasurementReader:
                 load = ExternalLoad(**tip, body_forces=forces)
             except InputError as problem:
                 raise InputError(f"{place}: {problem}.", problem.code) from None
-            has_mass = self.robot.material.density is not None or load.tip_mass
+            has_mass = self.robot.densities is not None or load.tip_mass
             if any(load.gravity or ()) and not has_mass:
                 raise InputError.UNSUPPORTED(
                     f"{place}: gravity has nothing to act on, because the density of "

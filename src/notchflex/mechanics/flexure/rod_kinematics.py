@@ -20,7 +20,7 @@ from jaxtyping import Array, Float
 from notchflex._arrays import xp
 from notchflex._jax import Pytree, jax, jnp
 from notchflex.mechanics.flexure.rod import Modes, Rod
-from notchflex.mechanics.material import SectionLaw
+from notchflex.mechanics.material import Law
 from notchflex.mechanics.motion import (
     PLANE,
     Motion,
@@ -304,7 +304,7 @@ def fibre_slope(rod: Rod, weights: Float[Array, "t w"]) -> Float[Array, "t modes
 
 def flexure_state(
     rod: Rod,
-    law: SectionLaw,
+    law: Law,
     memory: Any,
     modes: Modes,
     *,
@@ -341,13 +341,11 @@ def flexure_state(
     )
 
 
-def material_tangent(rod: Rod, law: SectionLaw, state: FlexureState) -> Float[Array, "modes modes"]:
+def material_tangent(rod: Rod, law: Law, state: FlexureState) -> Float[Array, "modes modes"]:
     """Differentiate the internal forces of the modes (`internal`) by the modes."""
 
     def resultant_slope(section: Any, slope: Array, columns: Array) -> Array:
-        strains = in_space(columns.T)
-        elastic = law.elastic(strains.T, jax.tree.map(lambda leaf: leaf[..., None], section))
-        return of_rod(rod, jnp.where(xp.arange(6) == 1, slope * strains, elastic)).T
+        return of_rod(rod, law.tangent(in_space(columns.T), slope, section)).T
 
     slopes = jax.vmap(resultant_slope)(rod.section, state.slope, rod.basis)
     weighted = rod.length[:, None, None] * rod.basis

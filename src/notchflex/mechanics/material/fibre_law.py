@@ -67,7 +67,10 @@ def _settle(
     start: Array,
 ) -> tuple[Array, Array, FibreSums]:
     """Find strain of the neutral axis, curvature and sums of all sections, from a curvature."""
-    # One condition stops the iteration of all sections; they may have leading axes.
+    # One condition stops the iteration of all sections; they may have leading axes, and laws too.
+    sum_fibres = FibreLaw.sum_fibres
+    for _ in law.change.shape[1:]:
+        sum_fibres = jax.vmap(sum_fibres)
     bending_strain = scale[0] * jnp.abs(joint.reduced)
 
     def proceed(search: tuple[Array, ...]) -> Array:
@@ -78,7 +81,7 @@ def _settle(
         """Try a step: take it where the imbalance falls, halve it elsewhere."""
         strain, curvature, by_strain, by_curvature, sums, imbalance, iterations = search
         trial = strain + by_strain, curvature + by_curvature
-        trial_sums = law.sum_fibres(fibres, memory, *trial)
+        trial_sums = sum_fibres(law, fibres, memory, *trial)
         bends_beyond = joint.beyond(trial[1], trial_sums.moment)
         # Of forces and of bending, as strains.
         size = jnp.abs(trial_sums.force) / scale[1] + scale[0] * jnp.abs(bends_beyond)
@@ -103,15 +106,14 @@ settle_fibres = jax.custom_batching.custom_vmap(_settle)
 @settle_fibres.def_vmap
 def _(size: int, batched: Any, law: FibreLaw, *sections: Any) -> tuple[Any, Any]:
     all_batched = True, True, FibreSums._make([True] * 5)
-    if any(jax.tree.leaves(batched[0])):  # rows of a batch that is not one of sections
-        axes = jax.tree.map(lambda varies: 0 if varies else None, tuple(batched))
-        return jax.vmap(_settle, in_axes=axes)(law, *sections), all_batched
+    # A law of each section has leading axes too, all of them.
+    shared = law.change.ndim == 1 and not any(jax.tree.leaves(batched[0]))
     rows = jax.tree.map(
         lambda varies, leaf: leaf if varies else jnp.broadcast_to(leaf, (size, *jnp.shape(leaf))),
-        list(batched[1:]),
-        list(sections),
+        list(batched[shared:]),
+        [law, *sections][shared:],
     )
-    return settle_fibres(law, *rows), all_batched
+    return settle_fibres(*[law][:shared], *rows), all_batched
 
 
 @jax.custom_jvp
@@ -178,7 +180,7 @@ class FibreLaw(SectionLaw):
     @property
     def remembers(self) -> bool:
         """Whether loading and unloading differ."""
-        return self.low.shape[0] == 2
+        return self.low.shape[-2] == 2
 
     def warmed(self, rise: Scalar) -> Self:
         """Return the law at a higher temperature, K: all kinks move, transformed strains stay."""

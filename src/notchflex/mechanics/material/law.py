@@ -22,17 +22,17 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial, singledispatch
 from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._arrays import decide, xp
 from notchflex._imports import unregistered
-from notchflex._jax import Pytree, constant, jax, jnp
+from notchflex._jax import Pytree, choose, constant, jax, jnp
 from notchflex.mechanics.section import gauss_on
 
 Scalar = Float[Array, ""]
@@ -331,18 +331,24 @@ class Transformed(NamedTuple):
 _WEAK = xp.arange(6) == 1
 
 
-class SectionLaw(Pytree, ABC):
-    """Section law of a material. Tangents are derivatives of the resultants.
+class Law(Pytree):
+    """What the chain needs of the law of a section, of any kind.
 
     Attributes:
         is_linear: Whether the moment of a section is proportional to its curvature.
-        elastic_modulus: Young's modulus in the free robot, MPa.
-        shear_modulus: Shear modulus, MPa.
+        axis: Axis of its numbers that runs along the flexures; None where one law serves all.
+        lumped: Whether it is that of a flexure as a whole, so that no moment between is missed.
     """
 
     is_linear: ClassVar[bool] = False
-    elastic_modulus: Scalar
-    shear_modulus: Scalar
+    axis: ClassVar[int | None] = None
+    lumped: ClassVar[bool] = False
+    respond: ClassVar[Callable[..., SectionResponse]]
+    bent: ClassVar[Callable[..., Bending]]
+    elastic: ClassVar[Callable[..., Strain]]
+    tangent: ClassVar[Callable[..., Strain]]
+    covers: ClassVar[Callable[..., Array]]
+    stored_energy_density: ClassVar[Callable[..., tuple[Scalar, Flattening]]]
     # Temperature, deg C, and how far the strains of the law move with it, 1/K; None where they stay
     temperature: Scalar | None = dataclasses.field(default=None, kw_only=True)
     moves: Each | None = dataclasses.field(default=None, kw_only=True)
@@ -365,6 +371,34 @@ class SectionLaw(Pytree, ABC):
     def warmed(self, rise: Scalar) -> Self:
         """Return the law at a higher temperature, K; only laws with `moves` have one."""
         raise NotImplementedError
+
+    def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
+        """Compute the stiffness in the free robot, of a section or of many."""
+        plain = dataclasses.replace(section, fibres=None)
+        columns = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], plain)
+        return self.elastic(constant(xp.eye(6)), columns).swapaxes(-1, -2)
+
+
+class SectionLaw(Law, ABC):
+    """Section law of a material. Tangents are derivatives of the resultants.
+
+    Attributes:
+        elastic_modulus: Young's modulus in the free robot, MPa.
+        shear_modulus: Shear modulus, MPa.
+    """
+
+    elastic_modulus: Scalar
+    shear_modulus: Scalar
+
+    def covers(self, strain: Strain, section: FibreSection) -> Bool[Array, "*shape"]:
+        """Return whether no fibre is shortened to nothing."""
+        farthest = jnp.maximum(section.edge_spine, section.edge_near)
+        return jnp.abs(strain[..., 1]) * farthest < 1.0
+
+    def tangent(self, strain: Strain, slope: Array, section: FibreSection) -> Strain:
+        """Return the change of the resultants with many strains, of the slope about y."""
+        columns = jax.tree.map(lambda leaf: leaf[..., None], section)
+        return jnp.where(_WEAK, slope * strain, self.elastic(strain.T, columns))
 
     @abstractmethod
     def moment(self, curvature: Scalar, section: FibreSection) -> Scalar:
@@ -466,11 +500,81 @@ class SectionLaw(Pytree, ABC):
         ]
         return xp.stack(resultants, axis=-1)
 
-    def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
-        """Compute the stiffness in the free robot, of a section or of many."""
-        plain = dataclasses.replace(section, fibres=None)
-        columns = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], plain)
-        return self.elastic(constant(xp.eye(6)), columns).swapaxes(-1, -2)
+
+def _of_kind(name: str, *, after: bool = False) -> Any:
+    """Return a method of a mixed law; `after` a memory, which is then its last argument."""
+
+    def method(mixed: MixedLaw, *arguments: Any) -> Any:
+        *others, memory = arguments
+        results: list[Any] = []
+        for law in mixed.laws:
+            forgets = after and not law.remembers
+            results.append(getattr(law, name)(*others, () if forgets else memory))
+            if forgets and hasattr(results[-1], "memory"):
+                results[-1] = results[-1]._replace(memory=memory)
+        return mixed.chosen(results)
+
+    return method
+
+
+class MixedLaw(Law):
+    """Laws of several materials, one for each flexure; its methods are those of one flexure."""
+
+    axis = 0
+    kind: Int[Array, "*n"]  # Which of the laws it is
+    laws: tuple[Law, ...]  # One of every kind; where it is not meant its numbers are of another
+
+    respond = _of_kind("respond", after=True)
+    bent = _of_kind("bent", after=True)
+    stored_energy_density = _of_kind("stored_energy_density", after=True)
+    elastic, tangent, covers = map(_of_kind, ("elastic", "tangent", "covers"))
+
+    @classmethod
+    def of(cls, laws: Sequence[Law]) -> MixedLaw:
+        """Join the laws of flexures, one for each."""
+        forms = [repr(jax.tree.map(xp.shape, law)) for law in laws]
+        kinds = [*dict.fromkeys(forms)]
+        columns = [
+            [laws[k if own == form else forms.index(form)] for k, own in enumerate(forms)]
+            for form in kinds
+        ]
+        stacked = (jax.tree.map(lambda *leaves: xp.stack(leaves), *same) for same in columns)
+        return cls(xp.array([*map(kinds.index, forms)]), tuple(stacked))
+
+    @property
+    def is_linear(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Whether all are."""
+        return all(law.is_linear for law in self.laws)
+
+    @property
+    def lumped(self) -> Any:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Whether that of each flexure is."""
+        return self.chosen([law.lumped for law in self.laws])
+
+    @property
+    def remembers(self) -> bool:
+        """Whether any of them does."""
+        return any(law.remembers for law in self.laws)
+
+    def rest(self, section: FibreSection) -> Any:
+        """Return the memory of free sections, which serves all laws that remember."""
+        return next((law.rest(section) for law in self.laws if law.remembers), ())
+
+    def chosen(self, results: Sequence[Any]) -> Any:
+        """Choose among what each of the laws gives."""
+        chosen = results[0]
+        for number, result in enumerate(results[1:], 1):
+            chosen = choose(self.kind == number, result, chosen)
+        return chosen
+
+    def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
+        """Return the energy per length lost in all flexures between rows of their memories."""
+
+        def lost(law: MixedLaw, *between: Any) -> Array:
+            return law.chosen([one.dissipated(*between) for one in law.laws])
+
+        rows = jax.vmap(lost, (None, None, 0, 0))
+        return jax.vmap(rows, (0, 0, 1, 1), 1)(self, section, before, after)
 
 
 def moduli(material: Any) -> tuple[Array, Array]:
@@ -491,7 +595,7 @@ def temperature_of(material: Any, *sides: Any) -> dict[str, Array]:
 
 
 @singledispatch
-def section_law(material: Any) -> SectionLaw:
+def section_law(material: Any) -> Law:
     """Return the section law of a material description."""
     raise unregistered("section law", material, "material", "section_law")
 
@@ -512,7 +616,7 @@ class SectionStrain(NamedTuple):
 
 
 def section_strain(
-    law: SectionLaw, strain: Strain, section: FibreSection, memory: object
+    law: Law, strain: Strain, section: FibreSection, memory: object
 ) -> SectionStrain:
     """Compute the strains of a section from those of its flexure, which holds its ends too."""
     ends, curvature = section.compliance, strain[1]

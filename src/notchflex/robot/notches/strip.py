@@ -126,6 +126,8 @@ class StripNotch(Notch):
                 f"is {self.strip_thickness} mm; a strip must be thinner than it is long, "
                 f"{length:.4g} mm.",
             )
+        if self.tube is not None and self.has_elastic_ends:
+            yield "tube", "is not for a strip with elastic ends, which takes that of the robot."
         if self.precurvature_deg:
             yield (
                 "precurvature_deg",

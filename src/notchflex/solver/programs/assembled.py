@@ -19,7 +19,15 @@ from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._arrays import Decisions
 from notchflex._jax import jax, jnp
-from notchflex.mechanics.chain import Chain, assemble, body_lengths, flexure, sites_of, tip_anchor
+from notchflex.mechanics.chain import (
+    Chain,
+    assemble,
+    body_lengths,
+    by_fibres,
+    flexure,
+    sites_of,
+    tip_anchor,
+)
 from notchflex.mechanics.flexure import Site
 from notchflex.mechanics.ring import Side
 from notchflex.robot import Robot
@@ -324,10 +332,10 @@ class AssembledRobots:
         for number, (notch, site) in enumerate(zip(example.notches, sites, strict=True)):
             first.setdefault((id(notch), id(site)), number)
         # The parts of notches come behind the single ones.
-        behind = len(form.parts) - len(robot.notch) - len(robot.tendon)
+        behind = next(k for k, part in enumerate(form.parts) if part is robot.notch[0])
         repeats = [group.repeat for group in robot.notch]
         part_of = behind + np.repeat(np.arange(len(repeats)), repeats)
-        options = chain.level, chain.refinement, robot.material.by_fibres
+        options = chain.level, chain.refinement, by_fibres(robot)
         made, trees = dict[tuple[int, _NotchForm], list[int]](), dict[int, Any]()
         for number in first.values():
             notch, site = example.notches[number], sites[number]
@@ -462,7 +470,8 @@ class AssembledRobots:
             lengths = np.asarray(body_lengths(robot.tube, robot.notches)).T
             rings[..., :2] = lengths[..., notches.first[..., None] + np.arange(2)]
             rings[..., 2:8] = notches.boundaries
-            rings[..., 8] = np.reshape(robot.material.poisson_ratio, (-1, 1, 1))
+            ratios = np.broadcast_arrays(*(each.poisson_ratio for each in robot.materials[1:]))
+            rings[..., 8] = np.reshape(ratios, (len(ratios), -1)).T[:, notches.first]
             is_free = notches.boundaries[..., 5]
             rings[..., 9] = is_free * np.reshape(tip_anchor(robot), (-1, 1, 1))
         return np.concatenate([of_parts, rings.reshape(*of_parts.shape[:2], -1)], axis=-1)
