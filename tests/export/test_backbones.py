@@ -75,9 +75,12 @@ def test_holes_of_disks_are_drawn_where_they_are() -> None:
 
 def test_mujoco_model_has_disks_and_backbones(tmp_path: Path) -> None:
     file = tmp_path / "disks.xml"
-    export_robot(disks(), file, SimulatorOptions(largest_tension=1.0))
+    exported = export_robot(disks(), file, SimulatorOptions(largest_tension=1.0))
     text = file.read_text(encoding="utf-8")
     assert text.count('type="cylinder"') == 5 + 8  # disks with the base, and halves of backbones
+    for error in exported.facts.get("errors", ()):  # where MuJoCo is installed
+        assert error["total_angle"] < 1e-6
+        assert error["tip_position"] < 1e-3  # a hinge stays where an arc moves
 
 
 @pytest.mark.parametrize(
