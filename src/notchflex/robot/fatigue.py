@@ -101,8 +101,8 @@ LINES: dict[str, dict[str, Any]] = {
         "amplitude": (0.004, 0.004),
         "cycles": 1e7,
         "reliability": None,
-        "temperature": 37.0,
-        "surface": "diamonds cut from tube",
+        "temperature": None,
+        "surface": "diamond specimens",
         "source": "Pelton et al. 2003, as commonly cited; beyond a mean of 1.5 % life rises, but "
         "no line is taken here",
     },
