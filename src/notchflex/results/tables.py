@@ -248,9 +248,10 @@ def _step(path: EquilibriumPath, index: int, external: list[dict[str, Any]]) -> 
 
 def _external(path: EquilibriumPath) -> list[dict[str, Any]]:
     """External loads of every step; nothing at all where no step has any."""
-    if all(load.is_nothing and load.sheath_bend_deg is None for load in path.load.different):
+    loads = path.load.external
+    if all(load.is_nothing and load.sheath_bend_deg is None for load in loads):
         return []
-    return [_with_units(asdict(load)) for load in path.load.external]
+    return [_with_units(asdict(load)) for load in loads]
 
 
 def _with_units(values: dict[str, Any]) -> dict[str, Any]:
