@@ -63,8 +63,8 @@ _HOME = {
             "short_repr",
         ),
         "notchflex.loads.load_path": ("load_path",),
-        "notchflex.mechanics.chain": ("law_errors", "unchecked_dimensions"),
-        "notchflex.mechanics.material": ("CORNERS", "SectionStrain", "edge_strain", "limit_line"),
+        "notchflex.mechanics.chain": ("law_errors", "limit_line", "unchecked_dimensions"),
+        "notchflex.mechanics.material": ("CORNERS", "SectionStrain", "edge_strain"),
         "notchflex.results.io": (
             "frame",
             "whole_document",

@@ -40,11 +40,11 @@ from notchflex.loads.load import check_pulls as check_pulls
 from notchflex.loads.load import short_repr as short_repr
 from notchflex.loads.load_path import load_path as load_path
 from notchflex.mechanics.chain import law_errors as law_errors
+from notchflex.mechanics.chain import limit_line as limit_line
 from notchflex.mechanics.chain import unchecked_dimensions as unchecked_dimensions
 from notchflex.mechanics.material import CORNERS as CORNERS
 from notchflex.mechanics.material import SectionStrain as SectionStrain
 from notchflex.mechanics.material import edge_strain as edge_strain
-from notchflex.mechanics.material import limit_line as limit_line
 from notchflex.results.io import frame as frame
 from notchflex.results.io import whole_document as whole_document
 from notchflex.results.io import write_groups as write_groups

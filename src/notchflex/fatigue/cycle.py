@@ -39,6 +39,7 @@ class StrainCycle(Displayed):
         mean: Mean strain at every point of every node of every notch, (n, nodes, points).
         amplitude: Its amplitude there, half the range.
         margin: Amplitude that the line allows less this one; NaN where the line is not known.
+        corner_factor: Factor on the strain at the corners of the cut of every notch, (n,).
         loops: How often the path was followed until its strains repeated; 0 for states.
         reason: Why the strains do not hold: a step that did not converge, or loops that still
             differ; empty where they do.
@@ -49,6 +50,7 @@ class StrainCycle(Displayed):
     mean: Points
     amplitude: Points
     margin: Points
+    corner_factor: Float[np.ndarray, " n"]
     loops: int
     reason: str
 
@@ -89,10 +91,16 @@ class StrainCycle(Displayed):
                 f"the limit line is known for mean strains of {low:g} to {high:g} % only; a notch "
                 "with a point beyond them has no margin."
             )
-        if self.limit.corner_factor is None:
+        if self.limit.corner_factor is None and self.limit.corner_radius is None:
             warnings.append(
                 "the concentration of strain at the corners of the cuts is left out; give "
-                "fatigue.corner_factor (K_t)."
+                "fatigue.corner_radius, or fatigue.corner_factor (K_t)."
+            )
+        if not np.isfinite(self.corner_factor).all():
+            warnings.append(
+                "notches without a known factor of their corners have no margin: it is known for "
+                'cuts "on-axis" 0.68 to 0.92 outer diameters deep, rings from 0.2 and radii from '
+                "0.006 to 0.1; give fatigue.corner_factor (K_t) instead."
             )
         at, used = facts.get("temperature"), getattr(robot.material, "temperature", None)
         if at is not None and used is not None and used != at:
@@ -173,10 +181,12 @@ def strain_cycle(
     low, high = strains.min(axis=0), strains.max(axis=0)
     mean, amplitude = 0.5 * (low + high), 0.5 * (high - low)
     chosen = robot.fatigue if limit is None else limit
-    line = limit_line(chosen)
+    line = limit_line(chosen, robot)
+    factor = np.ones(len(mean)) if line is None else np.asarray(line.corner_factor)
     margin: Any = np.full_like(mean, np.nan) if line is None else line.margin(mean, amplitude)
     failed = [reason for path in paths for reason in path.reason if reason]
-    return StrainCycle(robot, chosen, mean, amplitude, margin, loops, (*failed, reason)[0])
+    reason = (*failed, reason)[0]
+    return StrainCycle(robot, chosen, mean, amplitude, margin, factor, loops, reason)
 
 
 def _settled(path: EquilibriumPath) -> tuple[EquilibriumPath, int, str]:
@@ -217,7 +227,7 @@ def cycle_document(cycle: StrainCycle) -> dict[str, Any]:
     return {
         **document_head(cycle.robot),
         "limit": cycle.limit.facts,
-        "corner_factor": cycle.limit.corner_factor,
+        "corner_factors": cycle.corner_factor.tolist(),
         "loops": cycle.loops,
         "reason": cycle.reason,
         "notches": rows,

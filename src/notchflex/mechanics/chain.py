@@ -19,6 +19,7 @@ from jaxtyping import Array, Float, Int
 from notchflex._arrays import cached, plain_number, xp
 from notchflex._jax import Pytree, constant, jax, jnp, static
 from notchflex.mechanics.contact import ContactGroup, build_contacts
+from notchflex.mechanics.corner_factor import corner_factors
 from notchflex.mechanics.flexure import (
     FlexureState,
     Rod,
@@ -35,13 +36,13 @@ from notchflex.mechanics.flexure import (
     with_level,
 )
 from notchflex.mechanics.friction import FrictionLaw, friction_law
-from notchflex.mechanics.material import Fibres, Law, LimitLine, MixedLaw, limit_line, section_law
+from notchflex.mechanics.material import Fibres, Law, LimitLine, MixedLaw, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
 from notchflex.mechanics.section import FIBRES, fitted
 from notchflex.mechanics.sheath import Sheath, build_sheath
 from notchflex.mechanics.tendon import TUBE_AXIS, TendonGroup, route
-from notchflex.robot import Robot, Tendon, Tube
+from notchflex.robot import Fatigue, Robot, Tendon, Tube
 from notchflex.robot.kinds import Notch
 from notchflex.robot.part import unchecked
 
@@ -218,9 +219,13 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         elastic[-more:] = np.eye(chain.rods.modes)
     idle = {"present": 0.0, "visits": 0.0, "ends": 0.0, "back": 1, "body_length": 0.0}
     bodies = {name: getattr(chain, name) for name in ("body_length", "body_mass", "body_centre")}
+    limit = chain.limit
+    if limit is not None:
+        limit = replace(limit, corner_factor=longer(limit.corner_factor))
     return replace(
         chain,
         rods=rods,
+        limit=limit,
         law=chain.law if chain.law.axis is None else longer(chain.law),
         groups=tuple(longer(group, **idle) for group in chain.groups),
         contact_pairs=tuple(longer(pair, has_contact=0.0, back=1) for pair in chain.contact_pairs),
@@ -396,6 +401,18 @@ def unchecked_dimensions(robot: Robot) -> list[str]:
     ]
 
 
+def limit_line(fatigue: Fatigue, robot: Robot) -> LimitLine | None:
+    """Return a limit line of fatigue with the factors of a robot's corners; None without a line."""
+    facts, notches, radius = fatigue.facts, robot.notches, fatigue.corner_radius
+    if not facts:
+        return None
+    factors = xp.full(len(notches), fatigue.corner_factor or 1.0)
+    if radius is not None:
+        lengths = body_lengths(robot.tube, notches)
+        factors = corner_factors(radius, notches, robot.tubes[1:], lengths)
+    return LimitLine(*map(constant, (facts["mean"], facts["amplitude"], factors)))
+
+
 # One flexure of a chain: the rod of a notch with the modes that the loads need, and its fibres.
 
 
@@ -471,7 +488,7 @@ def assemble(
         notch_frame=template.notch_frame,
         tendon_entry=template.tendon_entry,
         contacts=_contacts(groups, len(tendons)),
-        limit=limit_line(robot.fatigue),
+        limit=limit_line(robot.fatigue, robot),
         level=level,
         loaded=loaded,
         follows=loaded and follows,  # unloaded chains are of one form

@@ -367,10 +367,12 @@ def cycle_picture(cycle: StrainCycle) -> Picture:
     Args:
         cycle: The strain cycle.
     """
-    facts, factor = cycle.limit.facts, cycle.limit.corner_factor or 1.0
-    scale = 100.0 * np.where(CORNERS, factor, 1.0)
+    facts = cycle.limit.facts
+    scales = 100.0 * np.where(CORNERS, cycle.corner_factor[:, None], 1.0)
     items: list[Mark] = []
-    for number, colour in enumerate(sequence_colours(len(cycle.mean))):
+    for number, (colour, scale) in enumerate(
+        zip(sequence_colours(len(scales)), scales, strict=True)
+    ):
         points = np.stack([scale * cycle.mean[number], scale * cycle.amplitude[number]], axis=-1)
         items.append(dots(points.reshape(-1, 2), colour, 3.0, name=f"notch {number + 1}"))
     if facts:

@@ -30,8 +30,10 @@ class Fatigue:
         temperature: Temperature of its tests [deg C].
         surface: Surface of its specimens.
         source: Where it is from.
-        corner_factor: Strain at the corners of the cut over that of the section (K_t); None leaves
-            the concentration out.
+        corner_factor: Strain at the corners of the cut over that of the section (K_t); without it
+            and `corner_radius` the concentration is left out.
+        corner_radius: Radius of these corners [mm], from which the factor of cuts "on-axis" is
+            known by finite elements; beyond their range a notch has no margin.
 
     Raises:
         InputError: A value is not allowed, or both a line of the literature and one of your own.
@@ -64,6 +66,9 @@ class Fatigue:
         Float | None,
         quantity("", "strain at the corners of the cut over that of the section", at_least=1.0),
     ] = None
+    corner_radius: Annotated[
+        Float | None, quantity("mm", "radius of the corners of the cut", above=0)
+    ] = None
 
     def conflicts(self) -> Problems:
         """Find a line that is given twice or by half, and means that do not rise."""
@@ -71,6 +76,11 @@ class Fatigue:
         given = [key for key, value in own.items() if value is not None]
         if self.line is not None and given:
             yield "line", f'is "{self.line}", which has its own `{given[0]}`; give one of the two.'
+        if self.corner_factor is not None and self.corner_radius is not None:
+            yield (
+                "corner_factor",
+                "stands beside `corner_radius`, from which it is computed; give one.",
+            )
         mean, amplitude = self.mean, self.amplitude
         if (mean is None) != (amplitude is None) or len(mean or ()) != len(amplitude or ()):
             yield "amplitude", "must have one number for each of `mean`."

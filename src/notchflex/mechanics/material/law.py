@@ -686,23 +686,16 @@ class LimitLine(Pytree):
 
     mean: Float[Array, " k"]
     amplitude: Float[Array, " k"]
-    corner_factor: Scalar  # Strain at a corner of the cut over that of the section
+    # Strain at a corner of the cut over that of the section, of every notch
+    corner_factor: Float[Array, " n"]
 
     def margin(self, mean: Array, amplitude: Array) -> Array:
         """Compute by how much cycles at the points of `edge_strain` are below; NaN if not known."""
         # A mean in compression counts as one in tension of its size: cracks open in tension.
-        corners = xp.broadcast_to(CORNERS, mean.shape)
-        factor = xp.where(corners, self.corner_factor, 1.0)
+        factor = xp.where(CORNERS, self.corner_factor[:, None, None], 1.0)
         mean, amplitude = factor * xp.abs(mean), factor * amplitude
         allowed, points = self.amplitude[0], [*zip(self.mean, self.amplitude, strict=True)]
         for (low, first), (high, last) in pairwise(points):
             allowed = allowed + (last - first) * (xp.clip(mean, low, high) - low) / (high - low)
         known = (mean >= self.mean[0]) & (mean <= self.mean[-1])
         return xp.where(known, allowed - amplitude, xp.nan)
-
-
-def limit_line(fatigue: Any) -> LimitLine | None:
-    """Return the limit line of a robot; None where it has none."""
-    facts, factor = fatigue.facts, fatigue.corner_factor
-    numbers = facts.get("mean"), facts.get("amplitude"), 1.0 if factor is None else factor
-    return LimitLine(*map(constant, numbers)) if facts else None
