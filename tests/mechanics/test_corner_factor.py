@@ -23,7 +23,7 @@ def test_finite_elements(margin, use: str, allowed: float):
 
 
 def test_rings_beyond_the_cells():
-    """Cells with a wall of 0.07 and a height of 0.5 outer diameters, 2 elements through the wall."""
+    """Cells with a wall of 0.07 and a height of 0.5, two elements through the wall."""
     for ring, found in ((0.6, 2.704), (1.2, 3.073), (2.4, 3.309)):
         assert float(corner_factor(0.02, 0.72, ring)) == pytest.approx(found, rel=0.045)
     assert corner_factor(0.02, 0.72, 9.0) == corner_factor(0.02, 0.72, 2.4)
