@@ -10,6 +10,9 @@ import notchflex as nf
 from oracles import frames
 from oracles.wrist import Material, Wrist
 
+UNCUT = ("disks-two-segments", "measured-backbone")
+"""Ready robots that are not cut from a tube."""
+
 
 @cache
 def ready(name: str) -> nf.Robot:

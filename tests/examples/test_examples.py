@@ -374,7 +374,7 @@ def test_strain_cycle():
 
 def test_what_a_bent_shaft_costs(margin):
     """Tensions, and stretch while the wire slides one way, are those of Euler's rope."""
-    names, printed = ran(20)
+    names, printed = ran(24)
     loop, limit = names["loop"], 0.15 * np.pi
     drive, base = loop.tension[:, 0], loop.base_tension[:, 0]
     held = np.clip(1.5 * np.exp(-limit), None, drive * np.exp(limit))

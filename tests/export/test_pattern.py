@@ -10,8 +10,9 @@ from notchflex.export.cuts import cuts_of
 from notchflex.export.formats import PatternOptions, Subject
 from notchflex.export.pattern import flat_pattern
 from refusals import refused
+from robots import UNCUT
 
-READY = list(nf.list_robots())
+READY = [name for name in nf.list_robots() if name not in UNCUT]
 
 
 def pattern_of(name, **options):

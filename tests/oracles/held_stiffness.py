@@ -58,7 +58,7 @@ def held_stiffness(
     def imbalance(flat: Array) -> Array:
         varied: Iterate = point_of(flat)
         at = evaluate(chain, varied, memory, solved.applied)
-        demand = command_residual(chain, command, at.base)
+        demand = command_residual(chain, command, None, at.base)
         residual = at.residual
         residual = residual._replace(modes=residual.modes * chain.stiffness)
         return ravel_pytree((residual, demand))[0]

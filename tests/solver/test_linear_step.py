@@ -49,7 +49,7 @@ def test_it_is_the_dense_step(case: str, margin) -> None:
         """The imbalance, twice: `jacfwd` differentiates one and hands on the other."""
         point: Iterate = point_of(varied)
         found = evaluate(ready.chain, point, rest.memory, wanted.applied)
-        demand = command_residual(ready.chain, wanted, found.base)
+        demand = command_residual(ready.chain, wanted, None, found.base)
         left = ravel_pytree((found.residual, demand))[0]
         return left, left
 

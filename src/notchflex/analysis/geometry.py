@@ -118,8 +118,9 @@ class Geometry:
             layout = notch.cut_layout(notch.tube or tube, *beside)
             if layout is None:
                 raise InputError.UNSUPPORTED(
-                    f'a notch of kind = "{notch.kind}" has no definition of its cuts, so there is '
-                    "no drawing, pattern or solid of it; give its class a method `cut_layout`."
+                    f'the cuts of a notch of kind = "{notch.kind}" are not known, so there is no '
+                    "drawing, pattern or solid of it; describe it by a kind that is cut, such as "
+                    '"arc" (a new kind knows its cuts by a method `cut_layout`).'
                 )
             layouts.append(layout._replace(cuts=tuple(cut.moved(start) for cut in layout.cuts)))
             start += layout.length

@@ -373,10 +373,8 @@ class ExternalLoads:
         tip_mass: Mass that hangs at the tip [g]; along 0,0,-9.81 without --gravity.
         gravity: Gravity X,Y,Z in the world [m/s2]; the robot's own weight counts where
             material.density is known.
-        temperature: Temperature of the robot [deg C]: one for all steps, or start:stop:count and
-            values joined by commas for each; needs material.reference_temperature.
-        sheath_bend_deg: Total angle by which the sheaths of the tendons are bent [deg]; that of the
-            robot file where not given.
+        temperature: Temperature of the robot [deg C], one or one for each step as --tension.
+        sheath_bend_deg: Total angle by which the sheaths are bent [deg].
         following: Forces and moments turn with the body they act on, and are given in its frame.
     """
 

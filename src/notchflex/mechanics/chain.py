@@ -219,13 +219,10 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         elastic[-more:] = np.eye(chain.rods.modes)
     idle = {"present": 0.0, "visits": 0.0, "ends": 0.0, "back": 1, "body_length": 0.0}
     bodies = {name: getattr(chain, name) for name in ("body_length", "body_mass", "body_centre")}
-    limit = chain.limit
-    if limit is not None:
-        limit = replace(limit, corner_factor=longer(limit.corner_factor))
     return replace(
         chain,
         rods=rods,
-        limit=limit,
+        limit=longer(chain.limit),
         law=chain.law if chain.law.axis is None else longer(chain.law),
         groups=tuple(longer(group, **idle) for group in chain.groups),
         contact_pairs=tuple(longer(pair, has_contact=0.0, back=1) for pair in chain.contact_pairs),
@@ -410,7 +407,10 @@ def limit_line(fatigue: Fatigue, robot: Robot) -> LimitLine | None:
     if radius is not None:
         lengths = body_lengths(robot.tube, notches)
         factors = corner_factors(radius, notches, robot.tubes[1:], lengths)
-    return LimitLine(*map(constant, (facts["mean"], facts["amplitude"], factors)))
+    mean, amplitude = (
+        constant(xp.tile(xp.array(facts[key]), (len(notches), 1))) for key in ("mean", "amplitude")
+    )
+    return LimitLine(mean, amplitude, constant(factors))
 
 
 # One flexure of a chain: the rod of a notch with the modes that the loads need, and its fibres.

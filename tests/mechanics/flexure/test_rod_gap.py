@@ -201,7 +201,7 @@ def test_constant_moment_of_every_material(material: Any) -> None:
     ("change", "words"),
     [
         ({"disk_radius": (10.0, 9.0)}, "has 2 values; give 4"),
-        ({"disk_radius": (10.0, 9.0, 8.0, 16.0)}, "outside the disks"),
+        ({"disk_radius": (10.0, 9.0, 8.0, 16.0)}, "outside the disk"),
         ({"disk_direction_deg": (0.0,) * 5}, "has 5 values; give 4"),
         ({"path": "wall-arc"}, "straight from disk to disk"),
     ],

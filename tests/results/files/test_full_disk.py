@@ -14,7 +14,7 @@ import pytest
 
 import notchflex as nf
 from notchflex import _replacing
-from notchflex.robot import reading, robot_text
+from notchflex.robot import files, robot_text
 from refusals import refused
 
 WRITE = """
@@ -132,7 +132,7 @@ def pipe(tmp_path):
 
 
 def test_a_pipe_without_a_writer_is_refused(pipe, monkeypatch):
-    monkeypatch.setattr(reading, "_WRITER_COMES", 0.1)
+    monkeypatch.setattr(files, "_WRITER_COMES", 0.1)
     with refused("FILE_UNREADABLE", str(pipe), "no program writes"):
         nf.load_robot(pipe)
     with refused("FILE_UNREADABLE", str(pipe)):
@@ -143,7 +143,7 @@ def test_a_pipe_without_a_writer_is_refused(pipe, monkeypatch):
 
 @pytest.mark.parametrize("slow", [0.0, 0.5])
 def test_a_pipe_with_a_writer_is_read(pipe, monkeypatch, slow):
-    monkeypatch.setattr(reading, "_WRITER_COMES", 0.2)
+    monkeypatch.setattr(files, "_WRITER_COMES", 0.2)
     wrist = nf.load_robot("pacheco2021-a")
     text = robot_text(wrist)
 

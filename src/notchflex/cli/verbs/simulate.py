@@ -93,9 +93,7 @@ def simulate(
             ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. For one of several tendons
             `1=SPEC`; those without hang slack.
         stroke: Tendon length drawn out at the base [mm], step by step; written as --tension.
-        spool: Way of a spool that drives two tendons ([[drive]] of the robot file) from where both
-            have its pretension [mm], step by step; written as --stroke. A step with the pretension
-            comes first.
+        spool: Way of a spool ([[drive]]) that drives two tendons [mm], written as --stroke.
         base_rotation: Turn the base by a rotation vector RX,RY,RZ [deg], for example `90,0,0`.
         uncertain: Carry the tolerances of the robot (its [tolerance] table, else assumed ones)
             through all steps: table, picture, CSV and JSON have the 5th, 50th and 95th percentile.

@@ -2,20 +2,22 @@
 
 from notchflex._imports import import_all
 from notchflex.mechanics.material.law import (
-    CORNERS,
     Fibres,
     FibreSection,
     Flattening,
     Law,
-    LimitLine,
     MixedLaw,
     NotchEnds,
     SectionLaw,
     SectionResponse,
+    section_law,
+)
+from notchflex.mechanics.material.strains import (
+    CORNERS,
+    LimitLine,
     SectionStrain,
     edge_strain,
     peak_strain,
-    section_law,
     section_strain,
 )
 
