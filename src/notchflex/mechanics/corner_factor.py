@@ -45,8 +45,9 @@ def corner_factors(
         if not isinstance(notch, ArcNotch) or notch.cut != "on-axis":
             factors.append(xp.array(xp.nan))
             continue
-        # The first notch has a held base beside it.
-        rings = body_length[number : number + 2] if number else xp.array([xp.inf])
+        # The first notch has a held base beside it, which acts as the longest ring.
+        held = xp.array([_RINGS[1] * tube.outer_diameter])
+        rings = body_length[number : number + 2] if number else held
         lengths = radius, notch.section_depth(tube), xp.max(rings)
         factors.append(corner_factor(*(length / tube.outer_diameter for length in lengths)))
     return xp.stack(factors)
