@@ -172,8 +172,8 @@ def balance(
 def test_work_is_stored_or_lost_where_notches_flatten(friction: nf.Capstan, margin: Margin) -> None:
     """Flattening and hysteresis together: what is missing falls with the square of the steps."""
     corners = [0.0, 1.7, 0.7, 1.3, 0.3, 1.6, 0.4]
-    coarse, fine = (balance(friction, corners, count)[1] for count in (40, 160))
-    margin.within("balance, part of the work", fine, 5e-5)
+    coarse, fine = (balance(friction, corners, count)[1] for count in (80, 320))
+    margin.within("balance, part of the work", fine, 1.25e-5)
     margin.within("the same without steps, extrapolated", (16.0 * fine[3::4] - coarse) / 15.0, 1e-6)
     assert np.abs(coarse).max() > 12.0 * np.abs(fine[3::4]).max()  # 16 by the trapezoid rule
 

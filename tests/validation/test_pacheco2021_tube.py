@@ -43,7 +43,7 @@ def fit(constants, starts):
 def test_the_ready_robots_hold_the_fitted_set():
     # From the factors 1 alone the search stops at a kink beside the minimum.
     found = fit((*TUBE, FACTORS), 2)
-    assert found.cost == pytest.approx(8.1446, abs=2e-3)
+    assert found.cost == pytest.approx(8.1401, abs=2e-3)
     for name in ("elastic_modulus", "plateau_stress", "plateau_modulus"):
         value = getattr(nf.load_robot("pacheco2021-a-true").material, name)
         assert found.values[f"material.{name}"] == pytest.approx(value, rel=5e-3)

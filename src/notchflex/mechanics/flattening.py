@@ -38,12 +38,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
-from numpy.polynomial import legendre
 
 from notchflex._arrays import xp
 from notchflex._jax import scan
 from notchflex.mechanics.ring import EDGE_NORM, HARMONICS, EndCompliance, WallSector, inverse
-from notchflex.mechanics.section import gauss_on, leggauss
+from notchflex.mechanics.section import gauss_on, up_to
 
 
 class FittedFactors(NamedTuple):
@@ -60,12 +59,7 @@ _BRAZIER, _WIDTH, _HEIGHT = 0.521, -1.056, 0.815  # c_b, p, m
 
 
 # Integrals of a function from 0 to Gauss's nodes on 0 ... 1, from its values there.
-_NODES = leggauss(24)[0]
-_UP_TO = (
-    0.5
-    * legendre.legval(_NODES, legendre.legint(np.eye(24), lbnd=-1.0)).T
-    @ np.linalg.inv(legendre.legvander(_NODES, 23))
-)
+_UP_TO = up_to(24, gauss_on(0.0, 1.0, 24)[0])
 
 
 class Distortion(NamedTuple):
@@ -91,17 +85,18 @@ def distortion(arc: WallSector, poisson_ratio: float) -> Distortion:
     """Compute the distortion of an arc of wall."""
     r, t, a = arc.radius, arc.wall, arc.half_angle
     angle, weights = gauss_on(0.0, a, len(_UP_TO))
-    sine, cosine, end, up_to = xp.sin(angle), xp.cos(angle), xp.sin(a), a * _UP_TO
+    sine, cosine, end = xp.sin(angle), xp.cos(angle), xp.sin(a)
+    before = a * _UP_TO
     turned = xp.cos(a) - cosine - angle * sine
     amplitude = 0.5 * (end**2 + sine**2) + end / a * turned
     # The solution u'' of u'''' + u'' = m is the integral of m sin x at the distance x. What moves
     # the section as a whole is taken off.
-    bent = sine * (up_to @ (cosine * amplitude)) - cosine * (up_to @ (sine * amplitude))
-    along = up_to @ (up_to @ bent)
+    bent = sine * (before @ (cosine * amplitude)) - cosine * (before @ (sine * amplitude))
+    along = before @ (before @ bent)
     rigid = xp.stack([xp.ones_like(angle), 2.0 * xp.sin(0.5 * angle) ** 2])
     weighed = rigid * weights[None]
     along = along - inverse(weighed @ rigid.T) @ (weighed @ along) @ rigid
-    pull, slide = 2.0 * t * r * weights * along, -2.0 * t * r**2 * weights * (up_to @ along)
+    pull, slide = 2.0 * t * r * weights * along, -2.0 * t * r**2 * weights * (before @ along)
 
     def harmonic(wave: Any, _: Any) -> Any:
         even, odd = wave

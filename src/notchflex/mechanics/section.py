@@ -8,7 +8,6 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from jaxtyping import Array, Float
-from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
 from notchflex._arrays import cached, is_traced, xp
@@ -19,7 +18,7 @@ from notchflex._values import read_only
 @lru_cache(maxsize=64)
 def leggauss(count: int) -> Any:
     """Return Gauss's nodes from -1 to 1 and their weights, read-only."""
-    return tuple(map(read_only, legendre.leggauss(count)))
+    return tuple(map(read_only, np.polynomial.legendre.leggauss(count)))
 
 
 def gauss_on(low: Any, high: Any, count: int = 16) -> tuple[Array, Array]:
@@ -28,6 +27,30 @@ def gauss_on(low: Any, high: Any, count: int = 16) -> tuple[Array, Array]:
     shape = (*[1] * (xp.ndim(half) - 1), count)
     points, weights = (values.reshape(shape) for values in leggauss(count))
     return low + half * (1.0 + points), half * weights
+
+
+def legendre(points: Float[Array, " k"], count: int) -> Float[Array, "k count"]:
+    """Return the first Legendre polynomials at points between -1 and 1."""
+    values = [xp.ones_like(points), points]
+    for degree in range(2, count):
+        last, before = values[-1], values[-2]
+        values.append(((2.0 * degree - 1.0) * points * last - (degree - 1.0) * before) / degree)
+    return xp.stack(values[:count], axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _projection(count: int) -> Float[Array, "count nodes"]:
+    """Return the coefficients, of Legendre polynomials, of Lagrange's at Gauss's nodes."""
+    points, weights = leggauss(count)
+    return (xp.arange(count) + 0.5)[:, None] * (weights[:, None] * legendre(points, count)).T
+
+
+def up_to(count: int, parts: Float[Array, " k"]) -> Float[Array, "k nodes"]:
+    """Integrate the Lagrange polynomials of Gauss's nodes on (0, 1) from 0 to given parts."""
+    values = legendre(2.0 * xp.asarray(parts) - 1.0, count + 1)
+    higher = (values[:, 2:] - values[:, :-2]) / (2.0 * xp.arange(1, count) + 1.0)
+    integrals = xp.concatenate([1.0 + values[:, 1:2], higher], axis=1)
+    return 0.5 * integrals @ _projection(count)
 
 
 def half_angle(radius: Array, above: Array, below: Array) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import FibreSection
 from notchflex.mechanics.material.linear import LinearLaw
 from notchflex.mechanics.motion import Motion, outer_twists, rotation_about
-from notchflex.mechanics.section import Section, gauss_on, leggauss
+from notchflex.mechanics.section import Section, gauss_on, legendre, leggauss, up_to
 
 # Quadrature of a rod.
 #
@@ -38,32 +38,8 @@ def gauss_nodes(ends: Any, count: int) -> tuple[Array, Array]:
     return positions.ravel(), weights.ravel()
 
 
-def legendre(points: Float[Array, " k"], count: int) -> Float[Array, "k count"]:
-    """Return the first Legendre polynomials at points between -1 and 1."""
-    values = [xp.ones_like(points), points]
-    for degree in range(2, count):
-        last, before = values[-1], values[-2]
-        values.append(((2.0 * degree - 1.0) * points * last - (degree - 1.0) * before) / degree)
-    return xp.stack(values[:count], axis=-1)
-
-
-@lru_cache(maxsize=64)
-def _projection(count: int) -> Float[Array, "count nodes"]:
-    """Return the coefficients, of Legendre polynomials, of Lagrange's at Gauss's nodes."""
-    points, weights = leggauss(count)
-    return (xp.arange(count) + 0.5)[:, None] * (weights[:, None] * legendre(points, count)).T
-
-
-def up_to(count: int, parts: Float[Array, " k"]) -> Float[Array, "k nodes"]:
-    """Integrate the Lagrange polynomials of Gauss's nodes on (0, 1) from 0 to given parts."""
-    values = legendre(2.0 * xp.asarray(parts) - 1.0, count + 1)
-    higher = (values[:, 2:] - values[:, :-2]) / (2.0 * xp.arange(1, count) + 1.0)
-    integrals = xp.concatenate([1.0 + values[:, 1:2], higher], axis=1)
-    return 0.5 * integrals @ _projection(count)
-
-
 _BETWEEN = 4  # Gauss's points between neighbouring nodes of the rotation
-_BEFORE = up_to(_BETWEEN, 0.5 * (1.0 + leggauss(_BETWEEN)[0]))
+_BEFORE = up_to(_BETWEEN, gauss_on(0.0, 1.0, _BETWEEN)[0])
 
 
 @dataclass(frozen=True)

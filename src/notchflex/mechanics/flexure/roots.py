@@ -231,6 +231,10 @@ def with_sideways(
     return dataclasses.replace(section, ends=ends)
 
 
+# Of a section's compliance, where it is left out.
+_STIFF = 1e-6
+
+
 def strip_sections(
     strip: RootedStrip,
     tube: Tube,
@@ -268,10 +272,6 @@ def strip_sections(
         area=area * xp.where(on_wall, 1.0 / _STIFF, shear_area),
         ends=ends,
     )
-
-
-# Of a section's compliance, where it is left out.
-_STIFF = 1e-6
 
 
 def rooted_strip_rod(
