@@ -1,5 +1,7 @@
 """Bands: tolerances carried through the solver, against derivatives and closed forms."""
 
+from dataclasses import replace as fields_replaced
+
 import numpy as np
 import pytest
 from scipy.special import ndtri
@@ -247,3 +249,40 @@ def test_a_picture_shades_the_bands_of_both_branches(wrist: nf.Robot):
     text = repr(bands)
     assert text.startswith("Bands of 8 draws over 10 steps")
     assert "notch.depth" in text
+
+
+def test_sections_and_sheaths_have_tolerances_of_their_own(wrist: nf.Robot):
+    """A backbone is a drawn wire, not a laser's cut in a tube as wide as its disks."""
+    nitinol = nf.Nitinol(42e3, 350.0, 6e3, density=6450.0)
+    shaft = nf.RodGap(
+        10.0,
+        0.5,
+        uncut_length=1.0,
+        repeat=2,
+        tube=nf.Tube(8.0, 0.5),
+        material=nf.Linear(200e3, density=7900.0),
+    )
+    tendon = nf.Tendon(
+        0.7,
+        path="straight",
+        sheath_length=500.0,
+        sheath_friction=0.1,
+        sheath_wire_stiffness=14e3,
+    )
+    cut = tuple(
+        fields_replaced(notch, tube=nf.Tube(1.5, 1.3), material=nitinol) for notch in wrist.notch
+    )
+    robot = wrist.replace(notch=(shaft, *cut), tendon=(tendon,))
+    chosen = {each.value: each for each in tolerances_of(robot)[0]}
+    assert chosen["notch.diameter"].sd == 0.006
+    assert chosen["notch.tube.inner_diameter"].sd == 0.012
+    assert "tube.inner_diameter" not in chosen  # no flexure is cut from it
+    assert "material.elastic_modulus" not in chosen  # nor made of it
+    assert chosen["notch.material.elastic_modulus"].plus == f"{100 * (65 / 42 - 1):.3g} %"
+    assert chosen["notch.material.plateau_stress"].minus == f"{100 * (1 - 250 / 350):.3g} %"
+    assert chosen["tendon.sheath_friction"].sd == chosen["friction.coefficient"].sd
+    # One deviation for all flexures of a value, each about its own.
+    source = {each.name: each for each in sources_of(robot, list(chosen.values()))}
+    values = source["notch.material.elastic_modulus"].values(1.0)
+    assert values["notch[1].material.elastic_modulus"] == pytest.approx(200e3 * 65 / 42, rel=2e-3)
+    assert values["notch[3].material.elastic_modulus"] == pytest.approx(65e3, rel=2e-3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from jaxtyping import Float
 from notchflex.analysis.varied import VariedRobots
 from notchflex.errors import InputError
 from notchflex.mechanics.chain import law_errors
-from notchflex.robot import Nitinol, Robot
+from notchflex.robot import Material, Nitinol, Robot
 from notchflex.robot.part import fields_of, unit_of
 from notchflex.robot.problems import Tolerance, amount
 from notchflex.robot.value_names import number_at, numbers_at
@@ -154,7 +155,7 @@ def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[ToleranceS
 CUT, CUT_OF_DIAMETER = 0.010, 0.005
 """Standard deviation of what is cut [mm], and at least this part of the outer diameter."""
 WALL, WALL_OF_DIAMETER = 0.006, 0.003
-"""The same for the wall of the tube [mm]."""
+"""The same for the wall of the tube, and for the wire of a backbone [mm]."""
 
 # Nitinol of an unknown tube: lower, usual and upper value, in proportion to the value of the file.
 # Data sheets of tubing: austenite of 40 to 65 GPa and, partly R-phase, from 30; upper plateau 250
@@ -180,39 +181,52 @@ def tolerances_of(robot: Robot) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]
     """Return the tolerances of a robot, and the names of those that its file lacks: assumed."""
     specified = {tolerance.value for tolerance in robot.tolerance}
     # What the file says of all notches holds for the last one too.
-    assumed = [
-        tolerance
+    assumed = {
+        tolerance.value: tolerance
         for tolerance in _assumed(robot)
         if not specified & {tolerance.value, f"notch.{tolerance.value.rpartition('.')[2]}"}
-    ]
-    return (*robot.tolerance, *assumed), tuple(tolerance.value for tolerance in assumed)
+    }
+    return (*robot.tolerance, *assumed.values()), tuple(assumed)
 
 
 def _assumed(robot: Robot) -> Iterator[Tolerance]:
-    diameter = robot.tube.outer_diameter
-    cut = _rounded(max(CUT, CUT_OF_DIAMETER * diameter))
-    cuts = [
-        name
+    cut = _rounded(max(CUT, CUT_OF_DIAMETER * robot.tube.outer_diameter))
+    lengths = {
+        name: getattr(notch, name)
         for notch in robot.notch
         for name, field in fields_of(type(notch)).items()
         if unit_of(field) == "mm" and name != "uncut_length"
-    ]
-    for name in dict.fromkeys(cuts):
+    }
+    for name, value in lengths.items():
         if _is_number(robot, f"notch.{name}"):
-            yield Tolerance(f"notch.{name}", sd=cut)
-    wall = max(WALL, WALL_OF_DIAMETER * diameter)
-    yield Tolerance("tube.inner_diameter", sd=_rounded(2.0 * wall))
-    material = robot.material
-    nitinol = isinstance(material, Nitinol)
-    for name, field in fields_of(type(material)).items():
-        is_modulus = unit_of(field) == "MPa"
-        if is_modulus and name not in _LEFT_OUT and _is_number(robot, f"material.{name}"):
-            limits = _NITINOL.get(name, _MODULUS) if nitinol else _MODULUS
-            yield _between(f"material.{name}", *limits)
-    if _is_number(robot, "friction.coefficient"):
-        yield _FRICTION
+            # The wire or tube of a backbone is drawn and not cut.
+            sd = _rounded(_wall(value)) if name.endswith("diameter") else cut
+            yield Tolerance(f"notch.{name}", sd=sd)
+    # Disks carry a backbone through their hole: their wall bends nowhere.
+    cut_tubes = [notch.tube for notch in robot.notch if not notch.is_round]
+    if None in cut_tubes:
+        yield Tolerance("tube.inner_diameter", sd=_rounded(2.0 * _wall(robot.tube.outer_diameter)))
+    if own := [tube.outer_diameter for tube in cut_tubes if tube]:
+        yield Tolerance("notch.tube.inner_diameter", sd=_rounded(2.0 * _wall(max(own))))
+    own_materials = [notch.material for notch in robot.notch if notch.material]
+    if len(own_materials) < len(robot.notch):
+        yield from _material("material", robot.material, robot)
+    # Sections of unlike kinds share the wider tolerance, that of nitinol.
+    for material in sorted(own_materials, key=lambda each: isinstance(each, Nitinol)):
+        yield from _material("notch.material", material, robot)
+    for name in ("friction.coefficient", "tendon.sheath_friction"):
+        if _is_number(robot, name):
+            yield replace(_FRICTION, value=name)
     yield from _tendon_radius(robot)
     yield from _law(robot)
+
+
+def _material(path: str, material: Material, robot: Robot) -> Iterator[Tolerance]:
+    limits = _NITINOL if isinstance(material, Nitinol) else {}
+    for name, field in fields_of(type(material)).items():
+        value = f"{path}.{name}"
+        if unit_of(field) == "MPa" and name not in _LEFT_OUT and _is_number(robot, value):
+            yield _between(value, *limits.get(name, _MODULUS))
 
 
 def _tendon_radius(robot: Robot) -> Iterator[Tolerance]:
@@ -231,6 +245,11 @@ def _law(robot: Robot) -> Iterator[Tolerance]:
     for name, size in sizes.items():
         if name == "notch" or size != sizes.get("notch"):
             yield Tolerance(f"{name}.stiffness_factor", sd=size)
+
+
+def _wall(diameter: float) -> float:
+    """Return the standard deviation of a wall, or of a wire, drawn to a diameter [mm]."""
+    return max(WALL, WALL_OF_DIAMETER * diameter)
 
 
 def _rounded(size: float) -> float:
