@@ -118,3 +118,23 @@ def test_the_table_balances_the_tendon_on_both_branches(wrist, tmp_path):
             known = np.interp(at, angle[moved][:: int(sign)], up[:: int(sign)][moved][:: int(sign)])
             inside = at < 0.95 * angle[moved].max()
             assert tension[inside] == pytest.approx(known[inside], abs=0.03)
+
+
+def test_models_are_pulled_at_the_base_behind_a_sheath(wrist, tmp_path):
+    """Friction and stretch of a sheath are not those of a hinge."""
+    behind = wrist.with_values(
+        {
+            "tendon.sheath_length": 500.0,
+            "tendon.sheath_friction": 0.1,
+            "tendon.sheath_bend_deg": 90.0,
+            "tendon.sheath_wire_stiffness": 14e3,
+            "tendon.backlash": 0.1,
+        }
+    )
+    tables = []
+    for robot in (wrist, behind):
+        nf.export_robot(robot, tmp_path / "a.csv", SimulatorOptions(1.5))
+        tables.append((tmp_path / "a.csv").read_text())
+    assert tables[0] == tables[1]
+    nf.export_robot(behind, tmp_path / "a.urdf", SimulatorOptions(1.5))
+    assert "the sheaths before it are left out" in (tmp_path / "a.urdf").read_text()

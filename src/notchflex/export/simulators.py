@@ -386,7 +386,7 @@ def measure_errors(model: JointModel, text: str) -> list[dict[str, Any]]:
 def _model_of(subject: Subject, options: SimulatorOptions) -> JointModel:
     top = options.largest_tension
     if top is None and subject.path is not None:
-        top = float(np.max(subject.path.tension))
+        top = float(np.max(subject.path.span_tension[..., 0]))  # at the base
     return joint_model(subject.robot, top)
 
 
@@ -398,6 +398,8 @@ def _head(model: JointModel, *sentences: str) -> str:
         "SI units: m, kg, s, N, rad. The base is body 0; z is its tube axis.",
         f"Fitted to a pull of each tendon from rest to {model.top:.6g} N and its release.",
     ]
+    if any(tendon.sheath_length for tendon in robot.tendon):
+        lines.append("Tendons are pulled at the base: the sheaths before it are left out.")
     return "\n".join([*lines, *sentences])
 
 
