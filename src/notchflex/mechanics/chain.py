@@ -170,6 +170,23 @@ def structural(chain: Chain) -> Chain:
     return marks
 
 
+# Numbers of a rod that are 0 where a flexure is added beyond the tip.
+_ZERO_BEYOND_THE_TIP = (
+    "start_offset",
+    "curve_offset",
+    "end_offset",
+    "node_offset",
+    "reference_strain",
+    "basis",
+    "turn",
+    "turn_pair",
+    "step",
+    "node_turn",
+    "has_closure",
+    "chord",
+)
+
+
 def padded(chain: Chain, flexures: int, edges: int) -> Chain:
     """Pad a chain with flexures beyond its tip, and with entries for contact edges."""
     # The added flexures are stiff, straight, of zero length and without tendons: the last body's
@@ -191,23 +208,7 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         return repeated
 
     rods = chain.rods
-    nothing = dict.fromkeys(
-        [
-            "start_offset",
-            "curve_offset",
-            "end_offset",
-            "node_offset",
-            "reference_strain",
-            "basis",
-            "turn",
-            "turn_pair",
-            "step",
-            "node_turn",
-            "has_closure",
-            "chord",
-        ],
-        0.0,
-    )
+    nothing = dict.fromkeys(_ZERO_BEYOND_THE_TIP, 0.0)
     rotations = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")
     unturned = dict.fromkeys(rotations, xp.eye(rods.start_rotation.shape[-1]))
     rods = longer(rods, padding_mask=1.0, **nothing, **unturned)
