@@ -70,7 +70,7 @@ VERBS = {
         "notchflex simulate pacheco2021-a --tension 0:3:31,3:0:31 --plot wrist.png\n"
         "    notchflex simulate pacheco2021-a --stroke 0:2:21 --set friction.coefficient=0.1\n"
         "    notchflex simulate two-axis-wrist --tension 1=0:1:11 --tension 2=0.1 --json -\n"
-        "    notchflex simulate pacheco2021-a --tension 0:3:301 --columns tension,gap,closed\n"
+        "    notchflex simulate pacheco2021-a --tension 0:3:301 --columns gap,closed\n"
         "    notchflex simulate pacheco2021-a --tension 0:3:31 --beside pacheco2021-b \\\n"
         '        --beside "slick: friction.coefficient=0" --plot beside.html\n'
         "    notchflex simulate gao2017 --tension 0:8:9,8:0:9 --tip-mass 20 --plot loop.gif\n"

@@ -373,7 +373,7 @@ class ExternalLoads:
         tip_mass: Mass that hangs at the tip [g]; along 0,0,-9.81 without --gravity.
         gravity: Gravity X,Y,Z in the world [m/s2]; the robot's own weight counts where
             material.density is known.
-        temperature: Temperature of the robot [deg C], one or one for each step as --tension.
+        temperature: Temperature [deg C]: one, or one for each step.
         sheath_bend_deg: Total angle by which the sheaths are bent [deg].
         following: Forces and moments turn with the body they act on, and are given in its frame.
     """

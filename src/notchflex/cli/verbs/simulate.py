@@ -92,18 +92,17 @@ def simulate(
         tension: Tension at the base of a tendon [N], step by step. Values or `start:stop:count`
             ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. For one of several tendons
             `1=SPEC`; those without hang slack.
-        stroke: Tendon length drawn out at the base [mm], step by step; written as --tension.
-        spool: Way of a spool ([[drive]]) that drives two tendons [mm], written as --stroke.
-        base_rotation: Turn the base by a rotation vector RX,RY,RZ [deg], for example `90,0,0`.
+        stroke: Tendon length drawn out at the base [mm]; as --tension.
+        spool: Way of a [[drive]] of two tendons [mm]; as --stroke.
+        base_rotation: Turn the base by a rotation vector [deg]: `90,0,0`.
         uncertain: Carry the tolerances of the robot (its [tolerance] table, else assumed ones)
             through all steps: table, picture, CSV and JSON have the 5th, 50th and 95th percentile.
-        draws: How many robots `--uncertain` draws within the tolerances; 256 if not given.
-        beside: Also simulate another robot under the same load: `ROBOT`, `LABEL: ROBOT`, or this
-            one with other values, `LABEL: PATH=VALUE, PATH=VALUE`. May be given up to four times.
-            Table, picture and JSON have all of them, other files the first.
-        columns: Quantities that the table shows, joined by commas, such as
-            `tension,notch_angle,gap`. A wrong name lists all names.
-        every_row: Show every step in the table, which otherwise has 60 at most.
+        draws: Robots that `--uncertain` draws; 256 if not given.
+        beside: Also simulate up to four other robots under the same load: `ROBOT`, `LABEL: ROBOT`,
+            or this one with other values, `LABEL: PATH=VALUE, PATH=VALUE`. Table, picture and JSON
+            have all of them, other files the first.
+        columns: Quantities of the table, such as `tension,notch_angle,gap`. A wrong name lists all.
+        every_row: Show all steps in the table, not 60 at most.
     """
     from notchflex.cli import path_table
 
