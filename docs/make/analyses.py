@@ -1,4 +1,4 @@
-"""Draws the pictures of the pages on sweeps, tolerances, sensing, sheaths and workspaces.
+"""Draws the pictures of the pages on sweeps, tolerances, sensing, sheaths, workspaces and nitinol.
 
 `python docs/make/analyses.py [FOLDER]` writes to docs/images; FOLDER has the measured angles of
 Pacheco 2021, which one picture needs.
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from pictures import HOLLOW, IMAGES, TOTAL, beside, label_all, picture, shown_file
+from pictures import HOLLOW, IMAGES, TENSION, TOTAL, beside, label_all, picture, shown_file
 
 import notchflex as nf
 from notchflex.plotting import sensed_picture, sweep_picture
@@ -88,6 +88,28 @@ def transmission(by_tension: Axes, by_stroke: Axes, along: Axes) -> None:
     along.set(xlabel="place: drive to base", ylabel="tension of the wire [N]")
 
 
+@picture("temperature.svg", 4.2, 2.9)
+def temperature(axes: Axes) -> None:
+    """Loops of wrist A with elastic ends in the workshop and in the body."""
+    known = {"reference_temperature": 22.0, "unloading_stress": 220.0}
+    named = {f"material.{key}": value for key, value in known.items()}
+    wrist = nf.load_robot("pacheco2021-a-true").with_values(named)
+    for celsius, colour in ((22.0, BLUE), (37.0, VERMILLION)):
+        loop = nf.pull(0.0, 1.4, steps=57).release().loaded(temperature=celsius)
+        path = nf.simulate(wrist, loop).raise_if_failed()
+        angle = np.degrees(path.total_angle)
+        axes.plot(path.tension, angle, color=colour, label=f"{celsius:.0f} °C")
+    axes.legend()
+    axes.set(xlabel=TENSION, ylabel=TOTAL)
+
+
+def fatigue(images: Path = IMAGES) -> None:
+    """The cycle of the page on strain cycles."""
+    wrist = nf.load_robot("pacheco2021-a-true").with_value("fatigue.line", "cao2020")
+    path = nf.simulate(wrist, nf.pull(0.0, 0.5, steps=6).release())
+    nf.plot(nf.strain_cycle(path)).save(images / "fatigue.svg")
+
+
 @picture("accuracy.svg", 7.2, 2.9, columns=3)
 def accuracy(*axes: Axes, measured: Path) -> None:
     """Every wrist of finite elements and every measured one, against the law from the drawing."""
@@ -140,7 +162,7 @@ def accuracy(*axes: Axes, measured: Path) -> None:
 
 
 if __name__ == "__main__":
-    for draw in (sweep, tolerances, sensing, workspace, transmission):
+    for draw in (sweep, tolerances, sensing, workspace, transmission, temperature, fatigue):
         draw()
     if len(sys.argv) > 1:
         accuracy(measured=Path(sys.argv[1]))

@@ -86,8 +86,8 @@ def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any):
     for script in ("figures", "control", "learning"):
         make(script).main(tmp_path)
     analyses = make("analyses")
-    analyses.sweep(tmp_path)
-    analyses.tolerances(tmp_path)
+    for draw in ("sweep", "tolerances", "transmission", "temperature", "fatigue"):
+        getattr(analyses, draw)(tmp_path)
     for part in ("finite_elements", "drawing"):
         make(f"against_{part}").pictures(tmp_path)
     drawn = {file.name for file in tmp_path.iterdir()}
@@ -95,7 +95,7 @@ def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any):
     plain = {file.name for file in (DOCS / "images").glob("*.svg")} - {"accuracy.svg"}
     compared = {"finite_elements.svg", "drawing_wrists.svg", "drawing_depth.svg"}
     assert drawn == plain | compared
-    assert len(plain) == 17
+    assert len(plain) == 21
     # A picture that changes in more than what a drawing program does has other text.
     for name in plain:
         texts = [
