@@ -155,7 +155,7 @@ def strain_cycle(
         The cycle, and its margins below the line.
 
     Raises:
-        InputError: Fewer than two states, or states of several robots.
+        InputError: Fewer than two states, or states of several robots or refinements.
 
     Example:
         >>> from notchflex import load_robot, pull, simulate
@@ -175,9 +175,15 @@ def strain_cycle(
             )
         paths, loops, reason = [state.path[state.step : state.step + 1] for state in several], 0, ""
     robot = paths[0].robot
-    if any(path.robot != robot for path in paths):
-        raise InputError.CONFLICT("the states of a strain cycle belong to different robots")
-    strains = np.concatenate([_strains(path) for path in paths])
+    refined = paths[0].chain.refinement
+    if any((path.robot, path.chain.refinement) != (robot, refined) for path in paths):
+        raise InputError.CONFLICT(
+            "the states of a strain cycle belong to different robots, or differ in refinement"
+        )
+    found = [_strains(path) for path in paths]
+    # A notch has one node where it bends uniformly, and else those of the others.
+    nodes = np.arange(max(strains.shape[2] for strains in found))
+    strains = np.concatenate([each[:, :, np.minimum(nodes, each.shape[2] - 1)] for each in found])
     low, high = strains.min(axis=0), strains.max(axis=0)
     mean, amplitude = 0.5 * (low + high), 0.5 * (high - low)
     chosen = robot.fatigue if limit is None else limit
