@@ -335,7 +335,8 @@ class Law(Pytree):
     Attributes:
         is_linear: Whether the moment of a section is proportional to its curvature.
         axis: Axis of its numbers that runs along the flexures; None where one law serves all.
-        lumped: Whether it is that of a flexure as a whole, so that no moment between is missed.
+        lumped: Whether it is that of a flexure as a whole: no moment between is missed, and the
+            strains of its section are not known.
     """
 
     is_linear: ClassVar[bool] = False
@@ -546,8 +547,9 @@ class MixedLaw(Law):
 
     @property
     def lumped(self) -> Any:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Whether that of each flexure is."""
-        return self.chosen([law.lumped for law in self.laws])
+        """Whether that of each flexure is; False where none is."""
+        each = [jnp.full(self.kind.shape, law.lumped) for law in self.laws]
+        return any(law.lumped for law in self.laws) and self.chosen(each)
 
     @property
     def remembers(self) -> bool:
