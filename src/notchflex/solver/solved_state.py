@@ -85,7 +85,7 @@ class SolvedState:
         """Strains of the section at every node of every notch; any where they are not known."""
         return self._by_law(section_strain)
 
-    def of_sections(self, values: Float[Array, "n *shape"]) -> Float[Array, "n *shape"]:
+    def of_sections(self, values: Array) -> Array:
         """Return values of the sections of all notches; NaN where their strains are not known."""
         # NaN comes last: adjoints multiply what is before it by 0.
         lumped = self.law.lumped
