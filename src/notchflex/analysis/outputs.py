@@ -143,7 +143,7 @@ def follow_row(
         reached = alive & result.converged
         quantity = SolvedState(robot, solved).quantity
         converged = reached & believable(quantity)
-        values = {name: quantity(name) for name in outputs if name in OF_STATE} | {
+        values = {
             "residual": result.residual,
             "iterations": result.iterations,
             "converged": converged,
@@ -152,6 +152,8 @@ def follow_row(
             how = [result.fraction_before, result.substeps, converged, True]
             packed = [PytreeLayout.of(pytree).pack(pytree) for pytree in (solved, result.between)]
             values |= dict(zip(STEPS, [*packed, jnp.array(how, float)], strict=True))
-        return (solved, reached), {name: values[name] for name in outputs}
+        return (solved, reached), {
+            name: values[name] if name in values else quantity(name) for name in outputs
+        }
 
     return jax.lax.scan(step, (at_rest(robot), jnp.array(True)), loads)[1]

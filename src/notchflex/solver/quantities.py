@@ -65,6 +65,16 @@ def base_stroke(state: SolvedState) -> Array:
     return jnp.full_like(state.solved.stroke, jnp.nan) if sheath is None else sheath.stroke
 
 
+@Quantity("state", per=("tendon",))
+def wire_stroke(state: SolvedState) -> Array:
+    """Way of the wire's end at the drive, on which the drive works; without a backlash `stroke`.
+
+    Within its backlash the drive moves, and the wire's end stays where it is, at its tension.
+    """
+    sheath = state.solved.memory.sheath
+    return state.solved.stroke - (0.0 if sheath is None else sheath.play)
+
+
 @Quantity("solve", "notch angle", r"\theta_j", "deg", key="notch_angle_deg",
           column="notch_{notch}_deg", per=("notch",))  # fmt: skip
 def notch_angle(state: SolvedState) -> Array:
