@@ -326,6 +326,7 @@ def _rows(
         index = [places[name] for name in names]
         return np.ravel_multi_index(index, tuple(axes.values())), numbers
 
+    loads.load.check_effect(values)
     of_loads = [name for name in values if name in LOADS]
     robot_of, of_robot = distinct(["robots", *(name for name in values if name not in LOADS)])
     path_of, of_path = distinct([*of_loads, "loads"])

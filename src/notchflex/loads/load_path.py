@@ -205,6 +205,16 @@ class LoadPath(ByValue, Displayed):
             raise InputError.NO_DATA(f"the loads give no {name} that could vary")
         return np.nan_to_num(commanded)
 
+    def check_effect(self, names: Iterable[str]) -> None:
+        """Raise for a temperature of the robot among some names, where all loads give their own."""
+        own = all(external.temperature is not None for external in self.different)
+        for name in names:
+            if own and name.endswith("material.temperature"):
+                raise InputError.CONFLICT(
+                    f"`{name}` has no effect: every load gives a temperature of its own; leave "
+                    "`temperature` out of the loads to vary that of the robot"
+                )
+
     def commanding(self, values: Mapping[str, Any]) -> LoadPath:
         """Return the path with other numbers of its loads.
 
