@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from notchflex import Equilibrium, EquilibriumPath, Fatigue, InputError, Robot, simulate
 from notchflex.support import (
-    CORNERS,
+    PLACES,
     Displayed,
     SectionStrain,
     Summary,
@@ -76,7 +76,7 @@ class StrainCycle(Displayed):
         values = self.mean[rows], self.amplitude[rows], self.smallest_margin
         names = (f"{name}_%" for name in ("mean", "amplitude", "margin"))
         numbers = {n: (100.0 * v).tolist() for n, v in zip(names, values, strict=True)}
-        places = [_place(point) for point in self.worst[:, 1].tolist()]
+        places = PLACES[self.worst[:, 1]].tolist()
         return {"notch": [*range(1, len(places) + 1)], "at": places, **numbers}
 
     def warnings(self) -> list[str]:
@@ -116,13 +116,6 @@ class StrainCycle(Displayed):
             rows.append((f"notch {number}", text))
         rows += [("", sentence) for sentence in self.warnings()]
         return Summary(f"Strain cycle of {self.robot.name}", rows, "nf.plot(...) draws all points")
-
-
-def _place(point: int) -> str:
-    # The points of `edge_strain`: the arc of the spine, then both faces.
-    if CORNERS[point]:
-        return "corner of the cut"
-    return "spine" if point < len(CORNERS) - 2 * np.diff(np.flatnonzero(CORNERS))[0] else "face"
 
 
 def line_words(limit: Fatigue) -> list[str]:

@@ -343,7 +343,7 @@ def moment_error(state: SolvedState) -> Array:
     required = state.required()[..., bending]
     real = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
     if chain.law.lumped is not False:
-        real = real & ~chain.law.lumped
+        real = real & ~jnp.asarray(chain.law.lumped)
     has_length = (real[:, None] & (chain.rods.length > 0.0))[..., None]
     carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
     missing = state.evaluation.flexure.resultants[..., bending] - required

@@ -88,7 +88,7 @@ class SolvedState:
     def of_sections(self, values: Array) -> Array:
         """Return values of the sections of all notches; NaN where their strains are not known."""
         # NaN comes last: adjoints multiply what is before it by 0.
-        lumped = self.law.lumped
+        lumped: Any = self.law.lumped
         if lumped is False:
             return values
         return jnp.where(lumped.reshape(-1, *(1,) * (values.ndim - 1)), jnp.nan, values)

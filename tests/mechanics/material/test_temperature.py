@@ -169,8 +169,9 @@ def test_a_temperature_that_all_loads_replace_does_not_vary():
         path.gradient({"total_angle": 1.0}).by(name)
     with refused:
         nf.differentiable(warm, load, [name])
-    with refused:
-        nf.batch(warm, {name: [22.0, 37.0]}, path.load)
+    with pytest.warns(nf.InputWarning, match="leave `temperature` out of the loads"):
+        rows = nf.batch(warm, {name: [22.0, 37.0]}, path.load)["total_angle"]
+    assert rows[0] == pytest.approx(rows[1], abs=1e-12)
     # Where the plateaus were measured counts: 1 K more there is 1 K less here.
     reference = path.jacobian("material.reference_temperature", "total_angle")["total_angle"]
     alone = nf.simulate(MEASURED.with_value(name, 37.0), [nf.Load(0.8)])

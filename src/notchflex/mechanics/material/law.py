@@ -335,6 +335,7 @@ class Law(Pytree):
     Attributes:
         is_linear: Whether the moment of a section is proportional to its curvature.
         axis: Axis of its numbers that runs along the flexures; None where one law serves all.
+        moving: Names of its strains that move with the temperature, each by its own of `moves`.
         lumped: Whether it is that of a flexure as a whole: no moment between is missed, and the
             strains of its section are not known.
     """
@@ -342,6 +343,7 @@ class Law(Pytree):
     is_linear: ClassVar[bool] = False
     axis: ClassVar[int | None] = None
     lumped: ClassVar[bool] = False
+    moving: ClassVar[tuple[str, str]]
     respond: ClassVar[Callable[..., SectionResponse]]
     bent: ClassVar[Callable[..., Bending]]
     elastic: ClassVar[Callable[..., Strain]]
@@ -368,8 +370,12 @@ class Law(Pytree):
         return xp.zeros(xp.shape(section.area))
 
     def warmed(self, rise: Scalar) -> Self:
-        """Return the law at a higher temperature, K; only laws with `moves` have one."""
-        raise NotImplementedError
+        """Return the law at a higher temperature, K; what has transformed stays."""
+        assert self.moves is not None
+        strains = {
+            name: getattr(self, name) + self.moves[k] * rise for k, name in enumerate(self.moving)
+        }
+        return dataclasses.replace(self, **strains)
 
     def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
         """Compute the stiffness in the free robot, of a section or of many."""

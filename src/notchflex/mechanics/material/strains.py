@@ -89,8 +89,11 @@ def edge_strain(strain: SectionStrain, section: FibreSection) -> Each:
     return stretch + curvature * x + sideways * y
 
 
-CORNERS = xp.isin(np.arange(len(_ARC) + 2 * len(_FACE)), (len(_ARC) + 7, len(_ARC) + 15))
-"""Which of the points of `edge_strain` are corners of the cut."""
+PLACES = np.repeat(("spine", *2 * ("face", "corner of the cut")), (len(_ARC), *2 * (7, 1)))
+"""Where the points of `edge_strain` are."""
+
+CORNERS = PLACES == "corner of the cut"
+"""Which of them are corners of the cut."""
 
 
 class LimitLine(Pytree):
