@@ -65,14 +65,10 @@ def base_stroke(state: SolvedState) -> Array:
     return jnp.full_like(state.solved.stroke, jnp.nan) if sheath is None else sheath.stroke
 
 
-@Quantity("state", per=("tendon",))
+@Quantity("solve", per=("tendon",))
 def wire_stroke(state: SolvedState) -> Array:
-    """Way of the wire's end at the drive, on which the drive works; without a backlash `stroke`.
-
-    Within its backlash the drive moves, and the wire's end stays where it is, at its tension.
-    """
-    sheath = state.solved.memory.sheath
-    return state.solved.stroke - (0.0 if sheath is None else sheath.play)
+    """Way of the wire's end at the drive, on which the drive works; without a backlash `stroke`."""
+    return state.solved.wire_stroke
 
 
 @Quantity("solve", "notch angle", r"\theta_j", "deg", key="notch_angle_deg",

@@ -269,6 +269,12 @@ class SolverState(NamedTuple):
         sheath = self.memory.sheath
         return self.point.base_tension if sheath is None else sheath.tension
 
+    @property
+    def wire_stroke(self) -> Float[Array, " t"]:
+        """Way of the end of every wire, mm: within a backlash it stands, and the drive moves."""
+        sheath = self.memory.sheath
+        return self.stroke if sheath is None else self.stroke - sheath.play
+
 
 def at_rest(chain: Chain) -> SolverState:
     """Return the state of the free robot, with slack tendons."""
