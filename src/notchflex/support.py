@@ -64,7 +64,7 @@ _HOME = {
         ),
         "notchflex.loads.load_path": ("load_path",),
         "notchflex.mechanics.chain": ("law_errors", "limit_line", "unchecked_dimensions"),
-        "notchflex.mechanics.material": ("CORNERS", "SectionStrain", "edge_strain"),
+        "notchflex.mechanics.material": ("CORNERS", "PLACES", "SectionStrain", "edge_strain"),
         "notchflex.results.io": (
             "frame",
             "whole_document",

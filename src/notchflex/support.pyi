@@ -43,6 +43,7 @@ from notchflex.mechanics.chain import law_errors as law_errors
 from notchflex.mechanics.chain import limit_line as limit_line
 from notchflex.mechanics.chain import unchecked_dimensions as unchecked_dimensions
 from notchflex.mechanics.material import CORNERS as CORNERS
+from notchflex.mechanics.material import PLACES as PLACES
 from notchflex.mechanics.material import SectionStrain as SectionStrain
 from notchflex.mechanics.material import edge_strain as edge_strain
 from notchflex.results.io import frame as frame

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -190,3 +192,8 @@ def test_what_is_no_batch_of_paths(wrist, given):
         nf.simulate_batch(wrist, given)
     with refused(ErrorCode.WRONG_TYPE):
         nf.simulate_batch(given, nf.pull(0.0, 1.0, steps=2))
+
+
+def test_works_are_outputs_whatever_is_imported_first() -> None:
+    code = "from notchflex.analysis.outputs import WORKS; assert 'tendon_work' in WORKS"
+    subprocess.run([sys.executable, "-c", code], check=True)

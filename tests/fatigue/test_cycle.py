@@ -154,6 +154,21 @@ def test_bent_sideways_a_cycle_sees_both_signs():
     assert largest.max(axis=(1, 2)) == pytest.approx(path.peak_strain.max(axis=0), rel=1e-3)
 
 
+@pytest.mark.parametrize("others", [(), (nf.RodGap(4.0, 0.8, uncut_length=0.5),)])
+@pytest.mark.parametrize("side", [(0.05, 0.0, 0.0), (0.0, 0.05, 0.0)])
+def test_states_under_the_tendon_alone_and_under_loads_have_a_cycle(others, side):
+    robot = WRIST.replace(notch=(*others, *WRIST.notch))
+    alone, loaded = nf.solve(robot, nf.Load(0.6)), nf.solve(robot, nf.Load(0.6, tip_force=side))
+    still = nf.solve(robot, nf.Load(0.6, tip_force=tuple(1e-12 * force for force in side)))
+    cycle, expected = nf.strain_cycle([alone, loaded]), nf.strain_cycle([still, loaded])
+    assert cycle.mean == pytest.approx(expected.mean, abs=1e-9)
+    assert cycle.amplitude == pytest.approx(expected.amplitude, abs=1e-9)
+    assert expected.amplitude[-1].max() > 1e-4
+    finer = nf.solve(robot, nf.Load(0.6), refinement=1)
+    with pytest.raises(nf.InputError, match="refinement"):
+        nf.strain_cycle([finer, loaded])
+
+
 def test_corner_factor_and_lines_of_ones_own():
     path = nf.simulate(WRIST, nf.pull(0.0, 0.4, steps=3).release())
     plain = nf.strain_cycle(path)

@@ -73,6 +73,36 @@ def test_a_saved_state_continues_as_the_uninterrupted_path(
     np.testing.assert_allclose(read.material_dissipation, rest.material_dissipation, rtol=1e-12)
 
 
+@pytest.mark.parametrize("force", [(0.02, 0.0, 0.0), (0.01, 0.01, 0.0)])
+def test_flexures_of_any_nodes_go_on_under_loads_in_the_plane_and_in_space(
+    force: tuple[float, float, float],
+) -> None:
+    # Under the tendon alone rods have five nodes, the table and the arcs have one.
+    others = (
+        nf.RodGap(4.0, 0.8, 0.5, uncut_length=0.5, repeat=2),
+        nf.TableNotch(2.0, angle_deg=(10.0, 40.0), moment=(3.1, 8.0), uncut_length=1.0),
+    )
+    tendon = nf.Tendon(0.7, path="straight")
+    mixed = FLATTENS.replace(notch=(*others, NOTCH), tendon=(tendon,))
+    loads = [*pulls([0.5, 1.6, 1.2]), *(nf.Load(pull, tip_force=force) for pull in (1.2, 0.6))]
+    loads.append(nf.Load(1.5))
+    whole, first = nf.simulate(mixed, loads), nf.simulate(mixed, loads[:3])
+    rest = nf.simulate(mixed, loads[3:], from_state=first.state)
+    assert whole.converged.all()
+    assert len(first.chain.law.rest(first.chain.rods.section)[0]) == 5
+    memory = first.state.fitted(rest.chain).memory.material
+    np.testing.assert_allclose(
+        memory, whole.state_at(2).fitted(rest.chain).memory.material, atol=1e-14
+    )
+    assert np.abs(memory).max() > 0.005
+    np.testing.assert_allclose(rest.notch_angle, whole.notch_angle[3:], atol=1e-7)
+    np.testing.assert_allclose(
+        first.material_dissipation[-1] + rest.material_dissipation[-1],
+        whole.material_dissipation[-1],
+        atol=1e-9,
+    )
+
+
 def test_a_batch_is_its_rows(path: nf.EquilibriumPath) -> None:
     other = WRIST.with_value("material.unloading_stress", 200.0)
     rows = nf.simulate_batch([WRIST, other], path.load)["total_angle"]

@@ -10,6 +10,7 @@ parallel.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -326,6 +327,9 @@ def _rows(
         index = [places[name] for name in names]
         return np.ravel_multi_index(index, tuple(axes.values())), numbers
 
+    # No error: of several loads of a study some may leave the temperature to the robot.
+    for warning in loads.load.replaced(values):
+        warnings.warn(warning, stacklevel=3)
     of_loads = [name for name in values if name in LOADS]
     robot_of, of_robot = distinct(["robots", *(name for name in values if name not in LOADS)])
     path_of, of_path = distinct([*of_loads, "loads"])

@@ -71,9 +71,10 @@ def differentiable(
     and so are the derivatives. Where a contact changes between sticking and sliding, lips meet or
     the material's law has a kink, the derivative is that of one side: `kinks` lists such contacts
     and notches, `one_sided` gives both sides. With friction it is NaN from a load on that was
-    solved in three parts or more, whose memory is not followed; smaller steps help. Inside a
-    program that JAX traces, numbers that no robot can have give NaN, and `converged` is
-    false there, as where a load does not converge.
+    solved in three parts or more, whose memory is not followed; smaller steps help. What is not
+    known of a state (NaN), such as strains of a table, has the slope 0. Inside a program that JAX
+    traces, numbers that no robot can have give NaN, and `converged` is false there, as where a load
+    does not converge.
 
     Args:
         robot: The robot.

@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from notchflex._jax import choose, jax, jnp
-from notchflex._quantity import REGISTERED
 from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.command import Command
 from notchflex.loads.load import short_repr
 from notchflex.loads.load_path import TENDONS, TIP
 from notchflex.mechanics.chain import Chain
+from notchflex.results.quantities import QUANTITIES
 from notchflex.solver.continuation import solve_load_step
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import Native
@@ -25,16 +25,14 @@ from notchflex.solver.quantities import believable, unpad_quantity
 from notchflex.solver.residual import SolverState, at_rest
 from notchflex.solver.solved_state import SolvedState
 
-OF_STATE = [
-    name for name, quantity in REGISTERED.items() if quantity.title and quantity.source != "path"
-]
+OF_STATE = [name for name, quantity in QUANTITIES.items() if quantity.source != "path"]
 """What is reported of a state alone, without its path."""
 DEFAULT_OUTPUTS = ("total_angle", "notch_angle", "tip_position", "tip_rotation", "converged")
 OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *OF_STATE]),)
 """What can be asked of a batch or of a function that can be differentiated."""
 LOADS = (*TENDONS, *TIP)
 """Names of the loads that batches vary and that slopes are taken by."""
-WORKS = {name: quantity.work_of for name, quantity in REGISTERED.items() if quantity.work_of}
+WORKS = {name: quantity.work_of for name, quantity in QUANTITIES.items() if quantity.work_of}
 """What can be asked of a batch besides: works, with what they are integrated of."""
 
 
@@ -143,7 +141,7 @@ def follow_row(
         reached = alive & result.converged
         quantity = SolvedState(robot, solved).quantity
         converged = reached & believable(quantity)
-        values = {name: quantity(name) for name in outputs if name in OF_STATE} | {
+        values = {
             "residual": result.residual,
             "iterations": result.iterations,
             "converged": converged,
@@ -152,6 +150,8 @@ def follow_row(
             how = [result.fraction_before, result.substeps, converged, True]
             packed = [PytreeLayout.of(pytree).pack(pytree) for pytree in (solved, result.between)]
             values |= dict(zip(STEPS, [*packed, jnp.array(how, float)], strict=True))
-        return (solved, reached), {name: values[name] for name in outputs}
+        return (solved, reached), {
+            name: values[name] if name in values else quantity(name) for name in outputs
+        }
 
     return jax.lax.scan(step, (at_rest(robot), jnp.array(True)), loads)[1]

@@ -123,6 +123,8 @@ def _checked(path: EquilibriumPath, names: str | Sequence[str]) -> tuple[str, ..
 
 def start_of(robot: Robot, load: LoadPath, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Return the present values of numbers and loads by name; raise for one that cannot vary."""
+    for warning in load.replaced(names):
+        raise InputError.CONFLICT(str(warning))
     numbers = tuple(name for name in names if name not in LOADS)
     values = dict(zip(numbers, _variable(robot, numbers), strict=True))
     return {name: load.numbers(name) if name in LOADS else np.array(values[name]) for name in names}

@@ -49,10 +49,8 @@ def spool_path(robot: Robot, ways: ArrayLike) -> LoadPath:
             f"ways of spools are numbers, steps by {len(drives)} spools; got {table.shape}"
         )
     tension, stroke = np.full((2, len(table) + 1, robot.number_of_tendons), np.nan)
-    sides = [(drive.tendon - 1, drive.antagonist - 1) for drive in drives]
-    for drive, both in zip(drives, sides, strict=True):
-        tension[0, both] = drive.pretension
+    both = np.array([(drive.tendon, drive.antagonist) for drive in drives]) - 1
+    tension[0, both] = [[drive.pretension] for drive in drives]
     start = solve(robot, LoadPath(tension[:1])[0]).raise_if_failed().stroke
-    for way, (drawn, released) in zip(table.T, sides, strict=True):
-        stroke[1:, drawn], stroke[1:, released] = start[drawn] + way, start[released] - way
+    stroke[1:, both] = start[both] + table[..., None] * [1.0, -1.0]
     return LoadPath(tension, stroke)

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from notchflex import Equilibrium, EquilibriumPath, Fatigue, InputError, Robot, simulate
 from notchflex.support import (
-    CORNERS,
+    PLACES,
     Displayed,
     SectionStrain,
     Summary,
@@ -76,7 +76,7 @@ class StrainCycle(Displayed):
         values = self.mean[rows], self.amplitude[rows], self.smallest_margin
         names = (f"{name}_%" for name in ("mean", "amplitude", "margin"))
         numbers = {n: (100.0 * v).tolist() for n, v in zip(names, values, strict=True)}
-        places = [_place(point) for point in self.worst[:, 1].tolist()]
+        places = PLACES[self.worst[:, 1]].tolist()
         return {"notch": [*range(1, len(places) + 1)], "at": places, **numbers}
 
     def warnings(self) -> list[str]:
@@ -118,13 +118,6 @@ class StrainCycle(Displayed):
         return Summary(f"Strain cycle of {self.robot.name}", rows, "nf.plot(...) draws all points")
 
 
-def _place(point: int) -> str:
-    # The points of `edge_strain`: the arc of the spine, then both faces.
-    if CORNERS[point]:
-        return "corner of the cut"
-    return "spine" if point < len(CORNERS) - 2 * np.diff(np.flatnonzero(CORNERS))[0] else "face"
-
-
 def line_words(limit: Fatigue) -> list[str]:
     """Return what is known of a limit line, each in words."""
     facts, words = limit.facts, [limit.line] if limit.line else []
@@ -155,7 +148,7 @@ def strain_cycle(
         The cycle, and its margins below the line.
 
     Raises:
-        InputError: Fewer than two states, or states of several robots.
+        InputError: Fewer than two states, or states of several robots or refinements.
 
     Example:
         >>> from notchflex import load_robot, pull, simulate
@@ -175,9 +168,15 @@ def strain_cycle(
             )
         paths, loops, reason = [state.path[state.step : state.step + 1] for state in several], 0, ""
     robot = paths[0].robot
-    if any(path.robot != robot for path in paths):
-        raise InputError.CONFLICT("the states of a strain cycle belong to different robots")
-    strains = np.concatenate([_strains(path) for path in paths])
+    refined = paths[0].chain.refinement
+    if any((path.robot, path.chain.refinement) != (robot, refined) for path in paths):
+        raise InputError.CONFLICT(
+            "the states of a strain cycle belong to different robots, or differ in refinement"
+        )
+    found = [_strains(path) for path in paths]
+    # A notch has one node where it bends uniformly, and else those of the others.
+    nodes = np.arange(max(strains.shape[2] for strains in found))
+    strains = np.concatenate([each[:, :, np.minimum(nodes, each.shape[2] - 1)] for each in found])
     low, high = strains.min(axis=0), strains.max(axis=0)
     mean, amplitude = 0.5 * (low + high), 0.5 * (high - low)
     chosen = robot.fatigue if limit is None else limit

@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 from notchflex._load_words import MOST_STEPS
 from notchflex._summary import MOST, Displayed, Summary, course, short, vector
 from notchflex._values import ByValue, read_only
-from notchflex.errors import InputError
+from notchflex.errors import InputError, InputWarning
 from notchflex.loads.load import (
     EXTERNAL,
     BodyForce,
@@ -205,6 +205,21 @@ class LoadPath(ByValue, Displayed):
             raise InputError.NO_DATA(f"the loads give no {name} that could vary")
         return np.nan_to_num(commanded)
 
+    def replaced(self, names: Iterable[str]) -> list[InputWarning]:
+        """Tell of temperatures of the robot among some names, where all loads give their own."""
+        given = [external.temperature for external in self.different]
+        return [
+            InputWarning(
+                f"`{name}` has no effect: every load gives a temperature of its own; leave "
+                "`temperature` out of the loads to vary that of the robot.",
+                name,
+                float(given[0] or 0.0),
+                None,
+            )
+            for name in names
+            if name.endswith("material.temperature") and None not in given
+        ]
+
     def commanding(self, values: Mapping[str, Any]) -> LoadPath:
         """Return the path with other numbers of its loads.
 
@@ -300,24 +315,20 @@ class LoadPath(ByValue, Displayed):
         """
         changes = {n: v for n, v in locals().items() if n in EXTERNAL and v is not None}
         if isinstance(temperature, Sequence | np.ndarray):
-            return self._at_temperatures(changes.pop("temperature")).loaded(**changes)
+            try:
+                steps, each = np.broadcast_arrays(np.arange(len(self)), temperature)
+            except ValueError:
+                raise InputError.WRONG_SHAPE(
+                    f"there are {len(temperature)} temperatures for {len(self)} steps; give one, "
+                    "or one for each step"
+                ) from None
+            path = self[steps]
+            warm = zip(path.external, each.tolist(), strict=True)
+            loads = [replace(load, **changes | {"temperature": value}) for load, value in warm]
+            return replace(path, external=tuple(loads))
         # Each distinct load is made and checked once.
         changed = [replace(load, **changes) for load in self.different]
         return replace(self, external=tuple(changed[number] for number in self.which.tolist()))
-
-    def _at_temperatures(self, temperatures: Any) -> LoadPath:
-        """Return the path with a temperature for each step; one step is repeated for several."""
-        try:
-            steps, values = np.broadcast_arrays(np.arange(len(self)), temperatures)
-        except ValueError:
-            raise InputError.WRONG_SHAPE(
-                f"there are {len(temperatures)} temperatures for {len(self)} steps; give one, or "
-                "one for each step"
-            ) from None
-        path, values = self[steps], values.tolist()
-        pairs = zip(path.external, values, strict=True)
-        external = tuple(replace(load, temperature=value) for load, value in pairs)
-        return replace(path, external=external)
 
     def for_tendons(self, count: int) -> LoadPath:
         """Return the path for a number of tendons; those added are slack."""

@@ -219,19 +219,17 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
     if elastic is not None:
         elastic[-more:] = np.eye(chain.rods.modes)
     idle = {"present": 0.0, "visits": 0.0, "ends": 0.0, "back": 1, "body_length": 0.0}
+    others = "limit", "contact_stiffness", "contact_flexibility", "notch_frame"
     bodies = {name: getattr(chain, name) for name in ("body_length", "body_mass", "body_centre")}
     return replace(
         chain,
         rods=rods,
-        limit=longer(chain.limit),
         law=chain.law if chain.law.axis is None else longer(chain.law),
         groups=tuple(longer(group, **idle) for group in chain.groups),
         contact_pairs=tuple(longer(pair, has_contact=0.0, back=1) for pair in chain.contact_pairs),
         stiffness=stiffness,
         elastic=elastic,
-        contact_stiffness=longer(chain.contact_stiffness),
-        contact_flexibility=longer(chain.contact_flexibility),
-        notch_frame=longer(chain.notch_frame),
+        **{name: longer(getattr(chain, name)) for name in others},
         **{k: np.pad(v, [(0, more)] + [(0, 0)] * (v.ndim - 1)) for k, v in bodies.items()},
     )
 

@@ -44,6 +44,12 @@ class Sheath(Pytree):
         """Return ln of the largest tension ratio over the sheaths; bent by a load from 0 rad on."""
         return self.friction * jnp.where(bend < 0.0, self.bend, bend)
 
+    def rest(self) -> SheathMemory:
+        """Return the memory of slack wires."""
+        none = constant(np.zeros(self.friction.shape))
+        place = constant(np.tile(np.linspace(0.0, 1.0, _CORNERS), (len(none), 1)))
+        return SheathMemory(none, place, 0.0 * place + np.log(_MIN_TENSION), none, none, none)
+
     def end_stretch(self, side: float, log_ratio: Array, tension: Array) -> Float[Array, " t"]:
         """Return the stretch, mm, of a wire that slides all along toward drive (1) or base (-1)."""
         # The mean of exp over the profile: T (exp(c) - 1) / c while it is pulled.
@@ -87,13 +93,6 @@ def build_sheath(tendons: Sequence[Tendon]) -> Sheath | None:
         compliance=given("sheath_length") * stretch,
         backlash=given("backlash"),
     )
-
-
-def slack_sheaths(tendons: int) -> SheathMemory:
-    """Return the memory of slack wires."""
-    none = constant(np.zeros(tendons))
-    place = constant(np.tile(np.linspace(0.0, 1.0, _CORNERS), (tendons, 1)))
-    return SheathMemory(none, place, 0.0 * place + np.log(_MIN_TENSION), none, none, none)
 
 
 def log_tension(tension: Float[Array, " t"]) -> Float[Array, " t"]:

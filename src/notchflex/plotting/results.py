@@ -376,8 +376,7 @@ def cycle_picture(cycle: StrainCycle) -> Picture:
         points = np.stack([scale * cycle.mean[number], scale * cycle.amplitude[number]], axis=-1)
         items.append(dots(points.reshape(-1, 2), colour, 3.0, name=f"notch {number + 1}"))
     if facts:
-        ends = (100.0 * np.array(facts[key]) for key in ("mean", "amplitude"))
-        mean, amplitude = ends
+        mean, amplitude = (100.0 * np.array(facts[key]) for key in ("mean", "amplitude"))
         name = f"limit line {cycle.limit.line or ''}".rstrip()
         items.append(line(mean, amplitude, VERMILLION, width=2.0, name=name))
         # A mean in compression counts by its size.

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 REPORTED = (*Shape._fields, *reported("state"))
 """Everything that a run reports of each state, by name."""
 
-BEFORE = ("tension", "stroke", "span_tension", "contact_slid")
+BEFORE = ("tension", "stroke", "wire_stroke", "span_tension", "contact_slid")
 """What is needed of the state before the first one: work is integrated from there."""
 
 FLATTENING = "flattening"

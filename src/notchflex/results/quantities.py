@@ -97,9 +97,9 @@ def front_eta(path: EquilibriumPath) -> np.ndarray:
 
 @Quantity("path", "tendon work", "W", "N mm", key="tendon_work_Nmm",
           column="tendon{tendon}_work_Nmm", per=("tendon",),
-          work_of=("tension", "stroke"))  # fmt: skip
+          work_of=("tension", "wire_stroke"))  # fmt: skip
 def tendon_work(path: EquilibriumPath) -> np.ndarray:
-    """Work done on a tendon at the base since the start of the path."""
+    """Work done on a tendon at its drive since the start of the path, none within a backlash."""
     return _accumulated(path, *REGISTERED["tendon_work"].work_of)
 
 

@@ -219,9 +219,10 @@ class State(ByValue, Displayed):
             if name == _MODES and array.ndim == leaf.ndim and array.shape[-1] < leaf.shape[-1]:
                 # The modes of every level are the first ones of the next.
                 array = np.pad(array, ((0, 0), (0, leaf.shape[-1] - array.shape[-1])))
-            if name == _MATERIAL and array.ndim == leaf.ndim and array.shape[1] == 1:
-                # A notch under tendons alone bends uniformly: it has one node.
-                array = np.repeat(array, leaf.shape[1], axis=1)
+            if name == _MATERIAL and array.ndim == leaf.ndim:
+                # A flexure has one node where it bends uniformly, as notches do under tendons
+                # alone, and else a fixed number; those beyond, of weight 0, repeat its last one.
+                array = array[:, np.minimum(np.arange(leaf.shape[1]), array.shape[1] - 1)]
             if array.shape != leaf.shape:
                 holder = (
                     f"{self.source} holds a state of" if self.source else "the state belongs to"

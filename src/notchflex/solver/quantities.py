@@ -53,8 +53,8 @@ def stroke(state: SolvedState) -> Array:
           column="tendon{tendon}_base_force_N", per=("tendon",), optional=True)  # fmt: skip
 def base_tension(state: SolvedState) -> Array:
     """Tension of a tendon at the base, behind its sheath; empty (NaN) without sheaths."""
-    none = state.solved.memory.sheath is None
-    return state.solved.point.base_tension + (jnp.nan if none else 0.0)
+    at_base = state.solved.point.base_tension
+    return jnp.full_like(at_base, jnp.nan) if state.solved.memory.sheath is None else at_base
 
 
 @Quantity("state", "tendon stroke at the base", r"u_\mathrm{b}", "mm", key="base_stroke_mm",
@@ -62,7 +62,13 @@ def base_tension(state: SolvedState) -> Array:
 def base_stroke(state: SolvedState) -> Array:
     """Tendon length drawn out at the base, behind its sheath; empty (NaN) without sheaths."""
     sheath = state.solved.memory.sheath
-    return state.solved.stroke * jnp.nan if sheath is None else sheath.stroke
+    return jnp.full_like(state.solved.stroke, jnp.nan) if sheath is None else sheath.stroke
+
+
+@Quantity("solve", per=("tendon",))
+def wire_stroke(state: SolvedState) -> Array:
+    """Way of the wire's end at the drive, on which the drive works; without a backlash `stroke`."""
+    return state.solved.wire_stroke
 
 
 @Quantity("solve", "notch angle", r"\theta_j", "deg", key="notch_angle_deg",
@@ -202,20 +208,21 @@ def outer_strain(state: SolvedState) -> Array:
     """Strain of the outer fibre in the middle of the spine (Pacheco 2021, eq. 16)."""
     strain = state.section_strain
     spine = state.chain.rods.section.edge_spine
-    return jnp.max(strain.stretch + strain.curvature * spine, axis=-1)
+    return state.of_sections(jnp.max(strain.stretch + strain.curvature * spine, axis=-1))
 
 
 @Quantity("state", "peak strain", r"\varepsilon_\mathrm{max}", key="peak_strain",
           column="notch_{notch}_peak_strain", per=("notch",))  # fmt: skip
 def peak_strain(state: SolvedState) -> Array:
     """Largest strain of any fibre of a notch: bending both ways and stretch, no shear."""
-    return jnp.max(peak_strain_of_section(state.section_strain, state.chain.rods.section), axis=-1)
+    strains = peak_strain_of_section(state.section_strain, state.chain.rods.section)
+    return state.of_sections(jnp.max(strains, axis=-1))
 
 
 @Quantity("state", per=("notch", "node", "row"))
 def notch_strain(state: SolvedState) -> Array:
     """Stretch, curvature and sideways curvature (1/mm) of the section at every node of a notch."""
-    return jnp.stack(state.section_strain, axis=-1)
+    return state.of_sections(jnp.stack(state.section_strain, axis=-1))
 
 
 @Quantity("state", "margin of fatigue", r"\varepsilon_\mathrm{m}", key="fatigue_margin",
@@ -231,8 +238,9 @@ def fatigue_margin(state: SolvedState) -> Array:
         return jnp.full(state.chain.flexures, jnp.nan)
     half = 0.5 * edge_strain(state.section_strain, section)
     margin = limit.margin(half, jnp.abs(half)).reshape(state.chain.flexures, -1)
-    known = jnp.all(margin == margin, axis=-1)
-    return jnp.where(known, jnp.min(margin, axis=-1), jnp.nan)
+    known = margin == margin
+    least = jnp.min(jnp.where(known, margin, 0.0), axis=-1)
+    return state.of_sections(jnp.where(jnp.all(known, axis=-1), least, jnp.nan))
 
 
 @Quantity("state", "notch gap", "g_j", "mm", key="gap_mm", column="notch_{notch}_gap_mm",
@@ -330,7 +338,7 @@ def moment_error(state: SolvedState) -> Array:
     chain, bending = state.chain, slice(1 if state.chain.frame is not None else 2)
     required = state.required()[..., bending]
     real = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
-    if chain.law.axis is not None:
+    if chain.law.lumped is not False:
         real = real & ~jnp.asarray(chain.law.lumped)
     has_length = (real[:, None] & (chain.rods.length > 0.0))[..., None]
     carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]

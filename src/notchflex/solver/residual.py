@@ -25,7 +25,6 @@ from notchflex.mechanics.sheath import (
     from_base,
     log_tension,
     mean_tension,
-    slack_sheaths,
     within,
 )
 from notchflex.mechanics.tendon import Crossing, TendonGroup, fibre_lengths
@@ -270,6 +269,12 @@ class SolverState(NamedTuple):
         sheath = self.memory.sheath
         return self.point.base_tension if sheath is None else sheath.tension
 
+    @property
+    def wire_stroke(self) -> Float[Array, " t"]:
+        """Way of the end of every wire, mm: within a backlash it stands, and the drive moves."""
+        sheath = self.memory.sheath
+        return self.stroke if sheath is None else self.stroke - sheath.play
+
 
 def at_rest(chain: Chain) -> SolverState:
     """Return the state of the free robot, with slack tendons."""
@@ -282,7 +287,7 @@ def at_rest(chain: Chain) -> SolverState:
         log_ratio=none,
     )
     slack = constant(np.zeros(chain.tendons))
-    sheath = None if chain.sheath is None else slack_sheaths(chain.tendons)
+    sheath = None if chain.sheath is None else chain.sheath.rest()
     memory = Memory(none, none, none, chain.law.rest(chain.rods.section), sheath=sheath)
     return SolverState(Iterate(unknowns, slack), memory, slack, unloaded(chain))
 
@@ -591,36 +596,22 @@ def command_residual(
     # exponentials, and the command decides; while it sticks, its end at the base keeps its place.
     # With the deviations where it would slide to either side, the law is that of friction:
     # clip(slip, toward the base, toward the drive) = 0.
-    limit = chain.sheath.log_ratio(command.bend)
+    sheath, tension = chain.sheath, base.base_tension
+    limit = sheath.log_ratio(command.bend)
     toward_base, toward_drive = (
-        deviation(
-            base.base_tension * jnp.exp(side * limit),
-            drawn + chain.sheath.end_stretch(side, limit, base.base_tension),
-        )
+        deviation(tension * jnp.exp(side * limit), drawn + sheath.end_stretch(side, limit, tension))
         for side in (-1.0, 1.0)
     )
-    slip = _sheath_slip(chain, memory, limit, base.base_tension, drawn)
-    held = jnp.where(slip <= toward_base, toward_base, slip)
-    return jnp.where(slip >= toward_drive, toward_drive, held)
-
-
-def _sheath_slip(
-    chain: Chain,
-    memory: SheathMemory,
-    limit: Float[Array, " t"],
-    tension: Float[Array, " t"],
-    drawn: Float[Array, " t"],
-) -> Float[Array, " t"]:
-    """Return the way of the stuck wire in its sheath toward the drive, mm."""
-    # Of a tendon that is inextensible in the robot the tension could be any while all contacts
-    # stick: the memory's stiffness keeps it.
-    assert chain.sheath is not None
     profile = within(memory, limit)
     moved = from_base(profile, log_tension(tension), limit)
-    stretched = chain.sheath.compliance * (mean_tension(moved) - mean_tension(profile))
+    stretched = sheath.compliance * (mean_tension(moved) - mean_tension(profile))
+    # Of a tendon that is inextensible in the robot the tension could be any while all contacts
+    # stick: the memory's stiffness keeps it.
     change = tension - jnp.exp(memory.level[:, -1])
     held = change * jnp.max(notch_heights(chain)) / chain.memory_stiffness
-    return drawn - memory.stroke + stretched + held
+    slip = drawn - memory.stroke + stretched + held
+    held = jnp.where(slip <= toward_base, toward_base, slip)
+    return jnp.where(slip >= toward_drive, toward_drive, held)
 
 
 def without_slack(

@@ -44,22 +44,9 @@ def state_after(
     before: SheathMemory | None,
 ) -> SolverState:
     """Return the state at a solved point, with the memory there and that of its sheaths before."""
-    if before is not None:
-        memory, drawn = _with_sheaths(chain, command, point, memory, drawn, before)
-    return SolverState(point, memory, drawn, command.applied)
-
-
-def _with_sheaths(
-    chain: Chain,
-    command: Command,
-    point: Iterate,
-    memory: Memory,
-    drawn: Float[Array, " t"],
-    before: SheathMemory,
-) -> tuple[Memory, Float[Array, " t"]]:
-    """Return the memory of a solved point with that of its sheaths, and the ways of the drives."""
     sheath, stop = chain.sheath, jax.lax.stop_gradient
-    assert sheath is not None
+    if sheath is None or before is None:
+        return SolverState(point, memory, drawn, command.applied)
     limit, base = sheath.log_ratio(command.bend), log_tension(point.base_tension)
     profile = within(before, limit)
 
@@ -88,5 +75,5 @@ def _with_sheaths(
     turned = jnp.where(motion < -_MOTION, -sheath.backlash, before.play)
     turned = jnp.where(motion > _MOTION, 0.0, turned)
     play = command.either(jnp.clip(command.target - end, -sheath.backlash, 0.0), turned)
-    after = SheathMemory(tension, *kept(moved), limit, drawn, play)
-    return memory._replace(sheath=after), end + play
+    memory = memory._replace(sheath=SheathMemory(tension, *kept(moved), limit, drawn, play))
+    return SolverState(point, memory, end + play, command.applied)

@@ -82,8 +82,16 @@ class SolvedState:
 
     @cached_property
     def section_strain(self) -> SectionStrain:
-        """Strains of the section at every node of every notch."""
+        """Strains of the section at every node of every notch; any where they are not known."""
         return self._by_law(section_strain)
+
+    def of_sections(self, values: Array) -> Array:
+        """Return values of the sections of all notches; NaN where their strains are not known."""
+        # NaN comes last: adjoints multiply what is before it by 0.
+        lumped: Any = self.law.lumped
+        if lumped is False:
+            return values
+        return jnp.where(lumped.reshape(-1, *(1,) * (values.ndim - 1)), jnp.nan, values)
 
     @cached_property
     def stored_energy_density(self) -> tuple[Float[Array, "n nodes"], Flattening]:

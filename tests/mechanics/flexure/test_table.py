@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax
 import numpy as np
 import pytest
 
@@ -239,3 +240,29 @@ def test_numbers_of_a_table_vary_and_differentiate():
         for factor in factors.tolist()
     ]
     np.testing.assert_allclose(many, each, rtol=0.0, atol=1e-13)
+
+
+def test_unknown_strains_do_not_enter_slopes_of_other_quantities():
+    arc = nf.ArcNotch("on-axis", depth=1.38, height=0.8, uncut_length=1.2)
+    table = nf.TableNotch(0.8, angle_deg=(40.0,), moment=(2.0,), uncut_length=1.2)
+    fatigue = nf.Fatigue(line="pelton2003", corner_radius=0.05)
+    robot, load = robot_of(table, arc, arc, fatigue=fatigue), [nf.Load(0.5), nf.Load(2.5)]
+    path = nf.simulate(robot, load)
+    # The table has no strains, and the line ends before the arcs at the second load.
+    assert np.isnan(path.fatigue_margin[:, 0]).all()
+    assert np.isnan(path.peak_strain).tolist() == [[True, False, False]] * 2
+    assert np.isfinite(path.fatigue_margin[0, 1:]).all()
+    assert np.isnan(path.fatigue_margin[1, 1:]).all()
+    unknown = "peak_strain", "outer_strain", "fatigue_margin", "base_stroke", "base_tension"
+    depth = "notch[2].depth"
+    slope = path.jacobian(depth, "total_angle")["total_angle"][:, 0]
+    assert np.abs(slope).min() > 0.05
+    weights = {"total_angle": [0.0, 1.0]} | dict.fromkeys(unknown, 0.0)
+    assert path.gradient(weights)[depth] == pytest.approx(slope[1], rel=1e-10)
+    function = nf.differentiable(robot, load, [depth], outputs=("total_angle", *unknown))
+
+    def last(value: Any) -> Any:
+        return function({depth: value})["total_angle"][-1]
+
+    values = jax.numpy.array([1.38, 1.38])
+    np.testing.assert_allclose(jax.vmap(jax.grad(last))(values), slope[1], rtol=1e-10)

@@ -151,11 +151,33 @@ def test_slopes_by_the_temperature_of_the_robot():
         robot = MEASURED.with_value("material.temperature", value)
         return nf.simulate(robot, load).total_angle
 
+    warm = MEASURED.with_value("material.temperature", 30.0)
     for load in ([nf.Load(0.8), nf.Load(1.2)], [nf.Load(0.8), nf.Load(1.2, temperature=37.0)]):
-        warm = MEASURED.with_value("material.temperature", 30.0)
         slope = nf.simulate(warm, load).jacobian(["material.temperature"], "total_angle")
         differences = (angle(30.01, load) - angle(29.99, load)) / 0.02
         assert np.ravel(slope["total_angle"]) == pytest.approx(differences, rel=1e-5, abs=1e-12)
+
+
+def test_a_temperature_that_all_loads_replace_does_not_vary():
+    warm = MEASURED.with_value("material.temperature", 30.0)
+    load, name = [nf.Load(0.8, temperature=37.0)], "material.temperature"
+    path = nf.simulate(warm, load)
+    refused = pytest.raises(nf.InputError, match="leave `temperature` out of the loads")
+    with refused:
+        path.jacobian([name], "total_angle")
+    with refused:
+        path.gradient({"total_angle": 1.0}).by(name)
+    with refused:
+        nf.differentiable(warm, load, [name])
+    with pytest.warns(nf.InputWarning, match="leave `temperature` out of the loads"):
+        rows = nf.batch(warm, {name: [22.0, 37.0]}, path.load)["total_angle"]
+    assert rows[0] == pytest.approx(rows[1], abs=1e-12)
+    # Where the plateaus were measured counts: 1 K more there is 1 K less here.
+    reference = path.jacobian("material.reference_temperature", "total_angle")["total_angle"]
+    alone = nf.simulate(MEASURED.with_value(name, 37.0), [nf.Load(0.8)])
+    slope = alone.jacobian(name, "total_angle")["total_angle"]
+    assert slope[0, 0] < -1e-3
+    assert reference == pytest.approx(-slope, rel=1e-9)
 
 
 def test_what_is_refused_and_what_is_warned_of():

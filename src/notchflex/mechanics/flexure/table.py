@@ -92,9 +92,9 @@ class TableLaw(Law):
         return energy + 0.5 * self.elastic(strain, section) @ strain, none
 
     def bent(self, reduced: Array, section: FibreSection, memory: Any) -> Bending:
-        """Return that the strains of the section are not known."""
-        unknown = jnp.full_like(reduced, jnp.nan)
-        return Bending(unknown, unknown, memory, unknown, unknown)
+        """Return nothing: the strains of the section are not known."""
+        none = jnp.zeros_like(reduced)
+        return Bending(none, none, memory, none, none)
 
     def covers(self, strain: Strain, section: FibreSection) -> Bool[Array, "*shape"]:
         """Return whether the curve reaches as far as a section is bent."""

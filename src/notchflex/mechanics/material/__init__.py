@@ -14,6 +14,7 @@ from notchflex.mechanics.material.law import (
 )
 from notchflex.mechanics.material.strains import (
     CORNERS,
+    PLACES,
     LimitLine,
     SectionStrain,
     edge_strain,
@@ -25,6 +26,7 @@ import_all(__name__, __path__)
 
 __all__ = [
     "CORNERS",
+    "PLACES",
     "FibreSection",
     "Fibres",
     "Flattening",

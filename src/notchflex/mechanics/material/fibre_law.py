@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import lru_cache
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -171,6 +171,7 @@ class FibreLaw(SectionLaw):
     # The transformed strain on a curve is a sum over its kinks: change * (strain - the strain
     # clipped between low and high).
 
+    moving = "low", "high"
     # Strain in compression where each kink of the lower and of the upper curve lies; one curve
     # without hysteresis
     low: Float[Array, "curves kinks"]
@@ -181,12 +182,6 @@ class FibreLaw(SectionLaw):
     def remembers(self) -> bool:
         """Whether loading and unloading differ."""
         return self.low.shape[-2] == 2
-
-    def warmed(self, rise: Scalar) -> Self:
-        """Return the law at a higher temperature, K: all kinks move, transformed strains stay."""
-        assert self.moves is not None
-        low, high = self.low + self.moves[0] * rise, self.high + self.moves[1] * rise
-        return dataclasses.replace(self, low=low, high=high)
 
     def rest(self, section: FibreSection) -> Any:
         """Return untransformed fibres."""

@@ -335,12 +335,15 @@ class Law(Pytree):
     Attributes:
         is_linear: Whether the moment of a section is proportional to its curvature.
         axis: Axis of its numbers that runs along the flexures; None where one law serves all.
-        lumped: Whether it is that of a flexure as a whole, so that no moment between is missed.
+        moving: Names of its strains that move with the temperature, each by its own of `moves`.
+        lumped: Whether it is that of a flexure as a whole: no moment between is missed, and the
+            strains of its section are not known.
     """
 
     is_linear: ClassVar[bool] = False
     axis: ClassVar[int | None] = None
     lumped: ClassVar[bool] = False
+    moving: ClassVar[tuple[str, str]]
     respond: ClassVar[Callable[..., SectionResponse]]
     bent: ClassVar[Callable[..., Bending]]
     elastic: ClassVar[Callable[..., Strain]]
@@ -367,8 +370,12 @@ class Law(Pytree):
         return xp.zeros(xp.shape(section.area))
 
     def warmed(self, rise: Scalar) -> Self:
-        """Return the law at a higher temperature, K; only laws with `moves` have one."""
-        raise NotImplementedError
+        """Return the law at a higher temperature, K; what has transformed stays."""
+        assert self.moves is not None
+        strains = {
+            name: getattr(self, name) + self.moves[k] * rise for k, name in enumerate(self.moving)
+        }
+        return dataclasses.replace(self, **strains)
 
     def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
         """Compute the stiffness in the free robot, of a section or of many."""
@@ -546,8 +553,9 @@ class MixedLaw(Law):
 
     @property
     def lumped(self) -> Any:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Whether that of each flexure is."""
-        return self.chosen([law.lumped for law in self.laws])
+        """Whether that of each flexure is; False where none is."""
+        each = [jnp.full(self.kind.shape, law.lumped) for law in self.laws]
+        return any(law.lumped for law in self.laws) and self.chosen(each)
 
     @property
     def remembers(self) -> bool:

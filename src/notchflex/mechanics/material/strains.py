@@ -89,8 +89,11 @@ def edge_strain(strain: SectionStrain, section: FibreSection) -> Each:
     return stretch + curvature * x + sideways * y
 
 
-CORNERS = xp.isin(np.arange(len(_ARC) + 2 * len(_FACE)), (len(_ARC) + 7, len(_ARC) + 15))
-"""Which of the points of `edge_strain` are corners of the cut."""
+PLACES = np.repeat(("spine", *2 * ("face", "corner of the cut")), (len(_ARC), *2 * (7, 1)))
+"""Where the points of `edge_strain` are."""
+
+CORNERS = PLACES == "corner of the cut"
+"""Which of them are corners of the cut."""
 
 
 class LimitLine(Pytree):
@@ -106,10 +109,12 @@ class LimitLine(Pytree):
         """Compute by how much cycles at the points of `edge_strain` are below; NaN if not known."""
         # A mean in compression counts as one in tension of its size: cracks open in tension.
         factor = xp.where(CORNERS, self.corner_factor[:, None, None], 1.0)
+        certain = factor == factor
+        factor = xp.where(certain, factor, 1.0)  # no NaN in adjoints
         mean, amplitude = factor * xp.abs(mean), factor * amplitude
         line = xp.stack([self.mean, self.amplitude]).T[..., None, None]
         allowed = line[0, :, 1]
         for (low, first), (high, last) in pairwise(xp.moveaxis(line, 2, 1)):
             allowed = allowed + (last - first) * (xp.clip(mean, low, high) - low) / (high - low)
-        known = (mean >= line[0, :, 0]) & (mean <= line[-1, :, 0])
+        known = certain & (mean >= line[0, :, 0]) & (mean <= line[-1, :, 0])
         return xp.where(known, allowed - amplitude, xp.nan)

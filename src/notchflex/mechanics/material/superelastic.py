@@ -8,8 +8,7 @@ moment = I stress(strain) / (r_o - ybar): a law of the cross-section, no iterati
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any, Self
+from typing import Any
 
 from jaxtyping import Array
 
@@ -34,18 +33,12 @@ class SuperelasticLaw(SectionLaw):
     # Weak-axis bending follows the curve; everything else (sideways bending, torsion, shear,
     # stretch) stays on the linear branch, of which the paper says nothing.
 
+    moving = "transition_strain", "plastic_strain"
     superelastic_modulus: Scalar
     transition_strain: Scalar
     plastic_strain: Scalar
     plastic_modulus: Scalar
     plastic_exponent: Scalar
-
-    def warmed(self, rise: Scalar) -> Self:
-        """Return the law at a higher temperature, K: the branches beyond the elastic one move."""
-        assert self.moves is not None
-        shift = self.moves[0] * rise
-        strains = self.transition_strain + shift, self.plastic_strain + shift
-        return dataclasses.replace(self, transition_strain=strains[0], plastic_strain=strains[1])
 
     def _branches(self, strain: Scalar) -> tuple[Array, Array, Array]:
         """Split a strain into its parts on the three branches, each with the strain's sign."""
@@ -99,4 +92,4 @@ def _(material: Superelastic) -> SuperelasticLaw:
     strains = material.transition_strain + shift, material.plastic_strain + shift
     others = material.plastic_modulus, material.plastic_exponent
     numbers = map(constant, (material.superelastic_modulus, *strains, *others))
-    return SuperelasticLaw(*moduli(material), *numbers, **temperature_of(material, 1.0))
+    return SuperelasticLaw(*moduli(material), *numbers, **temperature_of(material, 1.0, 1.0))

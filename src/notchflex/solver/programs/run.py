@@ -146,6 +146,7 @@ class SolverRun:
         known = {
             "tension": start.tension,
             "stroke": start.stroke,
+            "wire_stroke": start.wire_stroke,
             "material": start.memory.material,
         }
         return np.asarray(known[name]) if name in known else self._derived[name][0]
