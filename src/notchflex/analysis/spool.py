@@ -52,7 +52,13 @@ def spool_path(robot: Robot, ways: ArrayLike) -> LoadPath:
     sides = [(drive.tendon - 1, drive.antagonist - 1) for drive in drives]
     for drive, both in zip(drives, sides, strict=True):
         tension[0, both] = drive.pretension
-    start = solve(robot, LoadPath(tension[:1])[0]).raise_if_failed().stroke
+    state = solve(robot, LoadPath(tension[:1])[0])
+    if not state.converged:
+        raise InputError.NOT_CONVERGED(
+            f"no state of {robot.name} has the pretension of its spools: {state.reason}; give a "
+            "smaller drive.pretension"
+        )
+    start = state.stroke
     for way, (drawn, released) in zip(table.T, sides, strict=True):
         stroke[1:, drawn], stroke[1:, released] = start[drawn] + way, start[released] - way
     return LoadPath(tension, stroke)

@@ -301,6 +301,12 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
                 "nitinol and superelastic have"
             )
         replace(cast("Any", material), temperature=external.temperature)  # raises if it is too cold
+    in_sheath = any(tendon.sheath_length is not None for tendon in robot.tendon)
+    if external.sheath_bend_deg is not None and not in_sheath:
+        raise InputError.UNSUPPORTED(
+            f"sheath_bend_deg has no effect on {robot.name}: none of its tendons runs through a "
+            "sheath; give tendon.sheath_length (mm) and tendon.sheath_friction, or leave it out"
+        )
     for force in external.body_forces:
         if force.body > last:
             raise InputError.OUT_OF_RANGE(

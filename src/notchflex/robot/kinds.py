@@ -339,6 +339,11 @@ class Transforming:
         return 6.5 if self.plateau_slope is None else self.plateau_slope
 
     @property
+    def used_at(self) -> float | None:
+        """Temperature of use, that of the measurement where it is not given [deg C]."""
+        return self.reference_temperature if self.temperature is None else self.temperature
+
+    @property
     def plateau_shift(self) -> float:
         """By how much the stresses of the plateaus in tension are above those measured [MPa]."""
         if self.temperature is None or self.reference_temperature is None:

@@ -384,9 +384,12 @@ def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
                 by_unit.setdefault((unit_of(field), other), []).append(unusual)
     for (unit, other), values in by_unit.items():
         yield _outside(values, unit, other)
-    reference = getattr(robot.material, "reference_temperature", None)
-    used = getattr(robot.material, "temperature", reference)
-    yield from too_cold(robot.material, "material.temperature", reference if used is None else used)
+    own = (
+        (f"{named.name}.", getattr(named.part, "material", None)) for named in named_parts(robot)
+    )
+    for place, material in [("", robot.material), *own]:
+        used = getattr(material, "used_at", None)
+        yield from too_cold(material, f"{place}material.temperature", used)
     if not by_unit:
         yield from _narrow_channels(robot)
         yield from _remaining_depths(robot)

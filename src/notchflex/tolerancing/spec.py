@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from notchflex import EquilibriumPath, InputError, Robot
@@ -150,10 +151,17 @@ def criteria_of(spec: ToleranceSpec, paths: Mapping[str, EquilibriumPath]) -> li
         paths: The robot of the drawing under every load.
 
     Raises:
-        InputError: A robot or a load has no such entry or step.
+        InputError: A robot or a load has no such entry or step, or it is not known.
     """
     criteria: list[Criterion] = []
     for limit in spec.limits:
         with placed(f"the limit of {limit.quantity}"):
-            criteria += limited_numbers(limit, paths)
+            for one in limited_numbers(limit, paths):
+                values = paths[one.load].quantity(one.quantity.name)[None]
+                if np.isnan(one.of(values)).any():
+                    raise InputError.NOT_FINITE(
+                        f"{one.name} of the robot of the drawing is not known, so that it is "
+                        "within no limits; name entries that are known."
+                    )
+                criteria.append(one)
     return criteria
