@@ -274,9 +274,14 @@ def row_commands(
 
 def _bends(load: LoadPath, chain: Chain) -> Any:
     """Return the bend of the sheaths in every step, as `Command` has it."""
-    if chain.sheath is None:
-        return None
     bends = [external.sheath_bend_deg for external in load.different]
+    if chain.sheath is None:
+        if any(bend is not None for bend in bends):
+            raise InputError.UNSUPPORTED(
+                "sheath_bend_deg has no effect: no tendon of the robot runs through a sheath; give "
+                "tendon.sheath_length (mm) and tendon.sheath_friction, or leave the bend out"
+            )
+        return None
     return np.array([-1.0 if bend is None else radians(bend) for bend in bends])[load.which]
 
 
@@ -301,12 +306,6 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
                 "nitinol and superelastic have"
             )
         replace(cast("Any", material), temperature=external.temperature)  # raises if it is too cold
-    in_sheath = any(tendon.sheath_length is not None for tendon in robot.tendon)
-    if external.sheath_bend_deg is not None and not in_sheath:
-        raise InputError.UNSUPPORTED(
-            f"sheath_bend_deg has no effect on {robot.name}: none of its tendons runs through a "
-            "sheath; give tendon.sheath_length (mm) and tendon.sheath_friction, or leave it out"
-        )
     for force in external.body_forces:
         if force.body > last:
             raise InputError.OUT_OF_RANGE(
