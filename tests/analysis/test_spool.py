@@ -57,7 +57,8 @@ def test_what_is_refused():
     with pytest.raises(nf.InputError, match="steps by 1 spools"):
         nf.spool_path(robot, np.zeros((3, 2)))
     with refused("NOT_CONVERGED", "no state", "pretension", "smaller drive.pretension"):
-        nf.spool_path(antagonists().with_value("drive.pretension", 1e5), [0.0])
+        uneven = {"tendon[2].radius": 0.6, "tendon.path": "straight", "drive.pretension": 100.0}
+        nf.spool_path(robot.with_values(uneven), [0.0])
     with pytest.raises(nf.InputError, match="the robot has 2 tendons"):
         robot.with_value("drive.antagonist", 3)
     with pytest.raises(nf.InputError, match="a spool drives already"):

@@ -398,6 +398,7 @@ class Notch:
     """
 
     is_round: ClassVar[bool] = False  # whether it bends to all sides alike
+    is_cut: ClassVar[bool] = True  # whether its cuts are known, from which it can be made
     kind: str
     uncut_length: Annotated[
         Float, quantity("mm", "uncut length behind the notch, toward the tip", at_least=0)

@@ -4,10 +4,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
+from notchflex.robot.cuts import CutLayout, whole_gap
 from notchflex.robot.kinds import Material, Notch, Tube
 from notchflex.robot.part import Float, FloatOrInf, Problems, part, quantity
 
@@ -70,6 +71,7 @@ class TableNotch(Notch):
     ] = None
     _: KW_ONLY
     kind: Literal["table"] = "table"
+    is_cut: ClassVar = False
     axis_offset: Annotated[
         Float, quantity("mm", "distance of the neutral axis from the tube axis, off the bend")
     ] = 0.0
@@ -94,6 +96,10 @@ class TableNotch(Notch):
             points |= {-angle: -moment for angle, moment in points.items() if angle}
         angles, moments = zip(*sorted(points.items()), strict=True)
         return angles, moments
+
+    def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
+        """Return the whole gap: what fills it is not known."""
+        return whole_gap(tube.outer_radius, self.direction_deg, self.length, self.uncut_length)
 
     @property
     def stays_in_plane(self) -> bool:
