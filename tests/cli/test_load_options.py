@@ -152,5 +152,7 @@ def test_a_bend_without_a_sheath_is_refused(capsys):
     message = capsys.readouterr().err
     assert "no effect" in message
     assert "tendon.sheath_length" in message
+    with refused("OUT_OF_RANGE", "at most 3600 deg"):
+        nf.Load(1.0, sheath_bend_deg=1e9)
     with refused("UNSUPPORTED", "sheath"):
         nf.solve(nf.load_robot("pacheco2021-a"), nf.Load(1.0, sheath_bend_deg=10.0))

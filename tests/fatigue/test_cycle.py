@@ -216,6 +216,8 @@ def test_a_cycle_needs_two_states_of_one_robot():
     state = nf.solve(WRIST, nf.Load(0.5))
     with pytest.raises(nf.InputError, match="two solved states"):
         nf.strain_cycle([state])
+    with pytest.raises(nf.InputError, match="one state is no cycle"):
+        nf.strain_cycle(state.path)
     other = nf.solve(WRIST.with_value("notch.depth", 1.39), nf.Load(0.5))
     with pytest.raises(nf.InputError, match="different robots"):
         nf.strain_cycle([state, other])

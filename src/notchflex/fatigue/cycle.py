@@ -167,7 +167,7 @@ def strain_cycle(
         The cycle, and its margins below the line.
 
     Raises:
-        InputError: Fewer than two states, or states of several robots.
+        InputError: Fewer than two states or steps, or states of several robots.
 
     Example:
         >>> from notchflex import load_robot, pull, simulate
@@ -177,6 +177,11 @@ def strain_cycle(
         (2, True)
     """
     if isinstance(states, EquilibriumPath):
+        if len(states) < 2:
+            raise InputError.NO_DATA(
+                "one state is no cycle, as its strain has no amplitude; give a path of two or more "
+                "steps, such as 0,0.5"
+            )
         path, loops, reason = _settled(states)
         paths = [path]
     else:

@@ -27,14 +27,14 @@ _BOUND_TOLERANCE = 1e-9
 
 @Quantity("path", "commanded tension", "T", "N", key="load.tension_N", per=("tendon",), after="")
 def commanded_tension(path: EquilibriumPath) -> np.ndarray:
-    """Tension commanded at the base of a tendon; empty (NaN) where it is not commanded."""
+    """Tension commanded at the drive of a tendon; empty (NaN) where it is not commanded."""
     return path.load.tension
 
 
 @Quantity("path", "commanded stroke", "u", "mm", key="load.stroke_mm", per=("tendon",),
           after="commanded_tension")  # fmt: skip
 def commanded_stroke(path: EquilibriumPath) -> np.ndarray:
-    """Tendon length commanded to be drawn out at the base; empty (NaN) where not commanded."""
+    """Way commanded of the drive of a tendon; empty (NaN) where it is not commanded."""
     return path.load.stroke
 
 
@@ -125,7 +125,7 @@ def front_eta(path: EquilibriumPath) -> np.ndarray:
           column="tendon{tendon}_work_Nmm", per=("tendon",),
           work_of=("tension", "stroke"))  # fmt: skip
 def tendon_work(path: EquilibriumPath) -> np.ndarray:
-    """Work done on a tendon at the base since the start of the path."""
+    """Work done on a tendon at its drive, without a sheath the base, since the path started."""
     return _accumulated(path, *REGISTERED["tendon_work"].work_of)
 
 

@@ -187,7 +187,9 @@ class Tendon:
     ] = None
     sheath_friction: Annotated[
         Float | None,
-        quantity("", "coefficient of friction of wire in sheath", at_least=0, usual=(0, 0.5)),
+        quantity(
+            "", "coefficient of friction of wire in sheath", at_least=0, at_most=10, usual=(0, 0.5)
+        ),
     ] = None
     sheath_bend_deg: Annotated[
         Float | None, quantity("deg", "total angle by which the sheath is bent", at_least=0)

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, WithJsonSchema
 from notchflex.errors import InputError, InputWarning
 from notchflex.robot.kinds import Notch, Tendon, Tube, openings_along
 from notchflex.robot.part import ProblemError, Problems, fields_in, unit_of, unknown_key
-from notchflex.robot.value_names import described_at, named_parts, numbers_at
+from notchflex.robot.value_names import SECTIONS, described_at, named_parts, numbers_at
 
 if TYPE_CHECKING:
     from notchflex.robot.robot import Robot
@@ -118,7 +118,10 @@ def _flat(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     for name, entry in table.items():
         if isinstance(entry, Mapping) and "." not in name:
             for key, value in cast("Mapping[str, Any]", entry).items():
-                yield f"{name}.{key}", value
+                is_part = value and key in SECTIONS and isinstance(value, Mapping)
+                own = value if is_part else {"": value}
+                for last, one in cast("Mapping[str, Any]", own).items():
+                    yield f"{name}.{key}.{last}".rstrip("."), one
         else:
             yield name, entry
 
