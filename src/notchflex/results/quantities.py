@@ -46,7 +46,7 @@ def temperature(path: EquilibriumPath) -> np.ndarray:
     return _of_load(path, "temperature")
 
 
-@Quantity("path", "bend of the sheaths", r"\Theta", "deg", column="sheath_bend_deg",
+@Quantity("path", "bend of the sheaths", r"\theta_\mathrm{s}", "deg", column="sheath_bend_deg",
           after="temperature", optional=lambda path: _given(path, "sheath_bend_deg"))  # fmt: skip
 def sheath_bend(path: EquilibriumPath) -> np.ndarray:
     """Total bend of all sheaths as a load; empty (NaN) where it is that of the robot file."""
