@@ -439,6 +439,11 @@ class Notch:
         """Whether its stiffness depends on the rings or walls beside it."""
         return getattr(self, "ends", "rigid") != "rigid"
 
+    @property
+    def has_lips(self) -> bool:
+        """Whether it has lips, which meet where it closes."""
+        return not self.is_round
+
     def made_of(self, material: Material) -> Any:
         """Return what its section law follows from, where the robot is of a material."""
         return self.material or material

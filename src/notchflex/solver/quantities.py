@@ -246,7 +246,9 @@ def fatigue_margin(state: SolvedState) -> Array:
 
 
 @Quantity("state", "notch gap", "g_j", "mm", key="gap_mm", column="notch_{notch}_gap_mm",
-          per=("notch",))  # fmt: skip
+          per=("notch",), note="NaN where there are no lips, as of a backbone.",
+          optional=lambda path: np.array([notch.has_lips for notch in path.robot.notches])
+          )  # fmt: skip
 def gap(state: SolvedState) -> Array:
     """What is left of the opening of a notch between its lips, where it is narrowest."""
     return state.contact_pairs[1]

@@ -135,3 +135,20 @@ def limited_numbers(
         name = f"{quantity.name}[{names}]" if names else quantity.name
         name = " ".join([name, ", ".join(where)]).strip()
         yield Criterion(name, quantity, load, step - 1, entry, *asked.ends)
+
+
+def known_numbers(
+    asked: LimitedQuantity, paths: Mapping[str, EquilibriumPath]
+) -> Iterator[Criterion]:
+    """Yield the same as `limited_numbers`, but refuse what is not known of these paths.
+
+    Raises:
+        InputError: A number is not known, or as there.
+    """
+    for one in limited_numbers(asked, paths):
+        if np.isnan(one.of(np.asarray(paths[one.load].quantity(one.quantity.name))[None])).any():
+            raise InputError.NOT_FINITE(
+                f"{one.name} of this robot is not known, so that it is within no limits; name "
+                "entries that are known."
+            )
+        yield one

@@ -6,7 +6,6 @@ import os
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from notchflex import EquilibriumPath, InputError, Robot
@@ -18,7 +17,7 @@ from notchflex.specification import (
     as_list,
     check_quantity,
     coded,
-    limited_numbers,
+    known_numbers,
     load_named,
     made,
     placed,
@@ -156,12 +155,5 @@ def criteria_of(spec: ToleranceSpec, paths: Mapping[str, EquilibriumPath]) -> li
     criteria: list[Criterion] = []
     for limit in spec.limits:
         with placed(f"the limit of {limit.quantity}"):
-            for one in limited_numbers(limit, paths):
-                values = paths[one.load].quantity(one.quantity.name)[None]
-                if np.isnan(one.of(values)).any():
-                    raise InputError.NOT_FINITE(
-                        f"{one.name} of the robot of the drawing is not known, so that it is "
-                        "within no limits; name entries that are known."
-                    )
-                criteria.append(one)
+            criteria += known_numbers(limit, paths)
     return criteria

@@ -41,7 +41,7 @@ from notchflex.specification import (
     LimitedQuantity,
     check_quantity,
     coded,
-    limited_numbers,
+    known_numbers,
     made,
     placed,
     whole,
@@ -259,13 +259,13 @@ class WorkspaceTask(PieceTask):
         """The numbers that limits are about.
 
         Raises:
-            InputError: The robot has none of a quantity.
+            InputError: The robot has none of a quantity, or it is not known without tensions.
         """
         slack, criteria = np.zeros((1, len(self.largest))), list[Criterion]()
         for limit in self.limits:
             path = simulate(self.robot, _under(self.load, slack))
             with placed(f"the limit of {limit.quantity}"):
-                criteria += limited_numbers(limit, {"": path})
+                criteria += known_numbers(limit, {"": path})
         return criteria
 
     @cached_property

@@ -79,6 +79,11 @@ class TableNotch(Notch):
         Float | None, quantity("deg", "angle at which it closes", above=0, below=180)
     ] = None
 
+    @property
+    def has_lips(self) -> bool:
+        """Whether it meets a stop."""
+        return self.closing_angle_deg is not None
+
     def made_of(self, material: Material) -> Any:
         """Return itself: its numbers are its law."""
         del material
